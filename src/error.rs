@@ -29,16 +29,16 @@ pub struct Error {
 
 /// Most characters of a part of a sentence, and those of its end that are kept where there are more: what files and
 /// users call things may have any length.
-const MOST_CHARACTERS: usize = 600;
+const MAX_CHARACTERS: usize = 600;
 const KEPT_END: usize = 150;
 
 /// The text without its middle, where it is too long for a sentence.
 fn shortened(text: String) -> String {
     let count = text.chars().count();
-    if count <= MOST_CHARACTERS {
+    if count <= MAX_CHARACTERS {
         return text;
     }
-    let start: String = text.chars().take(MOST_CHARACTERS - KEPT_END).collect();
+    let start: String = text.chars().take(MAX_CHARACTERS - KEPT_END).collect();
     let end: String = text.chars().skip(count - KEPT_END).collect();
     format!("{start} … {end}")
 }

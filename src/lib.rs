@@ -1,19 +1,11 @@
-//! Nephroid bakes light that went through glass, mirrors and water into illumination maps, and lets you walk through
-//! the result.
-//!
-//! ```text
-//!  glTF or built-in ─► Scene ─► EffectPlan ─► light pass ──► IlluminationMaps ─► eye pass ─► window, PNG
-//!                               what this     CPU, rayon      flux per texel     wgpu raster or
-//!                               scene needs   obvhs BVH                          CPU ray tracer
-//! ```
-//!
-//! Baking takes a scene, settings, somebody who hears of progress and somebody who may stop it; no window and no graphics
-//! card:
+//! Nephroid bakes light that passed through glass, mirrors and water into illumination maps, and shows the result in an
+//! interactive window. This crate is the library behind the program of the same name; baking needs neither a window
+//! nor a graphics card.
 //!
 //! ```
 //! use std::sync::Arc;
 //! use nephroid::export::map_folder::MapFolder;
-//! use nephroid::progress::{Control, Stage};
+//! use nephroid::progress::Control;
 //! use nephroid::scene::{self, LoadOptions};
 //! use nephroid::session::BakeSession;
 //! use nephroid::settings::{BakeSettings, MapResolution};
@@ -21,22 +13,24 @@
 //! # let folder = tempfile::tempdir().expect("a temporary folder");
 //! # let folder = folder.path();
 //! let scene = Arc::new(scene::load("builtin:ring", &LoadOptions::default())?); // or a .glb
-//! let settings = BakeSettings {
-//!     density_per_sr: 1e3,
-//!     map_resolution: MapResolution::Fixed { width: 64, height: 64 },
-//!     ..BakeSettings::default()
-//! };
-//! let control = Control::default(); // any thread may call control.cancel(): what there is comes back, marked partial
-//! let progress = |stage: Stage, done: u64, total: u64| println!("{}: {done} of {total}", stage.name());
-//! let result = BakeSession::new(Arc::clone(&scene))?.bake(&settings, &progress, &control)?;
+//! let map_resolution = MapResolution::Fixed { width: 64, height: 64 };
+//! let settings = BakeSettings { density_per_sr: 1e3, map_resolution, ..BakeSettings::default() };
+//! let control = Control::default(); // any thread may call control.cancel()
+//! let progress = |stage: nephroid::progress::Stage, done: u64, total: u64| println!("{}: {done} of {total}", stage.name());
+//! let result = BakeSession::new(scene.clone())?.bake(&settings, &progress, &control)?;
 //! assert!(!result.partial && result.maps[0].width() == 64);
 //! MapFolder::open(folder, false)?.write(&scene, &settings, &result)?; // maps and manifest.json
 //! # Ok::<(), nephroid::error::Error>(())
 //! ```
 //!
-//! A [`session::BakeSession`] that is kept bakes again what a change of scene or settings touches, and no more.
+//! A [`session::BakeSession`] that is kept bakes again only what a change of scene or settings affects.
 //!
-//! A module imports only what stands above it in this list.
+//! The [guide]: [the window](guide::window), [scenes](guide::scenes), [glass and lights](guide::glass_and_lamps),
+//! [surfaces and maps](guide::surfaces), [files and units](guide::formats), [other programs](guide::engines),
+//! [many machines](guide::many_machines), [accuracy](guide::accuracy), [hard cases](guide::hard_cases),
+//! [how it works](guide::how_it_works), [contributing](guide::contributing), [changes](guide::changes).
+//!
+//! A module imports only from modules above it in `src/lib.rs`.
 
 // Units stand in brackets, as in `area [m²]`, which are no links.
 #![allow(rustdoc::broken_intra_doc_links)]
@@ -76,3 +70,5 @@ pub mod study;
 
 #[cfg(feature = "viewer")]
 pub mod viewer;
+
+pub mod guide;

@@ -6,7 +6,7 @@ mod memory;
 use std::process::ExitCode;
 
 #[global_allocator]
-static MEMORY: memory::OrOneSentence = memory::OrOneSentence;
+static MEMORY: memory::FirstSentence = memory::FirstSentence;
 
 fn main() -> ExitCode {
     cli::run()

@@ -13,7 +13,7 @@ use std::time::Duration;
 
 /// The system's allocator, but for what it refuses.
 #[derive(Debug)]
-pub struct OrOneSentence;
+pub struct FirstSentence;
 
 /// Set by the thread that tells of it: of several only the first does.
 static TOLD: AtomicBool = AtomicBool::new(false);
@@ -42,7 +42,7 @@ fn checked(pointer: *mut u8, bytes: usize) -> *mut u8 {
 
 // SAFETY: every call goes to the system's allocator with the arguments that came, and its answer is handed on; where that
 // is null, the process ends instead. So this allocator keeps `GlobalAlloc`'s contract as `System` does.
-unsafe impl GlobalAlloc for OrOneSentence {
+unsafe impl GlobalAlloc for FirstSentence {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         // SAFETY: the caller vouches for the layout, as `System` asks.
         checked(unsafe { System.alloc(layout) }, layout.size())

@@ -156,7 +156,7 @@ pub enum Wavelengths {
     Continuous,
     /// Seven, one for each colour of the rainbow (section 4.1 of the paper).
     Rainbow,
-    /// So many, 1 to [`MOST_WAVELENGTHS`], each for a band of equal importance to the eye.
+    /// So many, 1 to [`MAX_WAVELENGTHS`], each for a band of equal importance to the eye.
     Fixed(u32),
 }
 
@@ -172,7 +172,7 @@ choices! {
     /// How carefully to bake, by name.
     #[derive(Default)]
     pub enum Preset {
-        /// 10 % of relative RMSE (splat: 12,500 rays per steradian).
+        /// An error of 10 % (splat: 12,500 rays per steradian).
         Draft,
         /// 3 % (splat: 100,000 rays per steradian).
         #[default]
@@ -191,7 +191,7 @@ impl Preset {
         self.into()
     }
 
-    /// Relative RMSE that it aims at [1].
+    /// Error that it aims at [1].
     pub fn max_error(self) -> f64 {
         match self {
             Self::Draft => 0.10,
@@ -218,7 +218,7 @@ pub struct BakeSettings {
     pub estimator: Estimator,
     /// Light rays per steradian [1/sr]; for suns density/D² rays per m². Sigma's radius follows it, refined or not.
     pub density_per_sr: f64,
-    /// Target for the estimated error of maps, [`LEAST_MAX_ERROR`] to 1: light goes on from `density_per_sr` until it is
+    /// Target for the estimated error of maps, [`MIN_MAX_ERROR`] to 1: light goes on from `density_per_sr` until it is
     /// met (not splat). `None`: exactly that density.
     pub max_error: Option<f64>,
     /// What that error is.
@@ -285,10 +285,10 @@ const USUAL_PHOTON_DEPTH: u32 = 256;
 const THRESHOLD_PER_ERROR: f64 = 0.003;
 
 /// Least target for the error [1].
-pub const LEAST_MAX_ERROR: f64 = 1e-4;
+pub const MIN_MAX_ERROR: f64 = 1e-4;
 
 /// Most wavelengths of a bake.
-pub const MOST_WAVELENGTHS: u32 = 1000;
+pub const MAX_WAVELENGTHS: u32 = 1000;
 
 /// Wavelengths that splats take for the whole spectrum.
 pub const CONTINUOUS_BANDS: u32 = 64;
@@ -381,7 +381,7 @@ impl BakeSettings {
     /// Density that refinement towards an error begins from [rays/sr]: coarse enough that refinement decides, fine
     /// enough that no caster falls through.
     pub fn starting_density_per_sr(target: f64) -> f64 {
-        if target <= LEAST_MAX_ERROR {
+        if target <= MIN_MAX_ERROR {
             // Not a target but as much as time allows.
             return COARSEST_START_PER_SR;
         }
@@ -392,7 +392,7 @@ impl BakeSettings {
     /// that what is left out is far below the target.
     pub fn path_threshold(&self) -> f64 {
         self.branch_threshold.unwrap_or_else(|| match self.max_error {
-            Some(target) if target > LEAST_MAX_ERROR => (target * THRESHOLD_PER_ERROR).clamp(1e-6, 1e-3),
+            Some(target) if target > MIN_MAX_ERROR => (target * THRESHOLD_PER_ERROR).clamp(1e-6, 1e-3),
             // No target, or as much as time allows.
             _ => USUAL_THRESHOLD,
         })

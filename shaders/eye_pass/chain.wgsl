@@ -7,9 +7,9 @@ override HAS_TINTED_GLASS: bool;
 override TRACES_LIGHTS: bool;
 
 // Surfaces at which both ways on can be followed.
-const MOST_BRANCHING: u32 = 4u;
+const MAX_BRANCHING: u32 = 4u;
 // Holes and backs of single-sided surfaces that a gaze passes before it is taken to have left the scene.
-const MOST_BACKS: u32 = 64u;
+const MAX_BACKS: u32 = 64u;
 
 struct Gaze {
     origin: vec3f,
@@ -45,7 +45,7 @@ fn is_hole(hit: Hit, object: ObjectRecord) -> bool {
 fn nearest(gaze: Gaze) -> Seen {
     var origin = gaze.origin;
     var passed = 0.0;
-    for (var backs = 0u; backs < MOST_BACKS; backs += 1u) {
+    for (var backs = 0u; backs < MAX_BACKS; backs += 1u) {
         let hit = closest_hit(origin, gaze.direction, FAR_AWAY);
         if hit.triangle == NO_TRIANGLE {
             return Seen(hit, 0.0);
@@ -103,7 +103,7 @@ struct Walk {
     count: u32,
 }
 
-var<private> waiting: array<Gaze, MOST_WAITING>;
+var<private> waiting: array<Gaze, MAX_WAITING>;
 
 // Goes on from a surface, both ways at the first ones and then the stronger; false where the gaze ends here.
 fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> bool {
@@ -113,7 +113,7 @@ fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> b
     let is_back = is_followed(reflected);
     let is_through = is_followed(transmitted);
     let is_stronger = largest(transmitted.weight) >= largest(reflected.weight);
-    if is_back && is_through && gaze.depth < start.branching_depth && (*walk).count < MOST_WAITING {
+    if is_back && is_through && gaze.depth < start.branching_depth && (*walk).count < MAX_WAITING {
         waiting[(*walk).count] = reflected;
         (*walk).count += 1u;
         (*walk).gaze = transmitted;
@@ -126,7 +126,7 @@ fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> b
 }
 
 fn has_map(surface: u32) -> bool {
-    return surface == SURFACE_DIFFUSE || surface == SURFACE_MIXED;
+    return surface == SURFACE_DIFFUSE || surface == SURFACE_MIXED || surface == SURFACE_VARIED;
 }
 
 fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
@@ -136,10 +136,21 @@ fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
 }
 
 // The side of a point that is seen from somewhere.
-fn lit_point(point: SurfacePoint, is_front: bool) -> LitPoint {
+fn lit_point(point: SurfacePoint, is_front: bool, gaze: Gaze) -> LitPoint {
+    let object = objects[point.object];
+    var mixture: Mixture;
+    if object.surface == SURFACE_VARIED {
+        mixture = mixture_at(point, gaze, factors_at(point, gaze));
+    }
     let side = select(-1.0, 1.0, is_front);
     let margin = 2.0 * dot(abs(point.geometric_normal), point.error);
-    return LitPoint(point.place, margin, side * point.geometric_normal, side * point.interpolated_normal);
+    return LitPoint(
+        point.place,
+        margin,
+        side * point.geometric_normal,
+        side * point.interpolated_normal,
+        taking_of(object, mixture),
+    );
 }
 
 fn chain_radiance(first: Gaze) -> vec3f {
@@ -160,7 +171,13 @@ fn chain_radiance(first: Gaze) -> vec3f {
             part(&walk, point.object);
             walk.gaze.weight *= medium_transmittance(walk.gaze.media, seen.distance * start.unit_m);
             walk.gaze.width += walk.gaze.spread * seen.distance;
-            walk.radiance += shown(walk.gaze.weight * object.emitted_radiance, walk.gaze.wavelength);
+            var emitted = object.emitted_radiance;
+            if object.glow != NO_IMAGE {
+                let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
+                let level = footprint_level(object.glow, point.uv_density, walk.gaze.width, cos_view);
+                emitted *= texture_colour(object.glow, point.uv, level);
+            }
+            walk.radiance += shown(walk.gaze.weight * emitted, walk.gaze.wavelength);
             if has_map(object.surface) {
                 arrives = true;
                 break;
@@ -185,13 +202,14 @@ fn chain_radiance(first: Gaze) -> vec3f {
             let baked = irradiance(record, point.map_uv, level);
             var lit = baked.rgb;
             if TRACES_LIGHTS {
-                lit += direct_irradiance(lit_point(point, is_front), objects[point.object]);
+                lit += direct_irradiance(lit_point(point, is_front, gaze), objects[point.object]);
             }
-            var own = tint(gaze, point, cos_view) * lit / PI;
+            let colour = tint(gaze, point, cos_view);
+            var own = colour * lit / PI;
             if baked.a > 0.0 {
                 own = fault_colour() / frame.radiance_scale;
             }
-            let next = interact(point, gaze, vec3f(1.0));
+            let next = interact(point, gaze, colour);
             walk.radiance += shown(gaze.weight * next.own * own, gaze.wavelength);
             goes_on = go_on(&walk, point, next);
         }

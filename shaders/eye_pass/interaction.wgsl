@@ -39,28 +39,50 @@ fn no_branch() -> Branch {
     return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0, 0.0);
 }
 
-fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f) -> Branch {
+// Angle between the directions in which a surface reflects light where its microfacets are tilted by the GGX α one way
+// and the other; half of them are tilted less.
+fn lobe_rad(roughness: f32) -> f32 {
+    return 4.0 * atan(roughness * roughness);
+}
+
+// What images multiply transmission, roughness and metallic by, as the gaze sees them.
+fn factors_at(point: SurfacePoint, gaze: Gaze) -> vec3f {
+    let record = objects[point.object].variation;
+    if record == NO_IMAGE {
+        return vec3f(1.0);
+    }
+    let cos_view = abs(dot(point.geometric_normal, gaze.direction));
+    return texture_colour(record, point.uv, footprint_level(record, point.uv_density, gaze.width, cos_view));
+}
+
+fn mixture_at(point: SurfacePoint, gaze: Gaze, factors: vec3f) -> Mixture {
+    let object = objects[point.object];
+    let cos_view = abs(dot(point.geometric_normal, gaze.direction));
+    let level = footprint_level(object.texture, point.uv_density, gaze.width, cos_view);
+    return mixture_of(object, factors, alpha_at(object, point.uv, level));
+}
+
+fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f, lobe: f32) -> Branch {
     let incident = gaze.direction;
     var direction = mirrored(incident, facing.shading);
     if dot(direction, facing.geometric) <= 0.0 {
         direction = mirrored(incident, facing.geometric);
     }
     let curvature = select(-point.curvature, point.curvature, facing.front);
-    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, objects[point.object].lobe_rad);
+    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, lobe);
 }
 
-fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> Interaction {
-    let object = objects[point.object];
+fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe: f32) -> Interaction {
     let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
     let reflectance = thin_wall_reflectance(-dot(gaze.direction, facing.shading), eta);
     return Interaction(
         0.0,
-        reflection(point, facing, gaze, vec3f(reflectance)),
-        Branch(gaze.direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, object.lobe_rad),
+        reflection(point, facing, gaze, vec3f(reflectance), lobe),
+        Branch(gaze.direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, lobe),
     );
 }
 
-fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> Interaction {
+fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe: f32) -> Interaction {
     let incident = gaze.direction;
     let media = gaze.media;
     let ior = ior_of(point.object, gaze.wavelength);
@@ -77,7 +99,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> I
     let cos_incident = -dot(incident, facing.shading);
     let cos_clamped = clamp(cos_incident, 0.0, 1.0);
     let cos_geometric = clamp(-dot(incident, facing.geometric), 0.0, 1.0);
-    let whole = Interaction(0.0, reflection(point, facing, gaze, vec3f(1.0)), no_branch());
+    let whole = Interaction(0.0, reflection(point, facing, gaze, vec3f(1.0), lobe), no_branch());
     if eta != 1.0 && scaled_cos2_transmitted(cos_clamped, eta) <= 0.0 {
         return whole;
     }
@@ -94,7 +116,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> I
     let curvature = select(-point.curvature, point.curvature, facing.front);
     return Interaction(
         0.0,
-        reflection(point, facing, gaze, vec3f(reflectance)),
+        reflection(point, facing, gaze, vec3f(reflectance), lobe),
         // A tilted facet turns a refracted ray by |1/eta - 1| of its tilt, and a reflected one by twice that tilt.
         Branch(
             direction,
@@ -102,31 +124,63 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f) -> I
             beyond,
             curvature * (1.0 / eta - 1.0),
             1.0 / eta,
-            0.5 * abs(1.0 / eta - 1.0) * objects[point.object].lobe_rad,
+            0.5 * abs(1.0 / eta - 1.0) * lobe,
         ),
     );
+}
+
+// Each share of a mixture as the class that it is of. Nothing is both clear and has holes.
+fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors: vec3f) -> Interaction {
+    let object = objects[point.object];
+    let lobe = lobe_rad(object.roughness * factors.y);
+    let mixture = mixture_at(point, gaze, factors);
+    var met = Interaction(0.0, no_branch(), no_branch());
+    if mixture.clear > 0.0 {
+        if object.solid != 0u {
+            met = dielectric(point, facing, gaze, tint, lobe);
+        } else {
+            met = thin_wall(point, facing, gaze, tint, lobe);
+        }
+        met.reflection.share *= mixture.clear;
+        met.transmission.share *= mixture.clear;
+    } else if mixture.hole > 0.0 {
+        met.transmission = Branch(gaze.direction, vec3f(mixture.hole), gaze.media, 0.0, 1.0, 0.0);
+    }
+    let cos_incident = -dot(gaze.direction, facing.shading);
+    let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
+    let polish = mixture.polish * dielectric_reflectance(cos_incident, eta);
+    let back = mixture.metal * metal_reflectance(cos_incident, tint) + vec3f(mixture.body * polish);
+    met.reflection = reflection(point, facing, gaze, met.reflection.share + back, lobe);
+    // The map has the body's share already.
+    met.own = 1.0 - polish;
+    return met;
 }
 
 fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
     let object = objects[point.object];
     let facing = face(point, gaze.direction);
     let cos_incident = -dot(gaze.direction, facing.shading);
+    let factors = factors_at(point, gaze);
+    let lobe = lobe_rad(object.roughness * factors.y);
     switch object.surface {
         case SURFACE_MIRROR: {
             let share = metal_reflectance(cos_incident, tint);
-            return Interaction(0.0, reflection(point, facing, gaze, share), no_branch());
+            return Interaction(0.0, reflection(point, facing, gaze, share, lobe), no_branch());
         }
         case SURFACE_MIXED: {
             let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
             let reflectance = object.polish * dielectric_reflectance(cos_incident, eta);
-            let back = reflection(point, facing, gaze, vec3f(reflectance));
+            let back = reflection(point, facing, gaze, vec3f(reflectance), lobe);
             return Interaction(1.0 - reflectance, back, no_branch());
         }
         case SURFACE_THIN_WALL: {
-            return thin_wall(point, facing, gaze, tint);
+            return thin_wall(point, facing, gaze, tint, lobe);
         }
         case SURFACE_DIELECTRIC: {
-            return dielectric(point, facing, gaze, tint);
+            return dielectric(point, facing, gaze, tint, lobe);
+        }
+        case SURFACE_VARIED: {
+            return varied(point, facing, gaze, tint, factors);
         }
         default: {
             return Interaction(1.0, no_branch(), no_branch());

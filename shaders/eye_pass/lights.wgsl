@@ -33,6 +33,7 @@ struct LitPoint {
     margin: f32,
     geometric_normal: vec3f,
     shading_normal: vec3f,
+    taking: Taking,
 }
 
 // Share of its strength that a spot sends along a direction (KHR_lights_punctual), or a surface; 1 for the others.
@@ -74,8 +75,9 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
         }
         let cosine = dot(to_light, point.shading_normal);
         var taken = select(0.0, 1.0, dot(to_light, point.geometric_normal) >= 0.0);
-        if object.surface == SURFACE_MIXED {
-            taken *= 1.0 - object.polish * dielectric_reflectance(cosine, object.ior / light.ior);
+        taken *= point.taking.share;
+        if point.taking.polish > 0.0 {
+            taken *= 1.0 - point.taking.polish * dielectric_reflectance(cosine, object.ior / light.ior);
         }
         let share = across_beam * cosine * taken;
         if share > 0.0 {

@@ -9,7 +9,7 @@ struct ObjectRecord {
     double_sided: u32,
     map: u32,
     texture: u32,
-    lobe_rad: f32,
+    roughness: f32,
     bumps: u32,
     polish: f32,
     back_map: u32,
@@ -17,6 +17,18 @@ struct ObjectRecord {
     glass: u32,
     // Alpha of the texture from which on the surface is there; 0 where it always is.
     alpha_cutoff: f32,
+    // Image that multiplies transmission, roughness and metallic.
+    variation: u32,
+    metallic: f32,
+    transmission: f32,
+    // Alpha that the texture's multiplies; negative where all of the surface is there.
+    coverage: f32,
+    // Whether it bounds a body.
+    solid: u32,
+    // Image of what it emits.
+    glow: u32,
+    padding0: u32,
+    padding1: u32,
     // Rows of the way from its mesh's coordinates to the scene.
     row_x: vec4f,
     row_y: vec4f,
@@ -28,6 +40,7 @@ const SURFACE_MIRROR: u32 = 1u;
 const SURFACE_DIELECTRIC: u32 = 2u;
 const SURFACE_THIN_WALL: u32 = 3u;
 const SURFACE_MIXED: u32 = 4u;
+const SURFACE_VARIED: u32 = 5u;
 
 const PI: f32 = 3.14159265358979;
 

@@ -1,7 +1,7 @@
 // Chains of scenes in which all light goes the same ways; stands in for eye_pass/wavelengths.wgsl.
 
 // Gazes that may wait: one for each surface at which both ways on are followed.
-const MOST_WAITING: u32 = MOST_BRANCHING;
+const MAX_WAITING: u32 = MAX_BRANCHING;
 
 fn ior_of(object: u32, wavelength: u32) -> f32 {
     return objects[object].ior;

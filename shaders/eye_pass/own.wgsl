@@ -1,7 +1,7 @@
 // Opaque surfaces without what they reflect.
 @fragment
 fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
-    var radiance = objects[fragment.object].emitted_radiance;
+    var radiance = own_emission(fragment);
     var is_fault = false;
     if SURFACE != SURFACE_MIRROR {
         let lit = own_irradiance(fragment, is_front);

@@ -11,11 +11,17 @@ fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -
     let place = start.eye + offset;
     // Rasterisers interpolate to some 2⁻²⁰ of what they see.
     let margin = 4e-6 * (1.0 + length(offset));
-    let point = LitPoint(place, margin, towards_eye * normalize(across), shading_normal);
+    var mixture: Mixture;
+    if SURFACE == SURFACE_VARIED {
+        let factors = texture_colour(object.variation, fragment.uv, 0.0);
+        mixture = mixture_of(object, factors, alpha_at(object, fragment.uv, 0.0));
+    }
+    let taking = taking_of(object, mixture);
+    let point = LitPoint(place, margin, towards_eye * normalize(across), shading_normal, taking);
     let baked = own_irradiance(fragment, is_front);
     let irradiance = baked.rgb + direct_irradiance(point, object);
     let diffuse = own_base_colour(fragment) * irradiance / PI;
-    let radiance = object.emitted_radiance + (1.0 - own_polish(fragment)) * diffuse;
+    let radiance = own_emission(fragment) + (1.0 - own_polish(fragment)) * diffuse;
     cut_out(fragment);
     return vec4f(select(scaled(radiance), fault_colour(), baked.a > 0.0), 1.0);
 }

@@ -17,6 +17,12 @@ fn own_base_colour(fragment: Fragment) -> vec3f {
     return colour;
 }
 
+fn own_emission(fragment: Fragment) -> vec3f {
+    let object = objects[fragment.object];
+    let level = level_of(object.glow, dpdx(fragment.uv), dpdy(fragment.uv));
+    return object.emitted_radiance * texture_colour(object.glow, fragment.uv, level);
+}
+
 fn own_irradiance(fragment: Fragment, is_front: bool) -> vec4f {
     let record = map_of(objects[fragment.object], is_front);
     let level = level_of(record, dpdx(fragment.map_uv), dpdy(fragment.map_uv));

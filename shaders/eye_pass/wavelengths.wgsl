@@ -1,9 +1,9 @@
 // Chains that go on by wavelength from where they meet glass that parts light; twin of eye_pass/wavelengths.rs.
 
 // Wavelengths of a picture.
-const MOST_WAVELENGTHS: u32 = 4u;
+const MAX_WAVELENGTHS: u32 = 4u;
 // Gazes that may wait: one for each surface at which both ways on are followed, and those of the other wavelengths.
-const MOST_WAITING: u32 = MOST_BRANCHING + MOST_WAVELENGTHS - 1u;
+const MAX_WAITING: u32 = MAX_BRANCHING + MAX_WAVELENGTHS - 1u;
 
 struct SeenWavelengths {
     // From radiance in linear sRGB to what is seen of it at each wavelength.
@@ -52,7 +52,7 @@ fn is_within_parting_glass(media: vec4u) -> bool {
 // others wait, and will meet the surface again.
 fn part(walk: ptr<function, Walk>, object: u32) {
     let surface = objects[object].surface;
-    let goes_by_index = is_clear(surface) || surface == SURFACE_MIXED;
+    let goes_by_index = is_clear(surface) || surface == SURFACE_MIXED || surface == SURFACE_VARIED;
     if (*walk).gaze.wavelength != 0u || !goes_by_index {
         return;
     }

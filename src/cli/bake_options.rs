@@ -4,7 +4,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, ValueParser};
 use clap::{Arg, ArgAction, ArgGroup, ArgMatches, Args, Command, FromArgMatches, Id};
 use nephroid::error::{Error, Result};
 use nephroid::settings::options::{OPTIONS, OptionInfo, named};
-use nephroid::settings::{BakeSettings, Estimator, LEAST_MAX_ERROR, LayerKind, Preset};
+use nephroid::settings::{BakeSettings, Estimator, LayerKind, MIN_MAX_ERROR, Preset};
 
 /// The options of a bake that are named, with their values as they are written.
 #[derive(Clone, Debug, Default)]
@@ -119,7 +119,7 @@ impl BakeOptions {
         if settings.max_error.is_none() && !is_exact {
             settings.max_error = match (preset, settings.max_time_s) {
                 // As far as the time goes.
-                (None, Some(_)) => Some(LEAST_MAX_ERROR),
+                (None, Some(_)) => Some(MIN_MAX_ERROR),
                 _ => Some(preset.unwrap_or_default().max_error()),
             };
         }

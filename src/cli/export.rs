@@ -23,7 +23,7 @@ use super::options::RunOptions;
 use super::values::{self, Named};
 
 /// Exposures beyond that many stops are a slip.
-const MOST_STOPS: f64 = 64.0;
+const MAX_STOPS: f64 = 64.0;
 
 /// Share of a map's light that may be cut where nothing was asked for.
 const DEFAULT_CUT: f64 = 0.005;
@@ -32,7 +32,7 @@ const DEFAULT_CUT: f64 = 0.005;
 const WHITE_SHARE: f64 = 0.01;
 
 /// Below, gutters take most of an atlas [texels].
-const LEAST_ATLAS_SIDE: usize = 16;
+const MIN_ATLAS_SIDE: usize = 16;
 
 const FORMATS: &[Named<&str>] = &[
     ("glb", "glb", "The scene with its maps, binary glTF"),
@@ -168,7 +168,7 @@ pub struct ExportArguments {
     #[arg(long, value_parser = values::named(TRANSFERS))]
     transfer: Option<Transfer>,
     /// Of textures: many maps in one file, with sides of up to so many texels [default: one file for each; N: 4096]
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4096", value_parser = values::within(LEAST_ATLAS_SIDE..=MAX_MAP_SIDE, "texels"))]
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4096", value_parser = values::within(MIN_ATLAS_SIDE..=MAX_MAP_SIDE, "texels"))]
     atlas: Option<usize>,
     /// Of .ktx2: how texels are packed [default: rgb9e5]
     #[arg(long, value_parser = values::named(PACKINGS))]
@@ -220,11 +220,11 @@ impl ExportArguments {
 
     fn validate(&self) -> Result<()> {
         if let Some(stops) = self.exposure
-            && !(-MOST_STOPS..=MOST_STOPS).contains(&stops)
+            && !(-MAX_STOPS..=MAX_STOPS).contains(&stops)
         {
             return Err(Error::usage(
                 "--exposure",
-                format!("{stops} is outside of -{MOST_STOPS} to {MOST_STOPS} stops"),
+                format!("{stops} is outside of -{MAX_STOPS} to {MAX_STOPS} stops"),
                 "give a number of stops such as 2",
             ));
         }
@@ -424,7 +424,7 @@ fn exposure_of(scene: &Scene, maps: &[IlluminationMap]) -> f64 {
     }
     sent.sort_unstable_by(|a, b| b.total_cmp(a));
     let white = sent[(WHITE_SHARE * sent.len() as f64) as usize] * std::f64::consts::FRAC_1_PI;
-    (-white.log2()).clamp(-MOST_STOPS, MOST_STOPS)
+    (-white.log2()).clamp(-MAX_STOPS, MAX_STOPS)
 }
 
 fn glb_text(file: &str, bytes: usize, report: &GlbReport) -> String {

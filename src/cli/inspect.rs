@@ -182,15 +182,18 @@ fn object_report(scene: &Scene, index: usize, lines: &mut Lines) -> Value {
 }
 
 fn material_report(material: &Material, objects: usize, lines: &mut Lines) -> Value {
-    use SurfaceKind::{Dielectric, Mixed, ThinWall};
+    use SurfaceKind::{Dielectric, Mixed, ThinWall, Varied};
     let (name, surface) = (&material.name, surface_name(material.surface));
-    let ior = matches!(material.surface, Dielectric | ThinWall | Mixed).then_some(material.ior);
+    let ior = matches!(material.surface, Dielectric | ThinWall | Mixed | Varied).then_some(material.ior);
     let glass = material.glass.as_deref().map(glass_report);
     let metal = material.metal.map(Metal::name);
     let made_of = [
         ior.map(|ior| format!(", ior {ior:.4}")),
         glass.as_ref().map(|(_, line)| format!(", {line}")),
         metal.map(|metal| format!(", {metal} by wavelength")),
+        material
+            .is_solid_by_shape
+            .then(|| ", solid as its mesh is closed".into()),
     ];
     let made_of: String = made_of.into_iter().flatten().collect();
     lines.push(("material", format!("{name}: {surface}{made_of}")));
@@ -293,6 +296,7 @@ fn surface_name(surface: SurfaceKind) -> &'static str {
         SurfaceKind::Dielectric => "dielectric",
         SurfaceKind::ThinWall => "thin wall",
         SurfaceKind::Mixed => "mixed",
+        SurfaceKind::Varied => "varied",
     }
 }
 

@@ -91,7 +91,7 @@ impl LoadedScene {
 }
 
 /// More than the system says about a process [bytes].
-const MOST_BYTES: u64 = 1 << 16;
+const MAX_BYTES: u64 = 1 << 16;
 
 /// Share of what is left that maps may take: as much again for rays, files and the system's own tables.
 const SHARE_OF_MAPS: u64 = 2;
@@ -120,7 +120,7 @@ pub fn within_reach<'a>(settings: &'a BakeSettings, console: &Console) -> Cow<'a
 /// Address space that is granted and not taken yet [bytes]; `None` where it is not limited or the system does not tell.
 fn left_bytes() -> Option<u64> {
     let read = |name: &str| {
-        let bytes = files::read_file(&Path::new("/proc/self").join(name), MOST_BYTES).ok()?;
+        let bytes = files::read_file(&Path::new("/proc/self").join(name), MAX_BYTES).ok()?;
         String::from_utf8(bytes).ok()
     };
     let limit = granted_bytes(&read("limits")?)?;

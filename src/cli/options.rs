@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use nephroid::error::{Error, Result};
 use nephroid::scene::LoadOptions;
 
@@ -12,15 +12,30 @@ use super::values::{self, Exposure};
 /// Most worker threads.
 const MAX_THREADS: usize = 1024;
 
+/// A choice that is on unless it is turned off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Switch {
+    On,
+    Off,
+}
+
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Scene options")]
 pub struct SceneOptions {
     /// Add a sun to a scene without light
     #[arg(long)]
     default_light: bool,
-    /// Take transmissive materials without a volume for solid glass, where their meshes are closed
-    #[arg(long)]
-    solid_glass: bool,
+    /// Whether closed meshes of a transmissive material without a volume are solid glass, or panes without thickness
+    #[arg(
+        long,
+        value_name = "on|off",
+        value_enum,
+        num_args = 0..=1,
+        require_equals = true,
+        default_value = "on",
+        default_missing_value = "on"
+    )]
+    solid_glass: Switch,
     /// Surround the scene with an image of radiance in W/(m² sr), equirectangular, .hdr or .exr, and light it by that
     #[arg(long, value_name = "FILE")]
     environment: Option<PathBuf>,
@@ -30,7 +45,7 @@ impl SceneOptions {
     /// How the scene is read; a command may add a sun unasked.
     pub fn load_options(&self, adds_light: bool) -> LoadOptions {
         LoadOptions {
-            solid_glass: self.solid_glass,
+            solid_glass: self.solid_glass == Switch::On,
             default_light: self.default_light || adds_light,
             environment: self.environment.clone(),
             ..LoadOptions::default()

@@ -19,15 +19,15 @@ pub fn within(
 }
 
 /// Most parts of a bake.
-const MOST_SHARDS: u32 = 100_000;
+const MAX_SHARDS: u32 = 100_000;
 
 /// `I/N`: one part of several.
 pub fn share_of_bake(text: &str) -> Result<Share, String> {
     let numbers = text.split_once('/').and_then(|(number, count)| {
-        let count = count.parse().ok().filter(|count| *count <= MOST_SHARDS)?;
+        let count = count.parse().ok().filter(|count| *count <= MAX_SHARDS)?;
         Share::new(number.parse().ok()?, count)
     });
-    numbers.ok_or_else(|| format!("give one of several, such as 3/8, of up to {MOST_SHARDS}"))
+    numbers.ok_or_else(|| format!("give one of several, such as 3/8, of up to {MAX_SHARDS}"))
 }
 
 /// Largest side of a picture [pixels].

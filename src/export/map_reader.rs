@@ -105,6 +105,11 @@ impl<'a> MapReader<'a> {
         })
     }
 
+    /// The folder that the maps lie in.
+    pub fn folder(&self) -> &Path {
+        self.folder
+    }
+
     /// What there is.
     pub fn entries(&self) -> &[MapEntry] {
         &self.stored.maps

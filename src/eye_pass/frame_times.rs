@@ -23,7 +23,7 @@ const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// A frame is drawn once more where pipelines were made for it. They come in one go; whoever makes new ones for ever
 /// is not waited for.
-const MOST_REPEATS: usize = 8;
+const MAX_REPEATS: usize = 8;
 
 /// What is drawn.
 #[derive(Debug)]
@@ -259,7 +259,7 @@ impl Manner {
             let before = self.renderer.counts().pipelines;
             let drawing = self.draw(gpu, target, view)?;
             let made = self.renderer.counts().pipelines.saturating_sub(before);
-            if (made == 0 && !is_first) || repeat == MOST_REPEATS {
+            if (made == 0 && !is_first) || repeat == MAX_REPEATS {
                 self.drawings.push(drawing);
                 break;
             }

@@ -132,14 +132,14 @@ fn soft(exposed: LinearSrgb) -> LinearSrgb {
     const SHOULDER: f64 = 0.4;
     /// Brings 16 to 1, with slope 1 at the shoulder.
     const STEP: f64 = 0.123_872_741_774_841_12;
-    const MOST_WHITENESS: f64 = 0.4;
+    const MAX_WHITENESS: f64 = 0.4;
     let peak = exposed.max_channel();
     if peak <= SHOULDER {
         return exposed;
     }
     let rise = STEP * ((peak - SHOULDER) / STEP).ln_1p();
     let new_peak = (SHOULDER + rise).min(1.0);
-    let whiteness = MOST_WHITENESS * ((new_peak - SHOULDER) / (1.0 - SHOULDER)).powi(3);
+    let whiteness = MAX_WHITENESS * ((new_peak - SHOULDER) / (1.0 - SHOULDER)).powi(3);
     // A grey stays the same grey to the last bit.
     ((exposed / peak) * (1.0 - whiteness) + LinearSrgb::grey(whiteness)) * new_peak
 }

@@ -17,7 +17,7 @@ use crate::optics::{ColourBasis, LinearSrgb, Nanometres};
 /// Wavelengths of a picture that is seen for a moment only.
 const WHILE_WALKING: u32 = 3;
 /// Most wavelengths of one of many pictures of a view: three, and the one that carries what they lack.
-pub const MOST_PER_PICTURE: usize = WHILE_WALKING as usize + 1;
+pub const MAX_PER_PICTURE: usize = WHILE_WALKING as usize + 1;
 /// Fraction of the golden ratio: multiples of it fill the unit interval evenly, however many there are.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 

@@ -12,7 +12,7 @@ use super::tiles::TileLayout;
 const CUT_SPREADS: f64 = 4.0;
 
 /// Spreads [texels] below which nothing is moved: not even 10⁻⁸ of a texel's flux would be.
-const LEAST_SPREAD_TEXELS: f64 = 1e-4;
+const MIN_SPREAD_TEXELS: f64 = 1e-4;
 
 /// Spreads over the map's side from which a line becomes flat.
 const FLAT_SPREADS: f64 = 2.0;
@@ -24,7 +24,7 @@ const COARSE_PER_SPREAD: f64 = 2.0;
 const COARSEST: u32 = 6;
 
 /// Texels of a map in tiles that are smoothed at once.
-const MOST_AT_ONCE: usize = 2048 * 2048;
+const MAX_AT_ONCE: usize = 2048 * 2048;
 
 /// Smooths flux with a gaussian of standard deviation `spread_texels` [texels of the finest size], cut off at four of
 /// them, across and down; borders mirror. Nothing happens at 0 (or less, or at what is no number), nor where a map in
@@ -32,7 +32,7 @@ const MOST_AT_ONCE: usize = 2048 * 2048;
 ///
 /// No count is lost, in no channel. The result does not depend on the number of threads.
 pub fn smooth(flux: &mut FluxAccumulator, layout: Option<&TileLayout>, spread_texels: f64) {
-    if spread_texels < LEAST_SPREAD_TEXELS || spread_texels.is_nan() {
+    if spread_texels < MIN_SPREAD_TEXELS || spread_texels.is_nan() {
         return;
     }
     let (width, height) = layout.map_or((flux.width(), flux.height()), TileLayout::size);
@@ -40,11 +40,7 @@ pub fn smooth(flux: &mut FluxAccumulator, layout: Option<&TileLayout>, spread_te
         return;
     }
     let whole = (width | height).trailing_zeros().min(COARSEST);
-    let most_at_once = if layout.is_some() {
-        MOST_AT_ONCE
-    } else {
-        usize::MAX
-    };
+    let most_at_once = if layout.is_some() { MAX_AT_ONCE } else { usize::MAX };
     let mut level = 0;
     while level < whole
         && (spread_texels >= COARSE_PER_SPREAD * f64::from(2_u32 << level)
@@ -210,7 +206,7 @@ fn weight(side: i64, place: i64) -> i64 {
 
 /// The same for a map of one size, at that size.
 fn smooth_evenly(flux: &mut FluxAccumulator, spread_texels: f64) {
-    if spread_texels < LEAST_SPREAD_TEXELS {
+    if spread_texels < MIN_SPREAD_TEXELS {
         return;
     }
     let (width, height) = (flux.width(), flux.height());

@@ -27,10 +27,10 @@ const PRIOR_RATIO: f64 = 2.0;
 const RATIO_RANGE: (f64, f64) = (1.5, 6.0);
 
 /// No level is taken to have a smaller part of the squared error of the one before it.
-const LEAST_GAIN: f64 = 1.0 / (RATIO_RANGE.1 * RATIO_RANGE.1);
+const MIN_GAIN: f64 = 1.0 / (RATIO_RANGE.1 * RATIO_RANGE.1);
 
 /// A tile's squared error is taken to be at least this part of that of the tiles around it.
-const LEAST_SHARE_OF_NEIGHBOURS: f64 = 0.25;
+const MIN_SHARE_OF_NEIGHBOURS: f64 = 0.25;
 
 /// A texel's error is that of the texels around it up to this many texels away.
 const WINDOW_TEXELS: usize = 2;
@@ -73,6 +73,8 @@ pub struct LightError {
     pub relative_rmse: f64,
     /// How many times smaller the error became with the last level.
     pub ratio: f64,
+    /// Whether an audit found more than differences between levels show.
+    pub is_raised: bool,
 }
 
 impl LightError {
@@ -82,6 +84,7 @@ impl LightError {
         if !(factor > 1.0 && factor.is_finite()) {
             return;
         }
+        self.is_raised = true;
         self.relative_rmse *= factor;
         for map in self.maps.values_mut() {
             map.texels.iter_mut().for_each(|error| *error *= factor);
@@ -203,7 +206,7 @@ impl Image {
             let (sum, count) = cells.fold((0.0, 0), |(sum, count), tile| (sum + tiles[tile], count + 1));
             sum / f64::from(count)
         };
-        let least = |(tile, own): (usize, &f64)| own.max(LEAST_SHARE_OF_NEIGHBOURS * around(tile));
+        let least = |(tile, own): (usize, &f64)| own.max(MIN_SHARE_OF_NEIGHBOURS * around(tile));
         tiles.iter().enumerate().map(least).collect()
     }
 
@@ -329,10 +332,10 @@ pub fn estimate(
             .map(|tile| match old {
                 Some(old) if !is_refined(receiver, tile) => old.tiles[tile],
                 // A difference may vanish by chance, or because both levels miss the same.
-                Some(old) => (tile_sums[tile] * share).max(old.tiles[tile] * LEAST_GAIN),
+                Some(old) => (tile_sums[tile] * share).max(old.tiles[tile] * MIN_GAIN),
                 None => {
                     let older = older_tiles.as_ref().map_or(0.0, |tiles| tiles[tile]);
-                    tile_sums[tile].max(older * LEAST_GAIN) * share
+                    tile_sums[tile].max(older * MIN_GAIN) * share
                 }
             })
             .collect();

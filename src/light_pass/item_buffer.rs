@@ -28,7 +28,7 @@ use crate::transport::Tracer;
 pub const CELLS_PER_SIDE: usize = 128;
 
 /// Boxes that every node is compared with; of more objects than these, one box around all is.
-const MOST_BOXES: usize = 16;
+const MAX_BOXES: usize = 16;
 
 /// Marked cells of all faces of one light.
 #[derive(Debug)]
@@ -243,7 +243,7 @@ fn touched(index: usize, coarse: usize, fine: usize) -> (usize, usize) {
 
 /// The boxes themselves, or one around all where they are many.
 fn few(boxes: Vec<Bounds>) -> Vec<Bounds> {
-    if boxes.len() <= MOST_BOXES {
+    if boxes.len() <= MAX_BOXES {
         return boxes;
     }
     let around = |a: Bounds, b: Bounds| (a.0.min(b.0), a.1.max(b.1));

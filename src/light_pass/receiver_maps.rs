@@ -160,10 +160,10 @@ const STRAY_SHARE: f64 = 1e-6;
 
 /// Spreads that a kernel must have at a level [texels of the level]: linear interpolation between texels then adds less
 /// than one per cent to its variance.
-const LEAST_SPREAD_TEXELS: f64 = 6.0;
+const MIN_SPREAD_TEXELS: f64 = 6.0;
 
 /// Least side of a level [texels].
-const LEAST_LEVEL_SIDE: usize = 16;
+const MIN_LEVEL_SIDE: usize = 16;
 
 impl ReceiverMap {
     fn new(chart: Arc<Chart>, flux: FluxAccumulator) -> Self {
@@ -178,7 +178,7 @@ impl ReceiverMap {
     /// Sizes of the levels that it may have.
     fn level_sizes(&self) -> impl Iterator<Item = (usize, usize)> {
         let is_whole = self.chart.is_full() && self.chart.layout.is_none();
-        let halves = |side: usize| side.is_multiple_of(2) && side / 2 >= LEAST_LEVEL_SIDE;
+        let halves = |side: usize| side.is_multiple_of(2) && side / 2 >= MIN_LEVEL_SIDE;
         let first = (self.chart.width, self.chart.height);
         std::iter::successors(Some(first), move |&(width, height)| {
             (is_whole && halves(width) && halves(height)).then_some((width / 2, height / 2))
@@ -210,7 +210,7 @@ impl ReceiverMap {
 
     /// The coarsest level at which a smooth kernel of the given spread [texels of the map] is still well resolved.
     pub fn level_for(&self, spread_texels: f64) -> usize {
-        let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= LEAST_SPREAD_TEXELS;
+        let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= MIN_SPREAD_TEXELS;
         let levels = (0..).zip(self.level_sizes()).map(|(level, _)| level);
         levels.skip(1).take_while(fits).last().unwrap_or(0)
     }

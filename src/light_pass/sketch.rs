@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::{PathLimits, PathSignature, PathTracer};
-use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
+use crate::light_pass::caustic::setup::{Aim, CullMode, VisibleLight};
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
 use crate::progress::Control;
 use crate::settings::ItemBufferKind;
@@ -51,7 +51,7 @@ pub struct SketchedPatch {
 
 /// Where light landed.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Sketch {
+pub struct PathPreview {
     /// Of every ray, once for each way on which it came to a matte surface.
     pub landings: Vec<Landing>,
     /// Between neighbouring rays that met the same objects in the same way.
@@ -72,9 +72,9 @@ struct Arrived {
 
 /// Follows thin wavefronts of all lights; lamps with a size shine from their middles, glass bends all light as at
 /// 587.56 nm, and rough surfaces are smooth. Ends early where it is cancelled.
-pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> Sketch {
-    let aim = Aim::take(tracer, ItemBufferKind::Equal, Aiming::Reachable, false);
-    let mut all = Sketch::default();
+pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> PathPreview {
+    let aim = Aim::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, false);
+    let mut all = PathPreview::default();
     for aimed in &aim.lights {
         if control.is_cancelled() {
             break;
@@ -84,7 +84,7 @@ pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> Sketc
     all
 }
 
-fn of_light(tracer: &Tracer, aimed: &AimedLight, limits: SketchLimits, all: &mut Sketch) {
+fn of_light(tracer: &Tracer, aimed: &VisibleLight, limits: SketchLimits, all: &mut PathPreview) {
     let (side, cells) = cells(aimed, limits.cells);
     let corners: BTreeSet<Corner> = cells.iter().flat_map(|cell| corners_of(*cell)).collect();
     let corners: Vec<Corner> = corners.into_iter().collect();
@@ -108,7 +108,7 @@ fn of_light(tracer: &Tracer, aimed: &AimedLight, limits: SketchLimits, all: &mut
 }
 
 /// Cells that are worth a ray, as many as there may be or a quarter of that, and how many lie side by side.
-fn cells(aimed: &AimedLight, most: usize) -> (u32, BTreeSet<Corner>) {
+fn cells(aimed: &VisibleLight, most: usize) -> (u32, BTreeSet<Corner>) {
     let marked = |face: usize| {
         let all = (0..CELLS_PER_SIDE).flat_map(|row| (0..CELLS_PER_SIDE).map(move |column| (column, row)));
         let buffer = aimed.visible();
@@ -143,7 +143,7 @@ fn corners_of((face, column, row): Corner) -> [Corner; 4] {
 /// All landings of the ray of a corner.
 fn follow(
     tracer: &Tracer,
-    aimed: &AimedLight,
+    aimed: &VisibleLight,
     limits: SketchLimits,
     (face, column, row): Corner,
     side: u32,

@@ -6,7 +6,7 @@ use crate::geometry::enclosure::{Bounds, is_closed, triangle_meets_box, winding_
 use crate::scene::{InScene, Light, LightKind, LightSize, Mesh, Scene};
 
 /// Larger meshes are not looked at: they seal nothing.
-const MOST_TRIANGLES: usize = 200_000;
+const MAX_TRIANGLES: usize = 200_000;
 
 /// A winding number this close to a whole one is taken for it.
 const WINDING_TOLERANCE: f64 = 1e-6;
@@ -50,7 +50,7 @@ impl Compartments {
                 .filter(|(_, place)| overlap(around, *place))
                 .collect();
             let mesh = object.mesh();
-            if (near.is_empty() && lamps.is_empty()) || mesh.triangles.len() > MOST_TRIANGLES {
+            if (near.is_empty() && lamps.is_empty()) || mesh.triangles.len() > MAX_TRIANGLES {
                 continue;
             }
             let mesh = &*object.copy_in_scene();
@@ -125,7 +125,7 @@ fn overlap((low, high): Bounds, (from, to): Bounds) -> bool {
 
 /// Whether any part of a mesh lies in a box.
 fn enters(mesh: InScene, bounds: Bounds) -> bool {
-    mesh.triangle_count() > MOST_TRIANGLES
+    mesh.triangle_count() > MAX_TRIANGLES
         || (0..mesh.triangle_count()).any(|triangle| triangle_meets_box(mesh.corners(triangle), bounds))
 }
 

@@ -6,7 +6,7 @@ use crate::settings::{BakeSettings, LayerKind};
 
 /// What a light sees of the specular objects in the scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Sight {
+pub struct LightReach {
     /// Specular objects that nothing opaque and closed seals from the light.
     pub unsealed: usize,
     /// Those whose light may go on to a diffuse surface.
@@ -21,7 +21,7 @@ pub struct Sight {
 }
 
 /// Decides every effect. `sights` in the order of `Scene::lights`.
-pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> EffectPlan {
+pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> EffectPlan {
     let decision = Decision {
         scene,
         settings,
@@ -35,8 +35,7 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
     let lets_through = |material: &Material| !material.surface.is_opaque();
     let absorbs = |material: &Material| {
         let volume = material.volume.as_ref();
-        material.surface == SurfaceKind::Dielectric
-            && volume.is_some_and(|volume| volume.attenuation_distance_m.is_finite())
+        material.is_solid() && volume.is_some_and(|volume| volume.attenuation_distance_m.is_finite())
     };
     let effects = vec![
         on_paths(
@@ -57,7 +56,11 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[Sight]) -> Effec
         ),
         on_paths(
             Effect::Textures,
-            &|material| material.surface != SurfaceKind::Mixed && material.base_colour_texture.is_some(),
+            &|material| {
+                let has_tint =
+                    material.surface != SurfaceKind::Mixed && material.base_colour_texture.is_some();
+                has_tint || material.variation.is_some()
+            },
             "no lit mirror or glass has a texture",
         ),
         on_paths(
@@ -118,7 +121,7 @@ const FORCED_ON: &str = "switched on by the user, though nothing calls for it";
 struct Decision<'a> {
     scene: &'a Scene,
     settings: &'a BakeSettings,
-    sights: &'a [Sight],
+    sights: &'a [LightReach],
     /// Whether the caustic layer is wanted.
     caustic: bool,
 }
@@ -309,7 +312,7 @@ impl Decision<'_> {
             .collect()
     }
 
-    fn light_reason(&self, shines: bool, sight: Option<&Sight>) -> String {
+    fn light_reason(&self, shines: bool, sight: Option<&LightReach>) -> String {
         let Some(sight) = sight.filter(|_| self.caustic) else {
             return "the caustic layer is not asked for".into();
         };

@@ -5,7 +5,7 @@ mod decide;
 mod eye;
 mod reach;
 
-pub use decide::{Sight, decide, is_wanted, wants_caustics};
+pub use decide::{LightReach, decide, is_wanted, wants_caustics};
 pub use eye::{chains, dispersion};
 pub use reach::Reach;
 

@@ -8,10 +8,10 @@ use crate::geometry::enclosure::Bounds;
 use crate::scene::{InScene, Light, LightKind, Scene, SurfaceKind};
 
 /// With more specular objects than this, all that share a compartment are taken to send light to each other.
-const MOST_RELAYS: usize = 512;
+const MAX_RELAYS: usize = 512;
 
 /// Tests of a triangle with a box that are worth making for an object; beyond, it is taken to reach everything.
-const MOST_TESTS: usize = 1 << 22;
+const MAX_TESTS: usize = 1 << 22;
 
 /// Rounding that planes and boxes are compared with, relative to the scene.
 const TOLERANCE: f64 = 1e-9;
@@ -111,7 +111,7 @@ impl<'a> Reach<'a> {
 
     /// From the receivers backwards.
     fn find_useful(&mut self) {
-        if self.specular.len() > MOST_RELAYS {
+        if self.specular.len() > MAX_RELAYS {
             self.specular
                 .iter()
                 .for_each(|&object| self.is_useful[object] = true);
@@ -145,7 +145,7 @@ impl<'a> Reach<'a> {
             .len()
             .saturating_mul(to.len());
         let shares = |&to: &usize| self.compartments.share(from, to);
-        if tests > MOST_TESTS {
+        if tests > MAX_TESTS {
             return to.iter().any(shares);
         }
         to.iter().any(|&to| self.sends(from, lit_by, to))
@@ -161,11 +161,11 @@ impl<'a> Reach<'a> {
             return false;
         }
         match self.scene.material_of(from).surface {
-            SurfaceKind::Dielectric | SurfaceKind::ThinWall => true,
+            SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Varied => true,
             SurfaceKind::Diffuse => false,
             SurfaceKind::Mirror | SurfaceKind::Mixed => {
                 let mesh = self.scene.objects[from].in_scene();
-                self.specular.len() > MOST_RELAYS || self.reflects_into(mesh, lit_by, bounds)
+                self.specular.len() > MAX_RELAYS || self.reflects_into(mesh, lit_by, bounds)
             }
         }
     }

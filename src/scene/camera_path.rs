@@ -97,7 +97,7 @@ impl PathPlan {
             refused(
                 location,
                 &error.to_string(),
-                "give frames, vertical_fov_deg and keys with position_m and target_m, as README.md shows",
+                "give frames, vertical_fov_deg and keys with position_m and target_m, as the guide's page on the window shows",
             )
         })
     }

@@ -4,17 +4,17 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use super::{Scene, SurfaceKind};
+use super::Scene;
 use crate::error::Warning;
 
 /// How finely planes are told apart: parts of a unit normal, and of the largest coordinate.
 const STEPS: f64 = 1e9;
 
 /// Pairs that a scene is told of.
-const MOST_WARNINGS: usize = 8;
+const MAX_WARNINGS: usize = 8;
 
 /// Comparisons of triangles that are worth making; what is beyond is not looked at.
-const MOST_TESTS: usize = 1 << 22;
+const MAX_TESTS: usize = 1 << 22;
 
 /// A plane in steps, the same from both sides.
 type Plane = [i64; 4];
@@ -40,7 +40,7 @@ pub fn touching(scene: &Scene) -> BTreeMap<(usize, usize), usize> {
             let next = faces[index..].partition_point(|other| other.object == face.object);
             let others = &faces[index + next..];
             tests += others.len() + 1;
-            if tests > MOST_TESTS {
+            if tests > MAX_TESTS {
                 return pairs;
             }
             let touched = others
@@ -69,14 +69,14 @@ pub fn warnings(scene: &Scene) -> Vec<Warning> {
     };
     touching(scene)
         .into_iter()
-        .take(MOST_WARNINGS)
+        .take(MAX_WARNINGS)
         .map(warning)
         .collect()
 }
 
 /// Triangles of all solid dielectrics by their planes; nothing where there is only one such body.
 fn planes(scene: &Scene) -> BTreeMap<Plane, Vec<Face>> {
-    let is_solid = |object: &usize| scene.material_of(*object).surface == SurfaceKind::Dielectric;
+    let is_solid = |object: &usize| scene.material_of(*object).is_solid();
     let bodies: Vec<usize> = (0..scene.objects.len()).filter(is_solid).collect();
     let mut planes: BTreeMap<Plane, Vec<Face>> = BTreeMap::new();
     let Some((low, high)) = scene.bounds().filter(|_| bodies.len() > 1) else {

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{InScene, Light, LightKind, LightSize, PanelShape, Scene};
+use super::{Glow, InScene, Light, LightKind, LightSize, PanelShape, Scene};
 use crate::geometry::ray;
 use crate::optics::LinearSrgb;
 
@@ -238,8 +238,12 @@ impl<'a> Places<'a> {
             }
             (LightKind::Surface { .. }, _, square) => {
                 let surface = self.surface.as_ref()?;
-                let kind = surface.facet(square.unwrap_or(DVec2::splat(0.5)))?;
-                Some(whole(kind, surface.area_m2()))
+                let (kind, brightness) = surface.facet(square.unwrap_or(DVec2::splat(0.5)))?;
+                let brightness = brightness.filter(|_| square.is_some());
+                Some(Emitter {
+                    strength: brightness.map_or(strength, |of| strength * of) * surface.area_m2(),
+                    kind,
+                })
             }
             (LightKind::Environment { .. }, _, square) => {
                 let sample = scene.environment.as_ref()?.sample(square?)?;
@@ -298,19 +302,28 @@ pub fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
 struct Glowing<'a> {
     mesh: InScene<'a>,
     both_sides: bool,
-    /// Area of all triangles up to each, itself included [m²].
+    /// Area of all triangles up to each, itself included, by how bright they are [m²].
     upto_m2: Vec<f64>,
+    /// Of an image: the scene with its object, and the area of the object [m²].
+    image: Option<(&'a Scene, usize, f64)>,
+}
+
+/// How often a triangle is chosen for its area: dark ones too, whose image may have been overlooked.
+fn weight(glow: &Glow, triangle: usize) -> f64 {
+    const LEAST: f64 = 0.05;
+    glow.by_triangle[triangle].max(LEAST)
 }
 
 impl<'a> Glowing<'a> {
     /// `None` where it has no area.
     fn new(scene: &'a Scene, object: usize) -> Option<Self> {
         let mesh = scene.objects.get(object)?.in_scene();
+        let glow = scene.glows.get(&object);
         let mut sum_m2 = 0.0;
         let upto_m2: Vec<f64> = (0..mesh.triangle_count())
             .map(|triangle| {
-                let [a, b, c] = mesh.corners(triangle);
-                sum_m2 += 0.5 * (b - a).cross(c - a).length();
+                let bright = glow.map_or(1.0, |glow| weight(glow, triangle));
+                sum_m2 += mesh.triangle_area_m2(triangle) * bright;
                 sum_m2
             })
             .collect();
@@ -318,6 +331,7 @@ impl<'a> Glowing<'a> {
             mesh,
             both_sides: scene.material_of(object).double_sided,
             upto_m2,
+            image: glow.map(|_| (scene, object, mesh.area_m2())),
         })
     }
 
@@ -327,11 +341,12 @@ impl<'a> Glowing<'a> {
 
     /// Of all glowing sides [m²].
     fn area_m2(&self) -> f64 {
-        self.total_m2() * if self.both_sides { 2.0 } else { 1.0 }
+        let area_m2 = self.image.map_or(self.total_m2(), |(.., area_m2)| area_m2);
+        area_m2 * if self.both_sides { 2.0 } else { 1.0 }
     }
 
-    /// A point of it, evenly by area.
-    fn facet(&self, mut square: DVec2) -> Option<EmitterKind> {
+    /// A point of it, as often by area as its triangle is bright; and how bright it is there for that, where an image tells.
+    fn facet(&self, mut square: DVec2) -> Option<(EmitterKind, Option<LinearSrgb>)> {
         let mut side = 1.0;
         if self.both_sides {
             square.y *= 2.0;
@@ -355,7 +370,11 @@ impl<'a> Glowing<'a> {
         let (point, error) = ray::point_with_error(&self.mesh.corners(triangle), barycentric);
         let normal = self.mesh.face_normal(triangle) * side;
         let position = ray::offset_origin(point, error, normal, normal);
-        Some(EmitterKind::Facet { position, normal })
+        let brightness = self.image.map(|(scene, object, area_m2)| {
+            let chosen = weight(&scene.glows[&object], triangle) * area_m2 / self.total_m2();
+            scene.glow_at(object, triangle, barycentric) / chosen
+        });
+        Some((EmitterKind::Facet { position, normal }, brightness))
     }
 }
 

@@ -8,20 +8,20 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::{Mesh, Object};
 
 /// Triangles that copies of one mesh may have in all; of a mesh with more, each of its objects is an instance.
-pub const MOST_COPIED: usize = 1 << 18;
+pub const MAX_COPIED: usize = 1 << 18;
 
 /// Copies of meshes with fewer triangles take no more than what an instance takes.
-const LEAST_SHARED: usize = 64;
+const MIN_SHARED: usize = 64;
 
 /// Rounding of places on their way into the coordinates of an instance, in radii of its mesh: far below the margins of the
 /// hierarchy.
 const ROUNDING: f64 = 1e-9;
 
 /// Instances are not flattened more than this, as a share of their extents.
-const MOST_SKEW: f64 = 1e3;
+const MAX_SKEW: f64 = 1e3;
 
 /// Nor are they scaled so much that squares of lengths leave the range of numbers.
-const LARGEST_SCALE: f64 = 1e30;
+const MAX_SCALE: f64 = 1e30;
 
 /// Which objects are instances: those of meshes whose copies would have many triangles.
 pub fn find(objects: &[Object], most_copied: usize) -> Vec<bool> {
@@ -32,7 +32,7 @@ pub fn find(objects: &[Object], most_copied: usize) -> Vec<bool> {
     let is_many = |object: &Object| {
         let uses = uses[&Arc::as_ptr(object.mesh())];
         let triangles = object.mesh().triangles.len();
-        uses > 1 && triangles >= LEAST_SHARED && uses.saturating_mul(triangles) > most_copied
+        uses > 1 && triangles >= MIN_SHARED && uses.saturating_mul(triangles) > most_copied
     };
     let mut boxes: HashMap<*const Mesh, Option<(DVec3, DVec3)>> = HashMap::new();
     let mut is_instance = |object: &Object| {
@@ -75,8 +75,8 @@ pub fn is_sound(transform: &DAffine3, (low, high): (DVec3, DVec3)) -> bool {
     let radius = 0.5 * (high - low).length();
     // Also false where a number is not one.
     shrink * farthest * f64::EPSILON < ROUNDING * radius
-        && stretch * shrink < MOST_SKEW
-        && (1.0 / LARGEST_SCALE..LARGEST_SCALE).contains(&stretch)
+        && stretch * shrink < MAX_SKEW
+        && (1.0 / MAX_SCALE..MAX_SCALE).contains(&stretch)
 }
 
 #[cfg(test)]

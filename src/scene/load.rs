@@ -12,7 +12,7 @@ use crate::units::Irradiance;
 /// How a scene is read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LoadOptions {
-    /// Reads transmitting surfaces without a volume as solid glass where their mesh is closed.
+    /// Reads transmitting surfaces without a volume as solid glass where their mesh encloses space.
     pub solid_glass: bool,
     /// Adds a sun to a scene that has no light, with a warning.
     pub default_light: bool,
@@ -26,7 +26,7 @@ pub struct LoadOptions {
 impl Default for LoadOptions {
     fn default() -> Self {
         Self {
-            solid_glass: false,
+            solid_glass: true,
             default_light: false,
             environment: None,
             memory_limit_bytes: 8 << 30,

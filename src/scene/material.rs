@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::{NormalMap, Texture, TextureRef, Waves};
+use super::{NormalMap, Texture, TextureRef, Variation, Waves};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::wavelength::D_LINE;
 use crate::optics::{Glass, LinearSrgb, Metal, Nanometres};
@@ -14,8 +14,9 @@ use crate::optics::{Glass, LinearSrgb, Metal, Nanometres};
 /// pure Lambert.
 pub const SPECULAR_ROUGHNESS_LIMIT: f64 = 0.3;
 
-/// Roughness up to which metals and what lets light through send it on in a lobe; above it they are pure Lambert.
-pub const LOBE_ROUGHNESS_LIMIT: f64 = 0.6;
+/// Roughness up to which metals send light on in a lobe; above it they are pure Lambert. What lets light through does so
+/// at any roughness.
+pub const METAL_ROUGHNESS_LIMIT: f64 = 0.6;
 
 /// Up to this roughness a surface is as good as smooth: its lobe is some hundredths of a degree wide.
 pub const SMOOTH_ROUGHNESS: f64 = 0.01;
@@ -42,6 +43,8 @@ pub enum SurfaceKind {
     ThinWall,
     /// Polish over a diffuse body: the map gets (1 − F)Φ and the ray carries FΦ on.
     Mixed,
+    /// Any of the others, or shares of several, from place to place: see [`Mixture`](super::Mixture).
+    Varied,
 }
 
 impl SurfaceKind {
@@ -52,12 +55,17 @@ impl SurfaceKind {
 
     /// Whether no light goes through it.
     pub fn is_opaque(self) -> bool {
-        !matches!(self, Self::Dielectric | Self::ThinWall)
+        !self.is_clear() && self != Self::Varied
+    }
+
+    /// Whether it only shows what is behind it and what it reflects.
+    pub fn is_clear(self) -> bool {
+        matches!(self, Self::Dielectric | Self::ThinWall)
     }
 
     /// Whether it takes light into an illumination map.
     pub fn is_receiver(self) -> bool {
-        matches!(self, Self::Diffuse | Self::Mixed)
+        matches!(self, Self::Diffuse | Self::Mixed | Self::Varied)
     }
 }
 
@@ -74,6 +82,10 @@ pub struct Material {
     pub base_colour_texture: Option<TextureRef>,
     /// Where it is cut out.
     pub alpha_mask: Option<AlphaMask>,
+    /// The share of it that is there, [0, 1], where it is not all: multiplied by the alpha of its base colour's image.
+    pub coverage: Option<f64>,
+    /// How it changes from place to place.
+    pub variation: Option<Variation>,
     /// [0, 1].
     pub metallic: f64,
     /// [0, 1]; GGX α is its square.
@@ -88,8 +100,12 @@ pub struct Material {
     pub metal: Option<&'static Metal>,
     /// Set where the surface bounds a solid body.
     pub volume: Option<Volume>,
+    /// Whether it has one because its mesh encloses space, and not because the file says so.
+    pub is_solid_by_shape: bool,
     /// Emitted radiance [W/(m² sr)], luminous-equivalent: glTF's cd/m² divided by 683 lm/W.
     pub emitted_radiance: LinearSrgb,
+    /// sRGB-encoded image that multiplies `emitted_radiance`.
+    pub emission_texture: Option<TextureRef>,
     /// That light by wavelength, scaled to one luminous-equivalent watt, of which `emitted_radiance` has the colour;
     /// `None` where that is all that is known.
     pub emission_spectrum: Option<Arc<Spectrum>>,
@@ -117,7 +133,9 @@ impl Material {
     /// The image whose texture coordinates all of its images follow.
     pub fn coordinates(&self) -> Option<&TextureRef> {
         let normals = self.bending_map().map(|map| &map.image);
-        self.base_colour_texture.as_ref().or(normals)
+        let variation = self.variation.as_ref().map(|variation| &variation.image);
+        let surface = self.base_colour_texture.as_ref().or(variation);
+        surface.or(self.emission_texture.as_ref()).or(normals)
     }
 
     /// Whether anything bends its normals.
@@ -163,21 +181,50 @@ impl Material {
 
     /// The class that its factors make it: how a file's material is read unless the file says otherwise (unlit).
     pub fn classified(&self) -> SurfaceKind {
-        let has_lobe = self.roughness <= LOBE_ROUGHNESS_LIMIT;
-        let is_polished = self.roughness <= SPECULAR_ROUGHNESS_LIMIT;
-        if self.metallic >= 0.5 {
-            return if has_lobe {
-                SurfaceKind::Mirror
-            } else {
-                SurfaceKind::Diffuse
-            };
+        let surface = match &self.variation {
+            _ if self.coverage.is_some() => SurfaceKind::Varied,
+            Some(variation) => variation.surface,
+            None => Self::class_of(self.metallic, self.roughness, self.transmission),
+        };
+        match (surface.is_clear(), self.volume) {
+            (true, Some(_)) => SurfaceKind::Dielectric,
+            (true, None) => SurfaceKind::ThinWall,
+            (false, _) => surface,
         }
-        match (self.transmission >= 0.5, self.volume) {
-            (true, Some(_)) if has_lobe => SurfaceKind::Dielectric,
-            (true, None) if has_lobe => SurfaceKind::ThinWall,
-            (false, _) if is_polished => SurfaceKind::Mixed,
-            _ => SurfaceKind::Diffuse,
+    }
+
+    /// The class of a surface that is the same everywhere; what is clear is taken for thin.
+    pub fn class_of(metallic: f64, roughness: f64, transmission: f64) -> SurfaceKind {
+        if metallic >= 0.5 && roughness <= METAL_ROUGHNESS_LIMIT {
+            SurfaceKind::Mirror
+        } else if metallic >= 0.5 {
+            SurfaceKind::Diffuse
+        } else if transmission >= 0.5 {
+            SurfaceKind::ThinWall
+        } else if roughness <= SPECULAR_ROUGHNESS_LIMIT {
+            SurfaceKind::Mixed
+        } else {
+            SurfaceKind::Diffuse
         }
+    }
+
+    /// Whether any light goes through it by transmission.
+    pub fn transmits(&self) -> bool {
+        self.surface.is_clear() || (self.surface == SurfaceKind::Varied && self.transmission > 0.0)
+    }
+
+    /// Whether it bounds a body that light goes through.
+    pub fn is_solid(&self) -> bool {
+        match self.surface {
+            SurfaceKind::Dielectric => true,
+            SurfaceKind::Varied => self.transmission > 0.0 && self.volume.is_some(),
+            _ => false,
+        }
+    }
+
+    /// Whether its back is there for the eye.
+    pub fn has_back(&self) -> bool {
+        self.double_sided || self.transmits()
     }
 
     /// Whether no light goes through it anywhere.
@@ -185,9 +232,10 @@ impl Material {
         self.surface.is_opaque() && self.alpha_mask.is_none()
     }
 
-    /// Whether its specular part has a lobe.
+    /// Whether its specular part has a lobe, or may have one somewhere.
     pub fn is_rough(&self) -> bool {
-        self.surface.is_specular() && self.roughness > SMOOTH_ROUGHNESS
+        self.surface == SurfaceKind::Varied
+            || (self.surface.is_specular() && self.roughness > SMOOTH_ROUGHNESS)
     }
 }
 
@@ -200,6 +248,8 @@ impl Default for Material {
             base_colour: LinearSrgb::grey(0.8),
             base_colour_texture: None,
             alpha_mask: None,
+            coverage: None,
+            variation: None,
             metallic: 0.0,
             roughness: 1.0,
             transmission: 0.0,
@@ -207,7 +257,9 @@ impl Default for Material {
             glass: None,
             metal: None,
             volume: None,
+            is_solid_by_shape: false,
             emitted_radiance: LinearSrgb::BLACK,
+            emission_texture: None,
             emission_spectrum: None,
             polish: 1.0,
             waves: None,

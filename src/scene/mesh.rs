@@ -54,6 +54,12 @@ impl Mesh {
         InScene::from(self).bounds()
     }
 
+    /// Area of a triangle [m²].
+    pub fn triangle_area_m2(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
     /// Total area [m²].
     pub fn area_m2(&self) -> f64 {
         InScene::from(self).area_m2()
@@ -91,7 +97,6 @@ impl Mesh {
 #[derive(Clone, Debug)]
 pub struct Placement {
     world_from_object: DAffine3,
-    /// The inverse transpose without its division, so that flattened objects have normals too.
     cofactors: DMat3,
     is_mirrored: bool,
     is_shifted: bool,
@@ -102,11 +107,7 @@ impl Placement {
     pub fn new(world_from_object: DAffine3) -> Self {
         let linear = world_from_object.matrix3;
         Self {
-            cofactors: DMat3::from_cols(
-                linear.y_axis.cross(linear.z_axis),
-                linear.z_axis.cross(linear.x_axis),
-                linear.x_axis.cross(linear.y_axis),
-            ),
+            cofactors: cofactors(linear),
             is_mirrored: linear.determinant() < 0.0,
             is_shifted: linear == DMat3::IDENTITY,
             world_from_object,
@@ -273,13 +274,16 @@ impl<'a> InScene<'a> {
         Some(positions.fold((first, first), |(low, high), p| (low.min(p), high.max(p))))
     }
 
+    /// Area of a triangle [m²].
+    pub fn triangle_area_m2(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
     /// Total area [m²].
     pub fn area_m2(&self) -> f64 {
         (0..self.triangle_count())
-            .map(|triangle| {
-                let [a, b, c] = self.corners(triangle);
-                0.5 * (b - a).cross(c - a).length()
-            })
+            .map(|triangle| self.triangle_area_m2(triangle))
             .sum()
     }
 
@@ -288,4 +292,11 @@ impl<'a> InScene<'a> {
         let uvs = if set == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
         uvs.as_deref()
     }
+}
+
+/// What turns normals as a linear map turns the surface: its inverse transpose without the division, so that flattened
+/// objects have normals too.
+pub fn cofactors(linear: DMat3) -> DMat3 {
+    let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
+    DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
 }

@@ -1,6 +1,7 @@
 //! What is lit: surfaces, materials, lights, cameras. All coordinates are scene coordinates in metres, y up:
 //! world coordinates less [`Scene::origin_world`], which is zero unless the scene lies far from the world's origin.
 
+use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};
 use std::sync::Arc;
 
@@ -20,12 +21,14 @@ pub mod contact;
 pub mod edit;
 pub mod emitter;
 pub mod environment;
+mod glow;
 mod gltf;
 pub mod instances;
 pub mod light;
 pub mod load;
 pub mod material;
 pub mod mesh;
+mod mixture;
 pub mod normal_map;
 pub mod object;
 pub mod texture;
@@ -37,6 +40,7 @@ pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
 pub use edit::{Edit, EditState, LightEdit, MaterialEdit, why_light_stays};
 pub use environment::Environment;
+pub use glow::Glow;
 pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};
 pub use light::{Light, LightKind, LightList, LightSize, PanelShape};
@@ -44,6 +48,7 @@ pub use load::{LoadOptions, load, open_document};
 pub use material::AlphaMask;
 pub use material::{Material, SurfaceKind, Volume};
 pub use mesh::{InScene, Mesh};
+pub use mixture::{Mixture, Variation};
 pub use normal_map::NormalMap;
 pub use object::{Motion, Object};
 pub use texture::{Texture, TextureRef};
@@ -64,6 +69,8 @@ pub struct Scene {
     pub materials: Vec<Material>,
     /// Images that materials refer to; shared between a scene and its edited copies.
     pub textures: Vec<Arc<Texture>>,
+    /// Of objects whose emission has an image.
+    pub glows: BTreeMap<usize, Arc<Glow>>,
     /// Lights with some power.
     pub lights: Vec<Light>,
     /// Which of them were there when the scene was loaded.
@@ -102,13 +109,21 @@ impl Scene {
         (0..self.objects.len()).any(|object| self.material_of(object).is_dispersive())
     }
 
-    /// What an object's surface sends by itself [W/(m² sr)]: that of its light, where it has one, as edited.
+    /// What an object's surface sends by itself, in the mean [W/(m² sr)]: that of its light, where it has one, as edited.
     pub fn emitted_radiance(&self, object: usize) -> LinearSrgb {
         let is_of_it =
             |light: &&Light| matches!(light.kind, LightKind::Surface { object: of, .. } if of == object);
         match self.lights.iter().find(is_of_it) {
             Some(light) => light.strength(),
-            None => self.material_of(object).emitted_radiance,
+            None => {
+                let material = self.material_of(object);
+                let mean = match (self.glows.get(&object), &material.emission_texture) {
+                    (Some(glow), _) => glow.mean,
+                    (None, Some(_)) => LinearSrgb::BLACK,
+                    (None, None) => LinearSrgb::WHITE,
+                };
+                material.emitted_radiance * mean
+            }
         }
     }
 
@@ -172,6 +187,8 @@ impl Scene {
             objects,
             materials,
             textures,
+            // As materials, images and meshes have it.
+            glows: _,
             lights,
             light_list: _,
             environment,

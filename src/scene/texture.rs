@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec2};
 
+use super::{InScene, Scene};
 use crate::optics::LinearSrgb;
 
 /// How a coordinate outside [0, 1] is brought back.
@@ -81,9 +82,33 @@ impl Texture {
 }
 
 impl TextureRef {
+    /// Where it is looked up at a place of a triangle; `None` where the mesh lacks its coordinates.
+    pub fn place(&self, mesh: InScene, triangle: usize, barycentric: [f64; 3]) -> Option<DVec2> {
+        let uvs = mesh.uvs(self.uv_set)?;
+        let corners = mesh.triangle(triangle).into_iter().zip(barycentric);
+        let uv = corners.fold(DVec2::ZERO, |sum, (vertex, weight)| {
+            sum + uvs[vertex as usize] * weight
+        });
+        Some(self.transform(uv))
+    }
+
     /// The texture coordinate after KHR_texture_transform.
     pub fn transform(&self, uv: DVec2) -> DVec2 {
         self.uv_transform.transform_point2(uv)
+    }
+}
+
+impl Scene {
+    /// A texture, and where it is looked up at a place of a triangle of an object; `None` where its mesh lacks the
+    /// coordinates.
+    pub fn placed_texture(
+        &self,
+        reference: &TextureRef,
+        (object, triangle): (usize, usize),
+        barycentric: [f64; 3],
+    ) -> Option<(&Texture, DVec2)> {
+        let uv = reference.place(self.objects[object].in_scene(), triangle, barycentric)?;
+        Some((&self.textures[reference.texture], uv))
     }
 }
 

@@ -9,7 +9,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 /// Most waves of one material.
-pub const MOST_WAVES: usize = 8;
+pub const MAX_WAVES: usize = 8;
 
 /// Largest sum of the waves' slopes A·2π/λ [1]: steeper normals would send much of the light through the surface that
 /// is not bent.
@@ -83,8 +83,8 @@ impl Waves {
     /// What is wrong with them, to go after the name of what has them: none or too many, a number outside its range,
     /// slopes that add up to more than [`STEEPEST_SLOPE`].
     pub fn new(waves: Vec<Wave>) -> Result<Self, String> {
-        if waves.is_empty() || waves.len() > MOST_WAVES {
-            return Err(format!("{} waves are not 1 to {MOST_WAVES}", waves.len()));
+        if waves.is_empty() || waves.len() > MAX_WAVES {
+            return Err(format!("{} waves are not 1 to {MAX_WAVES}", waves.len()));
         }
         if let Some(bad) = waves.iter().position(|wave| !wave.is_valid()) {
             return Err(format!(

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::finish::{Finish, Levels};
+use super::finish::{Levels, MapAssembler};
 use super::spectra::SpectralBand;
 use crate::illumination::{IlluminationMap, Receiver};
 use crate::light_pass::receiver_maps::ReceiverMaps;
@@ -32,7 +32,7 @@ pub struct BandLayer {
     pub irradiance: Vec<f32>,
 }
 
-impl Finish<'_> {
+impl MapAssembler<'_> {
     /// Bands of all maps: map by map, from the shortest wavelength on; none where they are not kept.
     pub(super) fn band_layers(&self, maps: &[IlluminationMap], levels: &Levels) -> Vec<BandLayer> {
         let mut bands: Vec<(usize, &SpectralBand)> = levels

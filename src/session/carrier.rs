@@ -4,12 +4,12 @@
 //! tell what the target would cost by photons, and patches go on while they cost less than that. Costs are counted
 //! operations, so that the choice does not depend on the machine.
 
-use super::caustic::{CausticLayer, Climb, Course};
+use super::caustic::{CausticLayer, Course, LightProgress};
 use super::light_level::{LightLevel, LightState};
 use super::map_size::Sizes;
 use super::photon_level::GROWTH;
 use crate::error::{Error, Result};
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::photon::pass::HALVES;
 use crate::plan::Effect;
 use crate::settings::Estimator;
@@ -25,11 +25,15 @@ const RECEIVER_QUERY: f64 = 0.4;
 const LEVEL_GROWTH: f64 = 4.0;
 
 /// Light whose photons have more segments than this goes more ways than patches should follow.
-const MOST_WAYS: f64 = 4.0;
+const MAX_WAYS: f64 = 4.0;
 
 /// Patches have to promise the target for this part of what photons take: they may promise too much, and what they took is
 /// lost with the change.
 const PROMISE: f64 = 0.5;
+
+/// Relative RMSE of the photons that audit patches which interpolate between wavelengths. On the map of a prism, with some
+/// sixty lit texels, it shows a bias of a tenth.
+const AUDITORS: f64 = 0.15;
 
 /// Work grows with the inverse of the error to a power between these.
 const POWERS: (f64, f64) = (1.0, 2.5);
@@ -48,7 +52,7 @@ pub(super) enum Carrier {
     Splats,
 }
 
-impl Climb {
+impl LightProgress {
     /// Goes on from the first photons.
     pub(super) fn turn_to_photons(&mut self) {
         self.carrier = Carrier::Photons;
@@ -61,12 +65,12 @@ impl Climb {
 
 impl CausticLayer<'_> {
     /// Whether its light comes from many places.
-    pub(super) fn has_places(&self, light: &AimedLight) -> bool {
+    pub(super) fn has_places(&self, light: &VisibleLight) -> bool {
         self.plan.is_on(Effect::AreaLights) && self.tracer.scene().lights[light.light].has_extent()
     }
 
-    /// A rough surface that light meets.
-    pub(super) fn rough_object(&self, light: &AimedLight) -> Option<usize> {
+    /// A rough surface that light meets, or one that changes from place to place.
+    pub(super) fn rough_object(&self, light: &VisibleLight) -> Option<usize> {
         let scene = self.tracer.scene();
         let reached = self.aim.sights[light.light].reached.iter();
         let mut objects = reached.map(|&(object, _)| object);
@@ -75,13 +79,13 @@ impl CausticLayer<'_> {
     }
 
     /// Whether only photons can carry a light.
-    pub(super) fn is_soft(&self, light: &AimedLight) -> bool {
+    pub(super) fn is_soft(&self, light: &VisibleLight) -> bool {
         self.has_places(light) || self.rough_object(light).is_some()
     }
 
     /// # Errors
     /// A light of many places or on rough surfaces, for an estimator that has neither.
-    pub(super) fn refuse_soft_light(&self, lights: &[&AimedLight]) -> Result<()> {
+    pub(super) fn refuse_soft_light(&self, lights: &[&VisibleLight]) -> Result<()> {
         let estimator = self.settings.estimator;
         if matches!(estimator, Estimator::Auto | Estimator::Photon) {
             return Ok(());
@@ -93,7 +97,10 @@ impl CausticLayer<'_> {
                 (String::from("has a size"), Effect::AreaLights)
             } else if let Some(object) = self.rough_object(light) {
                 let name = &scene.objects[object].name;
-                (format!("shines on `{name}`, which is rough"), Effect::Roughness)
+                (
+                    format!("shines on `{name}`, which is rough or changes from place to place"),
+                    Effect::Roughness,
+                )
             } else {
                 continue;
             };
@@ -114,7 +121,7 @@ impl CausticLayer<'_> {
     }
 
     /// What carries a light to begin with.
-    pub(super) fn carrier(&self, light: &AimedLight) -> Carrier {
+    pub(super) fn carrier(&self, light: &VisibleLight) -> Carrier {
         match self.settings.estimator {
             Estimator::Photon => Carrier::Photons,
             Estimator::Auto if self.settings.max_error.is_none() || self.is_soft(light) => Carrier::Photons,
@@ -128,17 +135,17 @@ impl CausticLayer<'_> {
     /// the first patches would; then decides whether another level of patches is worth it. True where it made photons.
     pub(super) fn decide_carrier(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         sizes: &Sizes,
         state: &mut LightState,
-        climb: &mut Climb,
+        climb: &mut LightProgress,
         course: &mut Course,
     ) -> Result<bool> {
         let Some(target) = self.settings.max_error else {
             return Ok(false);
         };
         let is_first = climb.rival.is_none();
-        if is_first || self.are_photons_sooner(light, climb) {
+        if is_first || self.are_photons_sooner(light, climb) || self.lacks_auditors(light, climb) {
             let before = (climb.rival.as_mut(), climb.aim);
             let made = self.more_photons(light, sizes, state, before, course)?;
             let is_made = made.is_some();
@@ -157,16 +164,19 @@ impl CausticLayer<'_> {
             Some((0, share)) => segments * (share / most_share).powi(2).max(1.0),
             _ => f64::INFINITY,
         };
-        let cost = |level: &LightLevel| {
-            let (cells, queries) = level.work;
-            CELL * per_photon.powi(3) * cells as f64 + RECEIVER_QUERY * queries as f64
-        };
-        let so_far: f64 = climb.levels.iter().map(cost).sum();
+        let cost = |level: &LightLevel| cost(level, per_photon);
+        let so_far = cost_of(&climb.levels, per_photon);
         let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
         let promised = promised(climb, cost, most_share).unwrap_or(0.0);
-        let goes_many_ways = climb.levels.is_empty() && per_photon > MOST_WAYS;
+        let goes_many_ways = climb.levels.is_empty() && per_photon > MAX_WAYS;
         let is_late = are_photons_in_time(climb, state, course);
-        if goes_many_ways || is_late || so_far + next > by_photons || promised > PROMISE * by_photons {
+        let is_biased = is_biased(climb) && climb.shares.last().is_some_and(|(_, share)| *share > most_share);
+        if goes_many_ways
+            || is_late
+            || is_biased
+            || so_far + next > by_photons
+            || promised > PROMISE * by_photons
+        {
             climb.turn_to_photons();
         }
         // How many ways its cells have to be divided shows only when they are.
@@ -174,8 +184,26 @@ impl CausticLayer<'_> {
         Ok(false)
     }
 
+    /// Whether patches may have a bias that the first photons are too few to see, and more of them take less than the
+    /// patches did.
+    fn lacks_auditors(&self, light: &VisibleLight, climb: &LightProgress) -> bool {
+        let Some(rival) = climb
+            .rival
+            .as_ref()
+            .filter(|_| self.spectra.is_interpolated(light.light))
+        else {
+            return false;
+        };
+        let is_coarse = rival
+            .error
+            .as_ref()
+            .is_some_and(|error| error.estimate.relative_rmse > AUDITORS);
+        let known = photon_segments(rival).filter(|_| is_coarse);
+        known.is_some_and(|(segments, per_photon)| GROWTH.1 * segments < cost_of(&climb.levels, per_photon))
+    }
+
     /// Whether another level of photons takes less than the first one of patches.
-    fn are_photons_sooner(&self, light: &AimedLight, climb: &Climb) -> bool {
+    fn are_photons_sooner(&self, light: &VisibleLight, climb: &LightProgress) -> bool {
         let known = climb.rival.as_ref().and_then(photon_segments);
         let (Some((segments, per_photon)), true) = (known, climb.levels.is_empty()) else {
             return false;
@@ -194,8 +222,26 @@ impl CausticLayer<'_> {
     }
 }
 
+/// Time of a level of patches over that of a photon's segment, where a photon has so many.
+fn cost(level: &LightLevel, per_photon: f64) -> f64 {
+    let (cells, queries) = level.work;
+    CELL * per_photon.powi(3) * cells as f64 + RECEIVER_QUERY * queries as f64
+}
+
+/// Of all levels.
+fn cost_of(levels: &[LightLevel], per_photon: f64) -> f64 {
+    levels.iter().map(|level| cost(level, per_photon)).sum()
+}
+
+/// Whether audits found more than the last two levels of patches show of themselves: finer ones will not mend that.
+fn is_biased(climb: &LightProgress) -> bool {
+    let mut last = climb.levels.iter().rev().take(2);
+    climb.levels.len() > 1
+        && last.all(|level| level.error.as_ref().is_some_and(|error| error.estimate.is_raised))
+}
+
 /// Whether there is no time left for another level of patches, but for photons that are better than the last one.
-fn are_photons_in_time(climb: &Climb, state: &LightState, course: &Course) -> bool {
+fn are_photons_in_time(climb: &LightProgress, state: &LightState, course: &Course) -> bool {
     let (Some(left_s), Some(photon_s)) = (course.limited.time_left_s(), state.photon_s) else {
         return false;
     };
@@ -213,7 +259,7 @@ fn are_photons_in_time(climb: &Climb, state: &LightState, course: &Course) -> bo
 }
 
 /// What patches are expected to take for a share of the whole error, by their last two levels whose own share is known.
-fn promised(climb: &Climb, cost: impl Fn(&LightLevel) -> f64, most_share: f64) -> Option<f64> {
+fn promised(climb: &LightProgress, cost: impl Fn(&LightLevel) -> f64, most_share: f64) -> Option<f64> {
     let cost_of = |levels: usize| -> f64 { climb.levels.iter().take(levels).map(&cost).sum() };
     let has_error = |levels: usize| {
         let last = levels.checked_sub(1).and_then(|last| climb.levels.get(last));

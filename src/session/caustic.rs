@@ -11,15 +11,15 @@ use super::goals::{Errors, Goal};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates};
 use super::map_size::Sizes;
 use super::metric::{Backdrop, Counting};
-use super::shards::{Labour, PassSums};
-use super::sizes::MapSizes;
+use super::shards::{PassSums, ShardRole};
+use super::sizes::ChartCache;
 use super::spectra::Spectra;
 use crate::error::{Error, Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::accuracy::{self, Before, Images, LightError};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
-use crate::light_pass::caustic::setup::{Aim, AimedLight};
+use crate::light_pass::caustic::setup::{Aim, VisibleLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::share::Share;
@@ -40,10 +40,10 @@ const GOAL: f64 = 0.85;
 const ROUND_GAIN: f64 = 0.4;
 
 /// Rounds of refinement at most: cells are then a 2¹⁶th of the first ones.
-const MOST_ROUNDS: usize = 8;
+const MAX_ROUNDS: usize = 8;
 
 /// Patches with more of their light where a part of the spectrum is held in one place look finer than they are.
-const MOST_IN_ONE_PLACE: f64 = 0.3;
+const MAX_IN_ONE_PLACE: f64 = 0.3;
 
 /// Part of the time that there is when light between surfaces is still to be gathered.
 const PART_BEFORE_INDIRECT: f64 = 0.85;
@@ -53,7 +53,7 @@ pub(super) struct CausticLayer<'a> {
     pub(super) tracer: &'a Tracer,
     pub(super) aim: &'a Aim,
     pub(super) settings: &'a BakeSettings,
-    pub(super) sizes: &'a MapSizes,
+    pub(super) sizes: &'a ChartCache,
     /// Of lights whose wavelengths go different ways.
     pub(super) spectra: &'a Spectra,
     pub(super) plan: &'a EffectPlan,
@@ -94,7 +94,7 @@ pub(super) enum Stopped {
 
 /// The levels of one light in the bake under way.
 #[derive(Debug, Default)]
-pub(super) struct Climb {
+pub(super) struct LightProgress {
     /// What they are made of.
     pub(super) carrier: Carrier,
     /// The last level of the other carrier, shown until this one is better: photons, which tell what more of them would cost,
@@ -118,7 +118,7 @@ pub(super) struct Climb {
     pub(super) is_underrated: bool,
 }
 
-impl Climb {
+impl LightProgress {
     /// The picture: the last level, or the rival while that is better.
     pub(super) fn shown(&self) -> Option<&LightLevel> {
         if self.is_rival_better() {
@@ -173,7 +173,7 @@ pub(super) trait Onlooker {
 impl Onlooker for () {}
 
 /// The pictures of all lights so far.
-pub(super) fn shown<'a>(lights: &[&AimedLight], climbs: &'a [Climb]) -> Vec<Shown<'a>> {
+pub(super) fn shown<'a>(lights: &[&VisibleLight], climbs: &'a [LightProgress]) -> Vec<Shown<'a>> {
     let pictures = lights.iter().zip(climbs);
     pictures
         .filter_map(|(light, climb)| Some((light.light, climb.shown()?)))
@@ -186,7 +186,7 @@ pub(super) struct Course<'a> {
     pub(super) clock: &'a mut Clock,
     pub(super) outcome: &'a mut CausticOutcome,
     /// Who traces and deposits.
-    pub(super) labour: &'a mut Labour,
+    pub(super) role: &'a mut ShardRole,
     /// Mean footprints, where they are wanted.
     pub(super) statistics: Option<FootprintStatistics>,
     /// Receivers that the patches of the next level may ask for before it is given up.
@@ -209,12 +209,12 @@ impl Course<'_> {
         nothing: PassSums,
         run: impl FnOnce(&Self, Option<Share>, PassSums) -> PassSums,
     ) -> Result<PassSums> {
-        if let Labour::Merge(merging) = self.labour {
+        if let ShardRole::Merge(merging) = self.role {
             return merging.pass(chart_for, nothing);
         }
-        let share = self.labour.share();
+        let share = self.role.share();
         let sums = run(self, share, nothing);
-        self.labour.note(&sums)?;
+        self.role.note(&sums)?;
         Ok(sums)
     }
 }
@@ -227,10 +227,10 @@ impl CausticLayer<'_> {
     pub(super) fn bake(
         &self,
         states: &mut LightStates,
-        (clock, labour): (&mut Clock, &mut Labour),
+        (clock, role): (&mut Clock, &mut ShardRole),
         onlooker: &mut dyn Onlooker,
     ) -> Result<CausticOutcome> {
-        if labour.is_cut() && !self.fits_anyway() {
+        if role.is_cut() && !self.fits_anyway() {
             return Err(Error::failure(
                 "--memory",
                 format!(
@@ -242,7 +242,7 @@ impl CausticLayer<'_> {
             ));
         }
         let mut outcome = CausticOutcome::default();
-        let lights: Vec<&AimedLight> = self.lit().collect();
+        let lights: Vec<&VisibleLight> = self.lit().collect();
         self.refuse_soft_light(&lights)?;
         let whole = self.control.without_deadline();
         let part = if self.plan.is_on(Effect::Indirect) {
@@ -256,7 +256,7 @@ impl CausticLayer<'_> {
             control: &limited,
             clock,
             outcome: &mut outcome,
-            labour,
+            role,
             statistics: None,
             most_queries: u64::MAX,
             limited: &limited,
@@ -273,9 +273,9 @@ impl CausticLayer<'_> {
         course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());
         let mut climbs = Vec::with_capacity(lights.len());
         for light in &lights {
-            climbs.push(Climb {
+            climbs.push(LightProgress {
                 carrier: self.carrier(light),
-                ..Climb::default()
+                ..LightProgress::default()
             });
         }
         course.control = &whole;
@@ -292,10 +292,10 @@ impl CausticLayer<'_> {
             let mut errors = self.errors(&lights, &climbs, &counting);
             let underrated = self.underrated(&errors, &climbs);
             for &index in &underrated {
-                climbs[index] = Climb {
+                climbs[index] = LightProgress {
                     is_underrated: true,
                     carrier: climbs[index].carrier,
-                    ..Climb::default()
+                    ..LightProgress::default()
                 };
                 let state = states.of_mut(lights[index].light);
                 self.climb(lights[index], &sizes, state, &mut climbs[index], &mut course)?;
@@ -336,8 +336,8 @@ impl CausticLayer<'_> {
     fn note_cost(
         &self,
         states: &LightStates,
-        lights: &[&AimedLight],
-        climbs: &[Climb],
+        lights: &[&VisibleLight],
+        climbs: &[LightProgress],
         errors: &Errors,
         course: &mut Course,
     ) {
@@ -387,7 +387,7 @@ impl CausticLayer<'_> {
     }
 
     /// Says that a map was given up.
-    fn stray(&self, light: &AimedLight, receiver: Receiver) -> Warning {
+    fn stray(&self, light: &VisibleLight, receiver: Receiver) -> Warning {
         let scene = self.tracer.scene();
         Warning::new(
             &scene.objects[receiver.object()].name,
@@ -405,7 +405,7 @@ impl CausticLayer<'_> {
     }
 
     /// Why there is no finer level.
-    fn stopped(&self, climbs: &[Climb], errors: &Errors, limited: &Control) -> Option<Stopped> {
+    fn stopped(&self, climbs: &[LightProgress], errors: &Errors, limited: &Control) -> Option<Stopped> {
         if self.control.is_cancelled() {
             return Some(Stopped::Cancelled);
         }
@@ -417,7 +417,7 @@ impl CausticLayer<'_> {
     }
 
     /// Lights that see something specular and shine at all.
-    pub(super) fn lit(&self) -> impl Iterator<Item = &AimedLight> {
+    pub(super) fn lit(&self) -> impl Iterator<Item = &VisibleLight> {
         let scene = self.tracer.scene();
         let lights = self.aim.lights.iter();
         lights.filter(|light| scene.lights[light.light].strength().max_channel() > 0.0)
@@ -426,10 +426,10 @@ impl CausticLayer<'_> {
     /// One level more of a light.
     fn climb(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         sizes: &Sizes,
         state: &mut LightState,
-        climb: &mut Climb,
+        climb: &mut LightProgress,
         course: &mut Course,
     ) -> Result<()> {
         if climb.carrier == Carrier::Undecided {
@@ -458,7 +458,7 @@ impl CausticLayer<'_> {
             }
             return Ok(());
         };
-        if climb.carrier == Carrier::Undecided && level.in_one_place > MOST_IN_ONE_PLACE {
+        if climb.carrier == Carrier::Undecided && level.in_one_place > MAX_IN_ONE_PLACE {
             climb.turn_to_photons();
             climb.rival = None;
             return Ok(());
@@ -493,7 +493,13 @@ impl CausticLayer<'_> {
     }
 
     /// Which lights go on, and what each of them aims at.
-    fn decide(&self, lights: &[&AimedLight], climbs: &mut [Climb], errors: &Errors, counting: &Counting) {
+    fn decide(
+        &self,
+        lights: &[&VisibleLight],
+        climbs: &mut [LightProgress],
+        errors: &Errors,
+        counting: &Counting,
+    ) {
         let goals = self.goals(lights, climbs, errors);
         for ((light, climb), goal) in lights.iter().zip(climbs).zip(goals) {
             if climb.done {
@@ -511,7 +517,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    fn has_next_level(&self, light: &AimedLight, climb: &Climb) -> bool {
+    fn has_next_level(&self, light: &VisibleLight, climb: &LightProgress) -> bool {
         if climb.carrier == Carrier::Photons {
             self.next_photons(light, climb.levels.last(), climb.aim).is_some()
         } else {
@@ -521,7 +527,7 @@ impl CausticLayer<'_> {
 
     fn make(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         key: LevelKey,
         unit: FluxUnit,
         state: &mut LightState,
@@ -536,13 +542,13 @@ impl CausticLayer<'_> {
     /// The error of a level, from the levels before it; `None` where nothing is known yet, and of a shard's part.
     fn error_of(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         level: &LightLevel,
         state: &mut LightState,
-        climb: &Climb,
+        climb: &LightProgress,
         course: &mut Course,
     ) -> Result<Option<LightError>> {
-        let is_shard = course.labour.is_shard();
+        let is_shard = course.role.is_shard();
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
         Ok(match self.settings.estimator {
             estimator if estimator.refines() && is_shard => None,
@@ -580,7 +586,7 @@ impl CausticLayer<'_> {
     }
 
     /// Decides on another round of refinement towards a relative RMSE; false where there is nothing more to do.
-    fn refine(&self, climb: &mut Climb, target: f64, counting: &Counting) -> bool {
+    fn refine(&self, climb: &mut LightProgress, target: f64, counting: &Counting) -> bool {
         let Some(error) = climb.error() else {
             return false;
         };
@@ -589,7 +595,7 @@ impl CausticLayer<'_> {
         }
         // No round can do much more, and a bake that has its time shows what came of it.
         let goal = (GOAL * target).max(ROUND_GAIN * error.relative_rmse);
-        if self.settings.estimator == Estimator::Splat || climb.rounds.len() >= MOST_ROUNDS {
+        if self.settings.estimator == Estimator::Splat || climb.rounds.len() >= MAX_ROUNDS {
             return false;
         }
         let Some(level) = climb.levels.last() else {

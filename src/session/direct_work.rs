@@ -3,7 +3,7 @@
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
 use super::direct_cache::{DirectCache, DirectCharts};
-use super::sizes::MapSizes;
+use super::sizes::ChartCache;
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
 use crate::progress::{Control, Progress};
 use crate::settings::BakeSettings;
@@ -21,7 +21,7 @@ impl DirectWork {
     pub(super) fn look_for_borders(
         &mut self,
         tracer: &Tracer,
-        sizes: &MapSizes,
+        sizes: &ChartCache,
         settings: &BakeSettings,
         control: &Control,
     ) {

@@ -12,8 +12,8 @@ use super::direct_cache::{DirectCache, DirectChart, DirectCharts};
 use super::forecast::ForecastReport;
 use super::light_level::LightLevel;
 use super::map_plan::MEMORY;
-use super::map_size::{self, Wish};
-use super::sizes::{MapMemory, MapSizes};
+use super::map_size::{self, SizeRequest};
+use super::sizes::{ChartCache, MapMemory};
 use super::{BakeResult, LightLayer, StopReason, Timings, map_plan};
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
@@ -38,9 +38,9 @@ pub(super) type Shown<'a> = (usize, &'a LightLevel);
 
 /// All that finishing needs.
 #[derive(Clone, Copy)]
-pub(super) struct Finish<'a> {
+pub(super) struct MapAssembler<'a> {
     pub(super) scene: &'a Scene,
-    pub(super) sizes: &'a MapSizes,
+    pub(super) sizes: &'a ChartCache,
     pub(super) settings: &'a BakeSettings,
     pub(super) plan: &'a EffectPlan,
     /// Halvings of maps of direct light below the size that is asked for.
@@ -56,7 +56,7 @@ pub(super) type Charts = BTreeMap<Receiver, Arc<Chart>>;
 /// Light on one map.
 type Lit<'a> = (&'a Light, &'a LightLevel, &'a ReceiverMap);
 
-impl Finish<'_> {
+impl MapAssembler<'_> {
     /// Puts everything together, but for layers that were baked only for others to gather from.
     pub(super) fn result(
         &self,
@@ -185,9 +185,9 @@ impl Finish<'_> {
     }
 
     /// A map of direct and indirect light only.
-    fn direct_wish(&self, receiver: Receiver) -> Option<Wish> {
+    fn direct_wish(&self, receiver: Receiver) -> Option<SizeRequest> {
         if self.coarsening > 0 {
-            return self.direct_size(receiver.object()).map(Wish::dense);
+            return self.direct_size(receiver.object()).map(SizeRequest::dense);
         }
         self.sizes.direct_wish(receiver, self.settings)
     }

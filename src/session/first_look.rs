@@ -5,12 +5,12 @@
 
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
-use super::finish::{Finish, Levels};
+use super::finish::{Levels, MapAssembler};
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
 use super::result::LightLayer;
 use crate::illumination::IlluminationMap;
-use crate::light_pass::indirect::{LEAST_PASSES, Network};
+use crate::light_pass::indirect::{MIN_PASSES, Network};
 use crate::plan::{Effect, wants_caustics};
 use crate::progress::{Control, Progress};
 use crate::transport::Tracer;
@@ -31,12 +31,12 @@ impl FirstLook {
     /// All maps: caustics of the levels, with both layers where they are asked for.
     pub(super) fn maps(
         &mut self,
-        finish: &Finish,
+        finish: &MapAssembler,
         tracer: &Tracer,
         levels: &Levels,
         on_whom: (&dyn Progress, &Control),
     ) -> (Vec<IlluminationMap>, Vec<LightLayer>) {
-        let finish = &Finish {
+        let finish = &MapAssembler {
             coarsening: HALVINGS,
             ..*finish
         };
@@ -60,13 +60,13 @@ impl FirstLook {
     /// What surfaces send each other, traced where it was not yet.
     pub(super) fn traced(
         &mut self,
-        finish: &Finish,
+        finish: &MapAssembler,
         tracer: &Tracer,
         on_whom: (&dyn Progress, &Control),
     ) -> &IndirectCache {
         let indirect = &mut self.indirect;
         indirect.prepare(tracer, finish.sizes, finish.settings, ELEMENTS);
-        let passes = vec![LEAST_PASSES; indirect.network().map_or(0, Network::element_count)];
+        let passes = vec![MIN_PASSES; indirect.network().map_or(0, Network::element_count)];
         if indirect.passes != passes && indirect.trace(tracer, &passes, on_whom) {
             indirect.passes = passes;
         }

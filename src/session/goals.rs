@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 
 use super::carrier::Carrier;
-use super::caustic::{CausticLayer, Climb};
+use super::caustic::{CausticLayer, LightProgress};
 use super::metric::Counting;
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::ledger_sum::Account;
 
 /// A light whose error is below this share of what it might be need not even go through all lattices; one whose whole
@@ -52,7 +52,7 @@ impl Errors {
     }
 
     /// Whether the error of every light is known.
-    pub(super) fn are_of_all(&self, lights: &[&AimedLight]) -> bool {
+    pub(super) fn are_of_all(&self, lights: &[&VisibleLight]) -> bool {
         !lights.is_empty() && self.lights.len() == lights.len()
     }
 
@@ -81,12 +81,12 @@ impl Errors {
 impl CausticLayer<'_> {
     /// Whether all the flux that a light can add to the maps is less than the error that is aimed at: then one coarse
     /// lattice is enough, whatever it misses, unless it shines all on one spot.
-    pub(super) fn is_dim(&self, light: &AimedLight) -> bool {
+    pub(super) fn is_dim(&self, light: &VisibleLight) -> bool {
         let Some(target) = self.settings.max_error else {
             return false;
         };
         let scene = self.tracer.scene();
-        let sends_w = |light: &AimedLight| {
+        let sends_w = |light: &VisibleLight| {
             let strength = scene.lights[light.light].strength().luminance();
             strength * light.launch.power_bound_w() * light.visible().marked_share(&light.launch)
         };
@@ -99,7 +99,7 @@ impl CausticLayer<'_> {
     }
 
     /// Lights that were taken to be dim and, bright on some spot, are worth knowing better.
-    pub(super) fn underrated(&self, errors: &Errors, climbs: &[Climb]) -> Vec<usize> {
+    pub(super) fn underrated(&self, errors: &Errors, climbs: &[LightProgress]) -> Vec<usize> {
         let Some(target) = self.settings.max_error else {
             return Vec::new();
         };
@@ -119,17 +119,22 @@ impl CausticLayer<'_> {
     }
 
     /// What a light deposits [W], as far as that is known.
-    fn flux_w(&self, light: &AimedLight, climb: &Climb) -> Option<f64> {
+    fn flux_w(&self, light: &VisibleLight, climb: &LightProgress) -> Option<f64> {
         let level = climb.shown()?;
         let strength = level.strength(&self.tracer.scene().lights[light.light]);
         Some(level.ledger.watts(Account::Deposited, level.unit, strength))
     }
 
     /// Errors of the lights that have one.
-    pub(super) fn errors(&self, lights: &[&AimedLight], climbs: &[Climb], counting: &Counting) -> Errors {
+    pub(super) fn errors(
+        &self,
+        lights: &[&VisibleLight],
+        climbs: &[LightProgress],
+        counting: &Counting,
+    ) -> Errors {
         match counting {
             Counting::Visible(counts) => {
-                let of = |(index, (light, climb)): (usize, (&&AimedLight, &Climb))| {
+                let of = |(index, (light, climb)): (usize, (&&VisibleLight, &LightProgress))| {
                     let level = climb.shown()?;
                     let error = &level.error.as_ref()?.estimate;
                     let strength = level.strength(&self.tracer.scene().lights[light.light]);
@@ -149,9 +154,9 @@ impl CausticLayer<'_> {
     }
 
     /// By area and flux: the relative RMSE over all maps.
-    fn errors_by_rmse(&self, lights: &[&AimedLight], climbs: &[Climb]) -> Errors {
+    fn errors_by_rmse(&self, lights: &[&VisibleLight], climbs: &[LightProgress]) -> Errors {
         let (mut areas_m2, mut all_w) = (BTreeMap::new(), 0.0);
-        let of = |(index, (light, climb)): (usize, (&&AimedLight, &Climb))| {
+        let of = |(index, (light, climb)): (usize, (&&VisibleLight, &LightProgress))| {
             let level = climb.shown()?;
             let flux_w = self.flux_w(light, climb)?;
             // Light whose error is not known yet counts as well.
@@ -184,8 +189,13 @@ impl CausticLayer<'_> {
     }
 
     /// What each light aims at next; sets what it aims at in the end.
-    pub(super) fn goals(&self, lights: &[&AimedLight], climbs: &mut [Climb], errors: &Errors) -> Vec<Goal> {
-        let has_ladder = |light: &AimedLight, climb: &Climb| {
+    pub(super) fn goals(
+        &self,
+        lights: &[&VisibleLight],
+        climbs: &mut [LightProgress],
+        errors: &Errors,
+    ) -> Vec<Goal> {
+        let has_ladder = |light: &VisibleLight, climb: &LightProgress| {
             climb.carrier != Carrier::Photons && climb.levels.len() < self.lattices(light).len()
         };
         let Some(target) = self.settings.max_error else {
@@ -194,7 +204,7 @@ impl CausticLayer<'_> {
         let all_known = errors.are_of_all(lights);
         let level = errors.level(target);
         // Without an error there is nothing to aim at once all lattices are through.
-        let without_error = |(light, climb): (&&AimedLight, &Climb)| {
+        let without_error = |(light, climb): (&&VisibleLight, &LightProgress)| {
             if has_ladder(light, climb) || climb.carrier == Carrier::Photons {
                 Goal::NextLevel
             } else {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::sizes::MapSizes;
+use super::sizes::ChartCache;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::indirect::Network;
 use crate::progress::{Control, Progress};
@@ -43,7 +43,7 @@ impl IndirectCache {
     pub(super) fn prepare(
         &mut self,
         tracer: &Tracer,
-        sizes: &MapSizes,
+        sizes: &ChartCache,
         settings: &BakeSettings,
         most_texels: u64,
     ) {

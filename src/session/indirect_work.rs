@@ -4,12 +4,12 @@ use super::caustic::CausticOutcome;
 use super::clock::Clock;
 use super::indirect_cache::{IndirectCache, link_bytes, most_texels};
 use super::result::LightLayer;
-use super::sizes::MapSizes;
+use super::sizes::ChartCache;
 use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Layer, Receiver};
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
 use crate::light_pass::indirect::{
-    Grid, LEAST_PASSES, MOST_BOUNCES, Network, Resampling, Solution, TraceCounts,
+    Grid, MAX_BOUNCES, MIN_PASSES, Network, Resampling, Solution, TraceCounts,
 };
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress};
@@ -45,7 +45,7 @@ pub(super) struct IndirectWork {
 /// What the gathering needs of a bake.
 pub(super) struct Gathering<'a> {
     pub(super) tracer: &'a Tracer,
-    pub(super) sizes: &'a MapSizes,
+    pub(super) sizes: &'a ChartCache,
     pub(super) settings: &'a BakeSettings,
     pub(super) progress: &'a dyn Progress,
     /// What the user asks.
@@ -71,7 +71,7 @@ impl IndirectWork {
         let target = gathering.settings.max_error.unwrap_or(USUAL_TARGET);
         (self.target, self.solution) = (target, None);
         let elements = cache.network().map_or(0, Network::element_count);
-        let mut passes = vec![LEAST_PASSES; elements];
+        let mut passes = vec![MIN_PASSES; elements];
         loop {
             let watch = Stopwatch::start();
             let is_there = self.step(gathering, cache, maps, &passes);
@@ -233,7 +233,7 @@ impl IndirectWork {
             warnings.push(Warning::new(
                 "indirect layer",
                 format!(
-                    "after {MOST_BOUNCES} bounces light is still to come: surfaces give back nearly all of it"
+                    "after {MAX_BOUNCES} bounces light is still to come: surfaces give back nearly all of it"
                 ),
                 "use albedos below 1",
             ));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::caustic::{CausticLayer, Climb, Course, ESTIMATED_LEVELS};
+use super::caustic::{CausticLayer, Course, ESTIMATED_LEVELS, LightProgress};
 use super::light_level::{LevelKey, LightStates, TraceKey};
 use super::map_size::Sizes;
 use super::splat_level::LEVEL_STRIDES;
@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::lattice::Lattice;
 use crate::light_pass::caustic::path::PathLimits;
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::wavefront::refine::Round;
 use crate::settings::{BakeSettings, Estimator, Footprint, Kernel, MapResolution, Sigma};
@@ -28,26 +28,26 @@ const CELLS_FOR_AN_ERROR: f64 = 30.0;
 const STARTING_TARGET: f64 = 0.005;
 
 /// Cells to begin with, at least.
-const LEAST_CELLS: f64 = 500.0;
+const MIN_CELLS: f64 = 500.0;
 
 /// A small caster makes the lattice so many times denser at most.
-const MOST_DENSER: f64 = 64.0;
+const MAX_DENSER: f64 = 64.0;
 
 /// Density at which cells are counted: high enough that no side is rounded by much [rays/sr].
 const UNIT_DENSITY_PER_SR: f64 = 1e5;
 
 /// Least side of the lattice that mean footprints are taken from [cells].
-const LEAST_STATISTICS_SIDE: usize = 32;
+const MIN_STATISTICS_SIDE: usize = 32;
 
 /// How much coarser than the last one a coarse lattice is deposited at most.
-const MOST_COARSE: f64 = 16.0;
+const MAX_COARSE: f64 = 16.0;
 
 /// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
 const USUAL_ERROR: f64 = 0.012;
 
 impl CausticLayer<'_> {
     /// Cells across and down each face, from the coarsest lattice to that of the settings. Splats have strides instead.
-    pub(super) fn lattices(&self, light: &AimedLight) -> Vec<(usize, usize)> {
+    pub(super) fn lattices(&self, light: &VisibleLight) -> Vec<(usize, usize)> {
         let finest = self.lattice_size(light);
         if self.settings.estimator == Estimator::Splat {
             return vec![finest; LEVEL_STRIDES.len()];
@@ -63,7 +63,7 @@ impl CausticLayer<'_> {
         lattices
     }
 
-    fn lattice_size(&self, light: &AimedLight) -> (usize, usize) {
+    fn lattice_size(&self, light: &VisibleLight) -> (usize, usize) {
         light
             .launch
             .lattice_size(self.density_per_sr(light), light.reach_m)
@@ -71,22 +71,28 @@ impl CausticLayer<'_> {
 
     /// Density of a light's lattice [rays/sr]: as it is set or, with a target, so much that a small caster has its share
     /// of cells.
-    fn density_per_sr(&self, light: &AimedLight) -> f64 {
+    fn density_per_sr(&self, light: &VisibleLight) -> f64 {
         let set = self.settings.density_per_sr;
         let Some(target) = self.settings.max_error else {
             return set;
         };
-        let wanted = (CELLS_FOR_AN_ERROR / target.max(STARTING_TARGET)).max(LEAST_CELLS);
+        let wanted = (CELLS_FOR_AN_ERROR / target.max(STARTING_TARGET)).max(MIN_CELLS);
         // A lattice of 1 ray/sr has as many cells on casters as this; suns scale it by their reach.
         let (columns, rows) = light.launch.lattice_size(UNIT_DENSITY_PER_SR, light.reach_m);
         let whole = (columns * rows * light.launch.face_count()) as f64;
         let share = light.visible().marked_share(&light.launch);
         set.max(UNIT_DENSITY_PER_SR * wanted / (whole * share))
-            .min(set * MOST_DENSER)
+            .min(set * MAX_DENSER)
     }
 
     /// All that a level depends on.
-    pub(super) fn key(&self, light: &AimedLight, step: usize, climb: &Climb, sizes: &Sizes) -> LevelKey {
+    pub(super) fn key(
+        &self,
+        light: &VisibleLight,
+        step: usize,
+        climb: &LightProgress,
+        sizes: &Sizes,
+    ) -> LevelKey {
         let lattices = self.lattices(light);
         let size = lattices[step.min(lattices.len() - 1)];
         // Coarse lattices are deposited as coarsely, so that their difference shows both kinds of error.
@@ -99,7 +105,7 @@ impl CausticLayer<'_> {
             photons: None,
             sizes: sizes.clone(),
             coarseness: coarseness(self.settings.max_error, climb.goal)
-                * (before_last as f64).exp2().min(MOST_COARSE),
+                * (before_last as f64).exp2().min(MAX_COARSE),
             kernels: self.kernels(),
             stride: match self.settings.estimator {
                 estimator if estimator.refines() => 1,
@@ -111,7 +117,7 @@ impl CausticLayer<'_> {
     /// For a lattice of a size, so many lattices before the usual finest.
     pub(super) fn trace_key(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         size: (usize, usize),
         coarser: i32,
         rounds: &[Round],
@@ -164,7 +170,7 @@ impl CausticLayer<'_> {
     }
 
     /// The unit of a light's sums: by its own launch, so that other lights do not change a bit.
-    pub(super) fn unit(&self, light: &AimedLight) -> Result<FluxUnit> {
+    pub(super) fn unit(&self, light: &VisibleLight) -> Result<FluxUnit> {
         self.unit_for(light, light.launch.power_bound_w(), 1.0)
     }
 
@@ -172,7 +178,7 @@ impl CausticLayer<'_> {
     ///
     /// # Errors
     /// A power that is no number, or none at all.
-    pub(super) fn unit_for(&self, light: &AimedLight, power_w: f64, sums: f64) -> Result<FluxUnit> {
+    pub(super) fn unit_for(&self, light: &VisibleLight, power_w: f64, sums: f64) -> Result<FluxUnit> {
         let source = &self.tracer.scene().lights[light.light];
         let real_w = power_w * source.strength().max_channel();
         if power_w.is_finite() && power_w > 0.0 && real_w.is_finite() {
@@ -187,7 +193,7 @@ impl CausticLayer<'_> {
     }
 
     /// The lattice of rays, as splats have it.
-    pub(super) fn lattice<'a>(&'a self, light: &'a AimedLight, unit: FluxUnit) -> Lattice<'a> {
+    pub(super) fn lattice<'a>(&'a self, light: &'a VisibleLight, unit: FluxUnit) -> Lattice<'a> {
         Lattice {
             tracer: self.tracer,
             band: None,
@@ -228,7 +234,7 @@ impl CausticLayer<'_> {
     pub(super) fn sizes_of_maps(
         &self,
         states: &mut LightStates,
-        lights: &[&AimedLight],
+        lights: &[&VisibleLight],
         course: &mut Course,
     ) -> Result<Sizes> {
         if self.wants_statistics() {
@@ -266,10 +272,10 @@ impl CausticLayer<'_> {
     }
 
     /// The lattice that mean footprints are taken from: one of the light's lattices.
-    pub(super) fn statistics_size(&self, light: &AimedLight) -> (usize, usize) {
+    pub(super) fn statistics_size(&self, light: &VisibleLight) -> (usize, usize) {
         let lattices = self.lattices(light);
         let coarse = lattices.len().saturating_sub(ESTIMATED_LEVELS);
-        let fine_enough = |size: &&(usize, usize)| size.0.max(size.1) >= LEAST_STATISTICS_SIDE;
+        let fine_enough = |size: &&(usize, usize)| size.0.max(size.1) >= MIN_STATISTICS_SIDE;
         let last = lattices[lattices.len() - 1];
         lattices[coarse..]
             .iter()

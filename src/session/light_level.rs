@@ -9,15 +9,15 @@ use super::spectra::SpectralKey;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::{LightError, Noise};
-use crate::light_pass::caustic::kept::KeptLight;
+use crate::light_pass::caustic::kept::ArrivalCache;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger::CarriedFlux;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::ReceiverMaps;
-use crate::light_pass::wavefront::cell::Splits;
-use crate::light_pass::wavefront::kept_rays::KeptRays;
-use crate::light_pass::wavefront::overreach::Overreach;
+use crate::light_pass::wavefront::cell::SubdivisionLimits;
+use crate::light_pass::wavefront::kept_rays::RayCache;
+use crate::light_pass::wavefront::overreach::PatchOvershoot;
 use crate::light_pass::wavefront::pass::TracedLight;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
@@ -37,7 +37,7 @@ pub(super) struct TraceKey {
     /// How many lattices this one comes before the usual finest, where surfaces have bumps: what cells may miss of them.
     pub(super) coarser: i32,
     /// How often cells are split.
-    pub(super) splits: Splits,
+    pub(super) splits: SubdivisionLimits,
     /// Where cells are divided further, round by round.
     pub(super) rounds: Vec<Round>,
     /// What chose its wavelengths, where it is traced by wavelength.
@@ -88,7 +88,7 @@ pub(super) struct LightLevel {
     /// Maps that were given up: next to no light was on them.
     pub(super) strays: Vec<Receiver>,
     /// Patches that reach farther than their rays.
-    pub(super) overreaches: Vec<Overreach>,
+    pub(super) overreaches: Vec<PatchOvershoot>,
     /// Of splats: the squared difference of half sets, by receiver.
     pub(super) noise: Option<Noise>,
     /// By the levels before it; `None` where there are none, or no light arrived.
@@ -185,13 +185,13 @@ pub(super) struct LightState {
     /// What chose their wavelengths.
     spectrum: Option<SpectralKey>,
     /// What its rays met.
-    pub(super) rays: KeptRays,
+    pub(super) rays: RayCache,
     /// Levels of the last bake, the coarsest first.
     pub(super) levels: Vec<LightLevel>,
     /// Wall-clock seconds of a photon, of those that were followed last.
     pub(super) photon_s: Option<f64>,
     /// What splats were made of.
-    pub(super) arrivals: Option<(TraceKey, KeptLight)>,
+    pub(super) arrivals: Option<(TraceKey, ArrivalCache)>,
 }
 
 impl LightLevel {
@@ -277,7 +277,7 @@ impl LightState {
         let went_alike = self.has_bumps == has_bumps && self.spectrum.as_ref() == spectrum;
         (self.has_bumps, self.spectrum) = (has_bumps, spectrum.cloned());
         if self.rays.bytes() > kept_bytes || !went_alike {
-            self.rays = KeptRays::default();
+            self.rays = RayCache::default();
         }
         self.arrivals
             .take_if(|(_, arrivals)| arrivals.bytes() > kept_bytes);

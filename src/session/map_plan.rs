@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::caustic::CausticLayer;
-use super::map_size::{self, MapSize, Sizes, Wish};
+use super::map_size::{self, MapSize, SizeRequest, Sizes};
 use super::sizes::{self, LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE, MapMemory};
 use crate::error::Warning;
 use crate::illumination::tiles::COARSEST;
@@ -46,7 +46,7 @@ impl CausticLayer<'_> {
         }
         let wish = |receiver: Receiver| {
             let wish = match (self.settings.map_resolution, statistics) {
-                (MapResolution::Fixed { width, height }, None) => Some(Wish::dense((width, height))),
+                (MapResolution::Fixed { width, height }, None) => Some(SizeRequest::dense((width, height))),
                 (MapResolution::Fixed { width, height }, Some(seen)) => {
                     self.fixed_wish(receiver, (width, height), seen)
                 }
@@ -55,7 +55,7 @@ impl CausticLayer<'_> {
             };
             wish.map(|wish| (receiver, wish))
         };
-        let wishes: BTreeMap<Receiver, Wish> = receivers.filter_map(wish).collect();
+        let wishes: BTreeMap<Receiver, SizeRequest> = receivers.filter_map(wish).collect();
         let (limit, memory) = self.map_memory();
         let wished = map_size::wished(&wishes);
         let mut sizes = map_size::fit(&wishes, (limit, memory));
@@ -82,20 +82,20 @@ impl CausticLayer<'_> {
         receiver: Receiver,
         size: (usize, usize),
         seen: &FootprintStatistics,
-    ) -> Option<Wish> {
+    ) -> Option<SizeRequest> {
         let share = seen.mean(receiver)?.map_share;
         let texels = size.0 as f64 * size.1 as f64;
-        Some(Wish {
+        Some(SizeRequest {
             fineness: 0.5 * (texels * share).log2(),
             tiles: self
                 .may_be_tiled(receiver.object(), size)
                 .then(|| map_size::needs(size, seen.spots(receiver))),
-            ..Wish::dense(size)
+            ..SizeRequest::dense(size)
         })
     }
 
     /// As fine as its light asks for; in tiles where that takes less.
-    fn automatic_wish(&self, receiver: Receiver, seen: &FootprintStatistics) -> Option<Wish> {
+    fn automatic_wish(&self, receiver: Receiver, seen: &FootprintStatistics) -> Option<SizeRequest> {
         let object = receiver.object();
         let mut times = self.sizes.doublings(receiver, seen, LARGEST_TILED_SIDE)?;
         let is_direct = self.plan.is_on(Effect::Direct);
@@ -118,19 +118,19 @@ impl CausticLayer<'_> {
                 if let Some(borders) = &borders {
                     borders.refine(size, coarsest.saturating_sub(finer as u8), &mut tiles);
                 }
-                let wish = Wish {
+                let wish = SizeRequest {
                     is_even: false,
                     tiles: Some(tiles),
                     coarsest,
-                    ..Wish::dense(size)
+                    ..SizeRequest::dense(size)
                 };
-                let texels = wish.granted(map_size::Sparing::Nothing).texels();
+                let texels = wish.granted(map_size::MemoryReduction::Nothing).texels();
                 if is_small || texels <= (LARGEST_AUTOMATIC_SIDE * LARGEST_AUTOMATIC_SIDE) as u64 {
                     return Some(wish);
                 }
             }
             if is_small {
-                return Some(Wish::dense(size));
+                return Some(SizeRequest::dense(size));
             }
         }
         None

@@ -51,7 +51,7 @@ pub(super) fn halved((width, height): (usize, usize), times: u32) -> (usize, usi
 }
 
 /// Maps with fewer tiles than this are not worth them.
-const LEAST_TILES: usize = 32;
+const MIN_TILES: usize = 32;
 
 /// Tiles are worth their trouble where they take less than this share of a dense map.
 const WORTH: f64 = 0.75;
@@ -61,7 +61,7 @@ const FINER_PART: f64 = 0.25;
 
 /// What a tile asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct TileNeed {
+pub(super) struct TileDemand {
     /// Levels by which texels of the finest size are finer than its footprints.
     fineness: f64,
     /// Mean irradiance of the map over that of the tile, as levels: where light is half as bright, twice as much of it may
@@ -69,10 +69,10 @@ pub(super) struct TileNeed {
     dimness: f64,
 }
 
-impl TileNeed {
+impl TileDemand {
     /// Where no light was seen.
     pub(super) const NOTHING: Self = Self {
-        fineness: MOST_LEVELS,
+        fineness: MAX_LEVELS,
         dimness: 0.0,
     };
 
@@ -88,7 +88,7 @@ impl TileNeed {
 
     /// The level at which nothing is missed.
     fn wished(&self) -> f64 {
-        self.fineness + self.dimness.clamp(0.0, MOST_DIM)
+        self.fineness + self.dimness.clamp(0.0, MAX_DIM)
     }
 
     /// The level at which as much is missed everywhere, but for a number of levels.
@@ -98,7 +98,7 @@ impl TileNeed {
 }
 
 /// Dim light has texels that are larger than its footprints by so many levels at most.
-const MOST_DIM: f64 = 1.0;
+const MAX_DIM: f64 = 1.0;
 
 /// Where light ends within little on a map, or beside a place of it.
 #[derive(Clone, Debug)]
@@ -111,7 +111,7 @@ pub(super) struct Borders {
 
 impl Borders {
     /// Tiles of a map that a border runs through ask for a level at least.
-    pub(super) fn refine(&self, map: (usize, usize), level: u8, needs: &mut [TileNeed]) {
+    pub(super) fn refine(&self, map: (usize, usize), level: u8, needs: &mut [TileDemand]) {
         let (columns, rows) = tiles::tile_counts(map.0, map.1);
         // Of the tiles that a place and its neighbours lie in.
         let reach = |place: usize, places: usize, texels: usize, tiles: usize| {
@@ -131,13 +131,13 @@ impl Borders {
 
 /// What one map wants.
 #[derive(Clone, Debug)]
-pub(super) struct Wish {
+pub(super) struct SizeRequest {
     /// Texels across and down that are asked for, or that the finest light asks for.
     pub(super) size: (usize, usize),
     /// Whether each texel is to be as fine, if memory allows.
     pub(super) is_even: bool,
     /// What each tile asks for, row by row; `None` where the map cannot be in tiles.
-    pub(super) tiles: Option<Vec<TileNeed>>,
+    pub(super) tiles: Option<Vec<TileDemand>>,
     /// Levels by which texels of the size are finer than the footprints of the whole map.
     pub(super) fineness: f64,
     /// No tile's texels are to be larger than at this level, if memory allows.
@@ -146,14 +146,14 @@ pub(super) struct Wish {
 
 /// By how many levels texels may be larger than footprints: more takes less memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Sparing {
+pub(super) enum MemoryReduction {
     /// As is wished for.
     Nothing,
     /// So many levels.
     Levels(f64),
 }
 
-impl Wish {
+impl SizeRequest {
     /// A map of one level.
     pub(super) fn dense(size: (usize, usize)) -> Self {
         Self {
@@ -166,19 +166,19 @@ impl Wish {
     }
 
     /// The size that it gets.
-    pub(super) fn granted(&self, sparing: Sparing) -> MapSize {
+    pub(super) fn granted(&self, sparing: MemoryReduction) -> MapSize {
         match (sparing, &self.tiles) {
-            (Sparing::Nothing, Some(tiles)) if !self.is_even => self.in_tiles(tiles, None),
-            (Sparing::Nothing, _) => MapSize::dense(self.size),
-            (Sparing::Levels(levels), Some(tiles)) => {
-                let finest = tiles.iter().map(TileNeed::spared).fold(f64::INFINITY, f64::min);
+            (MemoryReduction::Nothing, Some(tiles)) if !self.is_even => self.in_tiles(tiles, None),
+            (MemoryReduction::Nothing, _) => MapSize::dense(self.size),
+            (MemoryReduction::Levels(levels), Some(tiles)) => {
+                let finest = tiles.iter().map(TileDemand::spared).fold(f64::INFINITY, f64::min);
                 if finest + levels < f64::from(COARSEST) {
                     self.in_tiles(tiles, Some(levels))
                 } else {
                     self.in_one(finest + levels)
                 }
             }
-            (Sparing::Levels(levels), None) => self.in_one(self.fineness + levels),
+            (MemoryReduction::Levels(levels), None) => self.in_one(self.fineness + levels),
         }
     }
 
@@ -193,10 +193,10 @@ impl Wish {
     }
 
     /// As it is wished for, or with so many levels spared.
-    fn in_tiles(&self, tiles: &[TileNeed], sparing: Option<f64>) -> MapSize {
+    fn in_tiles(&self, tiles: &[TileDemand], sparing: Option<f64>) -> MapSize {
         let (columns, _) = tiles::tile_counts(self.size.0, self.size.1);
-        let balanced = |level: &dyn Fn(&TileNeed) -> f64, coarsest: u8| {
-            let level = |tile: &TileNeed| level(tile).clamp(0.0, f64::from(coarsest)) as u8;
+        let balanced = |level: &dyn Fn(&TileDemand) -> f64, coarsest: u8| {
+            let level = |tile: &TileDemand| level(tile).clamp(0.0, f64::from(coarsest)) as u8;
             let mut levels: Vec<u8> = tiles.iter().map(level).collect();
             tiles::balance(&mut levels, columns);
             levels
@@ -204,7 +204,7 @@ impl Wish {
         let wanted = if self.is_even {
             vec![0; tiles.len()]
         } else {
-            balanced(&TileNeed::wished, self.coarsest)
+            balanced(&TileDemand::wished, self.coarsest)
         };
         let mut levels = wanted.clone();
         if let Some(spared) = sparing {
@@ -232,21 +232,21 @@ impl Wish {
 /// Whether a map of a size may be in tiles.
 pub(super) fn is_divisible((width, height): (usize, usize)) -> bool {
     let (columns, rows) = tiles::tile_counts(width, height);
-    columns * rows >= LEAST_TILES
+    columns * rows >= MIN_TILES
 }
 
 /// Steps in which texels grow where memory is short [levels].
 const SPARING_STEP: f64 = 0.125;
 
 /// Most that texels of whole maps are finer, or coarser, than their light.
-const MOST_LEVELS: f64 = 20.0;
+const MAX_LEVELS: f64 = 20.0;
 
 /// Sizes of all maps as they are wished for.
-pub(super) fn wished(wishes: &BTreeMap<Receiver, Wish>) -> Sizes {
-    granted(wishes, Sparing::Nothing)
+pub(super) fn wished(wishes: &BTreeMap<Receiver, SizeRequest>) -> Sizes {
+    granted(wishes, MemoryReduction::Nothing)
 }
 
-fn granted(wishes: &BTreeMap<Receiver, Wish>, sparing: Sparing) -> Sizes {
+fn granted(wishes: &BTreeMap<Receiver, SizeRequest>, sparing: MemoryReduction) -> Sizes {
     wishes
         .iter()
         .map(|(&receiver, wish)| (receiver, wish.granted(sparing)))
@@ -254,15 +254,15 @@ fn granted(wishes: &BTreeMap<Receiver, Wish>, sparing: Sparing) -> Sizes {
 }
 
 /// Sizes of all maps in so much memory [bytes]: as they are wished for, or as little coarser as can be.
-pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, (limit, memory): (u64, MapMemory)) -> Sizes {
+pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u64, MapMemory)) -> Sizes {
     let fits = |sizes: &Sizes| memory.bytes(sizes.values().map(MapSize::texels)) <= limit;
     let wished = wished(wishes);
     if fits(&wished) {
         return wished;
     }
     // Tiles with far more texels than light needs come first; then every other.
-    let steps = (2.0 * MOST_LEVELS / SPARING_STEP) as i32;
-    let sparing = |step: i32| Sparing::Levels(f64::from(step) * SPARING_STEP - MOST_LEVELS);
+    let steps = (2.0 * MAX_LEVELS / SPARING_STEP) as i32;
+    let sparing = |step: i32| MemoryReduction::Levels(f64::from(step) * SPARING_STEP - MAX_LEVELS);
     let (mut low, mut high) = (0, steps);
     while low < high {
         let middle = low + (high - low) / 2;
@@ -276,15 +276,15 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, Wish>, (limit, memory): (u64, MapM
 }
 
 /// Cells across and down that light is sorted into, at most.
-const MOST_CELLS: usize = 64;
+const MAX_CELLS: usize = 64;
 
 /// Powers of two that shares of a map are told apart by: from the whole map on.
 const BINS: usize = 36;
 
 /// What each tile of a map asks for, row by row.
-pub(super) fn needs<'a>(size: (usize, usize), spots: impl Iterator<Item = &'a Spot>) -> Vec<TileNeed> {
+pub(super) fn needs<'a>(size: (usize, usize), spots: impl Iterator<Item = &'a Spot>) -> Vec<TileDemand> {
     let (columns, rows) = tiles::tile_counts(size.0, size.1);
-    let (across, down) = (columns.min(MOST_CELLS), rows.min(MOST_CELLS));
+    let (across, down) = (columns.min(MAX_CELLS), rows.min(MAX_CELLS));
     let mut cells = vec![[0.0_f64; BINS]; across * down];
     for spot in spots {
         let bin = (-spot.map_share.log2()).clamp(0.0, (BINS - 1) as f64) as usize;
@@ -299,13 +299,13 @@ pub(super) fn needs<'a>(size: (usize, usize), spots: impl Iterator<Item = &'a Sp
     let texels = ((size.0 * size.1) as f64).log2();
     let mean = cells.iter().flatten().sum::<f64>() / cells.len() as f64;
     let of_cell = |bins: &[f64; BINS]| {
-        finer_bin(bins).map_or(TileNeed::NOTHING, |bin| TileNeed {
+        finer_bin(bins).map_or(TileDemand::NOTHING, |bin| TileDemand {
             // Half the logarithm of the footprint's texels.
             fineness: 0.5 * (texels - (bin as f64 + 0.5)),
             dimness: (mean / bins.iter().sum::<f64>()).log2(),
         })
     };
-    let cells: Vec<TileNeed> = cells.iter().map(of_cell).collect();
+    let cells: Vec<TileDemand> = cells.iter().map(of_cell).collect();
     (0..columns * rows)
         .map(|tile| {
             let (column, row) = (tile % columns, tile / columns);

@@ -3,20 +3,20 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::caustic::{CausticLayer, Climb, Onlooker, shown};
+use super::caustic::{CausticLayer, LightProgress, Onlooker, shown};
 use super::light_level::LightLevel;
 use crate::illumination::visible::{self, Blocks, Lit};
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::accuracy::{self, Image, LightError};
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::optics::LinearSrgb;
 use crate::settings::ErrorMetric;
 
 /// Light of other layers, by receiver.
-pub(super) type Backdrop = BTreeMap<Receiver, Beside>;
+pub(super) type Backdrop = BTreeMap<Receiver, ComparisonView>;
 
 /// Light of other layers on one map: luminance of E of each texel [W/m²].
-pub(super) struct Beside {
+pub(super) struct ComparisonView {
     pub(super) chart: Arc<Chart>,
     pub(super) direct: Vec<f64>,
     pub(super) indirect: Vec<f64>,
@@ -37,8 +37,8 @@ impl CausticLayer<'_> {
     /// How errors count, by the pictures of all lights so far, beside light of other layers.
     pub(super) fn counting(
         &self,
-        lights: &[&AimedLight],
-        climbs: &[Climb],
+        lights: &[&VisibleLight],
+        climbs: &[LightProgress],
         onlooker: &mut dyn Onlooker,
     ) -> Counting {
         if self.settings.error_metric == ErrorMetric::Rmse || self.settings.max_error.is_none() {
@@ -48,7 +48,12 @@ impl CausticLayer<'_> {
         Counting::Visible(self.visible_counts(lights, climbs, &backdrop))
     }
 
-    fn visible_counts(&self, lights: &[&AimedLight], climbs: &[Climb], backdrop: &Backdrop) -> Counts {
+    fn visible_counts(
+        &self,
+        lights: &[&VisibleLight],
+        climbs: &[LightProgress],
+        backdrop: &Backdrop,
+    ) -> Counts {
         let mut charts: BTreeMap<Receiver, Arc<Chart>> = BTreeMap::new();
         let mut traced: BTreeMap<Receiver, Vec<f64>> = BTreeMap::new();
         for (light, climb) in lights.iter().zip(climbs) {

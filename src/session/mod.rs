@@ -45,7 +45,7 @@ pub use survey::{PresetForecast, Survey};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::pass::Stopwatch;
-use crate::light_pass::caustic::setup::{Aim, Aiming};
+use crate::light_pass::caustic::setup::{Aim, CullMode};
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
@@ -55,15 +55,15 @@ use caustic::{CausticLayer, CausticOutcome, Onlooker, Stopped};
 use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
-use finish::{Finish, Shown};
+use finish::{MapAssembler, Shown};
 use first_look::FirstLook;
 use indirect_cache::IndirectCache;
 use indirect_work::{Gathering, IndirectWork};
 use light_level::LightStates;
 use scene_change::SceneChange;
-use shards::Labour;
+use shards::ShardRole;
 use showing::{Showing, TakeLevel};
-use sizes::MapSizes;
+use sizes::ChartCache;
 use spectra::Spectra;
 
 /// Owns a scene with all that is derived from it, and bakes it as often as scene or settings change. What a change does
@@ -73,7 +73,7 @@ pub struct BakeSession {
     scene: Arc<Scene>,
     tracer: Option<Arc<Tracer>>,
     aim: Option<(AimKey, Arc<Aim>)>,
-    sizes: MapSizes,
+    sizes: ChartCache,
     lights: LightStates,
     direct: DirectCache,
     indirect: IndirectCache,
@@ -82,12 +82,12 @@ pub struct BakeSession {
 
 /// What an [`Aim`] depends on beside the scene: how directions are divided, how thoroughly what cannot matter is left out,
 /// and whether lights have sizes.
-type AimKey = (ItemBufferKind, Aiming, bool);
+type AimKey = (ItemBufferKind, CullMode, bool);
 
 fn aim_key(settings: &BakeSettings) -> AimKey {
     let aiming = match settings.effects.get(Effect::LightPass) {
-        EffectSwitch::On => Aiming::Everything,
-        EffectSwitch::Auto | EffectSwitch::Off => Aiming::Reachable,
+        EffectSwitch::On => CullMode::Everything,
+        EffectSwitch::Auto | EffectSwitch::Off => CullMode::Reachable,
     };
     let sizes = settings.effects.get(Effect::AreaLights) != EffectSwitch::Off;
     (settings.item_buffer, aiming, sizes)
@@ -117,7 +117,7 @@ impl BakeSession {
                 "simplify its meshes",
             ));
         }
-        let sizes = MapSizes::new(scene.clone());
+        let sizes = ChartCache::new(scene.clone());
         Ok(Self {
             scene,
             tracer: None,
@@ -159,7 +159,7 @@ impl BakeSession {
             .tracer
             .take()
             .map(|tracer| Arc::new(tracer.edited(scene.clone())));
-        let sizes = std::mem::replace(&mut self.sizes, MapSizes::new(scene.clone()));
+        let sizes = std::mem::replace(&mut self.sizes, ChartCache::new(scene.clone()));
         self.sizes = sizes.edited(scene.clone(), &change.shapes);
         if change.moves_paths() || change.shares {
             self.direct.clear();
@@ -270,7 +270,7 @@ impl BakeSession {
         settings.validate()?;
         self.threads
             .of(settings)?
-            .install(|| self.bake_here(settings, progress, control, level, &mut Labour::Alone))
+            .install(|| self.bake_here(settings, progress, control, level, &mut ShardRole::Alone))
     }
 
     fn aim(&mut self, settings: &BakeSettings) -> Arc<Aim> {
@@ -326,7 +326,7 @@ impl BakeSession {
         let level = level.as_mut().filter(|_| is_new)?;
         progress.advance(Stage::Build, 0, 1);
         let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
-        let finish = Finish {
+        let finish = MapAssembler {
             scene: &self.scene,
             sizes: &self.sizes,
             settings,
@@ -350,7 +350,7 @@ impl BakeSession {
         progress: &dyn Progress,
         control: &Control,
         level: Option<&mut TakeLevel>,
-        labour: &mut Labour,
+        role: &mut ShardRole,
     ) -> Result<BakeResult> {
         let (whole, began) = (Stopwatch::start(), Instant::now());
         let mut clock = Clock::default();
@@ -365,7 +365,7 @@ impl BakeSession {
             ..
         } = &ground;
         let item_buffer_tests = *item_buffer_tests;
-        let finish = Finish {
+        let finish = MapAssembler {
             scene: &self.scene,
             sizes: &self.sizes,
             settings,
@@ -394,7 +394,7 @@ impl BakeSession {
             first_look,
             glance: None,
         };
-        let mut outcome = ground.bake(&self.sizes, lights, &mut clock, labour, &mut showing)?;
+        let mut outcome = ground.bake(&self.sizes, lights, &mut clock, role, &mut showing)?;
         let Showing {
             mut lamps,
             direct,
@@ -508,10 +508,10 @@ impl Ground<'_> {
     /// The caustic layer, where there is one.
     fn bake(
         &self,
-        sizes: &MapSizes,
+        sizes: &ChartCache,
         lights: &mut LightStates,
         clock: &mut Clock,
-        labour: &mut Labour,
+        role: &mut ShardRole,
         onlooker: &mut dyn Onlooker,
     ) -> Result<CausticOutcome> {
         if !self.plan.is_on(Effect::LightPass) {
@@ -530,12 +530,12 @@ impl Ground<'_> {
             control: self.control,
             began: self.began,
         };
-        layer.bake(lights, (clock, labour), onlooker)
+        layer.bake(lights, (clock, role), onlooker)
     }
 }
 
 /// Writes down what a bake took so far.
-fn account(result: &mut BakeResult, finish: &Finish, aim: &Aim, clock: &Clock) {
+fn account(result: &mut BakeResult, finish: &MapAssembler, aim: &Aim, clock: &Clock) {
     (result.timings_s, result.cpu_s) = clock.timings();
     result.item_buffers = item_buffers(finish.scene, aim);
 }

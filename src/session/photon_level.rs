@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::time::Instant;
 
-use super::caustic::{CausticLayer, Climb, Course};
+use super::caustic::{CausticLayer, Course, LightProgress};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums, drop_coarse};
 use super::map_size::Sizes;
 use super::shards::PassSums;
@@ -11,9 +11,9 @@ use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images, LightError};
-use crate::light_pass::caustic::pass::Listener;
-use crate::light_pass::caustic::setup::AimedLight;
-use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::caustic::pass::ProgressScope;
+use crate::light_pass::caustic::setup::VisibleLight;
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::photon::filter;
 use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::{HALVES, PhotonPass};
@@ -41,7 +41,7 @@ const POWER_WITH_BUNDLES: f64 = 0.8;
 const MARGIN: f64 = 1.1;
 
 /// Noise that is this part of the error aimed at is little enough, whatever else the error holds.
-const LEAST_NOISE: f64 = 0.7;
+const MIN_NOISE: f64 = 0.7;
 
 /// The mean flux of all photons may be so many times that of the first ones.
 const MEAN_MARGIN: f64 = 4.0;
@@ -53,7 +53,7 @@ const PART_OF_TIME: f64 = 0.85;
 const PART_OF_TIME_WITH_BUNDLES: f64 = 0.5;
 
 /// Fewer photons than so many times those before are not worth a level.
-const LEAST_GROWTH: f64 = 1.2;
+const MIN_GROWTH: f64 = 1.2;
 
 /// Photons of a level after one with fewer, or as many as there is part of the time for: a level that is cut off leaves
 /// nothing.
@@ -63,7 +63,7 @@ fn in_time(photons: u32, before: u32, part: f64, state: &LightState, course: &Co
     };
     let own_s = part * left_s / course.open_lights as f64;
     let affordable = f64::from(before) + own_s / photon_s;
-    let least = LEAST_GROWTH * f64::from(before);
+    let least = MIN_GROWTH * f64::from(before);
     (affordable.max(least) as u32).min(photons)
 }
 
@@ -72,7 +72,7 @@ impl CausticLayer<'_> {
     /// more.
     pub(super) fn next_photons(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         last: Option<&LightLevel>,
         aim: Option<f64>,
     ) -> Option<u32> {
@@ -98,7 +98,7 @@ impl CausticLayer<'_> {
             Some((error, given_up)) => {
                 // More photons do not bring back what was given up.
                 let noise2 = error * error - given_up * given_up;
-                let wanted2 = (goal * goal - given_up * given_up).max((LEAST_NOISE * goal).powi(2));
+                let wanted2 = (goal * goal - given_up * given_up).max((MIN_NOISE * goal).powi(2));
                 if noise2 <= wanted2 {
                     return None;
                 }
@@ -117,7 +117,7 @@ impl CausticLayer<'_> {
     }
 
     /// Photons of each half at the density of the settings.
-    fn photons_at_density(&self, light: &AimedLight) -> u32 {
+    fn photons_at_density(&self, light: &VisibleLight) -> u32 {
         let launch_measure = self.with_launch(light, |launch| launch.measure());
         let per_measure = if light.launch.is_fitted() {
             self.settings.density_per_sr / (light.reach_m * light.reach_m)
@@ -130,13 +130,13 @@ impl CausticLayer<'_> {
     }
 
     /// Whether its light may stay together.
-    fn has_bundles(&self, light: &AimedLight) -> bool {
+    fn has_bundles(&self, light: &VisibleLight) -> bool {
         let spectrum = self.spectra.photons(light.light);
         let is_smooth = spectrum.is_none_or(|spectrum| spectrum.tracers().is_some());
         is_smooth && self.rough_object(light).is_none()
     }
 
-    fn with_launch<T>(&self, light: &AimedLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
+    fn with_launch<T>(&self, light: &VisibleLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
         let source = self.tracer.scene().lights[light.light].of_unit_strength();
         if self.has_places(light) {
             let spheres = light.spheres(self.tracer, &source);
@@ -157,10 +157,10 @@ impl CausticLayer<'_> {
     /// A light whose power is no number.
     pub(super) fn climb_photons(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         sizes: &Sizes,
         state: &mut LightState,
-        climb: &mut Climb,
+        climb: &mut LightProgress,
         course: &mut Course,
     ) -> Result<()> {
         let last = climb.levels.last_mut();
@@ -183,7 +183,7 @@ impl CausticLayer<'_> {
     /// A light whose power is no number.
     pub(super) fn more_photons(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         sizes: &Sizes,
         state: &mut LightState,
         (last, aim): (Option<&mut LightLevel>, Option<f64>),
@@ -201,7 +201,7 @@ impl CausticLayer<'_> {
         let photons = in_time(photons, before, part, state, course);
         let key = LevelKey {
             photons: Some(photons),
-            ..self.key(light, 0, &Climb::default(), sizes)
+            ..self.key(light, 0, &LightProgress::default(), sizes)
         };
         match state.take(&key) {
             Some(level) => Ok(Some(level)),
@@ -218,7 +218,7 @@ impl CausticLayer<'_> {
     /// Follows the photons that are missing; `None` where it was stopped.
     fn make_photons(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         key: LevelKey,
         before: Option<&mut LightLevel>,
         course: &mut Course,
@@ -240,7 +240,7 @@ impl CausticLayer<'_> {
                 unit,
                 seed: self.settings.seed,
             };
-            let listener = Listener {
+            let listener = ProgressScope {
                 progress: self.progress,
                 control: course.control,
                 done: course.outcome.counts.rays,
@@ -274,7 +274,7 @@ impl CausticLayer<'_> {
             segments += so_far;
         }
         let unit = unit.per(u64::from(photons) * HALVES as u64);
-        let is_shard = course.labour.is_shard();
+        let is_shard = course.role.is_shard();
         let level = course.clock.time(
             |clock| &mut clock.deposit,
             || self.photon_level(light, (key, unit), raw, is_shard),
@@ -287,7 +287,7 @@ impl CausticLayer<'_> {
 
     fn photon_level(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         (key, unit): (LevelKey, FluxUnit),
         raw: PhotonSums,
         is_shard: bool,
@@ -307,12 +307,14 @@ impl CausticLayer<'_> {
         let is_signed = self.spectra.has(light.light);
         let mut maps = first.clone().into_owned();
         maps.add(&second);
+        let mut left = [0; 3];
         if self.settings.filters() {
-            noise.extend(filter::filter(&mut maps, [&first, &second], unit, is_signed));
+            let of_filter = filter::filter(&mut maps, [&first, &second], (unit, is_signed), &mut left);
+            noise.extend(of_filter);
         }
-        if !is_signed {
-            filter::without_negative(&mut maps);
-        }
+        filter::without_negative(&mut maps, is_signed, &mut left);
+        ledger.book_sum(Account::Sampling, left);
+        ledger.book_sum(Account::Deposited, left.map(|count| -count));
         drop((first, second));
         let mut bands = raw.halves[0].bands().to_vec();
         for (band, more) in bands.iter_mut().zip(raw.halves[1].bands()) {
@@ -333,7 +335,7 @@ impl CausticLayer<'_> {
     }
 
     /// Maps of both halves, before they are divided by their photons.
-    fn half_maps<'a>(&self, light: &AimedLight, raw: &'a PhotonSums) -> [Cow<'a, ReceiverMaps>; HALVES] {
+    fn half_maps<'a>(&self, light: &VisibleLight, raw: &'a PhotonSums) -> [Cow<'a, ReceiverMaps>; HALVES] {
         [0, 1].map(|half| {
             let mut maps = raw.halves[half].sum();
             if self.spectra.has(light.light) {
@@ -348,7 +350,7 @@ impl CausticLayer<'_> {
     /// alike at every level, no difference between levels shows.
     pub(super) fn audit(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         patches: &Images,
         photons: &LightLevel,
         estimate: &mut LightError,
@@ -366,7 +368,7 @@ impl CausticLayer<'_> {
     }
 
     /// The unit of a single photon, for the sums of as many as there may be.
-    fn photon_unit(&self, light: &AimedLight) -> Result<FluxUnit> {
+    fn photon_unit(&self, light: &VisibleLight) -> Result<FluxUnit> {
         let mean_w = self.with_launch(light, |launch| launch.mean_flux_w(self.settings.seed));
         // Where no photon starts, any unit will do.
         let power_w = (mean_w * MEAN_MARGIN).max(f64::MIN_POSITIVE);

@@ -64,6 +64,7 @@ impl SceneChange {
 
 /// Whether light leaves both materials in the same directions.
 fn leave_alike(a: &Material, b: &Material) -> bool {
+    let has_alpha = a.alpha_mask.is_some() || a.coverage.is_some();
     a.surface == b.surface
         && a.ior == b.ior
         && a.glass == b.glass
@@ -72,7 +73,10 @@ fn leave_alike(a: &Material, b: &Material) -> bool {
         && a.bending_map() == b.bending_map()
         && a.double_sided == b.double_sided
         && a.alpha_mask == b.alpha_mask
-        && (a.alpha_mask.is_none() || a.base_colour_texture == b.base_colour_texture)
+        && a.coverage == b.coverage
+        && a.variation == b.variation
+        && a.emission_texture == b.emission_texture
+        && (!has_alpha || a.base_colour_texture == b.base_colour_texture)
 }
 
 /// Whether both materials take and send on the same shares of light.

@@ -6,11 +6,11 @@ use super::caustic::{CausticOutcome, Onlooker};
 use super::clock::Clock;
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
-use super::finish::{Finish, Shown};
+use super::finish::{MapAssembler, Shown};
 use super::first_look::FirstLook;
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
-use super::metric::{Backdrop, Beside};
+use super::metric::{Backdrop, ComparisonView};
 use super::{BakeResult, LightLayer, account};
 use crate::error::Result;
 use crate::illumination::IlluminationMap;
@@ -27,7 +27,7 @@ pub(super) type TakeLevel<'a> = dyn FnMut(BakeResult) + Send + 'a;
 
 /// Shows a bake to whoever takes its levels.
 pub(super) struct Showing<'a, 'level> {
-    pub(super) finish: &'a Finish<'a>,
+    pub(super) finish: &'a MapAssembler<'a>,
     pub(super) tracer: &'a Tracer,
     pub(super) aim: &'a Aim,
     pub(super) progress: &'a dyn Progress,
@@ -143,7 +143,7 @@ impl Onlooker for Showing<'_, '_> {
                 let layer = map.layer(kind);
                 layer.map_or_else(Vec::new, |layer| layer.irradiance.iter().map(luminance).collect())
             };
-            let beside = Beside {
+            let beside = ComparisonView {
                 direct: of(LayerKind::Direct),
                 indirect: of(LayerKind::Indirect),
                 chart: Arc::clone(&map.chart),

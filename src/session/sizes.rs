@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
 
-use super::map_size::{self, Borders, MapSize, TileNeed, Wish};
+use super::map_size::{self, Borders, MapSize, SizeRequest, TileDemand};
 use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, Parametrisation, parametrise};
 use crate::illumination::tiles::tile_counts;
 use crate::illumination::{Chart, Receiver, Side, UvSet};
@@ -76,7 +76,7 @@ impl MapMemory {
 
 /// Parametrisations of a scene's surfaces, made on first use.
 #[derive(Debug)]
-pub struct MapSizes {
+pub struct ChartCache {
     scene: Arc<Scene>,
     parametrisations: Vec<OnceLock<Option<Arc<Parametrisation>>>>,
     /// Generated ones for maps of other sides than usual, by object and side.
@@ -103,12 +103,12 @@ type KeptChart = (Arc<Chart>, u64);
 const CHARTS_PER_RECEIVER: usize = 4;
 
 /// Charts that are kept however few receivers there are.
-const LEAST_CHARTS: usize = 256;
+const MIN_CHARTS: usize = 256;
 
 /// Charts in tiles that are kept.
-const MOST_TILED_CHARTS: usize = 64;
+const MAX_TILED_CHARTS: usize = 64;
 
-impl MapSizes {
+impl ChartCache {
     /// Nothing made yet.
     pub fn new(scene: Arc<Scene>) -> Self {
         let parametrisations = scene.objects.iter().map(|_| OnceLock::new()).collect();
@@ -227,7 +227,7 @@ impl MapSizes {
             .chart(width, height);
         let chart = Arc::new(chart.of_side(receiver.side()));
         let mut charts = charts();
-        if charts.len() >= LEAST_CHARTS.max(CHARTS_PER_RECEIVER * 2 * self.scene.objects.len()) {
+        if charts.len() >= MIN_CHARTS.max(CHARTS_PER_RECEIVER * 2 * self.scene.objects.len()) {
             let oldest = charts.iter().min_by_key(|(_, (_, last))| *last);
             if let Some(oldest) = oldest.map(|(key, _)| *key) {
                 charts.remove(&oldest);
@@ -253,7 +253,7 @@ impl MapSizes {
         }
         let chart = self.parametrisation(receiver.object())?.tiled_chart(layout)?;
         let chart = Arc::new(chart.of_side(receiver.side()));
-        if tiled.len() >= MOST_TILED_CHARTS {
+        if tiled.len() >= MAX_TILED_CHARTS {
             tiled.remove(0);
         }
         tiled.push(Arc::clone(&chart));
@@ -318,21 +318,21 @@ impl MapSizes {
 
     /// A map of direct and indirect light only: texels of a 400th of the scene's diagonal, or what is asked; in tiles where
     /// light ends within little.
-    pub fn direct_wish(&self, receiver: Receiver, settings: &BakeSettings) -> Option<Wish> {
+    pub fn direct_wish(&self, receiver: Receiver, settings: &BakeSettings) -> Option<SizeRequest> {
         let size = self.direct_size(receiver.object(), settings)?;
         let doublings = self.border_doublings(receiver, settings);
         let Some(borders) = self.borders(receiver).filter(|_| doublings > 0) else {
-            return Some(Wish::dense(size));
+            return Some(SizeRequest::dense(size));
         };
         let finest = (size.0 << doublings, size.1 << doublings);
         let (columns, rows) = tile_counts(finest.0, finest.1);
-        let mut tiles = vec![TileNeed::NOTHING; columns * rows];
+        let mut tiles = vec![TileDemand::NOTHING; columns * rows];
         borders.refine(finest, 0, &mut tiles);
-        Some(Wish {
+        Some(SizeRequest {
             is_even: false,
             tiles: Some(tiles),
             coarsest: doublings as u8,
-            ..Wish::dense(finest)
+            ..SizeRequest::dense(finest)
         })
     }
 
@@ -434,7 +434,7 @@ impl MapSizes {
         };
         let halved = |times: u32| -> Vec<(Receiver, (usize, usize))> {
             let side = |side: usize, most: usize| {
-                let least = (LEAST_GRID_SIDE >> (times - 1)).max(1);
+                let least = (MIN_GRID_SIDE >> (times - 1)).max(1);
                 (side >> times).max(least).min(most)
             };
             let size = |&(receiver, (width, height)): &(Receiver, (usize, usize))| {
@@ -463,7 +463,7 @@ fn border_doublings(settings: &BakeSettings) -> u32 {
 }
 
 /// Least side of a grid of indirect light, where there is room for it [texels].
-const LEAST_GRID_SIDE: usize = 8;
+const MIN_GRID_SIDE: usize = 8;
 
 /// A map of about FIRST_SIDE² texels whose sides have a power of two between them, at most 8:1.
 pub fn first_size(aspect: f64) -> (usize, usize) {

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::band_layers::LevelBand;
 use crate::error::Result;
-use crate::light_pass::caustic::setup::{Aim, AimedLight};
+use crate::light_pass::caustic::setup::{Aim, VisibleLight};
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::photon::spectrum::PhotonSpectrum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
@@ -167,6 +167,12 @@ impl Spectra {
         self.of_lights.get(&light)?.photons.as_ref()
     }
 
+    /// Whether patches interpolate a light between a few of its wavelengths, with an error that is alike at every level.
+    pub(super) fn is_interpolated(&self, light: usize) -> bool {
+        let spectral = self.of_lights.get(&light);
+        spectral.is_some_and(|light| matches!(light.traced, Traced::Whole(_)))
+    }
+
     /// Where in its cell a ray of a band starts, [0, 1)²: bands that share rays out start between each other's, evenly
     /// (M. Roberts' R₂ sequence).
     pub(super) fn ray_place(&self, light: usize, band: Option<usize>) -> DVec2 {
@@ -246,7 +252,7 @@ impl Spectra {
     }
 
     /// Whether a light's rays are not those of its lattice as it is.
-    pub(super) fn has_bands(&self, light: &AimedLight) -> bool {
+    pub(super) fn has_bands(&self, light: &VisibleLight) -> bool {
         let light = self.of_lights.get(&light.light);
         light.is_some_and(|light| matches!(light.traced, Traced::Bands(_)))
     }

@@ -9,10 +9,10 @@ use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images};
 use crate::light_pass::caustic::deposit::{Depositor, Halves};
-use crate::light_pass::caustic::kept::KeptLight;
+use crate::light_pass::caustic::kept::ArrivalCache;
 use crate::light_pass::caustic::lattice::Lattice;
-use crate::light_pass::caustic::pass::{self, Listener, PassReport, Source};
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::pass::{self, PassReport, ProgressScope, Source};
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
@@ -23,7 +23,7 @@ use crate::settings::{BakeSettings, Footprint, Sigma};
 const COARSENING: usize = 8;
 
 /// Least side of that lattice.
-const LEAST_COARSE_SIDE: usize = 64;
+const MIN_COARSE_SIDE: usize = 64;
 
 /// Stride of the lattice that the blur of splats is estimated from.
 const ERROR_STRIDE: usize = 2;
@@ -41,7 +41,7 @@ impl CausticLayer<'_> {
     /// stopped.
     pub(super) fn make_splats(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         key: LevelKey,
         unit: FluxUnit,
         state: &mut LightState,
@@ -77,7 +77,7 @@ impl CausticLayer<'_> {
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         self.spectra.to_linear_srgb(light.light, &mut second, &mut none);
         course.outcome.count(&report, course.clock);
-        let is_known = !report.cancelled && !course.labour.is_shard();
+        let is_known = !report.cancelled && !course.role.is_shard();
         let noise = is_known.then(|| {
             course.clock.time(
                 |clock| &mut clock.deposit,
@@ -100,13 +100,13 @@ impl CausticLayer<'_> {
     /// Every part of a light's spectrum, one after the other. What arrived is given back of light without one.
     fn deposit_parts(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         lattice: Lattice,
         worker: Worker,
         key: &LevelKey,
         mut sums: PassSums,
         course: &Course,
-    ) -> (PassSums, Option<KeptLight>) {
+    ) -> (PassSums, Option<ArrivalCache>) {
         let mut kept = None;
         let (first, second) = sums.maps.split_at_mut(1);
         for (number, (band, part)) in self.spectra.parts(light.light).into_iter().enumerate() {
@@ -146,14 +146,14 @@ impl CausticLayer<'_> {
         key: &LevelKey,
         halves: &mut Halves,
         course: &Course,
-    ) -> (PassReport, Option<KeptLight>) {
+    ) -> (PassReport, Option<ArrivalCache>) {
         let depositor = Depositor {
             lattice,
             settings: self.settings,
             statistics: course.statistics.as_ref(),
             gathers: false,
         };
-        let listener = Listener {
+        let listener = ProgressScope {
             progress: self.progress,
             control: course.control,
             done: course.outcome.counts.rays,
@@ -175,7 +175,7 @@ impl CausticLayer<'_> {
     /// Maps of every second ray across and down, each for four.
     pub(super) fn thinned_images(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         level: &LightLevel,
         state: &LightState,
         course: &mut Course,
@@ -215,7 +215,7 @@ impl CausticLayer<'_> {
     /// Mean footprints at the full density, from a lattice some 64 times thinner.
     pub(super) fn splat_statistics(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         unit: FluxUnit,
         state: &LightState,
         course: &mut Course,
@@ -232,7 +232,7 @@ impl CausticLayer<'_> {
             statistics: None,
             gathers: true,
         };
-        let listener = Listener {
+        let listener = ProgressScope {
             progress: &(),
             control: course.control,
             done: 0,
@@ -270,7 +270,7 @@ fn source_of<'a>(state: &'a LightState, key: &TraceKey) -> Source<'a> {
 
 /// The lattice for mean footprints: every so many-th of the same rays, so that kept ones will do.
 fn thinned(lattice: Lattice) -> Lattice {
-    let stride = |side: usize| (side / LEAST_COARSE_SIDE).clamp(1, COARSENING);
+    let stride = |side: usize| (side / MIN_COARSE_SIDE).clamp(1, COARSENING);
     Lattice {
         strides: (stride(lattice.size.0), stride(lattice.size.1)),
         ..lattice

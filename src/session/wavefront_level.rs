@@ -9,16 +9,16 @@ use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::caustic::pass::Listener;
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::pass::ProgressScope;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::bumps::BumpCells;
-use crate::light_pass::wavefront::cell::Splits;
-use crate::light_pass::wavefront::closeness::Closeness;
-use crate::light_pass::wavefront::kept_rays::KeptRays;
+use crate::light_pass::wavefront::cell::SubdivisionLimits;
+use crate::light_pass::wavefront::closeness::EdgeSearch;
+use crate::light_pass::wavefront::kept_rays::RayCache;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
 use crate::light_pass::wavefront::receivers::Receivers;
@@ -32,13 +32,13 @@ use crate::settings::Estimator;
 const USUAL_MAP_ERROR: f64 = 0.03;
 
 /// Light that is less than this share of its ray's says nothing of the sizes of maps.
-const LEAST_SIZED_SHARE: f64 = 0.01;
+const MIN_SIZED_SHARE: f64 = 0.01;
 
 impl CausticLayer<'_> {
     /// Traces and deposits a level, or deposits again what was traced for other maps; `None` where it was stopped.
     pub(super) fn make_wavefront(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         key: LevelKey,
         unit: FluxUnit,
         state: &mut LightState,
@@ -52,7 +52,7 @@ impl CausticLayer<'_> {
         };
         let mut traced = None;
         // Bands are too many to be kept, and those of a share are others in each pass.
-        let (mut taken, room) = if self.spectra.has_bands(light) || course.labour.is_cut() {
+        let (mut taken, room) = if self.spectra.has_bands(light) || course.role.is_cut() {
             (
                 None,
                 Room {
@@ -82,7 +82,7 @@ impl CausticLayer<'_> {
                     most_queries: course.most_queries.saturating_sub(sums.report.receiver_queries),
                 };
                 let cells = depositor.lattice.cell_count();
-                let listener = Listener {
+                let listener = ProgressScope {
                     progress: self.progress,
                     control: course.control,
                     done: course.outcome.counts.rays + sums.report.rays,
@@ -121,7 +121,7 @@ impl CausticLayer<'_> {
     /// A level of some maps, without what only some levels have.
     pub(super) fn level(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         (key, unit): (LevelKey, FluxUnit),
         (maps, bands): (ReceiverMaps, Vec<ReceiverMaps>),
         ledger: LedgerSum,
@@ -149,7 +149,7 @@ impl CausticLayer<'_> {
     /// Sizes of lit areas at the density that maps are meant for, from a thinner lattice.
     pub(super) fn wavefront_statistics(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         unit: FluxUnit,
         state: &mut LightState,
         course: &mut Course,
@@ -161,16 +161,16 @@ impl CausticLayer<'_> {
         let size = self.statistics_size(light);
         let mut lattice = WavefrontLattice {
             // Light that goes very many ways lies as wide as its cells: pieces of them say nothing of it.
-            splits: Splits::NONE,
+            splits: SubdivisionLimits::NONE,
             ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control)
         };
         // Rays that patches can go on with are kept; where photons may do the rest, few ways are enough.
         let is_for_patches = self.carrier(light) == Carrier::Patches;
-        let mut own = KeptRays::default();
+        let mut own = RayCache::default();
         let rays = if is_for_patches { &mut state.rays } else { &mut own };
         if !is_for_patches {
             let threshold = &mut lattice.tracer.limits.branch_threshold;
-            *threshold = threshold.max(LEAST_SIZED_SHARE);
+            *threshold = threshold.max(MIN_SIZED_SHARE);
         }
         let depositor = WavefrontDepositor {
             receivers: &receivers,
@@ -180,7 +180,7 @@ impl CausticLayer<'_> {
             coarseness: 1.0,
             most_queries: u64::MAX,
         };
-        let listener = Listener {
+        let listener = ProgressScope {
             progress: &(),
             control: course.control,
             done: 0,
@@ -214,11 +214,11 @@ impl CausticLayer<'_> {
     }
 
     /// How often cells are split.
-    pub(super) fn splits(&self) -> Splits {
+    pub(super) fn splits(&self) -> SubdivisionLimits {
         if self.settings.max_error.is_some() {
-            Splits::BEFORE_ROUNDS
+            SubdivisionLimits::BEFORE_ROUNDS
         } else {
-            Splits::FULL
+            SubdivisionLimits::FULL
         }
     }
 
@@ -230,20 +230,20 @@ impl CausticLayer<'_> {
         }
     }
 
-    fn closeness(trace: &TraceKey) -> Closeness {
+    fn closeness(trace: &TraceKey) -> EdgeSearch {
         if trace.is_dim {
-            Closeness::DIM
+            EdgeSearch::DIM
         } else {
-            Closeness::SHARP
+            EdgeSearch::SHARP
         }
     }
 
     /// Bodies that are small beside the cells of a lattice.
     fn small_bodies(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         (columns, rows): (usize, usize),
-        closeness: Closeness,
+        closeness: EdgeSearch,
     ) -> SmallBodies {
         let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
         SmallBodies::find(self.tracer, &light.launch, light.visible(), cell, closeness)
@@ -252,7 +252,7 @@ impl CausticLayer<'_> {
     /// A level's lattice, with cells as fine as the detail of normals asks for.
     fn bumpy_lattice<'a>(
         &'a self,
-        light: &'a AimedLight,
+        light: &'a VisibleLight,
         part: LightPart<'a>,
         trace: &TraceKey,
         bodies: &'a SmallBodies,
@@ -269,7 +269,7 @@ impl CausticLayer<'_> {
     /// A lattice that is as it is, whatever falls into its cells.
     fn wavefront_lattice<'a>(
         &'a self,
-        light: &'a AimedLight,
+        light: &'a VisibleLight,
         part: LightPart<'a>,
         size: (usize, usize),
         bodies: &'a SmallBodies,
@@ -307,6 +307,6 @@ pub(super) fn take_strays(maps: &mut ReceiverMaps, ledger: &mut LedgerSum) -> Ve
 }
 
 /// Flux that a light of unit strength sends to marked cells [W].
-fn reference_w(light: &AimedLight) -> f64 {
+fn reference_w(light: &VisibleLight) -> f64 {
     light.launch.power_bound_w() * light.visible().marked_share(&light.launch)
 }

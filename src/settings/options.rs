@@ -7,8 +7,7 @@ use strum::{EnumMessage, VariantArray};
 
 use super::{
     BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind,
-    MAX_MAP_SIDE, MOST_WAVELENGTHS, MapResolution, Preset, RayPlacement, Sigma, SpectralSampling,
-    Wavelengths,
+    MAX_MAP_SIDE, MAX_WAVELENGTHS, MapResolution, Preset, RayPlacement, Sigma, SpectralSampling, Wavelengths,
 };
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::{Error, Result};
@@ -124,7 +123,7 @@ pub const OPTIONS: &[OptionInfo] = &[
         default: "that of the preset",
         accuracy: "kept by the estimate, not by a reference",
         cost: "halving it takes about four times the rays",
-        limits: Some((super::LEAST_MAX_ERROR, 1.0, |s| s.max_error.into_iter().collect())),
+        limits: Some((super::MIN_MAX_ERROR, 1.0, |s| s.max_error.into_iter().collect())),
         applies: refining,
         set: |s, text| share(text).map(|error| s.max_error = Some(error)),
         ..row("max-error", "Max error [%]", "SHARE")
@@ -286,7 +285,7 @@ pub const OPTIONS: &[OptionInfo] = &[
         default: "continuous",
         accuracy: "few show as separate images of the lamp",
         cost: "each is traced",
-        limits: Some((1.0, MOST_WAVELENGTHS as f64, |s| match s.wavelengths {
+        limits: Some((1.0, MAX_WAVELENGTHS as f64, |s| match s.wavelengths {
             Wavelengths::Fixed(count) => vec![f64::from(count)],
             _ => Vec::new(),
         })),

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::paper::{SPLAT, WAVEFRONT, Way, over_a_floor, scene, splat, wavefront};
+use super::paper::{AUTO, SPLAT, Way, auto, over_a_floor, scene, splat};
 use super::plot::Plot;
 use super::references::Reference;
 use super::sweep::{
@@ -17,14 +17,18 @@ use crate::scene::builtin::{self, shapes};
 use crate::scene::{Light, Scene};
 use crate::session::forecast::{forecast, stood_at};
 use crate::session::{CostPoint, Forecast, StopReason};
-use crate::settings::{BakeSettings, ErrorMetric, Estimator};
+use crate::settings::{BakeSettings, ErrorMetric};
 
 /// What a bake that got to its target was expected to take when its error was first at most five times that, and where it
 /// stood then.
 fn predicted(measured: &Measured) -> Option<(CostPoint, Forecast)> {
     let (result, target) = (measured.result, measured.variant.settings.max_error?);
     let made = stood_at(&result.course, 5.0 * target)?;
-    let expected = forecast(&result.course[..=made], target, Estimator::Wavefront)?;
+    let expected = forecast(
+        &result.course[..=made],
+        target,
+        measured.variant.settings.estimator,
+    )?;
     (result.stop_reason == StopReason::MaxError).then_some((result.course[made], expected))
 }
 
@@ -68,8 +72,8 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
     const TARGETS: [f64; 5] = [0.10, 0.05, 0.02, 0.01, 0.005];
     const DENSITIES: [f64; 4] = [1e4, 1e5, 1e6, 4e6];
     const PLOTS: &[Plot] = &[
-        by_scene("wavefront-cpu", "cpu_s").only("estimator", "wavefront"),
-        by_scene("wavefront-rays", "rays").only("estimator", "wavefront"),
+        by_scene("auto-cpu", "cpu_s").only("estimator", "auto"),
+        by_scene("auto-rays", "rays").only("estimator", "auto"),
         by_scene("splat-cpu", "cpu_s").only("estimator", "splat"),
         by_scene("splat-rays", "rays").only("estimator", "splat"),
     ];
@@ -80,10 +84,7 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
         max_error: Some(target),
         error_metric: ErrorMetric::Rmse,
         max_time_s: Some(limit_s),
-        ..bench.at(
-            wavefront(BakeSettings::starting_density_per_sr(target)),
-            bench.side(),
-        )
+        ..bench.at(auto(BakeSettings::starting_density_per_sr(target)), bench.side())
     };
     let names = if bench.quick {
         &["mirror", "pool"][..]
@@ -93,7 +94,7 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
     let mut groups = Vec::new();
     for &name in names {
         let scene = scene(name)?;
-        // Neither estimator follows the light of lamps with a size.
+        // Splats do not follow the light of lamps with a size.
         if scene.lights.iter().any(Light::has_extent) {
             continue;
         }
@@ -111,7 +112,7 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
             Variant::new(labels, &scene, settings)
         };
         let targets = bench.some(&TARGETS, 4).iter();
-        let targets = targets.map(|&target| variant(WAVEFRONT, Some(target), towards(target, 20.0)));
+        let targets = targets.map(|&target| variant(AUTO, Some(target), towards(target, 20.0)));
         let densities = bench.some(&DENSITIES, 2).iter();
         let splats = densities.map(|&density| {
             let settings = BakeSettings {
@@ -126,7 +127,7 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
         });
     }
     Ok(Sweep {
-        note: "The wavefront refines towards each target; splats trace lattices of given densities. Bakes end after 20 s. Predictions \
+        note: "`auto` refines towards each target; splats trace lattices of given densities. Bakes end after 20 s. Predictions \
                are of when the error was first at most five times the target. A scene without a map that is known is measured against a bake \
                to 0.2 % of 60 s, where that gets to 1 %."
             .into(),

@@ -20,7 +20,7 @@ use crate::illumination::parametrisation::parametrise;
 use crate::illumination::{Chart, IlluminationMap, Receiver};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::path::{Arrival, PathLimits, PathTracer};
-use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
+use crate::light_pass::caustic::setup::{Aim, CullMode, VisibleLight};
 use crate::light_pass::emitter::Emitter;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
@@ -83,9 +83,9 @@ fn run(
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);
     let sizes = settings.effects.get(Effect::AreaLights) != EffectSwitch::Off;
-    let aim = Aim::take(tracer, settings.item_buffer, Aiming::Everything, sizes);
+    let aim = Aim::take(tracer, settings.item_buffer, CullMode::Everything, sizes);
     let plan = plan::decide(scene, settings, &aim.sights);
-    let lights: &[AimedLight] = if plan.is_on(Effect::LightPass) {
+    let lights: &[VisibleLight] = if plan.is_on(Effect::LightPass) {
         &aim.lights
     } else {
         &[]
@@ -98,7 +98,7 @@ fn run(
             effects: EffectSet::EVERYTHING,
             microfacets: None,
         },
-        aiming: (settings.item_buffer, Aiming::Reachable),
+        aiming: (settings.item_buffer, CullMode::Reachable),
         sizes,
         lobes: settings.effects.get(Effect::Roughness) != EffectSwitch::Off
             && scene.materials.iter().any(Material::is_rough),
@@ -145,7 +145,7 @@ const PLACES: usize = 2048;
 struct Run<'a> {
     tracer: &'a Tracer,
     limits: PathLimits,
-    aiming: (ItemBufferKind, Aiming),
+    aiming: (ItemBufferKind, CullMode),
     /// Whether lights have sizes.
     sizes: bool,
     /// Whether rough surfaces have lobes.
@@ -205,7 +205,7 @@ impl Run<'_> {
     }
 
     /// Both half sets of one light.
-    fn light(&self, light: &AimedLight) -> Tally {
+    fn light(&self, light: &VisibleLight) -> Tally {
         let source = &self.tracer.scene().lights[light.light];
         if !(self.sizes && source.has_extent()) {
             let whole = Part {
@@ -247,7 +247,7 @@ impl Run<'_> {
     }
 
     /// Rays from one place of a light, of both half sets or one.
-    fn part(&self, light: &AimedLight, part: Part) -> Tally {
+    fn part(&self, light: &VisibleLight, part: Part) -> Tally {
         let measure = light.item_buffer.marked_measure(&light.launch);
         let halves = part.half.map_or(0..HALVES, |half| half..half + 1);
         let places = if part.half.is_some() { PLACES } else { 1 };
@@ -275,7 +275,7 @@ impl Run<'_> {
     /// One ray, with its part of its cell's flux, for each cell of a row that may see something specular.
     fn row(
         &self,
-        light: &AimedLight,
+        light: &VisibleLight,
         size: (usize, usize),
         place: (usize, usize, usize),
         part: &Part,
@@ -405,7 +405,7 @@ fn targets(scene: &Scene, (width, height): (usize, usize)) -> Vec<Option<Target>
         .collect()
 }
 
-fn unit(scene: &Scene, lights: &[AimedLight]) -> Result<FluxUnit> {
+fn unit(scene: &Scene, lights: &[VisibleLight]) -> Result<FluxUnit> {
     let power_w: f64 = lights
         .iter()
         .map(|light| {

@@ -33,6 +33,7 @@ pub(super) type Way = (&'static str, fn(f64) -> BakeSettings);
 const AS_PAPER: Way = ("splat, as the paper", paper);
 pub(super) const SPLAT: Way = ("splat", splat);
 pub(super) const WAVEFRONT: Way = ("wavefront", wavefront);
+pub(super) const AUTO: Way = ("auto", auto);
 
 /// What "as the paper" means.
 const AS_PAPER_NOTE: &str = "As the paper: jittered rays, a cube around the light, discs of the wavefront's area, point samples \
@@ -50,17 +51,23 @@ pub(super) fn paper(density_per_sr: f64) -> BakeSettings {
 }
 
 pub(super) fn splat(density_per_sr: f64) -> BakeSettings {
-    BakeSettings {
-        density_per_sr,
-        ..BakeSettings::splat()
-    }
+    at_density(Estimator::Splat, density_per_sr)
 }
 
 /// Exactly one lattice.
 pub(super) fn wavefront(density_per_sr: f64) -> BakeSettings {
+    at_density(Estimator::Wavefront, density_per_sr)
+}
+
+/// The estimator that is used unless another is asked for.
+pub(super) fn auto(density_per_sr: f64) -> BakeSettings {
+    at_density(Estimator::Auto, density_per_sr)
+}
+
+fn at_density(estimator: Estimator, density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         density_per_sr,
-        ..BakeSettings::of(Estimator::Wavefront)
+        ..BakeSettings::of(estimator)
     }
 }
 

@@ -26,7 +26,7 @@ const WHITE_OVER_MEAN: f64 = 6.0;
 const SHOWN: f64 = 5e-3;
 
 /// Least size of the longer side of a map in a sheet [pixels].
-const LEAST_SIDE: usize = 200;
+const MIN_SIDE: usize = 200;
 
 /// Pixels between two maps, and their grey.
 const GAP: usize = 4;
@@ -123,7 +123,7 @@ pub fn sheet(file: String, caption: String, images: &[Image], columns: usize) ->
         .map(|(row, column)| first.values[row * first.width + column].luminance())
         .sum();
     let white = WHITE_OVER_MEAN * sum / (across.len() * down.len()) as f64;
-    let scale = LEAST_SIDE.div_ceil(across.len().max(down.len()));
+    let scale = MIN_SIDE.div_ceil(across.len().max(down.len()));
     let cell = [across.len() * scale, down.len() * scale];
     let columns = columns.clamp(1, images.len());
     let size = [

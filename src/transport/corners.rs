@@ -17,13 +17,13 @@ const SAME_SIDE: f64 = 0.97;
 const SIDES_AT_A_CORNER: usize = 3;
 
 /// Larger meshes stand for smooth shapes [triangles].
-const MOST_TRIANGLES: usize = 1 << 14;
+const MAX_TRIANGLES: usize = 1 << 14;
 
 /// More corners than these are facets: the lattice has to resolve them by itself.
-const MOST_CORNERS: usize = 64;
+const MAX_CORNERS: usize = 64;
 
 /// The same for edges.
-const MOST_EDGES: usize = 1 << 12;
+const MAX_EDGES: usize = 1 << 12;
 
 /// A mesh whose vertices at one place are one.
 struct Joined {
@@ -49,7 +49,7 @@ struct JoinedEdge {
 impl Joined {
     /// `None` for larger meshes.
     fn new(mesh: InScene) -> Option<Self> {
-        if mesh.triangle_count() > MOST_TRIANGLES {
+        if mesh.triangle_count() > MAX_TRIANGLES {
             return None;
         }
         let bits = |v: DVec3| (v + DVec3::ZERO).to_array().map(f64::to_bits);
@@ -107,7 +107,7 @@ pub fn sharp_corners(mesh: InScene) -> Vec<DVec3> {
         .filter(|&corner| turns(corner) || sides[corner].len() >= SIDES_AT_A_CORNER)
         .map(|corner| points[corner])
         .collect();
-    if corners.len() > MOST_CORNERS {
+    if corners.len() > MAX_CORNERS {
         Vec::new()
     } else {
         corners
@@ -125,7 +125,7 @@ pub fn sharp_edges(mesh: InScene) -> Vec<[DVec3; 2]> {
         .map(|(&(a, b), _)| [joined.points[a], joined.points[b]])
         .filter(|[a, b]| a != b)
         .collect();
-    if edges.len() > MOST_EDGES {
+    if edges.len() > MAX_EDGES {
         Vec::new()
     } else {
         edges

@@ -158,9 +158,11 @@ fn of_triangle(mesh: InScene, triangle: usize) -> Option<(DMat3, f64)> {
     let [a, b, c] = mesh.corners(triangle);
     let [na, nb, nc] = mesh.corner_normals(triangle);
     let (dual_b, dual_c) = dual_edges(b - a, c - a)?;
-    let area_m2 = 0.5 * (b - a).cross(c - a).length();
     let outer = |column: DVec3, row: DVec3| DMat3::from_cols(column * row.x, column * row.y, column * row.z);
-    Some((outer(nb - na, dual_b) + outer(nc - na, dual_c), area_m2))
+    Some((
+        outer(nb - na, dual_b) + outer(nc - na, dual_c),
+        mesh.triangle_area_m2(triangle),
+    ))
 }
 
 /// Vectors in the plane of two edges whose products with (edge 1, edge 2) are (1, 0) and (0, 1) [1/m].

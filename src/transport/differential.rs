@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::bend;
 use super::curvature;
-use super::interaction::{Branch, Event, TurnedBy};
+use super::interaction::{Branch, Event, NormalSource};
 use super::microfacets::Turn;
 use super::{SurfaceHit, Tracer};
 use crate::geometry::Ray;
@@ -115,13 +115,13 @@ impl Tracer {
         surface: (SurfaceScale, SurfaceDetail),
     ) -> RayDifferential {
         let normal_change_of = |derivative: &RayDerivative| {
-            if branch.by == TurnedBy::Geometric {
+            if branch.by == NormalSource::Geometric {
                 DVec3::ZERO
             } else {
                 self.normal_change(hit, branch.normal, derivative.origin, surface)
             }
         };
-        if let TurnedBy::Micro(facet) = branch.by {
+        if let NormalSource::Micro(facet) = branch.by {
             let turn = match branch.event {
                 Event::Refraction => Turn::Refracted {
                     eta: 1.0 / branch.ior_ratio,

@@ -12,7 +12,7 @@ use glam::{DAffine3, DVec3};
 
 use super::curvature::TrianglesAround;
 use super::smoothing::smoothing_groups;
-use super::tracer::HitPlace;
+use super::tracer::RayHit;
 use crate::geometry::bvh::{self, Frame};
 use crate::geometry::triangle::ShearedRay;
 use crate::geometry::{BoxBvh, Ray, TriangleBvh};
@@ -67,10 +67,10 @@ pub(super) struct Instance {
 }
 
 /// What a ray met, and the corners of that triangle in the scene [m].
-pub(super) type Met = (HitPlace, [DVec3; 3]);
+pub(super) type Met = (RayHit, [DVec3; 3]);
 
 impl Hierarchy {
-    /// Of a scene. `most_copied`: see [`instances::MOST_COPIED`].
+    /// Of a scene. `most_copied`: see [`instances::MAX_COPIED`].
     pub(super) fn new(scene: &Scene, most_copied: usize) -> Self {
         let is_instance = instances::find(&scene.objects, most_copied);
         let copied = Arc::new(Copied::new(scene, &is_instance));
@@ -155,7 +155,7 @@ impl Hierarchy {
         });
         let met = hit.map(|hit| {
             let (object, triangle) = triangles[hit.triangle as usize];
-            let place = HitPlace {
+            let place = RayHit {
                 object,
                 triangle,
                 barycentric: hit.barycentric,
@@ -187,7 +187,7 @@ impl Hierarchy {
                     let is_nearer =
                         best.is_none_or(|(hit, _)| first < (hit.distance_m, hit.object, hit.triangle));
                     if is_nearer && is_there(object as usize, triangle as usize, barycentric) {
-                        let place = HitPlace {
+                        let place = RayHit {
                             object,
                             triangle,
                             barycentric,

@@ -8,7 +8,8 @@ use super::microfacets::{self, Facet, Turn};
 use super::{MediumStack, SurfaceHit, Tracer};
 use crate::geometry::Ray;
 use crate::optics::{LinearSrgb, fresnel, refraction};
-use crate::scene::{Material, SurfaceKind};
+use crate::scene::material::SMOOTH_ROUGHNESS;
+use crate::scene::{Material, Mixture, SurfaceKind};
 
 /// What happened to a ray at a specular surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -47,18 +48,39 @@ pub struct Branch {
     /// Unit normal of the surface on the side of the incoming ray that gave the direction.
     pub normal: DVec3,
     /// How it did.
-    pub by: TurnedBy,
+    pub by: NormalSource,
 }
 
 /// What light turns about.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum TurnedBy {
+pub enum NormalSource {
     /// The triangle's normal, where the shading normal would send light through the facet.
     Geometric,
     /// The shading normal.
     Shading,
     /// A micro-facet around the shading normal.
     Micro(Facet),
+}
+
+/// What the diffuse body of a surface takes of the light that falls on it, for its illumination map.
+#[derive(Clone, Copy, Debug)]
+pub struct Taking {
+    /// Part of the surface that it is, [0, 1].
+    pub share: f64,
+    /// Part of it that polish covers, [0, 1].
+    pub polish: f64,
+    /// Refractive index of the polish.
+    pub ior: f64,
+}
+
+impl Taking {
+    /// Of light that comes at an angle out of a medium of an index.
+    pub fn of(&self, cosine: f64, ior_around: f64) -> f64 {
+        if self.polish == 0.0 {
+            return self.share;
+        }
+        self.share * (1.0 - self.polish * fresnel::dielectric_reflectance(cosine, self.ior / ior_around))
+    }
 }
 
 /// The shares of the light at one hit.
@@ -70,6 +92,8 @@ pub struct Interaction {
     pub transmission: Option<Branch>,
     /// Taken by the illumination map, before the albedo.
     pub deposit: LinearSrgb,
+    /// What the map's light is multiplied by where it leaves against the incoming ray.
+    pub leaving: LinearSrgb,
     /// Turned into heat here.
     pub absorbed: LinearSrgb,
     /// What a branch would have taken that is switched off.
@@ -77,7 +101,7 @@ pub struct Interaction {
 }
 
 /// Orientation of a hit: normals on the side of the incoming ray.
-struct Facing {
+struct HitFrame {
     /// Whether the outside was met.
     front: bool,
     geometric: DVec3,
@@ -93,10 +117,10 @@ struct Facing {
 struct Turned {
     direction: DVec3,
     normal: DVec3,
-    by: TurnedBy,
+    by: NormalSource,
 }
 
-impl Facing {
+impl HitFrame {
     fn new(hit: &SurfaceHit, incident: DVec3, micro: Option<Facet>) -> Self {
         let front = incident.dot(hit.geometric_normal) < 0.0;
         let side = if front { 1.0 } else { -1.0 };
@@ -132,7 +156,7 @@ impl Facing {
         Some(Turned {
             direction: microfacets::out_of(direction, self.geometric, side),
             normal: self.shading,
-            by: TurnedBy::Micro(facet),
+            by: NormalSource::Micro(facet),
         })
     }
 
@@ -151,7 +175,7 @@ impl Facing {
             Turned {
                 direction: refraction::reflect(incident, self.geometric),
                 normal: self.geometric,
-                by: TurnedBy::Geometric,
+                by: NormalSource::Geometric,
             }
         }
     }
@@ -168,7 +192,7 @@ impl Facing {
             Some(Turned {
                 direction: refraction::refract(incident, self.geometric, eta)?,
                 normal: self.geometric,
-                by: TurnedBy::Geometric,
+                by: NormalSource::Geometric,
             })
         }
     }
@@ -187,9 +211,9 @@ impl Facing {
             direction,
             normal: self.shading,
             by: if self.is_smooth {
-                TurnedBy::Shading
+                NormalSource::Shading
             } else {
-                TurnedBy::Geometric
+                NormalSource::Geometric
             },
         }
     }
@@ -200,13 +224,16 @@ pub struct Meeting<'a> {
     hit: &'a SurfaceHit,
     incident: DVec3,
     media: &'a MediumStack,
-    facing: Facing,
+    facing: HitFrame,
     /// Goes back, where something does.
     pub reflected: Option<LinearSrgb>,
     /// Goes through, where something does.
     pub transmitted: Option<LinearSrgb>,
     /// Taken by the illumination map, before the albedo.
     pub deposit: LinearSrgb,
+    /// What the map's light is multiplied by where it leaves against the incoming ray, where that is not `deposit`: the
+    /// map has the share of the surface that takes light already.
+    leaving: Option<LinearSrgb>,
     /// Turned into heat here.
     pub absorbed: LinearSrgb,
     /// What a branch would have taken that is switched off.
@@ -222,6 +249,8 @@ enum Through {
     Unreachable,
     /// The other side of a thin wall.
     ThinWall,
+    /// The other side of a surface that is not there.
+    Hole,
     /// Another medium.
     Medium {
         turned: Turned,
@@ -257,6 +286,10 @@ impl Meeting<'_> {
         let passed;
         let (turned, event, media, ior_ratio) = match &self.through {
             Through::Nothing | Through::Unreachable => return None,
+            Through::Hole => {
+                passed = self.facing.turned(self.incident);
+                (&passed, Event::ThinTransmission, self.media, 1.0)
+            }
             Through::ThinWall => {
                 passed = self.facing.passed(self.incident);
                 (&passed, Event::ThinTransmission, self.media, 1.0)
@@ -278,13 +311,21 @@ impl Meeting<'_> {
         })
     }
 
-    /// A share goes back, or would if that were on.
+    /// A further share goes back, or would if that were on.
     fn sends_back(&mut self, effects: EffectSet, share: LinearSrgb) {
         if effects.reflection {
-            self.reflected = Some(share);
+            self.reflected = Some(self.reflected.map_or(share, |before| before + share));
         } else {
             self.switched_off += share;
         }
+    }
+
+    /// Leaves a part of all that was shared out so far.
+    fn scale(&mut self, part: f64) {
+        self.reflected = self.reflected.map(|share| share * part);
+        self.transmitted = self.transmitted.map(|share| share * part);
+        self.absorbed = self.absorbed * part;
+        self.switched_off = self.switched_off * part;
     }
 
     /// What does not go back goes through, but for what the surface's tint takes.
@@ -320,6 +361,7 @@ impl Tracer {
             reflection: meeting.reflection(),
             transmission: meeting.transmission(),
             deposit: meeting.deposit,
+            leaving: meeting.leaving.unwrap_or(meeting.deposit),
             absorbed: meeting.absorbed,
             switched_off: meeting.switched_off,
         }
@@ -339,20 +381,25 @@ impl Tracer {
         micro: Option<DVec2>,
     ) -> Meeting<'a> {
         let material = self.scene().material_of(hit.object);
-        let micro = micro
-            .filter(|_| effects.lobes && material.is_rough())
-            .map(|point| Facet {
-                alpha: material.roughness * material.roughness,
-                point,
-            });
+        let place = (hit.triangle, hit.barycentric);
+        let is_varied = material.surface == SurfaceKind::Varied;
+        let varies = is_varied || (material.variation.is_some() && material.surface.is_specular());
+        let mixture = varies.then(|| self.mixture(hit.object, place, effects.textures));
+        let roughness = mixture.map_or(material.roughness, |mixture| mixture.roughness);
+        let is_rough = material.surface.is_specular() && roughness > SMOOTH_ROUGHNESS;
+        let micro = micro.filter(|_| effects.lobes && is_rough).map(|point| Facet {
+            alpha: roughness * roughness,
+            point,
+        });
         let mut meeting = Meeting {
             hit,
             incident,
             media,
-            facing: Facing::new(hit, incident, micro),
+            facing: HitFrame::new(hit, incident, micro),
             reflected: None,
             transmitted: None,
             deposit: LinearSrgb::BLACK,
+            leaving: None,
             absorbed: LinearSrgb::BLACK,
             switched_off: LinearSrgb::BLACK,
             through: Through::Nothing,
@@ -373,17 +420,59 @@ impl Tracer {
                 meeting.deposit = LinearSrgb::WHITE - share;
                 meeting.sends_back(effects, share);
             }
-            SurfaceKind::ThinWall => {
-                let eta = material.ior / media.ior(self.scene());
-                let cos_incident = meeting.facing.cos_incident(incident);
-                let reflectance = fresnel::thin_wall_reflectance(cos_incident, eta);
-                meeting.through = Through::ThinWall;
-                meeting.sends_back(effects, LinearSrgb::grey(reflectance));
-                meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
-            }
+            SurfaceKind::ThinWall => self.meet_thin_wall(effects, material, &mut meeting),
             SurfaceKind::Dielectric => self.meet_dielectric(effects, material, &mut meeting),
+            SurfaceKind::Varied => {
+                if let Some(mixture) = mixture {
+                    self.meet_mixture(effects, material, mixture, &mut meeting);
+                }
+            }
         }
         meeting
+    }
+
+    fn meet_thin_wall(&self, effects: EffectSet, material: &Material, meeting: &mut Meeting) {
+        let &mut Meeting {
+            hit, incident, media, ..
+        } = meeting;
+        let eta = material.ior / media.ior(self.scene());
+        let cos_incident = meeting.facing.cos_incident(incident);
+        let reflectance = fresnel::thin_wall_reflectance(cos_incident, eta);
+        meeting.through = Through::ThinWall;
+        meeting.sends_back(effects, LinearSrgb::grey(reflectance));
+        meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
+    }
+
+    /// Each share of a mixture as the class that it is of. Nothing is both clear and has holes.
+    fn meet_mixture(&self, effects: EffectSet, material: &Material, mixture: Mixture, meeting: &mut Meeting) {
+        let &mut Meeting {
+            hit, incident, media, ..
+        } = meeting;
+        if mixture.clear > 0.0 {
+            if material.is_solid() {
+                self.meet_dielectric(effects, material, meeting);
+            } else {
+                self.meet_thin_wall(effects, material, meeting);
+            }
+            meeting.scale(mixture.clear);
+        } else if mixture.hole > 0.0 {
+            meeting.through = Through::Hole;
+            meeting.lets_through(effects, 0.0, || LinearSrgb::WHITE);
+            meeting.scale(mixture.hole);
+        }
+        let cos_incident = meeting.facing.cos_incident(incident);
+        if mixture.metal > 0.0 {
+            let share = self.metal_share(effects, hit, material, cos_incident);
+            meeting.absorbed += (LinearSrgb::WHITE - share) * mixture.metal;
+            meeting.sends_back(effects, share * mixture.metal);
+        }
+        let eta = material.ior / media.ior(self.scene());
+        let polish = mixture.polish * fresnel::dielectric_reflectance(cos_incident, eta);
+        meeting.leaving = Some(LinearSrgb::grey(1.0 - polish));
+        meeting.deposit = LinearSrgb::grey(mixture.body * (1.0 - polish));
+        if mixture.body * polish > 0.0 {
+            meeting.sends_back(effects, LinearSrgb::grey(mixture.body * polish));
+        }
     }
 
     fn meet_dielectric(&self, effects: EffectSet, material: &Material, meeting: &mut Meeting) {

@@ -4,10 +4,9 @@ use glam::DVec3;
 
 use super::{MediumStack, Tracer};
 use crate::geometry::Ray;
-use crate::scene::SurfaceKind;
 
 /// Surfaces that are looked at above the point before it is taken to be outside of all others.
-const MOST_CROSSINGS: usize = 100_000;
+const MAX_CROSSINGS: usize = 100_000;
 
 /// The media around a point: bodies of which a ray straight up leaves the inside more often than it enters, outermost
 /// first. Straight up, so that an open sheet of water with its normals up counts as what lies below it.
@@ -19,11 +18,11 @@ pub fn media_at(tracer: &Tracer, point: DVec3) -> MediumStack {
         origin: point,
         direction: DVec3::Y,
     };
-    for _ in 0..MOST_CROSSINGS {
+    for _ in 0..MAX_CROSSINGS {
         let Some(hit) = tracer.closest_hit(&ray) else {
             break;
         };
-        if scene.material_of(hit.object).surface == SurfaceKind::Dielectric {
+        if scene.material_of(hit.object).is_solid() {
             if hit.geometric_normal.dot(ray.direction) < 0.0 {
                 entered[hit.object] += 1;
             } else if entered[hit.object] > 0 {

@@ -2,19 +2,22 @@
 
 use std::sync::{Arc, OnceLock};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bend;
 use super::corners::{sharp_corners, sharp_edges};
 use super::curvature::NormalField;
 use super::hierarchy::{self, Hierarchy, SceneNode};
+use super::interaction::Taking;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
-use crate::scene::{Adjacency, AlphaMask, InScene, Material, Scene, TextureRef, Waves, instances};
+use crate::scene::{
+    Adjacency, AlphaMask, Material, Mixture, Scene, SurfaceKind, TextureRef, Waves, instances,
+};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
@@ -57,7 +60,7 @@ struct SpecularShape {
 
 /// The place where a ray met a surface, and nothing that follows from it: what is worth keeping of a hit.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HitPlace {
+pub struct RayHit {
     /// Index into `Scene::objects`.
     pub object: u32,
     /// Index into the object's triangles.
@@ -104,7 +107,7 @@ impl SurfaceHit {
 impl Tracer {
     /// Builds the hierarchies over all triangles of a scene.
     pub fn new(scene: Arc<Scene>) -> Self {
-        Self::sharing(scene, instances::MOST_COPIED)
+        Self::sharing(scene, instances::MAX_COPIED)
     }
 
     /// The same, where copies of one mesh have no more than that many triangles.
@@ -184,7 +187,7 @@ impl Tracer {
     #[must_use]
     pub fn without_clear_bodies(&self) -> Self {
         let mut scene = Scene::clone(&self.scene);
-        let is_clear = |material: &&mut Material| !material.surface.is_opaque();
+        let is_clear = |material: &&mut Material| material.surface.is_clear();
         for material in scene.materials.iter_mut().filter(is_clear) {
             material.alpha_mask = Some(AlphaMask::NOWHERE);
         }
@@ -310,7 +313,7 @@ impl Tracer {
     }
 
     /// Where the nearest surface in front of the ray's origin is met.
-    pub fn closest_place(&self, ray: &Ray) -> Option<HitPlace> {
+    pub fn closest_place(&self, ray: &Ray) -> Option<RayHit> {
         Some(self.closest(ray)?.0)
     }
 
@@ -324,12 +327,12 @@ impl Tracer {
     }
 
     /// The surface at a place that a ray met.
-    pub fn surface_at(&self, hit: &HitPlace) -> SurfaceHit {
+    pub fn surface_at(&self, hit: &RayHit) -> SurfaceHit {
         let mesh = self.scene.objects[hit.object as usize].in_scene();
         self.surface_with(hit, &mesh.corners(hit.triangle as usize))
     }
 
-    fn surface_with(&self, hit: &HitPlace, corners: &[DVec3; 3]) -> SurfaceHit {
+    fn surface_with(&self, hit: &RayHit, corners: &[DVec3; 3]) -> SurfaceHit {
         let (object, triangle) = (hit.object as usize, hit.triangle as usize);
         let mesh = self.scene.objects[object].in_scene();
         let (point, point_error) = ray::point_with_error(corners, hit.barycentric);
@@ -412,16 +415,49 @@ impl Tracer {
 
     /// Whether a surface is there at a place of a triangle, or cut out.
     fn is_there(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> bool {
-        let object = &self.scene.objects[object];
-        let material = &self.scene.materials[object.material];
+        let material = self.scene.material_of(object);
         let Some(mask) = &material.alpha_mask else {
             return true;
         };
-        let placed = material.base_colour_texture.as_ref().and_then(|reference| {
-            let uv = texture_uv(object.in_scene(), reference, triangle, barycentric)?;
-            Some((&*self.scene.textures[reference.texture], uv))
-        });
-        mask.is_there(placed)
+        let image = material.base_colour_texture.as_ref();
+        mask.is_there(image.and_then(|image| self.scene.placed_texture(image, (object, triangle), barycentric)))
+    }
+
+    /// What the surface is made of at a place of a triangle; by the material's factors alone without `textures`.
+    pub(super) fn mixture(
+        &self,
+        object: usize,
+        (triangle, barycentric): (usize, [f64; 3]),
+        textures: bool,
+    ) -> Mixture {
+        let material = self.scene.material_of(object);
+        let placed = |image: &TextureRef| self.scene.placed_texture(image, (object, triangle), barycentric);
+        let variation = material.variation.as_ref().filter(|_| textures);
+        let factors = variation.and_then(|variation| placed(&variation.image));
+        let colour = material.base_colour_texture.as_ref();
+        let alpha = colour.filter(|_| material.coverage.is_some()).and_then(placed);
+        material.mixture(
+            factors.map_or(LinearSrgb::WHITE, |(texture, uv)| texture.sample(uv)),
+            alpha.map_or(1.0, |(texture, uv)| texture.alpha(uv)),
+        )
+    }
+
+    /// What the diffuse body of a surface takes at a place of a triangle.
+    pub fn taking(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> Taking {
+        let material = self.scene.material_of(object);
+        let (share, polish) = match material.surface {
+            SurfaceKind::Mixed => (1.0, material.polish),
+            SurfaceKind::Varied => {
+                let mixture = self.mixture(object, (triangle, barycentric), true);
+                (mixture.body, mixture.polish)
+            }
+            _ => (1.0, 0.0),
+        };
+        Taking {
+            share,
+            polish,
+            ior: material.ior,
+        }
     }
 
     /// Base colour of the surface at a hit, its texture included.
@@ -431,30 +467,11 @@ impl Tracer {
 
     /// What the texture at a hit multiplies the base colour by: white where there is none.
     pub(super) fn texture_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
-        let object = &self.scene.objects[hit.object];
-        let Some(reference) = &self.scene.materials[object.material].base_colour_texture else {
-            return LinearSrgb::WHITE;
-        };
-        match texture_uv(object.in_scene(), reference, hit.triangle, hit.barycentric) {
-            Some(uv) => self.scene.textures[reference.texture].sample(uv),
-            None => LinearSrgb::WHITE,
-        }
+        let image = self.scene.material_of(hit.object).base_colour_texture.as_ref();
+        let place = (hit.object, hit.triangle);
+        let placed = image.and_then(|image| self.scene.placed_texture(image, place, hit.barycentric));
+        placed.map_or(LinearSrgb::WHITE, |(texture, uv)| texture.sample(uv))
     }
-}
-
-/// Where a texture is looked up at a place of a triangle; `None` where the mesh lacks its coordinates.
-fn texture_uv(
-    mesh: InScene,
-    reference: &TextureRef,
-    triangle: usize,
-    barycentric: [f64; 3],
-) -> Option<DVec2> {
-    let uvs = mesh.uvs(reference.uv_set)?;
-    let corners = mesh.triangle(triangle).into_iter().zip(barycentric);
-    let uv = corners.fold(DVec2::ZERO, |sum, (vertex, weight)| {
-        sum + uvs[vertex as usize] * weight
-    });
-    Some(reference.transform(uv))
 }
 
 fn has_masks(scene: &Scene) -> bool {

@@ -23,7 +23,7 @@ use super::files::{Choice, Dialog};
 use super::gizmo::Gizmo;
 use super::graphics::{Graphics, RETRY_AFTER, Shown};
 use super::interface::{Painting, accessibility};
-use super::lens::Lens;
+use super::lens::Viewport;
 use super::model::{MapsShown, Model};
 use super::overlay;
 use super::pace::Pace;
@@ -38,14 +38,14 @@ use serde_json::{Value, json};
 
 /// What other threads tell the window.
 #[derive(Debug)]
-pub enum News {
+pub enum UserEvent {
     /// The baking thread moved on.
     Baker,
     /// A screen reader asks for something.
     Accessibility(accessibility::Event),
 }
 
-impl From<accessibility::Event> for News {
+impl From<accessibility::Event> for UserEvent {
     fn from(event: accessibility::Event) -> Self {
         Self::Accessibility(event)
     }
@@ -65,11 +65,11 @@ const LEVEL_OF_SOFTWARE: Duration = Duration::from_secs(3);
 /// Time between a picture and the frame that tells what it took.
 const REPORT_AFTER: Duration = Duration::from_millis(40);
 /// A device that has not told in so many frames how long a picture took is not asked again until the next one.
-const MOST_REPORTS: u32 = 25;
+const MAX_REPORTS: u32 = 25;
 /// Longest time that one frame flies: after a stall the camera is not thrown through the scene.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
 /// A device that was lost this often within [`LOSSES_WITHIN`] is given up.
-const MOST_LOSSES: usize = 3;
+const MAX_LOSSES: usize = 3;
 const LOSSES_WITHIN: Duration = Duration::from_secs(60);
 
 /// The maps on the device.
@@ -88,7 +88,7 @@ pub struct App {
     model: Model,
     panel: Panel,
     graphics: Option<Graphics>,
-    proxy: EventLoopProxy<News>,
+    proxy: EventLoopProxy<UserEvent>,
     stop: Option<Arc<Control>>,
     /// Inner size of the window to be opened [logical pixels].
     size: (u32, u32),
@@ -146,11 +146,11 @@ impl App {
     ///
     /// # Errors
     /// As [`Model::new`].
-    pub fn new(options: &ViewerOptions, proxy: EventLoopProxy<News>) -> Result<Self> {
+    pub fn new(options: &ViewerOptions, proxy: EventLoopProxy<UserEvent>) -> Result<Self> {
         let of_baker = proxy.clone();
         let wake = &Wake::new(move || {
             // Fails only when the window is gone, and then nobody waits for it.
-            let _ = of_baker.send_event(News::Baker);
+            let _ = of_baker.send_event(UserEvent::Baker);
         });
         let model = Model::new(options, wake)?;
         Ok(Self {
@@ -276,7 +276,7 @@ impl App {
         self.losses
             .retain(|loss| now.duration_since(*loss) < LOSSES_WITHIN);
         self.losses.push(now);
-        if self.losses.len() > MOST_LOSSES {
+        if self.losses.len() > MAX_LOSSES {
             self.fail(event_loop, reason);
             return;
         }
@@ -378,7 +378,7 @@ impl App {
                 beside::show(ui, rect, &mut self.divider, (beside, reference));
             }
             let camera = model.navigator.camera_for(f64::from(rect.aspect_ratio()));
-            let lens = Lens {
+            let lens = Viewport {
                 camera: &camera,
                 picture: rect,
             };
@@ -475,7 +475,7 @@ impl App {
     }
 }
 
-impl ApplicationHandler<News> for App {
+impl ApplicationHandler<UserEvent> for App {
     fn resumed(&mut self, event_loop: &ActiveEventLoop) {
         if self.graphics.is_none() {
             self.open(event_loop);
@@ -492,8 +492,8 @@ impl ApplicationHandler<News> for App {
         }
     }
 
-    fn user_event(&mut self, _: &ActiveEventLoop, news: News) {
-        if let (News::Accessibility(event), Some(graphics)) = (news, &mut self.graphics) {
+    fn user_event(&mut self, _: &ActiveEventLoop, news: UserEvent) {
+        if let (UserEvent::Accessibility(event), Some(graphics)) = (news, &mut self.graphics) {
             graphics.interface().on_accessibility(event);
         }
         self.request_redraw();

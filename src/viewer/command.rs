@@ -7,7 +7,7 @@ use super::exporting::Export;
 use super::filming::Film;
 use super::new_light::NewLight;
 use super::panel::{Display, Selection};
-use super::sketching::Sketched;
+use super::sketching::PreviewFlags;
 use crate::effect::Effect;
 use crate::scene::Edit;
 use crate::settings::BakeSettings;
@@ -28,7 +28,7 @@ pub struct Choices {
     /// Whether a click on the picture asks what lights the surface there.
     pub probes: bool,
     /// What is drawn of the light's way.
-    pub sketched: Sketched,
+    pub sketched: PreviewFlags,
     /// Whether the scene is read again when its files change.
     pub watches: bool,
 }
@@ -43,7 +43,7 @@ impl Choices {
             film: Film::default(),
             selection: Selection::default(),
             probes: false,
-            sketched: Sketched::default(),
+            sketched: PreviewFlags::default(),
             watches: false,
         }
     }

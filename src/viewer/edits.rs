@@ -13,7 +13,7 @@ use crate::scene::{Edit, EditState, Scene};
 use crate::settings::BakeSettings;
 
 /// Steps that can be taken back.
-const MOST_STEPS: usize = 1000;
+const MAX_STEPS: usize = 1000;
 
 /// A scene with its history, and that of the settings it is baked and shown with.
 #[derive(Clone, Debug)]
@@ -77,7 +77,7 @@ impl History {
             Some(last) if self.is_open && last.goes_on_in(&step) => last.after = step.after,
             _ => {
                 self.done.push(step);
-                if self.done.len() > MOST_STEPS {
+                if self.done.len() > MAX_STEPS {
                     self.done.remove(0);
                 }
             }

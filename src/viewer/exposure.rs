@@ -3,11 +3,11 @@
 use std::time::Duration;
 
 /// Most that better maps of the same scene move it [stops].
-const MOST_STOPS: f64 = 0.5;
+const MAX_STOPS: f64 = 0.5;
 /// Beyond this, the first maps said nothing of the light that there is [stops].
 const MISTAKEN_STOPS: f64 = 2.0;
 /// Less than this is not worth another picture [stops].
-const LEAST_STOPS: f64 = 0.1;
+const MIN_STOPS: f64 = 0.1;
 /// By then, all but 1/e of a move is made [s].
 const PACE_S: f64 = 0.2;
 /// One picture makes no more of a move than that of so long.
@@ -68,9 +68,9 @@ impl AutoExposure {
         let goal = if (suits - first).abs() > MISTAKEN_STOPS {
             suits
         } else {
-            suits.clamp(first - MOST_STOPS, first + MOST_STOPS)
+            suits.clamp(first - MAX_STOPS, first + MAX_STOPS)
         };
-        if (goal - self.goal).abs() > LEAST_STOPS {
+        if (goal - self.goal).abs() > MIN_STOPS {
             self.goal = goal;
         }
         shown

@@ -11,7 +11,7 @@ use crate::settings::LayerKind;
 /// Longest side of a thumbnail [pixels].
 pub const THUMBNAIL: usize = 64;
 /// Most texels across that a pixel is the mean of; more are skipped.
-const MOST_SAMPLES: f64 = 4.0;
+const MAX_SAMPLES: f64 = 4.0;
 
 /// What of a map a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,7 +117,7 @@ fn inside(map: &IlluminationMap, x: f64, y: f64) -> Option<(usize, usize)> {
 fn mean(map: &IlluminationMap, part: Part, [x, y]: [usize; 2]) -> Option<[f32; 3]> {
     let at = |origin: f64, pixel: usize, share: f64| origin + (pixel as f64 + share) * part.texels_per_pixel;
     inside(map, at(part.left, x, 0.5), at(part.top, y, 0.5))?;
-    let samples = part.texels_per_pixel.ceil().clamp(1.0, MOST_SAMPLES) as usize;
+    let samples = part.texels_per_pixel.ceil().clamp(1.0, MAX_SAMPLES) as usize;
     let share = |index: usize| (index as f64 + 0.5) / samples as f64;
     let mut sum = [0.0; 3];
     let mut count = 0.0_f32;

@@ -3,7 +3,7 @@
 use egui::{Color32, Pos2, Rect, Sense, Stroke, Ui, WidgetInfo, vec2};
 use glam::DVec3;
 
-use super::lens::Lens;
+use super::lens::Viewport;
 use crate::geometry::Ray;
 use crate::scene::{Edit, LightEdit, Motion, Scene};
 
@@ -22,7 +22,7 @@ const LAMP: Color32 = Color32::from_rgb(255, 214, 110);
 
 /// What the mouse moves.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Held {
+pub enum GizmoTarget {
     /// A light with a place, by its index.
     Light(usize),
     /// An object with all parts of its node, by its index.
@@ -105,10 +105,10 @@ enum Pose {
 
 impl Pose {
     /// `None` for what has no place, or is tilted.
-    fn of(held: Held, scene: &Scene) -> Option<Self> {
+    fn of(held: GizmoTarget, scene: &Scene) -> Option<Self> {
         match held {
-            Held::Light(light) => Some(Self::Light(light, scene.lights.get(light)?.kind.position()?)),
-            Held::Object(object) => {
+            GizmoTarget::Light(light) => Some(Self::Light(light, scene.lights.get(light)?.kind.position()?)),
+            GizmoTarget::Object(object) => {
                 let motion = scene.objects.get(object)?.motion();
                 Some(Self::Object {
                     object,
@@ -175,7 +175,13 @@ impl Gizmo {
     }
 
     /// Shows the handles of what is held over the picture; the edit that a pull asks for.
-    pub fn show(&mut self, ui: &Ui, lens: &Lens<'_>, held: Option<Held>, scene: &Scene) -> Option<Edit> {
+    pub fn show(
+        &mut self,
+        ui: &Ui,
+        lens: &Viewport<'_>,
+        held: Option<GizmoTarget>,
+        scene: &Scene,
+    ) -> Option<Edit> {
         self.is_hot = false;
         let pose = held.and_then(|held| Pose::of(held, scene));
         let Some(pose) = pose.filter(|pose| lens.is_before(pose.middle_m())) else {
@@ -198,7 +204,13 @@ impl Gizmo {
     }
 
     /// Lets a handle be dragged.
-    fn pull(&mut self, ui: &Ui, lens: &Lens<'_>, (handle, pose): (Handle, &Pose), at: Pos2) -> Option<Edit> {
+    fn pull(
+        &mut self,
+        ui: &Ui,
+        lens: &Viewport<'_>,
+        (handle, pose): (Handle, &Pose),
+        at: Pos2,
+    ) -> Option<Edit> {
         let rect = Rect::from_center_size(at, vec2(2.0 * REACH, 2.0 * REACH));
         if !lens.picture.contains_rect(rect) && self.grip.is_none() {
             return None;
@@ -245,7 +257,7 @@ fn on_ring(angle_rad: f64, length_m: f64) -> DVec3 {
     DVec3::new(angle_rad.sin(), 0.0, angle_rad.cos()) * (RING * length_m)
 }
 
-fn draw(ui: &Ui, lens: &Lens<'_>, handle: Handle, (origin, tip): (DVec3, DVec3), length_m: f64) {
+fn draw(ui: &Ui, lens: &Viewport<'_>, handle: Handle, (origin, tip): (DVec3, DVec3), length_m: f64) {
     let painter = ui.painter().with_clip_rect(lens.picture);
     let stroke = Stroke::new(2.5, handle.colour());
     let line = |from: DVec3, to: DVec3| {
@@ -268,7 +280,7 @@ fn draw(ui: &Ui, lens: &Lens<'_>, handle: Handle, (origin, tip): (DVec3, DVec3),
 }
 
 /// Marks every light that has a place, so that it can be clicked.
-fn lamps(ui: &Ui, lens: &Lens<'_>, scene: &Scene) {
+fn lamps(ui: &Ui, lens: &Viewport<'_>, scene: &Scene) {
     let painter = ui.painter().with_clip_rect(lens.picture);
     for light in &scene.lights {
         if let Some(position) = light.kind.position().filter(|position| lens.is_before(*position)) {
@@ -280,7 +292,7 @@ fn lamps(ui: &Ui, lens: &Lens<'_>, scene: &Scene) {
 }
 
 /// The light that is seen at a place of the picture, if one is.
-pub fn light_at(lens: &Lens<'_>, scene: &Scene, place: Pos2) -> Option<usize> {
+pub fn light_at(lens: &Viewport<'_>, scene: &Scene, place: Pos2) -> Option<usize> {
     let seen = scene.lights.iter().enumerate().filter_map(|(index, light)| {
         let position = light.kind.position()?;
         let distance = lens

@@ -7,7 +7,7 @@ use winit::dpi::LogicalSize;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::{Window, WindowAttributes};
 
-use super::app::News;
+use super::app::UserEvent;
 use super::interface::{Interface, Painting};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
@@ -41,7 +41,7 @@ pub enum Shown {
 
 /// How pictures are made.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Making {
+pub struct RenderOptions {
     /// What is seen in mirrors and through glass.
     pub chains: EffectSwitch,
     /// What glass that parts wavelengths does.
@@ -50,7 +50,7 @@ pub struct Making {
     pub white_balance: Matrix3,
 }
 
-impl Default for Making {
+impl Default for RenderOptions {
     fn default() -> Self {
         Self {
             chains: EffectSwitch::default(),
@@ -67,7 +67,7 @@ struct Canvas {
     /// As the renderer has it.
     scene: Arc<Scene>,
     style: MapStyle,
-    making: Making,
+    making: RenderOptions,
 }
 
 impl Canvas {
@@ -77,7 +77,7 @@ impl Canvas {
             renderer: Renderer::new(gpu, scene, FORMAT, SAMPLES)?,
             scene: Arc::clone(scene),
             style: MapStyle::default(),
-            making: Making::default(),
+            making: RenderOptions::default(),
         })
     }
 
@@ -107,7 +107,7 @@ impl Canvas {
         }
     }
 
-    fn set_making(&mut self, gpu: &Gpu, making: Making) -> Result<()> {
+    fn set_making(&mut self, gpu: &Gpu, making: RenderOptions) -> Result<()> {
         if self.making == making {
             return Ok(());
         }
@@ -174,7 +174,7 @@ impl Graphics {
     /// No window or no adapter is to be had.
     pub fn new(
         event_loop: &ActiveEventLoop,
-        proxy: EventLoopProxy<News>,
+        proxy: EventLoopProxy<UserEvent>,
         scene: &Arc<Scene>,
         (width, height): (u32, u32),
     ) -> Result<Self> {
@@ -296,7 +296,7 @@ impl Graphics {
     ///
     /// # Errors
     /// The device cannot hold what that takes.
-    pub fn set_making(&mut self, making: Making) -> Result<()> {
+    pub fn set_making(&mut self, making: RenderOptions) -> Result<()> {
         self.main.set_making(&self.gpu, making)
     }
 

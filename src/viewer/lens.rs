@@ -8,14 +8,14 @@ use crate::scene::Camera;
 
 /// A camera with the picture that it makes.
 #[derive(Clone, Copy, Debug)]
-pub struct Lens<'a> {
+pub struct Viewport<'a> {
     /// Whose vertical angle of view is that of the picture's height.
     pub camera: &'a Camera,
     /// Where the picture lies [points].
     pub picture: Rect,
 }
 
-impl Lens<'_> {
+impl Viewport<'_> {
     /// Distance along the camera's axis [m].
     pub fn depth_m(&self, point: DVec3) -> f64 {
         (point - self.camera.position).dot(self.camera.forward)

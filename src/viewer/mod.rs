@@ -38,7 +38,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use winit::event_loop::EventLoop;
 
-use self::app::{App, News};
+use self::app::{App, UserEvent};
 use self::files::FilesOptions;
 use crate::error::{Error, Result};
 use crate::illumination::IlluminationMap;
@@ -92,9 +92,9 @@ pub fn run(options: ViewerOptions) -> Result<()> {
     app.failure().map_or(Ok(()), Err)
 }
 
-fn event_loop() -> Result<EventLoop<News>> {
+fn event_loop() -> Result<EventLoop<UserEvent>> {
     // Where a library of the window system is missing, winit panics instead of telling.
-    let built = panic::catch_unwind(|| EventLoop::<News>::with_user_event().build());
+    let built = panic::catch_unwind(|| EventLoop::<UserEvent>::with_user_event().build());
     let reason = match built {
         Ok(Ok(event_loop)) => return Ok(event_loop),
         Ok(Err(error)) => error.to_string(),

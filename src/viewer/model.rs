@@ -18,12 +18,12 @@ use super::command::{Choices, Command};
 use super::edits::{EditedScene, Part};
 use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
-use super::files::keeper::Keeper;
+use super::files::keeper::Autosaver;
 use super::files::{Files, working_folder};
 use super::filming::Player;
-use super::navigation::{Navigator, Travel};
+use super::navigation::{NavigationMode, Navigator};
 use super::probe::{Probed, Prober};
-use super::sketching::Sketcher;
+use super::sketching::PreviewTask;
 use super::timing::{FrameTimes, Latencies};
 use super::views::MapSurvey;
 use super::walking::{Solid, Surroundings};
@@ -32,7 +32,7 @@ use crate::error::Result;
 use crate::geometry::Ray;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::explain::Limits;
-use crate::light_pass::sketch::{Sketch, SketchLimits};
+use crate::light_pass::sketch::{PathPreview, SketchLimits};
 use crate::plan::EffectLine;
 use crate::scene::{Edit, Scene};
 use crate::session::BakeSession;
@@ -43,7 +43,7 @@ use serde_json::{Value, json};
 /// Quiet time after the last change before it is baked.
 pub const QUIET: Duration = Duration::from_millis(150);
 /// Rays that a probe may take for each place of a light.
-const MOST_PROBE_RAYS: u64 = 3_000_000;
+const MAX_PROBE_RAYS: u64 = 3_000_000;
 
 /// Cells of the lattice of rays that is drawn, for each light.
 const SKETCHED_CELLS: usize = 3000;
@@ -91,7 +91,7 @@ pub struct Model {
     /// Counts the maps that were shown.
     maps_revision: u64,
     prober: Prober,
-    sketcher: Sketcher,
+    sketcher: PreviewTask,
     /// What the present maps are held against.
     pub reference: Option<Reference>,
     /// What is to be picked once surfaces are known.
@@ -99,7 +99,7 @@ pub struct Model {
     /// The light in the mouse's hand.
     placing: picking::Placing,
     /// What waits for the surfaces of the scene.
-    sought: seeking::Sought,
+    sought: seeking::PendingSearch,
     /// The camera's path, while it is played.
     player: Option<Player>,
     /// What became of the last file of a path.
@@ -109,7 +109,7 @@ pub struct Model {
     /// Whether the exposure is that of an earlier time.
     pub exposure_is_kept: bool,
     /// What was kept of it and not taken over.
-    left_alone: keeping::LeftAlone,
+    left_alone: keeping::IgnoredState,
     /// The scene in the window by its full path.
     full_source: String,
     /// What is read from files, and from which.
@@ -150,11 +150,11 @@ impl Model {
             exporter: Exporter::new(wake),
             surroundings: Surroundings::new(wake),
             prober: Prober::new(wake),
-            sketcher: Sketcher::new(wake),
+            sketcher: PreviewTask::new(wake),
             reference: None,
             picking: None,
             placing: picking::Placing::default(),
-            sought: seeking::Sought::default(),
+            sought: seeking::PendingSearch::default(),
             player: None,
             film_told: None,
             probed_scene: None,
@@ -169,7 +169,7 @@ impl Model {
             asked: options.maps.is_some().then_some((0, wanted)),
             first_request: 1,
             exposure_is_kept: false,
-            left_alone: keeping::LeftAlone::default(),
+            left_alone: keeping::IgnoredState::default(),
             full_source: String::new(),
             refusal: None,
             survey: MapSurvey::default(),
@@ -191,7 +191,7 @@ impl Model {
     }
 
     /// Gets about in another way from now on.
-    pub fn travel(&mut self, travel: Travel) {
+    pub fn travel(&mut self, travel: NavigationMode) {
         let surfaces = self.surfaces();
         let solid = surfaces.as_deref().map(|tracer| tracer as &dyn Solid);
         self.navigator.set_travel(travel, solid);
@@ -203,7 +203,7 @@ impl Model {
         if self.play_on(seconds) || !self.navigator.is_moving() {
             return;
         }
-        if self.navigator.travel() == Travel::Walk {
+        if self.navigator.travel() == NavigationMode::Walk {
             // Stands until there is something to stand on.
             if let Some(surfaces) = self.surfaces() {
                 self.navigator.advance_among(seconds, &*surfaces);
@@ -231,7 +231,7 @@ impl Model {
     /// When something is to be done though nothing happens.
     pub fn due(&self) -> Option<Instant> {
         let keeper = self.files.keeper.as_ref();
-        let dues = [self.bake_due, keeper.and_then(Keeper::due)];
+        let dues = [self.bake_due, keeper.and_then(Autosaver::due)];
         dues.into_iter().flatten().min()
     }
 
@@ -251,7 +251,7 @@ impl Model {
     }
 
     /// How light runs, where that is drawn.
-    pub fn sketch(&self) -> Option<&Arc<Sketch>> {
+    pub fn sketch(&self) -> Option<&Arc<PathPreview>> {
         self.sketcher.shown()
     }
 
@@ -293,7 +293,7 @@ impl Model {
             let limits = Limits {
                 max_depth: settings.depth(),
                 branch_threshold: settings.path_threshold(),
-                most_rays: MOST_PROBE_RAYS,
+                most_rays: MAX_PROBE_RAYS,
             };
             let maps = self.last.as_ref().map_or(&self.given, |last| &last.result.maps);
             self.prober.look(&tracer, maps, limits);

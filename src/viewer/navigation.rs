@@ -45,7 +45,7 @@ pub const BOOKMARKS: usize = 9;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
-pub enum Travel {
+pub enum NavigationMode {
     /// Anywhere, through walls.
     #[default]
     Fly,
@@ -55,7 +55,7 @@ pub enum Travel {
     Orbit,
 }
 
-impl Travel {
+impl NavigationMode {
     /// Its name in the panel and in the event log.
     pub fn name(self) -> &'static str {
         self.into()
@@ -122,7 +122,7 @@ pub struct Navigator {
     cameras: Vec<Camera>,
     /// Which of the file's cameras `C` shows next.
     next_camera: usize,
-    travel: Travel,
+    travel: NavigationMode,
     walker: Walker,
     walking_m_per_s: f64,
     /// Distance of the point that is orbited, straight ahead [m].
@@ -154,7 +154,7 @@ impl Navigator {
             radius_m,
             cameras: scene.cameras.clone(),
             next_camera: 0,
-            travel: Travel::Fly,
+            travel: NavigationMode::Fly,
             walker: Walker::default(),
             walking_m_per_s: walking::SPEED_M_PER_S,
             orbit_m: radius_m,
@@ -206,25 +206,25 @@ impl Navigator {
     /// Speed without running [m/s].
     pub fn speed_m_per_s(&self) -> f64 {
         match self.travel {
-            Travel::Walk => self.walking_m_per_s,
-            Travel::Fly | Travel::Orbit => self.speed_m_per_s,
+            NavigationMode::Walk => self.walking_m_per_s,
+            NavigationMode::Fly | NavigationMode::Orbit => self.speed_m_per_s,
         }
     }
 
     /// How it gets about.
-    pub fn travel(&self) -> Travel {
+    pub fn travel(&self) -> NavigationMode {
         self.travel
     }
 
     /// Gets about in another way from now on; an orbit is around what is straight ahead, or else around the scene.
-    pub fn set_travel(&mut self, travel: Travel, solid: Option<&dyn Solid>) {
+    pub fn set_travel(&mut self, travel: NavigationMode, solid: Option<&dyn Solid>) {
         if travel == self.travel {
             return;
         }
         self.travel = travel;
         self.velocity_m_per_s = DVec3::ZERO;
         self.walker = Walker::default();
-        if travel != Travel::Fly {
+        if travel != NavigationMode::Fly {
             self.roll_rad = 0.0;
         }
         let (_, _, forward) = self.level_axes();
@@ -286,7 +286,7 @@ impl Navigator {
     pub fn is_moving(&self) -> bool {
         self.keys.direction() != DVec3::ZERO
             || self.velocity_m_per_s != DVec3::ZERO
-            || (self.travel == Travel::Walk && self.walker.is_moving())
+            || (self.travel == NavigationMode::Walk && self.walker.is_moving())
     }
 
     /// Lets time pass [s, ≥ 0] where nothing is in the way. The velocity approaches what the keys ask for exponentially and
@@ -294,14 +294,14 @@ impl Navigator {
     pub fn advance(&mut self, seconds: f64) {
         let path = self.drift(seconds);
         match self.travel {
-            Travel::Fly | Travel::Walk => self.position += path,
-            Travel::Orbit => self.move_pivot(path),
+            NavigationMode::Fly | NavigationMode::Walk => self.position += path,
+            NavigationMode::Orbit => self.move_pivot(path),
         }
     }
 
     /// The same among surfaces: those who walk stand on them and are stopped by them.
     pub fn advance_among(&mut self, seconds: f64, solid: &dyn Solid) {
-        if self.travel != Travel::Walk || seconds <= 0.0 {
+        if self.travel != NavigationMode::Walk || seconds <= 0.0 {
             return self.advance(seconds);
         }
         // Whoever has come past a corner walks on where he wants to, within one long frame too.
@@ -347,7 +347,7 @@ impl Navigator {
         let pivot = self.position + self.level_axes().2 * self.orbit_m;
         self.yaw_rad = (self.yaw_rad + counts.x * LOOK_RAD_PER_COUNT).rem_euclid(std::f64::consts::TAU);
         self.pitch_rad = (self.pitch_rad - counts.y * LOOK_RAD_PER_COUNT).clamp(-FRAC_PI_2, FRAC_PI_2);
-        if self.travel == Travel::Orbit {
+        if self.travel == NavigationMode::Orbit {
             self.position = pivot - self.level_axes().2 * self.orbit_m;
         }
     }
@@ -357,13 +357,13 @@ impl Navigator {
     pub fn wheel(&mut self, notches: f64) {
         let factor = WHEEL_FACTOR.powf(notches);
         match self.travel {
-            Travel::Fly => {}
-            Travel::Walk => {
+            NavigationMode::Fly => {}
+            NavigationMode::Walk => {
                 let (slowest, fastest) = WALKING_RANGE;
                 self.walking_m_per_s = (self.walking_m_per_s * factor).clamp(slowest, fastest);
                 return;
             }
-            Travel::Orbit => {
+            NavigationMode::Orbit => {
                 let (_, _, forward) = self.level_axes();
                 let ahead_m = self.orbit_m * (1.0 - 1.0 / factor);
                 return self.move_pivot(forward * ahead_m);
@@ -457,7 +457,7 @@ impl Navigator {
     fn wanted_velocity(&self) -> DVec3 {
         let keys = self.keys.direction();
         let (right, _, forward) = self.level_axes();
-        let direction = if self.travel == Travel::Walk {
+        let direction = if self.travel == NavigationMode::Walk {
             right * keys.x + DVec3::Y.cross(right) * keys.z
         } else {
             right * keys.x + DVec3::Y * keys.y + forward * keys.z

@@ -16,9 +16,9 @@ const EARLY_MS: f64 = 14.0;
 /// What a picture at rest may take [ms]: the next key press waits for it.
 const REST_MS: f64 = 250.0;
 /// Pictures whose mean the picture at rest becomes.
-const MOST_SAMPLES: u32 = 64;
+const MAX_SAMPLES: u32 = 64;
 /// As many are made in any case, however long they take.
-const LEAST_SAMPLES: u32 = 4;
+const MIN_SAMPLES: u32 = 4;
 /// Nothing is refined for so long after a key or the mouse was used.
 const PAUSE: Duration = Duration::from_millis(400);
 /// For how long further ones are made.
@@ -113,6 +113,6 @@ impl Pace {
     /// Whether the mean of so many pictures of a view at rest is to be made better.
     pub fn refines(&mut self, samples: u32, now: Instant) -> bool {
         let since = *self.rests_since.get_or_insert(now);
-        samples < LEAST_SAMPLES || (samples < MOST_SAMPLES && now.duration_since(since) < REFINES_FOR)
+        samples < MIN_SAMPLES || (samples < MAX_SAMPLES && now.duration_since(since) < REFINES_FOR)
     }
 }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::background::{Background, Task, Wake};
 use super::flat_map::layers_at;
-use super::lens::Lens;
+use super::lens::Viewport;
 use crate::geometry::Ray;
 use crate::illumination::{IlluminationMap, Side};
 use crate::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
@@ -18,9 +18,9 @@ use crate::transport::{MediumStack, SurfaceHit, Tracer, media_at};
 use crate::units::LUMENS_PER_WATT;
 
 /// Mirrors and glass that the eye looks through to what it points at.
-const MOST_SEEN_THROUGH: usize = 32;
+const MAX_SEEN_THROUGH: usize = 32;
 /// Of the mean of its map: texels that are darker are explained no more closely.
-const LEAST_SHARE: f64 = 1e-3;
+const MIN_SHARE: f64 = 1e-3;
 
 /// What is known of a point.
 #[derive(Clone, Debug)]
@@ -142,7 +142,7 @@ pub struct Seen {
 pub fn seen(tracer: &Tracer, gaze: &Ray) -> Option<Seen> {
     let mut ray = *gaze;
     let mut media: MediumStack = media_at(tracer, gaze.origin);
-    for _ in 0..MOST_SEEN_THROUGH {
+    for _ in 0..MAX_SEEN_THROUGH {
         let hit = tracer.closest_hit(&ray)?;
         let interaction = tracer.interact(&hit, ray.direction, &media);
         if interaction.deposit.max_channel() > 0.0 {
@@ -196,8 +196,8 @@ fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) ->
             .sum();
         flux_w / map.chart.area_m2()
     });
-    let scale = texel.total_w_m2().max(LEAST_SHARE * mean);
-    if scale > 0.0 { scale } else { LEAST_SHARE }
+    let scale = texel.total_w_m2().max(MIN_SHARE * mean);
+    if scale > 0.0 { scale } else { MIN_SHARE }
 }
 
 /// The point that is asked about, and what is known of it.
@@ -279,16 +279,16 @@ impl Prober {
 }
 
 /// Paths that are drawn: the strongest.
-const MOST_PATHS: usize = 24;
+const MAX_PATHS: usize = 24;
 const CAUSTIC: Color32 = Color32::from_rgb(255, 196, 64);
 const DIRECT: Color32 = Color32::from_rgb(120, 190, 255);
 const POINT: Color32 = Color32::from_rgb(255, 80, 80);
 
 /// Draws the paths over a picture as the camera sees them: the wider, the larger their share.
-pub fn draw(painter: &Painter, lens: &Lens<'_>, probed: &Probed) {
+pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
     let painter = painter.with_clip_rect(lens.picture);
     let paths = probed.explanation.iter().flat_map(|told| &told.paths);
-    for path in paths.take(MOST_PATHS) {
+    for path in paths.take(MAX_PATHS) {
         let share = probed.share(path) as f32;
         let colour = if path.vertices.is_empty() { DIRECT } else { CAUSTIC };
         let stroke = Stroke::new(1.2 + 2.5 * share.clamp(0.0, 1.0), colour.gamma_multiply(0.9));

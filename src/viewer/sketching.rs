@@ -5,8 +5,8 @@ use std::sync::Arc;
 use egui::{Color32, Painter, Stroke};
 
 use super::background::{Background, Task, Wake};
-use super::lens::Lens;
-use crate::light_pass::sketch::{Sketch, SketchLimits, sketch};
+use super::lens::Viewport;
+use crate::light_pass::sketch::{PathPreview, SketchLimits, sketch};
 use crate::transport::Tracer;
 
 const HIT: Color32 = Color32::from_rgb(255, 214, 110);
@@ -16,14 +16,14 @@ const DOT: f32 = 1.2;
 
 /// What of it is drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Sketched {
+pub struct PreviewFlags {
     /// Where rays land.
     pub hits: bool,
     /// Patches of wavefronts.
     pub patches: bool,
 }
 
-impl Sketched {
+impl PreviewFlags {
     /// Whether anything is.
     pub fn is_any(self) -> bool {
         self.hits || self.patches
@@ -32,13 +32,13 @@ impl Sketched {
 
 /// Finds it, and keeps what it found.
 #[derive(Debug)]
-pub struct Sketcher {
+pub struct PreviewTask {
     /// Of these surfaces.
-    shown: Option<(Arc<Tracer>, SketchLimits, Arc<Sketch>)>,
-    coming: Background<(Arc<Tracer>, SketchLimits), Sketch>,
+    shown: Option<(Arc<Tracer>, SketchLimits, Arc<PathPreview>)>,
+    coming: Background<(Arc<Tracer>, SketchLimits), PathPreview>,
 }
 
-impl Sketcher {
+impl PreviewTask {
     /// Nothing yet; the window is woken when there is something.
     pub fn new(wake: &Wake) -> Self {
         Self {
@@ -48,7 +48,7 @@ impl Sketcher {
     }
 
     /// What was found last.
-    pub fn shown(&self) -> Option<&Arc<Sketch>> {
+    pub fn shown(&self) -> Option<&Arc<PathPreview>> {
         self.shown.as_ref().map(|(.., sketch)| sketch)
     }
 
@@ -84,7 +84,7 @@ impl Sketcher {
 }
 
 /// Draws it over a picture as the camera sees it, in front of everything.
-pub fn draw(painter: &Painter, lens: &Lens<'_>, sketch: &Sketch, what: Sketched) {
+pub fn draw(painter: &Painter, lens: &Viewport<'_>, sketch: &PathPreview, what: PreviewFlags) {
     let painter = painter.with_clip_rect(lens.picture);
     if what.patches {
         let stroke = Stroke::new(0.6, OUTLINE.gamma_multiply(0.7));

@@ -9,10 +9,10 @@ use crate::session::forecast::forecast;
 use crate::settings::LayerKind;
 
 /// A forecast that may be wrong by more than this is not told [1].
-const MOST_FACTOR: f64 = 2.0;
+const MAX_FACTOR: f64 = 2.0;
 
 /// Less of a stage than this tells nothing of its pace [1].
-const LEAST_FRACTION: f64 = 0.1;
+const MIN_FRACTION: f64 = 0.1;
 
 /// Time until a bake is done [s, ≥ 0], rounded by nobody; `None` where nothing is known yet or no bake is running. `wanted` is
 /// what is baked, `last` the newest maps.
@@ -42,7 +42,7 @@ pub fn time_left_s(
         let course = &level.result.course;
         let spent_cpu_s = course.last().filter(|point| !point.is_coarse)?.cpu_s;
         let expected = forecast(course, target, wanted.settings.estimator)?;
-        if expected.factor > MOST_FACTOR {
+        if expected.factor > MAX_FACTOR {
             return None;
         }
         let more_cpu_s = expected.cpu_s - spent_cpu_s;
@@ -52,7 +52,7 @@ pub fn time_left_s(
         left_s.is_finite().then_some(left_s.max(0.0))
     });
     let by_pace = || {
-        let is_known = fraction >= LEAST_FRACTION && wanted.settings.max_error.is_none();
+        let is_known = fraction >= MIN_FRACTION && wanted.settings.max_error.is_none();
         is_known.then(|| elapsed_s * (1.0 - fraction) / fraction)
     };
     let at_most_s = wanted

@@ -72,7 +72,7 @@ pub fn sum_ms(ms: GpuMs) -> f64 {
 }
 
 /// Waits that are remembered of each kind: the last ones.
-const MOST_WAITS: usize = 10_000;
+const MAX_WAITS: usize = 10_000;
 /// Whoever asks the system for events and gets none at once has met all that came before.
 const WAITED: Duration = Duration::from_millis(1);
 
@@ -152,7 +152,7 @@ impl Latencies {
             } else {
                 &mut self.otherwise
             };
-            if waits.len() == MOST_WAITS {
+            if waits.len() == MAX_WAITS {
                 waits.pop_front();
             }
             waits.push_back(now.duration_since(came));

@@ -7,7 +7,7 @@ square grid; of lamps with a size, the cone or disc of the casters' bounding bal
 a ray goes one way, by Fresnel, by numbers that are even among neighbours. It starts a little further on its own line; or
 beside it, where Mitsuba's `spawn_ray` has it, as all of Mitsuba's integrators do.
 
-Surfaces are those that Nephroid's README describes: the triangle says which side is met, and turns light where its interpolated
+Surfaces are those that Nephroid's guide describes: the triangle says which side is met, and turns light where its interpolated
 normal would send it through; rough ones show GGX micro-normals and lose nothing between them; of bodies that overlap, the one
 that was entered last is the medium.
 """

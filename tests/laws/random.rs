@@ -10,7 +10,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 
 use support::laws::law::*;
 use support::laws::{Baked, Table, is_long};
-use support::random_scenes::{MOST_LAMPS, scene};
+use support::random_scenes::{MAX_LAMPS, scene};
 use support::tools::{at, set, settings, transformed};
 
 /// What may be done to a scene.
@@ -65,7 +65,7 @@ pub fn fill(t: &mut Table) {
         // One rounding for each light alone, one for each sum of two, one for the light of all together.
         all.law(
             "sum of their maps, roundings",
-            2.0 * f64::from(MOST_LAMPS),
+            2.0 * f64::from(MAX_LAMPS),
             roundings_apart,
         );
     }

@@ -18,12 +18,11 @@ use nephroid::study::brute_force::{brute_force, relative_noise};
 use nephroid::transport::Tracer;
 use serde::{Deserialize, Serialize};
 
-use support::brute_force::brute;
 use support::hard_scenes::{self, Shading, TinyBall};
 use support::laws::law::deposited_w;
 use support::laws::{Baked, Table};
 use support::project_file;
-use support::tools::{at, bake, builtin_scene, energy_fault, map_of, settings};
+use support::tools::{at, bake, brute, builtin_scene, energy_fault, map_of, settings};
 
 /// Texels of all maps across and down.
 const SIDE: usize = 64;

@@ -14,7 +14,7 @@ const GLASS: f64 = 1.5;
 pub const FLOOR: f64 = 2.0;
 pub const SKY: f64 = 7.0;
 /// Most specular surfaces on a chain.
-const MOST_SURFACES: f64 = 32.0;
+const MAX_SURFACES: f64 = 32.0;
 
 /// A scene and what is seen of it.
 pub struct Law {
@@ -275,7 +275,7 @@ fn between_mirrors() -> Law {
             // Where it ends in the row of images of the hall.
             let end = eye.x + direction.x / direction.y.abs() * height;
             let surfaces = (0.5 * (end + 1.0)).floor();
-            if surfaces > MOST_SURFACES {
+            if surfaces > MAX_SURFACES {
                 return Some(0.0);
             }
             let is_decided = (0.5 * (end + 1.0) - surfaces - 0.5).abs() < 0.499;

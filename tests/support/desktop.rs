@@ -19,7 +19,7 @@ use x11rb::protocol::xproto::{
 };
 use x11rb::rust_connection::RustConnection;
 
-use crate::evidence::keep_bytes;
+use crate::keep_bytes;
 use crate::program::program;
 use crate::skip;
 use crate::tools::builtin_scene;

@@ -62,7 +62,7 @@ impl Glb {
     pub fn push_floats(&mut self, values: &[f32], width: usize) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.push_view(&bytes);
-        let kind = ["SCALAR", "VEC2", "VEC3"][width - 1];
+        let kind = ["SCALAR", "VEC2", "VEC3", "VEC4"][width - 1];
         self.push(
             "accessors",
             json!({ "bufferView": view, "componentType": 5126, "count": values.len() / width, "type": kind }),
@@ -128,11 +128,16 @@ impl Glb {
 
     /// The bytes of the `.glb` file.
     pub fn bytes(&self) -> Vec<u8> {
-        let mut json = self.json.clone();
+        let mut file = self.clone();
         if !self.binary.is_empty() {
-            json["buffers"] = json!([{ "byteLength": self.binary.len() }]);
+            file.json["buffers"] = json!([{ "byteLength": self.binary.len() }]);
         }
-        let mut text = json.to_string().into_bytes();
+        file.bytes_as_stated()
+    }
+
+    /// The same with the buffers that the JSON states.
+    pub fn bytes_as_stated(&self) -> Vec<u8> {
+        let mut text = self.json.to_string().into_bytes();
         text.resize(text.len().next_multiple_of(4), b' ');
         let mut body = Vec::new();
         for (kind, chunk) in [(b"JSON", &text), (b"BIN\0", &self.binary)] {

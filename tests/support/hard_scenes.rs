@@ -3,11 +3,14 @@
 //! `wall`, `blocker`, …
 
 use std::f64::consts::{PI, TAU};
+
 use glam::{DMat3, DVec3};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Mesh, Scene};
-use nephroid::units::{Flux, Irradiance};
+use nephroid::scene::{LightKind, LightSize, Material, Mesh, PanelShape, Scene};
+use nephroid::units::{Flux, Irradiance, Radiance};
+
+use crate::tools::builtin_scene;
 
 /// How normals run over a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -291,4 +294,36 @@ fn cap(columns: u32, rows: u32, surface: impl Fn(DVec3) -> (DVec3, DVec3)) -> Me
         let (sine_v, cosine_v) = (0.5 * PI * v).sin_cos();
         surface(DVec3::new(sine_v * cosine_u, -cosine_v, sine_v * sine_u))
     })
+}
+
+/// A built-in scene under a square lamp of a side [m] instead of its point: it shines downwards, with the same intensity
+/// on its axis whatever its side.
+pub fn under_square_lamp(name: &str, side_m: f64) -> Scene {
+    let mut scene = builtin_scene(name);
+    scene.lights[0].kind = LightKind::Panel {
+        centre: scene.lights[0].kind.position().expect("a point light"),
+        across: DVec3::X * (0.5 * side_m),
+        down: DVec3::Z * (0.5 * side_m),
+        shape: PanelShape::Rectangle,
+        radiance: Radiance(8.0 / (side_m * side_m)),
+    };
+    scene
+}
+
+/// Built-in `nephroid` under a sun as wide as ours.
+pub fn under_the_suns_disc() -> Scene {
+    let mut scene = builtin_scene("nephroid");
+    let diameter_rad = 0.53_f64.to_radians();
+    scene.lights[0].size = LightSize::Angle { diameter_rad };
+    scene
+}
+
+/// A built-in scene whose specular materials have a roughness.
+pub fn roughened(name: &str, roughness: f64) -> Scene {
+    let mut scene = builtin_scene(name);
+    let specular = |material: &&mut Material| material.surface.is_specular();
+    for material in scene.materials.iter_mut().filter(specular) {
+        material.roughness = roughness;
+    }
+    scene
 }

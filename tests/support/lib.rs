@@ -1,13 +1,10 @@
 //! Shared by the test binaries: scenes, meshes, files made in memory, the program in a sandbox, skips that are counted.
 #![allow(missing_docs, clippy::missing_panics_doc)]
 
-pub mod brute_force;
-pub mod bump_scenes;
 pub mod chain_laws;
 #[cfg(target_os = "linux")]
 pub mod desktop;
 pub mod effect_scenes;
-pub mod evidence;
 #[cfg(target_os = "linux")]
 pub mod file_drop;
 pub mod files;
@@ -21,13 +18,11 @@ pub mod program;
 pub mod random_scenes;
 pub mod references;
 pub mod scenes;
-mod skip;
 pub mod sound;
 pub mod tools;
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
-
-pub use skip::skip;
 
 /// The project's folder.
 fn root() -> &'static Path {
@@ -39,6 +34,15 @@ fn root() -> &'static Path {
 fn build_folder() -> PathBuf {
     let test = std::env::current_exe().expect("the path of this test binary");
     test.ancestors().nth(2).expect("it lies in the build folder").to_owned()
+}
+
+/// Writes a file into the build folder's `evidence`, and says where it is.
+pub fn keep_bytes(name: &str, bytes: &[u8]) -> String {
+    let folder = build_folder().join("evidence");
+    std::fs::create_dir_all(&folder).expect("the build folder can be written");
+    let path = folder.join(name);
+    std::fs::write(&path, bytes).expect("the build folder can be written");
+    format!("see {}", path.display())
 }
 
 /// A file or folder of the project; fails where it is missing.
@@ -58,6 +62,29 @@ pub fn shared_or_skip(path: &str) -> Option<PathBuf> {
     let test = std::thread::current().name().unwrap_or("?").to_owned();
     skip(&test, &format!("../shared/{path} is not there"));
     None
+}
+
+/// Says that a test was skipped and why, past the test harness's capture, so that `tests/run` counts it.
+///
+/// # Panics
+/// With CI=true.
+pub fn skip(test: &str, reason: &str) {
+    assert!(
+        std::env::var("CI").as_deref() != Ok("true"),
+        "{test} was skipped ({reason}), which CI=true does not allow"
+    );
+    let _ = writeln!(std::io::stderr(), "skipped: {test}: {reason}");
+}
+
+/// What it holds, or the end of a test whose skip was counted.
+#[macro_export]
+macro_rules! or_skip {
+    ($option:expr) => {
+        match $option {
+            Some(found) => found,
+            None => return,
+        }
+    };
 }
 
 /// How a law is tried: many cases, the same ones in every run, so that a failure can be looked at.

@@ -89,19 +89,7 @@ impl Sandbox {
 
     /// Names of the files in a folder, sorted; none where there is no such folder.
     pub fn files(&self, folder: impl AsRef<Path>) -> Vec<String> {
-        let mut names: Vec<String> = std::fs::read_dir(self.folder.path().join(folder))
-            .into_iter()
-            .flatten()
-            .map(|entry| {
-                entry
-                    .expect("it can be listed")
-                    .file_name()
-                    .to_string_lossy()
-                    .into_owned()
-            })
-            .collect();
-        names.sort();
-        names
+        names(&self.folder.path().join(folder))
     }
 
     pub fn manifest(&self, folder: &str) -> Value {
@@ -147,4 +135,19 @@ impl Run {
 pub fn read_json(path: &Path) -> Value {
     let bytes = std::fs::read(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     serde_json::from_slice(&bytes).expect("JSON")
+}
+
+pub fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
+}
+
+/// Names in a folder, sorted; none where there is no such folder.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten();
+    let name = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("it can be listed").file_name();
+    let mut names: Vec<String> = entries
+        .map(|entry| name(entry).to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
 }

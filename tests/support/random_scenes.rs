@@ -9,7 +9,7 @@ use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 use crate::laws::scenes::{Build, floor, light, random};
 
 /// Lamps of a scene, at most.
-pub const MOST_LAMPS: u32 = 3;
+pub const MAX_LAMPS: u32 = 3;
 
 /// One of many scenes.
 pub fn scene(seed: u64) -> Scene {
@@ -25,7 +25,7 @@ pub fn scene(seed: u64) -> Scene {
         let wall = shapes::rectangle(centre, turn * DVec3::X * width, turn * DVec3::Z * height);
         scene = scene.diffuse(&format!("wall{index}"), wall);
     }
-    for index in 0..1 + dice.below(MOST_LAMPS) {
+    for index in 0..1 + dice.below(MAX_LAMPS) {
         let name = format!("lamp{index}");
         scene = scene.lit(Light { name, ..dice.lamp() });
     }

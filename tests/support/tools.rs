@@ -8,6 +8,8 @@ use nephroid::progress::Control;
 use nephroid::scene::{Camera, LightKind, Scene, builtin};
 use nephroid::session::{BakeResult, BakeSession};
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, MapResolution};
+use nephroid::study::brute_force::brute_force;
+use nephroid::transport::Tracer;
 
 /// A built-in scene that must exist.
 pub fn builtin_scene(name: &str) -> Scene {
@@ -159,4 +161,10 @@ pub fn bits(map: &IlluminationMap) -> Vec<u32> {
         .flatten()
         .map(|e| e.to_bits())
         .collect()
+}
+
+/// A scene's maps by brute force.
+pub fn brute(scene: &Scene, settings: &BakeSettings, rays: u64) -> BakeResult {
+    let tracer = Tracer::new(Arc::new(scene.clone()));
+    brute_force(&tracer, settings, rays, &(), &Control::default()).expect("a reference")
 }

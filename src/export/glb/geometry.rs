@@ -71,6 +71,16 @@ pub fn write(
         &mut attributes,
         warnings,
     );
+    let skin = format!("/nodes/{}/skin", object.node);
+    if glb.json.pointer(&skin).is_some() {
+        // Its joints would bend once more what is written as they bent it.
+        glb.remove(&skin);
+        warnings.push(Warning::new(
+            format!("surface `{}`", object.name),
+            "lost its skin: its map is that of one pose",
+            "give it light-map coordinates (TEXCOORD_1) of its own",
+        ));
+    }
     let indices = glb.push_indices(parted.corners.iter().copied());
     let primitive = glb.primitive(place);
     primitive["attributes"] = attributes;

@@ -19,7 +19,7 @@ const SCHEMA: u32 = 4;
 pub(super) const FILE_NAME: &str = "shard.json";
 
 /// Largest one that is read [bytes].
-const MOST_BYTES: u64 = 64 << 20;
+const MAX_BYTES: u64 = 64 << 20;
 
 /// What the user named as the scene, and how it was read.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -125,7 +125,7 @@ impl ShardManifest {
                 "name folders that `nephroid bake --shard` wrote",
             ));
         }
-        let bytes = files::read_file(&path, MOST_BYTES)?;
+        let bytes = files::read_file(&path, MAX_BYTES)?;
         let refused =
             |what: String| Error::failure(path.display().to_string(), what, "bake this shard again");
         let document: serde_json::Value =

@@ -11,7 +11,7 @@ use crate::scene::Scene;
 use crate::session::{ShardSource, ShardSums, Timings};
 
 /// Shards that are named one by one where they are missing.
-const MOST_NAMED: usize = 8;
+const MAX_NAMED: usize = 8;
 
 /// The folders of all shards of one bake.
 #[derive(Debug)]
@@ -121,12 +121,12 @@ impl ShardSet {
         let mut present = by_number.iter().map(|shard| number(shard)).peekable();
         let is_missing = |wanted: &u32| present.next_if_eq(wanted).is_none();
         // One more than is named tells that there are more.
-        let missing: Vec<u32> = (1..=count).filter(is_missing).take(MOST_NAMED + 1).collect();
+        let missing: Vec<u32> = (1..=count).filter(is_missing).take(MAX_NAMED + 1).collect();
         if missing.is_empty() && by_number.len() == count as usize {
             return Ok(());
         }
-        let named: Vec<String> = missing.iter().take(MOST_NAMED).map(u32::to_string).collect();
-        let more = if missing.len() > MOST_NAMED {
+        let named: Vec<String> = missing.iter().take(MAX_NAMED).map(u32::to_string).collect();
+        let more = if missing.len() > MAX_NAMED {
             " and more"
         } else {
             ""

@@ -1,7 +1,7 @@
 //! Which light of a map is in its textures.
 
 use crate::error::{Error, Result, Warning};
-use crate::export::map_reader::{StoredLight, StoredMap};
+use crate::export::map_reader::{MapReader, StoredLight, StoredMap};
 use crate::files;
 use crate::settings::LayerKind;
 
@@ -70,19 +70,32 @@ impl Part {
 }
 
 impl Content {
-    /// The textures of a map, with a warning of light that is in none of them.
+    /// # Errors
+    /// A layer that no map has.
+    pub fn check(self, reader: &MapReader<'_>) -> Result<()> {
+        let Self::Layer(kind) = self else {
+            return Ok(());
+        };
+        if reader.entries().iter().any(|entry| entry.layers.contains(&kind)) {
+            return Ok(());
+        }
+        Err(Error::failure(
+            reader.folder().display().to_string(),
+            format!("the {} layer was not baked", kind.name()),
+            "name a layer that was, or bake it (--layers)",
+        ))
+    }
+
+    /// The textures of a map, with a warning of light that is in none of them; none where the map lacks a layer that others
+    /// have, such as the back of a surface.
     ///
     /// # Errors
-    /// A map that lacks the layer, or the parts of lights, that are asked for.
+    /// A map that lacks the parts of lights that are asked for.
     pub fn parts(self, stored: &StoredMap) -> Result<(Vec<Part>, Option<Warning>)> {
         let map = &stored.map;
         let kinds: Vec<LayerKind> = map.layers.iter().map(|layer| layer.kind).collect();
         let layer = |kind: LayerKind| {
-            let layer = map.layer(kind).ok_or_else(|| {
-                let what = format!("the {} layer was not baked", kind.name());
-                lacking(stored, what, "name a layer that was, or bake it (--layers)")
-            })?;
-            Ok(Part {
+            map.layer(kind).map(|layer| Part {
                 layers: vec![kind],
                 light: None,
                 key: kind.name().into(),
@@ -99,8 +112,8 @@ impl Content {
                 };
                 Ok((vec![sum], None))
             }
-            Self::Layer(kind) => Ok((vec![layer(kind)?], None)),
-            Self::EachLayer => Ok((kinds.into_iter().map(layer).collect::<Result<_>>()?, None)),
+            Self::Layer(kind) => Ok((layer(kind).into_iter().collect(), None)),
+            Self::EachLayer => Ok((kinds.into_iter().filter_map(layer).collect(), None)),
             Self::EachLight => {
                 let parts = parts_of_lights(stored);
                 if parts.is_empty() && has_light(&map.total()) {

@@ -82,6 +82,7 @@ pub fn write(
     mut folder: TextureFolder,
     control: &Control,
 ) -> Result<TextureReport> {
+    options.content.check(reader)?;
     let mut writer = Writer {
         options,
         exposure_stops: 0.0,

@@ -78,7 +78,7 @@ struct MapTotal<'a> {
 
 /// A ray on its way from the eye.
 #[derive(Clone, Copy)]
-struct Gaze<'a> {
+struct EyePath<'a> {
     ray: Ray,
     media: MediumStack,
     /// Share of the pixel's radiance that the ray brings, per channel.
@@ -89,7 +89,7 @@ struct Gaze<'a> {
     at: Option<&'a SceneAtWavelength>,
 }
 
-impl Gaze<'_> {
+impl EyePath<'_> {
     /// What a radiance at its end adds to the pixel's.
     fn brings(&self, radiance: LinearSrgb) -> LinearSrgb {
         let brought = self.weight * radiance;
@@ -137,7 +137,7 @@ impl<'a> LitScene<'a> {
     ) -> LinearSrgb {
         rays.camera_rays += 1;
         let mut seen = LinearSrgb::BLACK;
-        let mut waiting = vec![Gaze {
+        let mut waiting = vec![EyePath {
             ray,
             media,
             weight: LinearSrgb::WHITE,
@@ -155,7 +155,7 @@ impl<'a> LitScene<'a> {
             if CHAINS && gaze.at.is_none() && spectrum.parts(self.tracer, &hit, &gaze.media) {
                 for at in &spectrum.wavelengths {
                     let at = Some(at);
-                    seen += self.meet::<CHAINS>(Gaze { at, ..gaze }, &hit, &mut waiting, rays);
+                    seen += self.meet::<CHAINS>(EyePath { at, ..gaze }, &hit, &mut waiting, rays);
                 }
             } else {
                 seen += self.meet::<CHAINS>(gaze, &hit, &mut waiting, rays);
@@ -167,16 +167,16 @@ impl<'a> LitScene<'a> {
     /// What a gaze sees of the surface that it meets; the ways on wait.
     fn meet<'b, const CHAINS: bool>(
         &self,
-        gaze: Gaze<'b>,
+        gaze: EyePath<'b>,
         hit: &SurfaceHit,
-        waiting: &mut Vec<Gaze<'b>>,
+        waiting: &mut Vec<EyePath<'b>>,
         rays: &mut EyeRays,
     ) -> LinearSrgb {
         let incident = gaze.ray.direction;
         let tracer = gaze.at.map_or(self.tracer, |at| &at.tracer);
         let interaction = tracer.interact(hit, incident, &gaze.media);
         let side = Side::met(incident, hit.geometric_normal);
-        let seen = gaze.brings(self.own_radiance(hit, side, interaction.deposit));
+        let seen = gaze.brings(self.own_radiance(hit, side, interaction.leaving));
         if !CHAINS {
             return seen;
         }
@@ -207,7 +207,8 @@ impl<'a> LitScene<'a> {
 
     /// What a surface sends by itself: emission, and the share of its map that its polish lets out, L = ρE/π.
     fn own_radiance(&self, hit: &SurfaceHit, side: Side, share: LinearSrgb) -> LinearSrgb {
-        let emitted = self.emitted[hit.object];
+        let scene = self.tracer.scene();
+        let emitted = self.emitted[hit.object] * scene.glow_at(hit.object, hit.triangle, hit.barycentric);
         let Some(map) = self.maps[Receiver::new(hit.object, side).index()]
             .as_ref()
             .filter(|_| share != LinearSrgb::BLACK)
@@ -222,12 +223,12 @@ impl<'a> LitScene<'a> {
 
     /// The gaze along a branch, unless it lies beyond the limits. Radiance through a refraction scales by the square
     /// of n on the eye's side over n on the far side.
-    fn followed<'b>(&self, gaze: &Gaze<'b>, branch: &Branch) -> Option<Gaze<'b>> {
+    fn followed<'b>(&self, gaze: &EyePath<'b>, branch: &Branch) -> Option<EyePath<'b>> {
         let weight = gaze.weight * branch.share * (branch.ior_ratio * branch.ior_ratio);
         let within = gaze.depth < self.limits.max_depth
             && weight.max_channel() > 0.0
             && weight.max_channel() >= self.limits.branch_threshold;
-        within.then(|| Gaze {
+        within.then(|| EyePath {
             ray: branch.ray,
             media: branch.media,
             weight,
@@ -249,13 +250,12 @@ fn nearest<const CHAINS: bool>(tracer: &Tracer, mut ray: Ray) -> Option<(Surface
     loop {
         let hit = tracer.closest_hit(&ray)?;
         let material = tracer.scene().material_of(hit.object);
-        let clear = matches!(material.surface, SurfaceKind::Dielectric | SurfaceKind::ThinWall);
         let back = hit.geometric_normal.dot(ray.direction) > 0.0;
         passed_m += hit.distance_m;
-        let is_drawn = if clear {
+        let is_drawn = if material.surface.is_clear() {
             CHAINS
         } else {
-            !back || material.double_sided
+            !back || material.has_back()
         };
         if is_drawn {
             return Some((hit, passed_m));
@@ -306,7 +306,9 @@ impl SpectralScene {
         let scene = tracer.scene();
         let is_dispersive = |object: usize| scene.material_of(object).is_dispersive();
         let goes_by_index = match scene.material_of(hit.object).surface {
-            SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Mixed => true,
+            SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Mixed | SurfaceKind::Varied => {
+                true
+            }
             SurfaceKind::Diffuse | SurfaceKind::Mirror => false,
         };
         !self.wavelengths.is_empty()

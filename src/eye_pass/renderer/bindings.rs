@@ -126,13 +126,13 @@ pub(super) struct Storage {
 }
 
 /// Buffers have some size even without content [bytes].
-const LEAST_BYTES: u64 = 256;
+const MIN_BYTES: u64 = 256;
 
 impl Storage {
     pub(super) fn new(gpu: &Gpu, label: &'static str) -> Self {
         Self {
             label,
-            buffer: buffer(gpu, label, LEAST_BYTES),
+            buffer: buffer(gpu, label, MIN_BYTES),
             written: Vec::new(),
         }
     }

@@ -22,15 +22,15 @@ use crate::transport::{MediumStack, PackedMesh, Tracer, media_at};
 /// Nodes that may wait while a ray is traced; `STACK` in the shader.
 const STACK: usize = 64;
 /// Largest number of a body that a chain can remember.
-const MOST_OBJECTS: usize = u16::MAX as usize - 1;
+const MAX_OBJECTS: usize = u16::MAX as usize - 1;
 /// Storage buffers that a fragment of a chain reads.
 const BUFFERS: u32 = 9;
 /// Number of triangles of a leaf that is an instance; the shader's.
 const INSTANCE: u32 = u32::MAX;
 /// Stands for no object in the shader.
 const NO_OBJECT: u32 = u32::MAX;
-/// Surfaces at which both ways on can be followed; `MOST_BRANCHING` in the shader.
-pub(super) const MOST_BRANCHING: u32 = 4;
+/// Surfaces at which both ways on can be followed; `MAX_BRANCHING` in the shader.
+pub(super) const MAX_BRANCHING: u32 = 4;
 
 /// The scene as chains see it.
 #[derive(Debug)]
@@ -288,7 +288,7 @@ impl ChainScene {
             near: (view.camera.near_m / self.unit_m()) as f32,
             branch_threshold: limits.branch_threshold as f32,
             max_depth: limits.max_depth,
-            branching_depth: limits.branching_depth.min(MOST_BRANCHING),
+            branching_depth: limits.branching_depth.min(MAX_BRANCHING),
             light_count: if traces_lights { self.light_count } else { 0 },
             ..Default::default()
         }
@@ -363,11 +363,11 @@ fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
     if u32::try_from(scene.triangle_count()).is_err() {
         return Err(too_many_triangles(gpu, scene));
     }
-    if scene.objects.len() > MOST_OBJECTS {
+    if scene.objects.len() > MAX_OBJECTS {
         return Err(refused(
             scene,
             format!(
-                "{} objects are more than the {MOST_OBJECTS} that chains tell apart",
+                "{} objects are more than the {MAX_OBJECTS} that chains tell apart",
                 scene.objects.len()
             ),
         ));

@@ -2,7 +2,7 @@
 
 use super::MapStyle;
 use super::objects::{Look, Objects};
-use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
+use super::pipelines::{Faces, PipelineFlags, PipelineKey, Writes};
 use crate::eye_pass::View;
 
 /// An object drawn once.
@@ -50,7 +50,7 @@ impl Manner {
             MapStyle::Lit => Writes::Own,
         };
         let is_shape = matches!(writes, Writes::Inspected(what) if what.is_of_shape());
-        let is_left_out = !look.surface.is_opaque() && writes != Writes::Composed && !is_shape;
+        let is_left_out = look.surface.is_clear() && writes != Writes::Composed && !is_shape;
         (!is_left_out).then(|| self.of(look, writes))
     }
 
@@ -58,7 +58,7 @@ impl Manner {
     pub(super) fn traced_keys(self, look: &Look) -> Vec<PipelineKey> {
         let writes: &[Writes] = if self.is_specular(look) {
             &[Writes::Depth, Writes::Traced]
-        } else if look.surface.is_opaque() {
+        } else if !look.surface.is_clear() {
             &[Writes::Depth]
         } else {
             &[]
@@ -67,9 +67,12 @@ impl Manner {
     }
 
     fn of(self, look: &Look, writes: Writes) -> PipelineKey {
-        let has_back = look.double_sided || !look.surface.is_opaque();
-        let faces = if has_back { Faces::Both } else { Faces::Front };
-        let how = DrawnHow {
+        let faces = if look.double_sided {
+            Faces::Both
+        } else {
+            Faces::Front
+        };
+        let how = PipelineFlags {
             has_texture: match writes {
                 Writes::Traced => self.has_tinted_glass,
                 _ => look.has_texture(),
@@ -183,7 +186,7 @@ impl EyeQuality {
         };
         Self {
             traced_scale,
-            branching_depth: self.branching_depth.min(super::chains::MOST_BRANCHING),
+            branching_depth: self.branching_depth.min(super::chains::MAX_BRANCHING),
             ..self
         }
     }

@@ -88,7 +88,7 @@ const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexForm
 const PAGE_BYTES: u64 = 1 << 30;
 
 /// Meshes that lie farther from the origin of their coordinates are drawn as copies [diagonals of their boxes].
-const MOST_OFF_CENTRE: f64 = 64.0;
+const MAX_OFF_CENTRE: f64 = 64.0;
 
 /// Part of an object within one page.
 #[derive(Clone, Debug, PartialEq)]
@@ -288,7 +288,7 @@ fn suits_single(transform: &DAffine3, (low, high): (DVec3, DVec3)) -> bool {
     let linear = transform.matrix3;
     let axes = [linear.x_axis, linear.y_axis, linear.z_axis];
     let is_moderate = |axis: &DVec3| (1e-6..1e6).contains(&axis.length());
-    low.abs().max(high.abs()).length() <= MOST_OFF_CENTRE * (high - low).length()
+    low.abs().max(high.abs()).length() <= MAX_OFF_CENTRE * (high - low).length()
         && axes.iter().all(is_moderate)
         && instances::is_sound(transform, (low, high))
 }

@@ -23,7 +23,7 @@ const BLOCK: usize = 4096;
 /// Largest value written: below the end of half floats, 65504, with room to spare.
 const LARGEST_VALUE: f32 = 32768.0;
 /// Least peak that a kept scale leaves [written value]: 21 binary orders of half floats are below it.
-const LEAST_PEAK: f32 = 128.0;
+const MIN_PEAK: f32 = 128.0;
 
 /// A map on the device: E [W/m²] = texel × `irradiance_scale`.
 #[derive(Debug)]
@@ -107,7 +107,7 @@ fn scale_for_half_floats(peak: f32) -> f32 {
 /// The present scale where a peak still fits it, so that what did not change keeps its bits; else the peak's own.
 fn kept_scale(present: f32, peak: f32) -> f32 {
     let written = peak / present;
-    if (LEAST_PEAK..=LARGEST_VALUE).contains(&written) {
+    if (MIN_PEAK..=LARGEST_VALUE).contains(&written) {
         present
     } else {
         scale_for_half_floats(peak)

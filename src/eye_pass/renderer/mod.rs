@@ -64,7 +64,7 @@ use crate::scene::Scene;
 /// Most that illumination maps take on the device unless it is told otherwise [bytes].
 const MAP_BUDGET_BYTES: u64 = 1 << 30;
 /// Storage buffers that every fragment reads.
-const LEAST_BUFFERS: u32 = 2;
+const MIN_BUFFERS: u32 = 2;
 
 /// A scene on the device, drawn as often as asked.
 #[derive(Debug)]
@@ -120,7 +120,7 @@ impl Renderer {
                 "use 1 or 4",
             ));
         }
-        if gpu.limits().max_storage_buffers_per_shader_stage < LEAST_BUFFERS {
+        if gpu.limits().max_storage_buffers_per_shader_stage < MIN_BUFFERS {
             return Err(Error::failure(
                 "graphics device",
                 format!("{} lets fragments read no storage buffers", gpu.adapter_name()),

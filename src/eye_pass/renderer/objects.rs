@@ -28,10 +28,12 @@ pub(super) struct Look {
     /// Without what refers to images.
     record: ObjectRecord,
     base_colour_texture: Option<usize>,
+    variation: Option<usize>,
+    emission_texture: Option<usize>,
 }
 
 /// Glasses that can part wavelengths in one scene; as many as the shader's uniform has room for.
-const MOST_GLASSES: usize = 128;
+const MAX_GLASSES: usize = 128;
 
 /// All objects with the images they share.
 #[derive(Debug)]
@@ -83,9 +85,9 @@ impl Objects {
             };
             let known = self.glasses.iter().position(|known| *known == glass.dispersion);
             let place = known.unwrap_or(self.glasses.len());
-            if place == MOST_GLASSES {
+            if place == MAX_GLASSES {
                 log::warn!(
-                    "`{}` is one glass more than the {MOST_GLASSES} seen by wavelength",
+                    "`{}` is one glass more than the {MAX_GLASSES} seen by wavelength",
                     glass.name
                 );
                 continue;
@@ -175,6 +177,12 @@ impl Objects {
                 texture: look
                     .base_colour_texture
                     .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
+                variation: look
+                    .variation
+                    .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
+                glow: look
+                    .emission_texture
+                    .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
                 bumps: self.images.bump_record(index),
                 ..look.record
             })
@@ -192,31 +200,49 @@ impl Look {
     fn of(scene: &Scene, index: usize, [row_x, row_y, row_z]: [[f32; 4]; 3]) -> Self {
         let object = &scene.objects[index];
         let material = &scene.materials[object.material];
+        let emitted = match scene.glows.get(&index) {
+            // The shader multiplies by its image.
+            Some(glow) => scene.emitted_radiance(index) * glow.per_colour(),
+            None => scene.emitted_radiance(index),
+        };
         Self {
             surface: material.surface,
-            double_sided: material.double_sided,
+            double_sided: material.has_back(),
             has_bumps: material.has_bumps(),
             bounds: object.bounds(),
             record: ObjectRecord {
                 base_colour: rgb(material.base_colour),
                 ior: material.ior as f32,
-                emitted_radiance: rgb(scene.emitted_radiance(index)),
+                emitted_radiance: rgb(emitted),
                 surface: surface_code(material.surface),
                 absorption_per_m: absorption_per_m(material),
-                double_sided: u32::from(material.double_sided),
+                double_sided: u32::from(material.has_back()),
                 map: NO_IMAGE,
                 texture: NO_IMAGE,
-                lobe_rad: lobe_rad(material) as f32,
+                roughness: material.roughness as f32,
                 bumps: NO_IMAGE,
                 polish: material.polish as f32,
                 back_map: NO_IMAGE,
                 glass: 0,
                 alpha_cutoff: alpha_cutoff(material),
+                variation: NO_IMAGE,
+                metallic: material.metallic as f32,
+                transmission: material.transmission as f32,
+                coverage: material.coverage.map_or(-1.0, |factor| factor as f32),
+                solid: u32::from(material.is_solid()),
+                glow: NO_IMAGE,
+                padding0: 0,
+                padding1: 0,
                 row_x,
                 row_y,
                 row_z,
             },
             base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
+            variation: material
+                .variation
+                .as_ref()
+                .map(|variation| variation.image.texture),
+            emission_texture: material.emission_texture.as_ref().map(|image| image.texture),
         }
     }
 
@@ -245,6 +271,7 @@ pub(super) fn surface_code(surface: SurfaceKind) -> u32 {
         SurfaceKind::Dielectric => 2,
         SurfaceKind::ThinWall => 3,
         SurfaceKind::Mixed => 4,
+        SurfaceKind::Varied => 5,
     }
 }
 
@@ -256,12 +283,6 @@ fn alpha_cutoff(material: &Material) -> f32 {
         Some(_) => f32::INFINITY,
         None => 0.0,
     }
-}
-
-/// Angle between the directions in which a surface of GGX α = roughness² reflects light where its microfacets are tilted
-/// by α one way and the other [rad]: half of them are tilted less (Walter et al. 2007, eq. 35, at α: tan²θ = α²).
-fn lobe_rad(material: &Material) -> f64 {
-    4.0 * (material.roughness * material.roughness).atan()
 }
 
 /// What a body absorbs [1/m]: −ln(colour)/distance, per channel.

@@ -26,7 +26,7 @@ const CUT_SCALED: f64 = 500.0;
 /// Places across and down a pixel of a picture that is drawn anew to be kept.
 const ANEW_SIDE: u32 = 2;
 /// Least pictures of a view in which chains go on by wavelength: 48 wavelengths.
-const LEAST_PARTED: u32 = 16;
+const MIN_PARTED: u32 = 16;
 
 impl Renderer {
     /// Radiance per pixel [W/(m² sr)] of a view, looked at through the centres of its pixels, in the precision of half
@@ -123,7 +123,7 @@ impl Renderer {
         let is_chain = |object: &usize| manner.is_specular(&self.objects.list[*object]);
         let has_chains = || visible_objects(&self.objects, view).iter().any(is_chain);
         if manner.parts_wavelengths && has_chains() {
-            LEAST_PARTED.div_ceil(places) * places
+            MIN_PARTED.div_ceil(places) * places
         } else {
             places
         }

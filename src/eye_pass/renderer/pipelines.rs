@@ -84,12 +84,12 @@ pub(super) struct PipelineKey {
     pub(super) faces: Faces,
     /// Of what shows itself only.
     surface: SurfaceKind,
-    how: DrawnHow,
+    how: PipelineFlags,
 }
 
 /// What a kind of drawing has to be ready for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct DrawnHow {
+pub(super) struct PipelineFlags {
     /// Whether the surface has a texture; for chains, whether anything specular in the scene has.
     pub(super) has_texture: bool,
     /// Whether the traced picture has other pixels than the picture.
@@ -110,7 +110,7 @@ pub(super) struct DrawnHow {
 
 impl PipelineKey {
     /// The key of a kind of drawing. What does not matter to it is left out, so that fewer pipelines serve.
-    pub(super) fn new(writes: Writes, surface: SurfaceKind, faces: Faces, how: DrawnHow) -> Self {
+    pub(super) fn new(writes: Writes, surface: SurfaceKind, faces: Faces, how: PipelineFlags) -> Self {
         let is_lit = how.traces_lights && surface != SurfaceKind::Mirror;
         let writes = match writes {
             Writes::Own if is_lit => Writes::OwnUnderLights,
@@ -130,7 +130,7 @@ impl PipelineKey {
             } else {
                 SurfaceKind::Diffuse
             },
-            how: DrawnHow {
+            how: PipelineFlags {
                 has_texture: how.has_texture && looks_up,
                 is_scaled: how.is_scaled && writes == Writes::Composed,
                 traces_lights: how.traces_lights && writes == Writes::Traced,

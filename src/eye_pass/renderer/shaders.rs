@@ -1,7 +1,7 @@
 //! The eye pass's shader modules and what they share with Rust.
 
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
-use super::pipelines::{DrawnHow, Faces, PipelineKey, Writes};
+use super::pipelines::{Faces, PipelineFlags, PipelineKey, Writes};
 use super::tone_mapping;
 use super::uniforms::{
     Accumulation, ChainStart, DisplayWhite, Frame, Instance, LightRecord, Node, ObjectRecord, ProbeHit,
@@ -28,7 +28,7 @@ macro_rules! chains {
         program! { $name:
             "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
             "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-            "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
+            "eye_pass/mixture" "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
             $background "eye_pass/chain" "eye_pass/traced"
         }
     };
@@ -69,7 +69,7 @@ pub(super) const SKY: Program = program! { "sky":
 pub(super) const UNDER_LIGHTS: Program = program! { "under_lights":
     "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
     "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-    "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
+    "eye_pass/mixture" "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
 };
 
 /// What was traced, in the picture.
@@ -150,12 +150,13 @@ pub struct Specialisation {
 
 /// Every specialisation that pipelines can ask for, for the tests; some of them more than once.
 pub fn specialisations() -> Vec<Specialisation> {
-    const KINDS: [SurfaceKind; 5] = [
+    const KINDS: [SurfaceKind; 6] = [
         SurfaceKind::Diffuse,
         SurfaceKind::Mirror,
         SurfaceKind::Dielectric,
         SurfaceKind::ThinWall,
         SurfaceKind::Mixed,
+        SurfaceKind::Varied,
     ];
     let alone = |program: Program, entry_point| Specialisation {
         program: program.name,
@@ -166,7 +167,7 @@ pub fn specialisations() -> Vec<Specialisation> {
     for writes in Writes::all() {
         for kind in KINDS {
             for flags in 0..64 {
-                let manner = DrawnHow {
+                let manner = PipelineFlags {
                     has_texture: flags & 1 > 0,
                     is_scaled: flags & 1 > 0,
                     traces_lights: flags & 2 > 0,

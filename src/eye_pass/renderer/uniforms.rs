@@ -107,8 +107,8 @@ shader_struct! {
         map: u32,
         /// Record of its base colour texture.
         texture: u32,
-        /// Angle over which its roughness spreads what it reflects or lets through [rad].
-        lobe_rad: f32,
+        /// [0, 1].
+        roughness: f32,
         /// Record of what bends its normals.
         bumps: u32,
         /// Part of the surface that its polish covers.
@@ -119,6 +119,20 @@ shader_struct! {
         glass: u32,
         /// Alpha of its texture from which on its surface is there; 0 where it always is.
         alpha_cutoff: f32,
+        /// Record of the image that multiplies transmission, roughness and metallic.
+        variation: u32,
+        /// [0, 1].
+        metallic: f32,
+        /// [0, 1].
+        transmission: f32,
+        /// Share of it that is there, times its texture's alpha; negative where all of it is.
+        coverage: f32,
+        /// Whether it bounds a body.
+        solid: u32,
+        /// Record of the image of what it emits.
+        glow: u32,
+        padding0: u32,
+        padding1: u32,
         /// Rows of the way from its mesh's coordinates to the scene.
         row_x: [f32; 4],
         row_y: [f32; 4],

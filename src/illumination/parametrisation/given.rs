@@ -10,10 +10,10 @@ use crate::scene::Mesh;
 const OUTSIDE: f64 = 1e-5;
 
 /// A set must use at least this share of the map, else most texels would be wasted on nothing.
-const LEAST_COVERAGE: f64 = 0.05;
+const MIN_COVERAGE: f64 = 0.05;
 
 /// A triangle must get at least this share of the map area that its surface area calls for.
-const LEAST_DENSITY: f64 = 1e-6;
+const MIN_DENSITY: f64 = 1e-6;
 
 /// How far an affine, covering set may be from affine and from covering.
 const AFFINE_TOLERANCE: f64 = 1e-4;
@@ -46,15 +46,14 @@ pub enum Refusal {
 pub fn light_map_set(mesh: &Mesh, uvs: &[DVec2]) -> Result<Vec<[DVec2; 3]>, Refusal> {
     let corners = corner_coordinates(mesh, uvs).ok_or(Refusal::Outside)?;
     let covered = covered_share(&corners);
-    if covered < LEAST_COVERAGE {
+    if covered < MIN_COVERAGE {
         return Err(Refusal::Sparse);
     }
     let surface_m2 = mesh.area_m2();
     let dense = |triangle: usize| {
-        let [a, b, c] = mesh.corners(triangle);
-        let share_of_surface = 0.5 * (b - a).cross(c - a).length() / surface_m2;
+        let share_of_surface = mesh.triangle_area_m2(triangle) / surface_m2;
         let share_of_map = 0.5 * twice_signed_area(corners[triangle]).abs() / covered;
-        share_of_surface == 0.0 || share_of_map > LEAST_DENSITY * share_of_surface
+        share_of_surface == 0.0 || share_of_map > MIN_DENSITY * share_of_surface
     };
     if !(0..corners.len()).all(dense) {
         return Err(Refusal::Collapsed);

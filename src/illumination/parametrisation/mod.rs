@@ -115,10 +115,7 @@ impl Parametrisation {
     /// Map coordinates that are known already: [0, 1], three corners per triangle of the mesh.
     pub fn new(object: usize, mesh: &Mesh, uv_set: UvSet, corner_uvs: Vec<[DVec2; 3]>) -> Self {
         let triangle_areas_m2: Vec<f64> = (0..mesh.triangles.len())
-            .map(|triangle| {
-                let [a, b, c] = mesh.corners(triangle);
-                0.5 * (b - a).cross(c - a).length()
-            })
+            .map(|triangle| mesh.triangle_area_m2(triangle))
             .collect();
         let uniform = is_uniform(&corner_uvs, &triangle_areas_m2);
         Self {

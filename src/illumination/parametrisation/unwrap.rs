@@ -18,7 +18,7 @@ const CHART_ANGLE_DEG: f32 = 50.0;
 const DISTORTION: f32 = 1.5;
 
 /// Meshes of fewer triangles are unwrapped in no time.
-const LEAST_KEPT: usize = 2000;
+const MIN_KEPT: usize = 2000;
 
 /// Changes with whatever changes the coordinates of a mesh: a new version of uvunwrap, other options.
 const LAYOUT_VERSION: u64 = 2;
@@ -29,7 +29,7 @@ const SIDES: (usize, usize) = (16, 8192);
 /// Map coordinates in [0, 1] of all triangles for a map of `side` texels at least: more where it cannot hold all charts
 /// with their gutters. `None` where the mesh cannot be unwrapped.
 pub fn unwrap(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
-    if mesh.triangles.len() < LEAST_KEPT {
+    if mesh.triangles.len() < MIN_KEPT {
         return lay_out(mesh, side);
     }
     let name = format!("{:016x}.uv", content_hash(mesh, side));
@@ -90,7 +90,7 @@ fn decode(bytes: &[u8], triangles: usize) -> Option<Vec<[DVec2; 3]>> {
 }
 
 /// More vertices than this for each place are no seams any more: files split them all over for normals or coordinates.
-const MOST_SPLIT: f64 = 1.5;
+const MAX_SPLIT: f64 = 1.5;
 
 /// Positions and indices of a mesh. Where most of its vertices differ in normals or coordinates alone, those of one place
 /// are one: a chart goes on over them, or there would be as many charts as facets.
@@ -108,7 +108,7 @@ fn welded(mesh: &Mesh, local: impl Fn(&glam::DVec3) -> [f32; 3]) -> (Vec<[f32; 3
             })
     };
     let vertices: Vec<u32> = split.iter().map(&mut vertex_at).collect();
-    if (split.len() as f64) < MOST_SPLIT * positions.len() as f64 {
+    if (split.len() as f64) < MAX_SPLIT * positions.len() as f64 {
         return (split, indices);
     }
     (

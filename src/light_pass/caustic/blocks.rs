@@ -12,7 +12,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::settings::KernelSampling;
 
 /// Splats of a task.
-const MOST_SPLATS: usize = 1024;
+const MAX_SPLATS: usize = 1024;
 
 /// Side of the tiles whose splats go together, for the narrowest ones [texels]; each further class of splats and their
 /// tiles is twice as wide, so that wide splats do not make large blocks of many narrow ones.
@@ -90,7 +90,7 @@ pub(super) fn add(
     order.par_sort_unstable();
     let tasks: Vec<&[u64]> = order
         .chunk_by(|a, b| a >> 32 == b >> 32)
-        .flat_map(|tile| tile.chunks(MOST_SPLATS))
+        .flat_map(|tile| tile.chunks(MAX_SPLATS))
         .collect();
     let stripes: Vec<Mutex<&mut [FluxCount]>> = flux
         .texels_mut()

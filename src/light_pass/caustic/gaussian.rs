@@ -9,7 +9,7 @@ use super::kernel::normal_distribution;
 use super::numeric::{exp, floor};
 
 /// Most texels of a window each way.
-pub(super) const MOST_TEXELS: usize = 24;
+pub(super) const MAX_TEXELS: usize = 24;
 
 /// Standard deviations that a window reaches; the outermost texels take what lies beyond, below 1e-4 on each side.
 const REACH: f64 = 3.75;
@@ -40,9 +40,9 @@ struct Axis {
     first: i64,
     count: usize,
     /// Border after each texel [standard deviations from the centre].
-    border: [f64; MOST_TEXELS],
+    border: [f64; MAX_TEXELS],
     /// Share of the kernel before that border; 1 after the last texel.
-    below: [f64; MOST_TEXELS],
+    below: [f64; MAX_TEXELS],
 }
 
 impl Axis {
@@ -50,7 +50,7 @@ impl Axis {
     fn set(&mut self, centre: f64, deviation: f64, step: f64) -> bool {
         let first = floor(centre - REACH * deviation);
         let last = floor(centre + REACH * deviation);
-        let is_narrow = last - first < MOST_TEXELS as i64;
+        let is_narrow = last - first < MAX_TEXELS as i64;
         if is_narrow {
             self.first = first;
             self.count = (last - first) as usize + 1;
@@ -95,8 +95,8 @@ impl Cornered {
         if rows > 1 {
             joint.set(borders.at, correlation);
         }
-        let mut above = [0.0; MOST_TEXELS];
-        let mut here = [0.0; MOST_TEXELS];
+        let mut above = [0.0; MAX_TEXELS];
+        let mut here = [0.0; MAX_TEXELS];
         for row in 0..rows {
             // Share of the kernel left of each border and above this row's lower border.
             let below = down.below[row];

@@ -1,6 +1,6 @@
 //! The distribution function of two correlated normal variables, along rows of texel corners.
 
-use super::gaussian::MOST_TEXELS;
+use super::gaussian::MAX_TEXELS;
 use super::kernel::{SQRT_HALF_PI, half_normal_integral};
 use super::numeric::exp;
 
@@ -26,7 +26,7 @@ struct Node {
     square: f64,
     cross: f64,
     /// The node's weight times the density along each border.
-    density: [f64; MOST_TEXELS],
+    density: [f64; MAX_TEXELS],
 }
 
 /// Borders along one axis.

@@ -11,7 +11,7 @@ use crate::optics::LinearSrgb;
 
 /// All that one light sent to diffuse surfaces, row by row of its lattice.
 #[derive(Debug, Default)]
-pub struct KeptLight {
+pub struct ArrivalCache {
     /// Rows of all faces, face by face.
     rows: Vec<KeptRow>,
     /// Accounts of the paths; `Deposited` is not among them.
@@ -45,7 +45,7 @@ struct Kept {
     triangle: u32,
 }
 
-impl KeptLight {
+impl ArrivalCache {
     /// Memory taken [bytes].
     pub fn bytes(&self) -> u64 {
         self.bytes

@@ -7,22 +7,22 @@ use rayon::prelude::*;
 use std::time::Instant;
 
 use super::deposit::{DepositReport, Depositor, Halves, RowContext};
-use super::kept::KeptLight;
+use super::kept::ArrivalCache;
 use super::lattice::{Lattice, TracedRow};
 use super::statistics::FootprintStatistics;
 use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::share::Share;
-use crate::light_pass::wavefront::overreach::Overreach;
+use crate::light_pass::wavefront::overreach::PatchOvershoot;
 use crate::progress::{Control, Progress, Stage};
 
 /// Rays that a band aims at: enough for all cores, and few enough that what they bring stays in their caches.
 const RAYS_PER_BAND: usize = 1 << 14;
 
 /// Rows of a band, however few or many rays they hold.
-const LEAST_ROWS: usize = 4;
-const MOST_ROWS: usize = 4096;
+const MIN_ROWS: usize = 4;
+const MAX_ROWS: usize = 4096;
 
 /// What the pass of one light did.
 #[derive(Clone, Debug, Default)]
@@ -42,7 +42,7 @@ pub struct PassReport {
     /// Sizes of footprints.
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their rays.
-    pub overreaches: Vec<Overreach>,
+    pub overreaches: Vec<PatchOvershoot>,
     /// Luminous flux of all patches [counts], and of those that hold a part of the spectrum in one place.
     pub in_one_place: [i128; 2],
     /// Wall-clock and CPU seconds of tracing.
@@ -101,7 +101,7 @@ impl Seconds {
 
 /// Who listens to a pass, and how it is stopped.
 #[derive(Clone, Copy)]
-pub struct Listener<'a> {
+pub struct ProgressScope<'a> {
     /// Hears how far it is.
     pub progress: &'a dyn Progress,
     /// Asks it to stop.
@@ -121,7 +121,7 @@ pub enum Source<'a> {
         keep_bytes: u64,
     },
     /// From rays of an earlier pass over the same lattice, or one with strides of 1.
-    Kept(&'a KeptLight),
+    Kept(&'a ArrivalCache),
 }
 
 /// Traces, or takes as traced before, and deposits the whole lattice of one light. Gives what arrived, where it was
@@ -131,8 +131,8 @@ pub fn run(
     source: Source,
     halves: &mut Halves,
     chart_for: &ChartFor,
-    listener: &Listener,
-) -> (PassReport, Option<KeptLight>) {
+    listener: &ProgressScope,
+) -> (PassReport, Option<ArrivalCache>) {
     let mut report = PassReport::default();
     let mut recorder = Recorder::new(source);
     let lattice = &depositor.lattice;
@@ -196,7 +196,7 @@ pub fn run_share(
     share: Share,
     halves: &mut Halves,
     chart_for: &ChartFor,
-    listener: &Listener,
+    listener: &ProgressScope,
 ) -> PassReport {
     let mut report = PassReport::default();
     let mut number = 0;
@@ -245,7 +245,7 @@ pub fn run_share(
 
 /// Keeps what arrives, until it is too much.
 struct Recorder {
-    light: Option<KeptLight>,
+    light: Option<ArrivalCache>,
     most_bytes: u64,
 }
 
@@ -256,7 +256,7 @@ impl Recorder {
             Source::Kept(_) => 0,
         };
         Self {
-            light: (most_bytes > 0).then(KeptLight::default),
+            light: (most_bytes > 0).then(ArrivalCache::default),
             most_bytes,
         }
     }
@@ -273,9 +273,9 @@ impl Recorder {
 
 /// The row after a band's last.
 fn band_end(lattice: &Lattice, face: usize, first_row: usize) -> usize {
-    let rows = lattice.traced_size().1.min(first_row + MOST_ROWS);
+    let rows = lattice.traced_size().1.min(first_row + MAX_ROWS);
     let (mut end, mut rays) = (first_row, 0);
-    while end < rows && (rays < RAYS_PER_BAND || end < first_row + LEAST_ROWS) {
+    while end < rows && (rays < RAYS_PER_BAND || end < first_row + MIN_ROWS) {
         rays += lattice.row_ray_count(face, end);
         end += 1;
     }

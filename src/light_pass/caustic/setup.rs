@@ -11,14 +11,14 @@ use crate::light_pass::emitter::Emitter;
 use crate::light_pass::item_buffer::{Hiding, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::light_pass::photon::spheres::Spheres;
-use crate::plan::{Reach, Sight};
+use crate::plan::{LightReach, Reach};
 use crate::scene::{Light, Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
 use crate::transport::{Tracer, media_at};
 
 /// A light that sees something specular.
 #[derive(Clone, Debug)]
-pub struct AimedLight {
+pub struct VisibleLight {
     /// Index into `Scene::lights`.
     pub light: usize,
     /// Where its rays start, as of a white light of unit strength: what the real one gives is a scale of that.
@@ -35,7 +35,7 @@ pub struct AimedLight {
     spheres: Arc<OnceLock<Spheres>>,
 }
 
-impl AimedLight {
+impl VisibleLight {
     /// Where light can matter: the item buffer, or less where everything is aimed at.
     pub fn visible(&self) -> &ItemBuffer {
         self.visible.as_ref().unwrap_or(&self.item_buffer)
@@ -67,10 +67,10 @@ impl AimedLight {
     pub fn from_place(
         &self,
         tracer: &Tracer,
-        (item_buffer, aiming): (ItemBufferKind, Aiming),
+        (item_buffer, aiming): (ItemBufferKind, CullMode),
         emitter: &Emitter,
     ) -> Option<Self> {
-        let aimer = Aimer {
+        let aimer = EmissionCuller {
             tracer,
             item_buffer,
             aiming,
@@ -87,7 +87,7 @@ impl AimedLight {
 
 /// How thoroughly what cannot matter is left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Aiming {
+pub enum CullMode {
     /// Specular objects that are sealed off, hidden, or can send no light to a diffuse one are left out.
     Reachable,
     /// Everything specular is aimed at.
@@ -96,7 +96,7 @@ pub enum Aiming {
 
 /// What it took to look around from one light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct LookAround {
+pub struct ItemBufferStats {
     /// Marked cells of the item buffer.
     pub cells: u64,
     /// Cells that opaque faces cover.
@@ -111,30 +111,30 @@ pub struct LookAround {
 #[derive(Debug, Default)]
 pub struct Aim {
     /// Lights with at least one marked cell.
-    pub lights: Vec<AimedLight>,
+    pub lights: Vec<VisibleLight>,
     /// What each light of the scene sees.
-    pub sights: Vec<Sight>,
+    pub sights: Vec<LightReach>,
     /// What that took, light by light.
-    pub looks: Vec<LookAround>,
+    pub looks: Vec<ItemBufferStats>,
 }
 
 impl Aim {
     /// Builds the item buffers of all lights that something specular could call for.
     ///
     /// `sizes`: whether lights are as large as they are, or shine from their middles.
-    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, aiming: Aiming, sizes: bool) -> Self {
+    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, aiming: CullMode, sizes: bool) -> Self {
         let scene = tracer.scene();
         let has = |wanted: fn(SurfaceKind) -> bool| {
             (0..scene.objects.len()).any(|object| wanted(scene.material_of(object).surface))
         };
         let mut aim = Self::default();
         if !has(SurfaceKind::is_specular) || !has(SurfaceKind::is_receiver) {
-            aim.sights = vec![Sight::default(); scene.lights.len()];
-            aim.looks = vec![LookAround::default(); scene.lights.len()];
+            aim.sights = vec![LightReach::default(); scene.lights.len()];
+            aim.looks = vec![ItemBufferStats::default(); scene.lights.len()];
             return aim;
         }
-        let looker = Looker {
-            aimer: Aimer {
+        let looker = ItemBufferBuilder {
+            aimer: EmissionCuller {
                 tracer,
                 item_buffer,
                 aiming,
@@ -165,16 +165,16 @@ impl Aim {
 const PLACES: u32 = 16;
 
 /// So many more are tried where those see nothing.
-const MOST_PLACES: u32 = 256;
+const MAX_PLACES: u32 = 256;
 
 /// Which places those are.
 const PLACES_SEED: u64 = 0;
 
 /// Aims at casters from a place.
-struct Aimer<'a> {
+struct EmissionCuller<'a> {
     tracer: &'a Tracer,
     item_buffer: ItemBufferKind,
-    aiming: Aiming,
+    aiming: CullMode,
 }
 
 /// What a place of a light sees.
@@ -186,13 +186,13 @@ struct View {
     tests: u64,
 }
 
-impl Aimer<'_> {
+impl EmissionCuller<'_> {
     /// `casters`: specular objects that matter; `None` where nothing could be aimed at.
     fn look(&self, emitter: &Emitter, casters: &[usize]) -> Option<View> {
         let visible = self.at_reachable(emitter, casters);
         match self.aiming {
-            Aiming::Reachable => visible,
-            Aiming::Everything => self.at_everything(emitter, visible),
+            CullMode::Reachable => visible,
+            CullMode::Everything => self.at_everything(emitter, visible),
         }
     }
 
@@ -281,15 +281,15 @@ impl AllSeen {
     }
 }
 
-struct Looker<'a> {
-    aimer: Aimer<'a>,
+struct ItemBufferBuilder<'a> {
+    aimer: EmissionCuller<'a>,
     /// Whether lights have sizes.
     sizes: bool,
     reach: Reach<'a>,
 }
 
-impl Looker<'_> {
-    fn look(&self, light: usize) -> (Sight, Option<AimedLight>, LookAround) {
+impl ItemBufferBuilder<'_> {
+    fn look(&self, light: usize) -> (LightReach, Option<VisibleLight>, ItemBufferStats) {
         let scene = self.aimer.tracer.scene();
         let casters: Arc<[usize]> = self.reach.casters(light).into();
         let places: Vec<(u32, Emitter)> = self.places(light).collect();
@@ -313,9 +313,9 @@ impl Looker<'_> {
             hidden_cells,
             tests,
         } = all;
-        let mut look = LookAround {
+        let mut look = ItemBufferStats {
             tests,
-            ..LookAround::default()
+            ..ItemBufferStats::default()
         };
         for list in [&mut seen, &mut visibly] {
             list.sort_unstable();
@@ -332,7 +332,7 @@ impl Looker<'_> {
             return (sight, None, look);
         }
         let near = if visibly.is_empty() { &sight.seen } else { &visibly };
-        let aimed = AimedLight {
+        let aimed = VisibleLight {
             light,
             reach_m: reach_m(scene, near),
             launch: view.launch,
@@ -344,23 +344,23 @@ impl Looker<'_> {
         (sight, Some(aimed), look)
     }
 
-    fn sight(&self, light: usize, casters: &[usize], seen: Vec<usize>) -> Sight {
+    fn sight(&self, light: usize, casters: &[usize], seen: Vec<usize>) -> LightReach {
         match self.aimer.aiming {
-            Aiming::Reachable => Sight {
+            CullMode::Reachable => LightReach {
                 unsealed: self.reach.unsealed(light).len(),
                 casters: casters.len(),
                 reached: self.reach.reached(light, &seen),
                 seen,
-                ..Sight::default()
+                ..LightReach::default()
             },
-            Aiming::Everything => {
+            CullMode::Everything => {
                 let specular = specular_objects(self.aimer.tracer.scene());
-                Sight {
+                LightReach {
                     unsealed: specular.len(),
                     casters: specular.len(),
                     reached: specular.iter().map(|&object| (object, None)).collect(),
                     seen,
-                    ..Sight::default()
+                    ..LightReach::default()
                 }
             }
         }
@@ -371,7 +371,7 @@ impl Looker<'_> {
         let scene = self.aimer.tracer.scene();
         let source = scene.lights[light].of_unit_strength();
         let many = self.sizes && source.has_extent();
-        (0..if many { MOST_PLACES } else { 1 }).filter_map(move |place| {
+        (0..if many { MAX_PLACES } else { 1 }).filter_map(move |place| {
             let emitter = if many {
                 Emitter::sample(&source, scene, even_point(place, 0, PLACES_SEED))
             } else {

@@ -42,12 +42,12 @@ pub struct MeanFootprint {
 }
 
 /// Footprints below this share of a map count as this size: a focus must not ask for texels without end.
-const LEAST_SHARE: f64 = 1e-10;
+const MIN_SHARE: f64 = 1e-10;
 
 impl FootprintStatistics {
     /// One more footprint, with the flux [W] it carries.
     pub fn add(&mut self, receiver: Receiver, flux_w: f64, area_m2: f64, map_share: f64) {
-        let share = map_share.max(LEAST_SHARE);
+        let share = map_share.max(MIN_SHARE);
         // Both areas are cut alike, as their ratio is the map's own.
         let area_m2 = if map_share > 0.0 {
             area_m2 * (share / map_share)
@@ -71,7 +71,7 @@ impl FootprintStatistics {
         if is_on_map && spot.flux_w > 0.0 && spot.map_share > 0.0 {
             self.spots.push(Spot {
                 bounds,
-                map_share: spot.map_share.max(LEAST_SHARE),
+                map_share: spot.map_share.max(MIN_SHARE),
                 ..spot
             });
         }
@@ -110,7 +110,7 @@ impl FootprintStatistics {
             sums.log_area_share -= sums.flux * ratio.ln();
         }
         for spot in &mut self.spots {
-            spot.map_share = (spot.map_share / ratio).max(LEAST_SHARE);
+            spot.map_share = (spot.map_share / ratio).max(MIN_SHARE);
         }
         self
     }

@@ -24,6 +24,10 @@ pub struct Facet {
 
 /// A point of a surface.
 pub struct SurfacePoint {
+    /// Index within the mesh.
+    pub triangle: usize,
+    /// Of the triangle's corners.
+    pub barycentric: [f64; 3],
     /// Where [m].
     pub position: DVec3,
     /// Bound of its rounding error per axis [m].
@@ -75,6 +79,8 @@ impl Facet {
         let [na, nb, nc] = self.corner_normals;
         let normal = na * barycentric[0] + nb * barycentric[1] + nc * barycentric[2];
         SurfacePoint {
+            triangle: self.triangle as usize,
+            barycentric,
             position,
             // Barycentric coordinates from the map add up to 1 only within their own rounding.
             error: error * 2.0,

@@ -5,9 +5,8 @@ use glam::DVec3;
 use super::facet::SurfacePoint;
 use super::surroundings::Surroundings;
 use crate::optics::LinearSrgb;
-use crate::optics::fresnel::dielectric_reflectance;
 use crate::scene::emitter::{Emitter, EmitterKind};
-use crate::scene::{Material, SurfaceKind};
+use crate::transport::Taking;
 
 /// Light on its way to a point, whatever surface is there.
 pub struct Beam {
@@ -64,26 +63,20 @@ pub struct Arriving {
 }
 
 impl Arriving {
-    /// What a beam gives a point; `None` where it is nothing, or comes to the wrong side. A mixed surface takes what its
-    /// polish does not reflect; the light comes all the way through what is around its source.
+    /// What a beam gives a point; `None` where it is nothing, or comes to the wrong side. The light comes all the way
+    /// through what is around its source.
     pub fn from_beam(
         beam: &Beam,
         point: &SurfacePoint,
-        material: &Material,
+        taking: &Taking,
         within: &Surroundings,
     ) -> Option<Self> {
         if beam.to_light.dot(point.geometric_normal) < 0.0 {
             return None;
         }
         let cosine = beam.to_light.dot(point.shading_normal);
-        let taken = match material.surface {
-            SurfaceKind::Mixed => {
-                1.0 - material.polish * dielectric_reflectance(cosine, material.ior / within.ior)
-            }
-            _ => 1.0,
-        };
         let open = beam.across_beam * cosine;
-        let strength = within.transmittance(beam.distance_m) * (open * taken);
+        let strength = within.transmittance(beam.distance_m) * (open * taking.of(cosine, within.ior));
         (strength.max_channel() > 0.0).then(|| Self {
             irradiance: beam.strength * strength,
             to_light: beam.to_light,

@@ -389,6 +389,8 @@ impl<'a> Baker<'a> {
         look: (usize, Look),
     ) -> Sample {
         let point = facet.at(place);
+        let object = self.chart.object();
+        let taking = self.tracer.taking(object, point.triangle, point.barycentric);
         let mut sample = Sample {
             irradiance: LinearSrgb::BLACK,
             mask: 0,
@@ -401,7 +403,7 @@ impl<'a> Baker<'a> {
             match &source.emission {
                 Emission::Single(emitter) => {
                     let arriving = Beam::new(emitter, point.position)
-                        .and_then(|beam| Arriving::from_beam(&beam, &point, self.material, &source.within));
+                        .and_then(|beam| Arriving::from_beam(&beam, &point, &taking, &source.within));
                     let Some(arriving) = arriving else { continue };
                     sample.shadow_rays += 1;
                     let ray = point.spawn(arriving.to_light);
@@ -412,7 +414,8 @@ impl<'a> Baker<'a> {
                 }
                 Emission::Soft(soft) => {
                     let run = soft.run(hash, index, look);
-                    let gathered = soft.gather(self.tracer, &point, self.material, &source.within, run);
+                    let gathered =
+                        soft.gather(self.tracer, &point, (self.material, &taking), &source.within, run);
                     sample.shadow_rays += gathered.shadow_rays;
                     sample.irradiance += gathered.irradiance;
                     sample.soft += gathered.irradiance.luminance();

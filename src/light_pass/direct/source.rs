@@ -19,7 +19,7 @@ use crate::geometry::sampling::even_point;
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, Places};
 use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
-use crate::transport::Tracer;
+use crate::transport::{Taking, Tracer};
 
 /// Places of a light that are ready: a power of 2.
 const READY: usize = 1 << 13;
@@ -28,7 +28,7 @@ const READY_OF_SKY: usize = 1 << 14;
 /// Angle of a sun [rad] whose places shine on a surface alike.
 const NARROW_RAD: f64 = 0.03;
 /// Surfaces of more triangles are looked at by samples alone.
-const MOST_POLYGONS: usize = 16;
+const MAX_POLYGONS: usize = 16;
 /// Corners that stand for the edge of a disc.
 const DISC_CORNERS: usize = 64;
 /// Share of its way that a shadow ray stops before a lamp, so as not to meet the lamp's own surface.
@@ -190,7 +190,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
         }
         LightKind::Surface { object, .. } => {
             let mesh = scene.objects.get(object)?.in_scene();
-            if mesh.triangle_count() > MOST_POLYGONS {
+            if mesh.triangle_count() > MAX_POLYGONS || scene.glows.contains_key(&object) {
                 return None;
             }
             let both_sides = scene.material_of(object).double_sided;
@@ -230,7 +230,7 @@ impl Soft {
         &self,
         tracer: &Tracer,
         point: &SurfacePoint,
-        material: &Material,
+        (material, taking): (&Material, &Taking),
         within: &Surroundings,
         run: Range<usize>,
     ) -> Gathered {
@@ -239,7 +239,7 @@ impl Soft {
         for index in run.clone() {
             let arriving = self
                 .beam(index, &run, point, material)
-                .and_then(|beam| Arriving::from_beam(&beam, point, material, within));
+                .and_then(|beam| Arriving::from_beam(&beam, point, taking, within));
             let Some(arriving) = arriving else { continue };
             sum.shadow_rays += 1;
             sum.open += arriving.open;

@@ -3,12 +3,12 @@
 use glam::DVec2;
 
 /// Triangles of less area count by where their middle lies [squares].
-const LEAST_AREA: f64 = 1e-12;
+const MIN_AREA: f64 = 1e-12;
 
 /// Share of a triangle's area in the unit square, [0, 1].
 pub(super) fn share_in_square(triangle: [DVec2; 3]) -> f64 {
     let whole = area(&triangle).abs();
-    if whole < LEAST_AREA {
+    if whole < MIN_AREA {
         let middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
         return f64::from(u8::from(is_in_square(middle)));
     }

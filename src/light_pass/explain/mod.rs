@@ -16,11 +16,11 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::{DMat2, DVec2, DVec3};
 
-use self::search::{Piece, Searcher};
+use self::search::{Piece, TexelSearch};
 use self::walk::{Walker, Way};
 use crate::geometry::sampling::even_point;
 use crate::light_pass::caustic::path::PathSignature;
-use crate::light_pass::caustic::setup::{Aim, AimedLight, Aiming};
+use crate::light_pass::caustic::setup::{Aim, CullMode, VisibleLight};
 use crate::light_pass::direct::bake_direct;
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
@@ -36,7 +36,7 @@ const PLACES_SEED: u64 = 0;
 const NEGLIGIBLE: f64 = 1e-5;
 /// A path is to meet the point that was asked about this nearly [m], and is looked for in so many steps.
 const MEETS_M: f64 = 1e-9;
-const MOST_STEPS: u32 = 40;
+const MAX_STEPS: u32 = 40;
 
 /// A specular surface on the way.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -122,7 +122,7 @@ pub fn explain(
     scale_w_m2: f64,
     control: &Control,
 ) -> Explanation {
-    let aim = Aim::take(tracer, ItemBufferKind::Equal, Aiming::Reachable, true);
+    let aim = Aim::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, true);
     let negligible_w = NEGLIGIBLE * scale_w_m2 * target.area_m2;
     let mut found = Explanation {
         is_complete: true,
@@ -142,7 +142,7 @@ pub fn explain(
 
 fn explain_light(
     tracer: &Tracer,
-    aimed: &AimedLight,
+    aimed: &VisibleLight,
     target: &Target,
     (limits, negligible_w): (Limits, f64),
     control: &Control,
@@ -161,12 +161,12 @@ fn explain_light(
         let wavefront = match emitter {
             Some(None) => None,
             Some(Some(emitter)) => {
-                aimed.from_place(tracer, (ItemBufferKind::Equal, Aiming::Reachable), &emitter)
+                aimed.from_place(tracer, (ItemBufferKind::Equal, CullMode::Reachable), &emitter)
             }
             None => Some(aimed.clone()),
         };
         let Some(wavefront) = wavefront else { continue };
-        let searcher = Searcher {
+        let searcher = TexelSearch {
             walker: Walker {
                 tracer,
                 launch: &wavefront.launch,
@@ -258,7 +258,7 @@ fn meeting(walker: &Walker<'_>, piece: &Piece) -> Option<Way> {
     let mut square = piece.ray;
     let mut best = way(square)?;
     let mut step = 1e-4 * side;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_STEPS {
         let miss = goal - best.place;
         if miss.length() * texel_m < MEETS_M {
             break;

@@ -20,7 +20,7 @@ const BUFFER: u32 = CELLS_PER_SIDE.trailing_zeros();
 /// Cells that the search begins with, at most.
 const FIRST_CELLS: u64 = 60_000;
 /// And halvings of the domain's side for them.
-const MOST_FIRST: u32 = 16;
+const MAX_FIRST: u32 = 16;
 /// A way through a whole cell is followed no further where it lights no more than this across [texels], and its middle
 /// lies this near to that of its corners.
 const FINE_TEXELS: f64 = 0.25;
@@ -119,7 +119,7 @@ enum Verdict {
 }
 
 /// A search for one wavefront.
-pub(super) struct Searcher<'a> {
+pub(super) struct TexelSearch<'a> {
     pub(super) walker: Walker<'a>,
     pub(super) item_buffer: &'a ItemBuffer,
     /// Flux on the texel that does not matter [W].
@@ -128,7 +128,7 @@ pub(super) struct Searcher<'a> {
     pub(super) control: &'a Control,
 }
 
-impl Searcher<'_> {
+impl TexelSearch<'_> {
     pub(super) fn search(&self) -> Found {
         let mut found = Found::default();
         let mut known: HashMap<Point, Vec<Arrival>> = HashMap::new();
@@ -168,7 +168,7 @@ impl Searcher<'_> {
                 }));
             }
         }
-        while !marked.is_empty() && 4 * marked.len() as u64 <= FIRST_CELLS && marked[0].level < MOST_FIRST {
+        while !marked.is_empty() && 4 * marked.len() as u64 <= FIRST_CELLS && marked[0].level < MAX_FIRST {
             marked = marked.iter().flat_map(|cell| cell.halves(&[])).collect();
         }
         marked

@@ -12,7 +12,7 @@ use crate::optics::LinearSrgb;
 use crate::transport::{MediumStack, Tracer};
 
 /// Segments that one light ray may have waiting.
-const MOST_WAITING: usize = 512;
+const MAX_WAITING: usize = 512;
 
 /// Light that came to the receiver over at least one specular surface.
 #[derive(Clone, Copy, Debug)]
@@ -138,7 +138,7 @@ impl Walker<'_> {
                 let is_followed = flux_w.is_finite()
                     && flux_w.luminance() > floor_w
                     && segment.depth < self.limits.max_depth
-                    && waiting.len() < MOST_WAITING;
+                    && waiting.len() < MAX_WAITING;
                 if is_followed {
                     steps.push(Step {
                         vertex: PathVertex {

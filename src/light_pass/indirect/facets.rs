@@ -9,7 +9,7 @@ use crate::illumination::islands::root;
 use crate::scene::Mesh;
 
 /// Neighbouring triangles of one smooth piece lie at less than 30° to each other.
-const LEAST_COSINE: f64 = 0.866;
+const MIN_COSINE: f64 = 0.866;
 
 /// Both ends of a side in the map, the lower one first.
 type Side = [(u64, u64); 2];
@@ -25,7 +25,7 @@ pub fn smooth_pieces(mesh: &Mesh, chart: &Chart) -> Vec<u32> {
             let side = side(corners[from], corners[to]);
             let other = *at.entry(side).or_insert(triangle as u32);
             let cosine = mesh.face_normal(triangle).dot(mesh.face_normal(other as usize));
-            if cosine >= LEAST_COSINE {
+            if cosine >= MIN_COSINE {
                 let (a, b) = (root(&mut parent, triangle as u32), root(&mut parent, other));
                 parent[a.max(b) as usize] = a.min(b);
             }

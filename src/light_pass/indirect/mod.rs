@@ -23,7 +23,7 @@ mod trace;
 
 pub use element::{Element, Elements};
 pub use grid::Grid;
-pub use network::{LEAST_PASSES, MOST_PASSES, Network};
+pub use network::{MAX_PASSES, MIN_PASSES, Network};
 pub use resample::Resampling;
-pub use solve::{MOST_BOUNCES, Solution};
+pub use solve::{MAX_BOUNCES, Solution};
 pub use trace::TraceCounts;

@@ -17,10 +17,10 @@ use crate::transport::{SurfaceHit, Tracer};
 const FIRST_RAYS: u32 = 16;
 
 /// Passes that every element needs, 64 rays: less may miss a small bright spot altogether, and see no error either.
-pub const LEAST_PASSES: u8 = 3;
+pub const MIN_PASSES: u8 = 3;
 
 /// Passes of an element at most: 4,096 rays.
-pub const MOST_PASSES: u8 = 9;
+pub const MAX_PASSES: u8 = 9;
 
 /// Which grid a surface's light comes from.
 #[derive(Clone, Debug)]
@@ -93,7 +93,7 @@ impl Network {
     /// Whether an element lies within a solid, or nothing was seen from it: its light is not for others to go by.
     pub fn is_hidden(&self, element: usize) -> bool {
         let sees_nothing = |pass: u8| self.row(element, pass).is_none_or(|(_, kept)| kept == 0);
-        self.stances[element] == Stance::Inside || (0..LEAST_PASSES).all(sees_nothing)
+        self.stances[element] == Stance::Inside || (0..MIN_PASSES).all(sees_nothing)
     }
 
     /// Links of an element in a pass, and its rays that count; `None` where it was not traced.
@@ -123,7 +123,7 @@ impl Network {
 
     /// Memory once every element has so many passes, about [bytes].
     pub fn bytes_after(&self, passes: &[u8]) -> u64 {
-        let missing: u64 = (0..MOST_PASSES)
+        let missing: u64 = (0..MAX_PASSES)
             .map(|pass| {
                 let rays = u64::from(Self::rays_after(pass.max(1)));
                 self.missing(passes, pass).len() as u64 * rays

@@ -5,12 +5,11 @@ use glam::DVec2;
 use crate::geometry::Ray;
 use crate::illumination::Side;
 use crate::optics::LinearSrgb;
-use crate::optics::fresnel::dielectric_reflectance;
 use crate::scene::SurfaceKind;
 use crate::transport::{Branch, EffectSet, Interaction, MediumStack, SurfaceHit, Tracer};
 
 /// Rays that carry less than this share of what they could are given up, and counted.
-const LEAST_WEIGHT: f64 = 1e-4;
+const MIN_WEIGHT: f64 = 1e-4;
 
 /// How far rays are followed.
 #[derive(Clone, Copy, Debug)]
@@ -68,14 +67,14 @@ impl Follower<'_> {
                 self.tracer
                     .interact_with(EffectSet::EVERYTHING, &hit, ray.direction, &media, micro);
             if material.surface.is_receiver() {
-                if is_back && !material.double_sided {
+                if is_back && !material.has_back() {
                     // Nothing is drawn there, and nothing sends light.
                     return found;
                 }
                 land(
                     &hit,
                     side,
-                    weight * interaction.deposit * self.tracer.base_colour(&hit),
+                    weight * interaction.leaving * self.tracer.base_colour(&hit),
                 );
             }
             let Some((branch, share)) = chosen(&interaction, material.surface, choice(2 * depth).x) else {
@@ -83,7 +82,7 @@ impl Follower<'_> {
             };
             weight = weight * share * (branch.ior_ratio * branch.ior_ratio);
             (ray, media) = (branch.ray, branch.media);
-            if weight.max_channel() < LEAST_WEIGHT {
+            if weight.max_channel() < MIN_WEIGHT {
                 break;
             }
         }
@@ -107,7 +106,7 @@ fn chosen(interaction: &Interaction, surface: SurfaceKind, at: f64) -> Option<(B
                 None
             }
         }
-        (Some(back), None) if surface == SurfaceKind::Mixed => {
+        (Some(back), None) if surface.is_receiver() => {
             let likely = back.share.max_channel();
             (at < likely).then(|| (back, back.share / likely))
         }
@@ -115,16 +114,4 @@ fn chosen(interaction: &Interaction, surface: SurfaceKind, at: f64) -> Option<(B
         (None, None) => None,
     }
     .filter(|(_, share)| share.max_channel() > 0.0)
-}
-
-/// Share of the light from a direction, out of a medium, that a surface takes: what its polish does not reflect.
-pub fn taken(tracer: &Tracer, object: usize, cosine: f64, media: &MediumStack) -> f64 {
-    let material = tracer.scene().material_of(object);
-    match material.surface {
-        SurfaceKind::Mixed => {
-            let eta = material.ior / media.ior(tracer.scene());
-            1.0 - material.polish * dielectric_reflectance(cosine, eta)
-        }
-        _ => 1.0,
-    }
 }

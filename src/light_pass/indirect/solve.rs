@@ -2,11 +2,11 @@
 
 use rayon::prelude::*;
 
-use super::network::{MOST_PASSES, Network};
+use super::network::{MAX_PASSES, Network};
 use crate::optics::LinearSrgb;
 
 /// Most times that light is sent on.
-pub const MOST_BOUNCES: u32 = 1000;
+pub const MAX_BOUNCES: u32 = 1000;
 
 /// What is still to come may be this part of the mean.
 const TOLERANCE: f64 = 1e-5;
@@ -22,7 +22,7 @@ pub struct Solution {
     pub mean: f64,
     /// How many times light was sent on.
     pub bounces: u32,
-    /// False where [`MOST_BOUNCES`] did not do.
+    /// False where [`MAX_BOUNCES`] did not do.
     pub converged: bool,
     /// Root mean square of the noise over the mean of E, by area; 0 without light.
     pub relative_noise: f64,
@@ -30,12 +30,12 @@ pub struct Solution {
 
 impl Network {
     /// Solves E = K (S + E) for the E that sources S [W/m²] of all elements give, by the first so many passes of each
-    /// element, at least [`LEAST_PASSES`](super::LEAST_PASSES).
+    /// element, at least [`MIN_PASSES`](super::MIN_PASSES).
     pub fn solve(&self, sources: &[LinearSrgb], passes: &[u8]) -> Solution {
         let count = self.element_count();
         let mut irradiance = vec![LinearSrgb::BLACK; count];
         let (mut bounces, mut converged, mut last_change) = (0, false, f64::INFINITY);
-        while bounces < MOST_BOUNCES {
+        while bounces < MAX_BOUNCES {
             let sent: Vec<LinearSrgb> = sources.iter().zip(&irradiance).map(|(s, e)| *s + *e).collect();
             let next: Vec<LinearSrgb> = (0..count)
                 .into_par_iter()
@@ -147,7 +147,7 @@ impl Solution {
             target * self.mean * if is_rough { alone.min(together) } else { alone }
         };
         (0..passes.len())
-            .filter(|&element| passes[element] < MOST_PASSES && self.noise[element] > most(element))
+            .filter(|&element| passes[element] < MAX_PASSES && self.noise[element] > most(element))
             .collect()
     }
 }

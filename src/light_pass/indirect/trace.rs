@@ -6,11 +6,11 @@ use rayon::prelude::*;
 
 use super::grid::{Grid, cosine_direction};
 use super::network::Places;
-use super::path::{Follower, taken};
+use super::path::Follower;
 use crate::geometry::sampling::even_point;
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
-use crate::scene::{Mesh, SurfaceKind};
+use crate::scene::Mesh;
 use crate::transport::{MediumStack, Tracer, media_at};
 
 /// What one ray weighs where it ended.
@@ -82,7 +82,7 @@ impl std::ops::AddAssign for TraceCounts {
 const CHUNK: usize = 32;
 
 /// An element far smaller than is usual on its grid takes up to so many times fewer rays.
-const MOST_HALVINGS: u32 = 3;
+const MAX_HALVINGS: u32 = 3;
 
 /// All that tracing needs.
 pub struct Pass<'a> {
@@ -145,7 +145,7 @@ impl Pass<'_> {
 
     fn has_bodies(&self) -> bool {
         let scene = self.tracer().scene();
-        (0..scene.objects.len()).any(|object| scene.material_of(object).surface == SurfaceKind::Dielectric)
+        (0..scene.objects.len()).any(|object| scene.material_of(object).is_solid())
     }
 
     fn element(&self, number: usize, has_bodies: bool, part: &mut Batch) {
@@ -161,7 +161,7 @@ impl Pass<'_> {
         let halvings = (grid.usual_m2 / grid.elements.all()[element].area_m2)
             .log2()
             .floor();
-        let halvings = halvings.clamp(0.0, f64::from(MOST_HALVINGS)) as u32;
+        let halvings = halvings.clamp(0.0, f64::from(MAX_HALVINGS)) as u32;
         let first_link = part.links.len();
         let mut ends = Vec::new();
         for index in self.rays.0 >> halvings..self.rays.1 >> halvings {
@@ -207,7 +207,9 @@ impl Pass<'_> {
         let point = grid.point(mesh, element, even_point(index, 0, seed))?;
         let direction = cosine_direction(&point, even_point(index, 1, seed));
         let own = grid.chart.object();
-        let share = taken(self.tracer(), own, direction.dot(point.shading_normal), &media);
+        let taking = self.tracer().taking(own, point.triangle, point.barycentric);
+        let ior_around = media.ior(self.tracer().scene());
+        let share = taking.of(direction.dot(point.shading_normal), ior_around);
         let first = part.links.len();
         let (links, counts) = (&mut part.links, &mut part.counts);
         let found = self.follower.follow(

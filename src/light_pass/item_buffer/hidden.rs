@@ -23,13 +23,13 @@ const SLIVER: f64 = 1e-11;
 const NEARER: f64 = 1e-7;
 
 /// A triangle that spans less than this, seen from the light, has a plane that rounding may tilt.
-const LEAST_VOLUME: f64 = 1e-6;
+const MIN_VOLUME: f64 = 1e-6;
 
 /// Faces that are subtracted from a cell: those that came first.
-const MOST_FACES: usize = 64;
+const MAX_FACES: usize = 64;
 
 /// Pieces that a cell may fall into.
-const MOST_PIECES: usize = 256;
+const MAX_PIECES: usize = 256;
 
 /// A triangle in a face's homogeneous coordinates, with how near to the light it is.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ impl Facet {
         let volume = a.dot(edges[0]);
         let weighted = edges[0] * values[0] + edges[1] * values[1] + edges[2] * values[2];
         let whole = a.length() * b.length() * c.length();
-        let is_sound = volume.abs() > LEAST_VOLUME * whole;
+        let is_sound = volume.abs() > MIN_VOLUME * whole;
         if volume < 0.0 {
             edges = edges.map(|edge| -edge);
         }
@@ -136,7 +136,7 @@ impl HiddenCells {
         let cells = polygon.touched(self.grid, marked);
         for &(column, row) in &cells {
             let faces = &mut self.faces[row * CELLS_PER_SIDE + column];
-            if faces.len() < MOST_FACES {
+            if faces.len() < MAX_FACES {
                 faces.push((object, *facet));
             }
             self.doubtful.set(column, row);
@@ -212,7 +212,7 @@ impl HiddenCells {
             if left.is_empty() {
                 return true;
             }
-            if left.len() > MOST_PIECES {
+            if left.len() > MAX_PIECES {
                 return false;
             }
         }

@@ -179,7 +179,7 @@ impl<'a> Search<'a> {
     /// closes cells faster than the search does.
     pub(super) fn close_some(&self, mesh: InScene, open: &mut CellBits) {
         const BATCH: u64 = 1024;
-        const LEAST_CLOSED: u64 = BATCH / 12;
+        const MIN_CLOSED: u64 = BATCH / 12;
         let count = mesh.triangle_count() as u64;
         for batch in 0..count / BATCH {
             let before = open.count();
@@ -190,7 +190,7 @@ impl<'a> Search<'a> {
                 let vertex = mesh.triangle(triangle as usize)[0];
                 self.close_at(mesh.position(vertex as usize), open);
             }
-            if before - open.count() < LEAST_CLOSED {
+            if before - open.count() < MIN_CLOSED {
                 return;
             }
         }

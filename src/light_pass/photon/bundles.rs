@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::launch::LAMP_DIMENSION;
 use super::spectrum::{Hue, PhotonSpectrum};
-use super::survey::{LEAST_PHOTONS, Survey, Surveyor};
+use super::survey::{MIN_PHOTONS, Survey, Surveyor};
 use super::walk::WAVELENGTH_DIMENSION;
 use crate::geometry::sampling::{even_point, in_square};
 use crate::illumination::Receiver;
@@ -29,16 +29,16 @@ use crate::light_pass::wavefront::coverage::FluxTriangle;
 use crate::optics::LinearSrgb;
 
 /// Bundles are as fine as so many photons ask for, at most.
-const MOST_PHOTONS: f64 = 8e6;
+const MAX_PHOTONS: f64 = 8e6;
 
 /// One cell of so many tells what bundles would carry.
 const TRIED: usize = 16;
 
 /// Bundles that carry less of what arrives are not worth it.
-const LEAST_CARRIED: f64 = 0.25;
+const MIN_CARRIED: f64 = 0.25;
 
 /// Bundles of a light, about: 100 bytes each.
-const MOST_BUNDLES: usize = 1 << 21;
+const MAX_BUNDLES: usize = 1 << 21;
 
 /// Triangles that are deposited at once, about.
 const TRIANGLES_AT_ONCE: usize = 1 << 17;
@@ -47,7 +47,7 @@ const TRIANGLES_AT_ONCE: usize = 1 << 17;
 const PART_TEXELS: f64 = 0.1;
 
 /// Parts of a lamp along an axis for one photon, at most.
-const MOST_LAMP_PARTS: f64 = 8.0;
+const MAX_LAMP_PARTS: f64 = 8.0;
 
 /// The same of light that is parted.
 const FEW_LAMP_PARTS: f64 = 2.0;
@@ -90,14 +90,14 @@ impl Moves {
     /// Parts of a lamp that a bundle is deposited for, along both axes: what the draw of their points leaves is to be less than
     /// the noise of so many photons. No more than `most` along an axis.
     fn lamp_parts(&self, photons: f64, most: f64) -> DVec2 {
-        let finer = (photons.sqrt() / MOST_LAMP_PARTS).max(1.0);
+        let finer = (photons.sqrt() / MAX_LAMP_PARTS).max(1.0);
         let parts = |moved: Vec2| (2.0 * finer * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
         DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(most))
     }
 
     /// How far light of one part of a lamp arrives from that of the next [texels].
     pub(super) fn lamp_step_texels(&self) -> f64 {
-        let parts = self.lamp_parts(1.0, MOST_LAMP_PARTS).to_array();
+        let parts = self.lamp_parts(1.0, MAX_LAMP_PARTS).to_array();
         let steps = [0, 1].map(|axis| 2.0 * f64::from(self.lamp[axis].abs().max_element()) / parts[axis]);
         steps[0].max(steps[1])
     }
@@ -193,17 +193,17 @@ impl Bundles {
     /// As fine as suits so many photons; none where they are too few.
     pub(super) fn new(surveyor: &Surveyor, photons: f64) -> Self {
         let cells = surveyor.launch.cell_count();
-        let photons = photons.min(MOST_PHOTONS) / cells as f64;
+        let photons = photons.min(MAX_PHOTONS) / cells as f64;
         let has_size = surveyor.launch.lamp_offsets().is_some();
-        if cells == 0 || photons < LEAST_PHOTONS[usize::from(has_size)] {
+        if cells == 0 || photons < MIN_PHOTONS[usize::from(has_size)] {
             return Self::default();
         }
-        let survey = |cell| surveyor.survey(cell, photons, MOST_BUNDLES / cells);
+        let survey = |cell| surveyor.survey(cell, photons, MAX_BUNDLES / cells);
         let tried = |cell: usize| cell.is_multiple_of(TRIED).then(|| survey(cell));
         let tried: Vec<Option<Survey>> = (0..cells).into_par_iter().map(tried).collect();
         let of_tried = |flux_w: fn(&Survey) -> f64| tried.iter().flatten().map(flux_w).sum::<f64>();
         let is_worth_it =
-            of_tried(|survey| survey.carried_w) > LEAST_CARRIED * of_tried(|survey| survey.arriving_w);
+            of_tried(|survey| survey.carried_w) > MIN_CARRIED * of_tried(|survey| survey.arriving_w);
         if !is_worth_it {
             return Self::default();
         }
@@ -327,7 +327,7 @@ impl Bundles {
             }
         };
         let lamp_parts = match hues.len() {
-            1 => moves.lamp_parts(photons, photons.sqrt().floor().max(MOST_LAMP_PARTS)),
+            1 => moves.lamp_parts(photons, photons.sqrt().floor().max(MAX_LAMP_PARTS)),
             // Each of them is deposited at every wavelength.
             hues => {
                 let photons = photons / hues as f64;

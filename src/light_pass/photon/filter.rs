@@ -24,7 +24,7 @@ const CHANCE_PAIRS: f32 = 2.0;
 const ERROR_BY_LIGHT: f32 = 1.5;
 
 /// Details take no more of the light of a cell than leaves this part of it, where channels may be negative.
-const LEAST_LEFT: f32 = 1e-5;
+const MIN_LEFT: f32 = 1e-5;
 
 /// Light is told from none down to this part of the map's mean.
 const DARKEST: f32 = 1e-4;
@@ -35,41 +35,88 @@ pub fn takes(map: &ReceiverMap) -> bool {
 }
 
 /// Filters the sum of two halves, and gives the squared error of each texel that is left [W²/m⁴]. `sum` holds the light of
-/// both; `is_signed`: channels of its light may be negative.
-pub fn filter(sum: &mut ReceiverMaps, halves: [&ReceiverMaps; 2], unit: FluxUnit, is_signed: bool) -> Noise {
+/// both; `is_signed`: channels of its light may be negative. Adds the counts of maps that could not take them to `left`.
+pub fn filter(
+    sum: &mut ReceiverMaps,
+    halves: [&ReceiverMaps; 2],
+    (unit, is_signed): (FluxUnit, bool),
+    left: &mut Sums,
+) -> Noise {
     let mut noise = Noise::new();
     for (receiver, map) in sum.iter_mut().filter(|(_, map)| takes(map)) {
         let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
         let kept = details.filtered();
         noise.insert(receiver, details.squares(&kept, map));
-        details.put(&kept, map, unit);
+        add(left, details.put(&kept, map, unit));
     }
     noise
 }
 
-/// Takes negative counts, which the noise of bundles leaves where there is little light, out of all others.
-pub fn without_negative(maps: &mut ReceiverMaps) {
+/// Counts of many texels.
+pub type Sums = [i128; 3];
+
+fn add(sums: &mut Sums, more: Sums) {
+    for (sum, more) in sums.iter_mut().zip(more) {
+        *sum += more;
+    }
+}
+
+/// Takes negative light, which the noise of bundles leaves where there is little, out of all other. Adds the counts of maps
+/// that have not enough of that to `left`.
+pub fn without_negative(maps: &mut ReceiverMaps, is_signed: bool, left: &mut Sums) {
     for (_, map) in maps.iter_mut() {
         let counts = map.levels()[0].texels();
-        if counts.iter().flatten().any(|count| *count < 0) {
-            let positive: Vec<[f64; 3]> = counts
-                .iter()
-                .map(|texel| texel.map(|count| count.max(0) as f64))
-                .collect();
-            put(map, |texel| positive[texel], false);
+        if counts.iter().any(|&count| lit(count, is_signed) != count) {
+            let counts = counts.to_vec();
+            let flux = |texel: usize| lit(counts[texel], is_signed).map(|count| count as f64);
+            add(left, put(map, flux, is_signed));
         }
     }
 }
 
-/// Densities in a cell, in means of the map: luminance of each half as if it were all the light, and the channels.
-type Raw = [f32; 5];
+/// Counts of a texel without what is negative: channels, or all of them below a luminance of 0 where they may be negative.
+fn lit(count: FluxCount, is_signed: bool) -> FluxCount {
+    if !is_signed {
+        return count.map(|count| count.max(0));
+    }
+    let luminance = LinearSrgb::from(count.map(|count| count as f64)).luminance();
+    if luminance < 0.0 { [0; 3] } else { count }
+}
+
+/// Densities in a cell, in means of the map: the channels of each half as if it were all the light.
+type Raw = [f32; 6];
 
 /// The same after the filter, channels first, and the squared bias.
 type Kept = [f32; 6];
 
+/// Of each half.
+fn luminances(raw: &Raw) -> [f32; 2] {
+    let [r, g, b, r2, g2, b2] = *raw;
+    [luminance(&[r, g, b]) as f32, luminance(&[r2, g2, b2]) as f32]
+}
+
+/// Of both halves.
+fn channels(raw: &Raw) -> [f32; 3] {
+    [0, 1, 2].map(|channel| 0.5 * (raw[channel] + raw[3 + channel]))
+}
+
+/// What the details of each half differ by from grey ones of the same luminance in the light around: photons of single
+/// wavelengths err by far more in it than in luminance.
+fn tints(detail: &Raw, smooth: &Kept) -> [[f32; 3]; 2] {
+    let light = luminance(&[smooth[0], smooth[1], smooth[2]]) as f32;
+    let [a, b] = luminances(detail);
+    let tint = |luminance: f32, first: usize| {
+        [0, 1, 2].map(|channel| {
+            let colour = if light > 0.0 { smooth[channel] / light } else { 1.0 };
+            detail[first + channel] - luminance * colour
+        })
+    };
+    [tint(a, 0), tint(b, 3)]
+}
+
 struct Details {
     cells: Cells,
-    raw: Values<5>,
+    raw: Values<6>,
     /// Luminance [W/m²].
     mean: f64,
     /// Channels may be negative, as those of pure colours are.
@@ -88,14 +135,13 @@ impl Details {
             0.0
         };
         let raw = cells.densities(|texel| {
-            let half = |half: Option<&[FluxCount]>| {
-                half.map_or(0.0, |counts| 2.0 * unit.flux_w(counts[texel]).luminance() * per_w) as f32
-            };
-            let [red, green, blue] = unit
-                .flux_w(counts[texel])
-                .to_array()
-                .map(|watts| (watts * per_w) as f32);
-            [half(halves[0]), half(halves[1]), red, green, blue]
+            let [first, second] = halves.map(|half| {
+                half.map_or([0.0; 3], |counts| {
+                    let flux_w = unit.flux_w(counts[texel]).to_array();
+                    flux_w.map(|watts| (2.0 * watts * per_w) as f32)
+                })
+            });
+            [first[0], first[1], first[2], second[0], second[1], second[2]]
         });
         Self {
             cells,
@@ -109,7 +155,10 @@ impl Details {
     fn filtered(&self) -> Vec<Kept> {
         let coarsest = self.raw.len() - 1;
         let mut kept: Values<6> = vec![Vec::new(); self.raw.len()];
-        let as_is = |&[a, b, red, green, blue]: &Raw| [red, green, blue, a, b, 0.0];
+        let as_is = |raw: &Raw| {
+            let ([a, b], [red, green, blue]) = (luminances(raw), channels(raw));
+            [red, green, blue, a, b, 0.0]
+        };
         kept[coarsest] = self.raw[coarsest].iter().map(as_is).collect();
         for level in (0..coarsest).rev() {
             kept[level] = self.refined(level, &kept);
@@ -121,9 +170,12 @@ impl Details {
     fn refined(&self, level: usize, kept: &Values<6>) -> Vec<Kept> {
         let mut details: Vec<Raw> = self.cells.between(level, &self.raw);
         let cells = details.par_iter_mut().zip(&self.raw[level]);
-        cells.for_each(|(detail, raw)| *detail = [0, 1, 2, 3, 4].map(|i| raw[i] - detail[i]));
+        cells.for_each(|(detail, raw)| *detail = [0, 1, 2, 3, 4, 5].map(|i| raw[i] - detail[i]));
         let mut refined = self.cells.between(level, kept);
-        let noise = |[a, b, ..]: &Raw| 0.25 * (a - b) * (a - b);
+        let noise = |detail: &Raw| {
+            let [a, b] = luminances(detail);
+            0.25 * (a - b) * (a - b)
+        };
         // Noise is in proportion to light where photons bring alike.
         let light = |smooth: &Kept| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
         let both = details
@@ -131,16 +183,16 @@ impl Details {
             .zip(&refined)
             .map(|(detail, smooth)| [noise(detail), light(smooth)]);
         let by_light = self.cells.pooled(level, both.collect(), PHOTONS_POOLED);
-        let power = details
-            .par_iter()
-            .zip(&by_light)
-            .map(|(detail, [noise_of_all, light])| {
+        let power = details.par_iter().zip(&refined).zip(&by_light).map(
+            |((detail, smooth), [noise_of_all, light])| {
                 let photon = if *light > 0.0 {
                     2.0 * noise_of_all / light
                 } else {
                     0.0
                 };
-                let product = detail[0] * detail[1];
+                let [a, b] = luminances(detail);
+                let product = a * b;
+                let [first, second] = tints(detail, smooth);
                 let chance = CHANCE_PAIRS * photon * photon;
                 [
                     if product > 0.0 {
@@ -149,40 +201,56 @@ impl Details {
                         product
                     },
                     noise(detail),
+                    (0..3).map(|i| first[i] * second[i]).sum(),
+                    (0..3).map(|i| 0.25 * (first[i] - second[i]).powi(2)).sum(),
                 ]
-            });
-        let power: Vec<[f32; 2]> = power.collect();
+            },
+        );
+        let power: Vec<[f32; 4]> = power.collect();
         drop(by_light);
         let pooled = self.cells.around(level, &power);
         drop(power);
         let cells = refined.par_iter_mut().zip(&details).zip(&pooled);
-        cells.for_each(|((kept, detail), [signal, noise])| {
-            let share = if *signal > 0.0 {
-                signal / (signal + noise.max(0.0))
-            } else {
-                0.0
+        cells.for_each(|((kept, detail), [signal, noise, tint_signal, tint_noise])| {
+            let part = |signal: f32, noise: f32| {
+                if signal > 0.0 {
+                    signal / (signal + noise.max(0.0))
+                } else {
+                    0.0
+                }
             };
-            let missed = (1.0 - share) * (1.0 - share) * detail[0] * detail[1];
-            let [red, green, blue] = self.lit(kept, detail, share);
+            let share = part(*signal, *noise);
+            let [first, second] = luminances(detail);
+            let missed = (1.0 - share) * (1.0 - share) * first * second;
+            let [red, green, blue] = self.channels_of(kept, detail, [share, part(*tint_signal, *tint_noise)]);
             let [.., a, b, missed_before] = *kept;
-            let [a, b] = [a + share * detail[0], b + share * detail[1]];
+            let [a, b] = [a + share * first, b + share * second];
             *kept = [red, green, blue, a, b, missed_before + missed];
         });
         refined
     }
 
-    /// The channels of a cell with a share of its detail, less where nothing would be left of its light.
-    fn lit(&self, smooth: &Kept, detail: &Raw, share: f32) -> [f32; 3] {
-        let with = |share: f32| [0, 1, 2].map(|channel| smooth[channel] + share * detail[2 + channel]);
+    /// The channels of a cell with a share of its detail's luminance and one of its tint, less where nothing would be left of
+    /// its light.
+    fn channels_of(&self, smooth: &Kept, detail: &Raw, [share, of_tint]: [f32; 2]) -> [f32; 3] {
+        let [first, second] = tints(detail, smooth);
+        let tint = [0, 1, 2].map(|channel| 0.5 * (first[channel] + second[channel]));
+        let whole = channels(detail);
+        let detail =
+            [0, 1, 2].map(|channel| share * (whole[channel] - tint[channel]) + of_tint * tint[channel]);
+        let with = |part: f32| [0, 1, 2].map(|channel| smooth[channel] + part * detail[channel]);
         if !self.is_signed {
-            return with(share).map(|value| value.max(0.0));
+            return with(1.0).map(|value| value.max(0.0));
         }
-        let [before, after] = [0.0, share].map(|share| luminance(&with(share)) as f32);
-        let least = LEAST_LEFT * before.max(0.0);
-        if after >= least.min(before) {
-            return with(share);
-        }
-        with(share * (before - least).max(0.0) / (before - after))
+        let [before, after] = [0.0, 1.0].map(|part| luminance(&with(part)) as f32);
+        let least = MIN_LEFT * before.max(0.0);
+        let lit = if after >= least {
+            with(1.0)
+        } else {
+            with(((before - least) / (before - after)).clamp(0.0, 1.0))
+        };
+        // What rounds to less than nothing is grey.
+        if luminance(&lit) < 0.0 { [least; 3] } else { lit }
     }
 
     /// The squared error of each texel [W²/m⁴]: what was missed and what is left of the noise, among the texels around it as
@@ -217,40 +285,60 @@ impl Details {
     }
 
     /// Puts what was kept in the place of a map's counts.
-    fn put(&self, of_texels: &[Kept], map: &mut ReceiverMap, unit: FluxUnit) {
+    fn put(&self, of_texels: &[Kept], map: &mut ReceiverMap, unit: FluxUnit) -> Sums {
         let counts_per_mean = self.mean / unit.watts();
         let chart = map.chart.clone();
         let flux = |texel: usize| {
             let counts = chart.texel_area_m2(texel) * counts_per_mean;
             [0, 1, 2].map(|channel| f64::from(of_texels[texel][channel]) * counts)
         };
-        put(map, flux, self.is_signed);
+        put(map, flux, self.is_signed)
     }
 }
 
 /// Puts other counts in the place of a map's; each channel keeps its sum. What is missing is shared out as the channel is, or
-/// as luminance is where channels may be negative: that stays above 0.
-fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3], is_signed: bool) {
+/// as luminance is where channels may be negative: that stays above 0. Gives what no texel could take.
+fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3], is_signed: bool) -> Sums {
     let texels = map.texels_mut();
-    for channel in 0..3 {
-        let share = |flux: &[f64; 3]| match is_signed {
-            true => LinearSrgb::from(*flux).luminance(),
-            false => flux[channel],
-        };
-        let before: f64 = texels.iter().map(|count| count[channel] as f64).sum();
-        let (mut after, mut size) = (0.0, 0.0);
-        for flux in (0..texels.len()).map(&flux) {
-            after += flux[channel];
-            size += share(&flux);
-        }
-        let missing = if size > 0.0 { (before - after) / size } else { 0.0 };
-        // Roundings add up to nothing.
-        let mut left = 0.0;
-        for (texel, count) in texels.iter_mut().enumerate() {
-            let flux = flux(texel);
-            let wanted = flux[channel] + share(&flux) * missing + left;
-            count[channel] = wanted.round() as i64;
-            left = wanted - count[channel] as f64;
+    let sums = |texels: &[FluxCount]| {
+        let mut sums = [0; 3];
+        texels
+            .iter()
+            .for_each(|count| add(&mut sums, count.map(i128::from)));
+        sums
+    };
+    let share = |flux: [f64; 3]| match is_signed {
+        true => [LinearSrgb::from(flux).luminance(); 3],
+        false => flux,
+    };
+    let before = sums(texels);
+    let (mut after, mut size) = ([0.0; 3], [0.0; 3]);
+    for flux in (0..texels.len()).map(&flux) {
+        let share = share(flux);
+        for channel in 0..3 {
+            after[channel] += flux[channel];
+            size[channel] += share[channel];
         }
     }
+    let missing = [0, 1, 2].map(|channel| match size[channel] > 0.0 {
+        true => (before[channel] as f64 - after[channel]) / size[channel],
+        false => 0.0,
+    });
+    for (texel, count) in texels.iter_mut().enumerate() {
+        let (flux, share) = (flux(texel), share(flux(texel)));
+        let wanted = [0, 1, 2].map(|channel| flux[channel] + share[channel] * missing[channel]);
+        *count = lit(wanted.map(|wanted| wanted.round() as i64), is_signed);
+    }
+    // The brightest texel takes what rounding left.
+    let rounded = sums(texels);
+    let left = [0, 1, 2].map(|channel| before[channel] - rounded[channel]);
+    let brightness = |count: &&mut FluxCount| count.iter().map(|&count| i128::from(count)).sum::<i128>();
+    if let Some(brightest) = texels.iter_mut().max_by_key(brightness) {
+        let with = [0, 1, 2].map(|channel| brightest[channel] + left[channel] as i64);
+        if lit(with, is_signed) == with {
+            *brightest = with;
+            return [0; 3];
+        }
+    }
+    left
 }

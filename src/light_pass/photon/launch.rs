@@ -10,7 +10,7 @@ use super::spheres::Spheres;
 use crate::geometry::Ray;
 use crate::geometry::cube_face::FaceMapping;
 use crate::geometry::sampling::{even_code, even_point, in_square, unfolded};
-use crate::light_pass::caustic::setup::AimedLight;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
 use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
@@ -82,7 +82,7 @@ struct Cell {
 
 impl<'a> PhotonLaunch<'a> {
     /// The domain of a light as its item buffer sees it.
-    pub fn of_cells(aimed: &'a AimedLight) -> Self {
+    pub fn of_cells(aimed: &'a VisibleLight) -> Self {
         let side = CELLS_PER_SIDE;
         let marked = |face: usize| {
             let on_curve = (0..side * side).map(|place| {

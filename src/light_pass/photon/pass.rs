@@ -13,7 +13,7 @@ use super::survey::Surveyor;
 use super::walk::{Hit, PhotonRules, PhotonWalk, Place};
 use crate::illumination::accumulator::FluxCount;
 use crate::illumination::{Chart, Receiver};
-use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
+use crate::light_pass::caustic::pass::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::share::Share;
@@ -71,7 +71,7 @@ impl PhotonPass<'_> {
         indices: Range<u32>,
         share: Option<Share>,
         halves: &mut [&mut [ReceiverMaps]],
-        listener: &Listener,
+        listener: &ProgressScope,
     ) -> PassReport {
         // Indices that are alike in their last bits have places that are alike in their first ones.
         let stride = (indices.end / BLOCK).max(1).next_power_of_two();

@@ -17,17 +17,17 @@ use crate::progress::Control;
 use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
 
 /// Ways with less than this part of the light that starts are left to photons.
-const LEAST_SHARE: f64 = 0.01;
+const MIN_SHARE: f64 = 0.01;
 
 /// Longer ways are left to photons.
-const MOST_STEPS: usize = 12;
+const MAX_STEPS: usize = 12;
 
 /// Ways of a point; further ones are left to photons.
-const MOST_WAYS: usize = 16;
+const MAX_WAYS: usize = 16;
 
 /// Cells are looked at where so many photons start in them, of light of one place and of a lamp with a size: for that there
 /// are more points to follow.
-pub(super) const LEAST_PHOTONS: [f64; 2] = [24.0, 400.0];
+pub(super) const MIN_PHOTONS: [f64; 2] = [24.0, 400.0];
 
 /// A square is divided where those of its photons that follow no bundle take as many segments as its division, times this.
 const WORTH: f64 = 1.0;
@@ -36,20 +36,20 @@ const WORTH: f64 = 1.0;
 const POINTS_OF_DIVISION: f64 = 8.0;
 
 /// Divisions of a cell, at most.
-const MOST_DIVISIONS: u32 = 10;
+const MAX_DIVISIONS: u32 = 10;
 
 /// A bundle is of use while the light of the middle of its square arrives no farther than this from the mean of two opposite
 /// corners [texels]. Within its triangles it is wrong by a quarter of that or less.
-const MOST_BENT_TEXELS: f64 = 1.0;
+const MAX_BENT_TEXELS: f64 = 1.0;
 
 /// Light of one part of a lamp arrives within so many texels.
-const MOST_STEP_TEXELS: f64 = 0.5;
+const MAX_STEP_TEXELS: f64 = 0.5;
 
 /// Segments of a photon that takes a way without bundles, about.
 const LOST_SEGMENTS: f64 = 10.0;
 
 /// Photons start as if no less than this part of the light were left to them.
-const LEAST_LEFT: f64 = 0.03;
+const MIN_LEFT: f64 = 0.03;
 
 /// Corners of the triangles of a square, beside its middle.
 pub(super) const TRIANGLES: [[usize; 2]; 4] = [[0, 1], [1, 3], [2, 3], [0, 2]];
@@ -171,11 +171,11 @@ impl Surveyor<'_> {
         let (bundles, ends, outcome) = square.bundles();
         let by_photons = outcome.left * square.photons * outcome.segments;
         let is_fine = by_photons <= WORTH * POINTS_OF_DIVISION * outcome.followed
-            || square.divisions == MOST_DIVISIONS
+            || square.divisions == MAX_DIVISIONS
             || survey.bundles_left == 0;
         if is_fine || self.control.is_cancelled() {
             // The variance of a photon over its cost.
-            let left = (outcome.left + outcome.lost).clamp(LEAST_LEFT, 1.0);
+            let left = (outcome.left + outcome.lost).clamp(MIN_LEFT, 1.0);
             let share = 0.25_f64.powi(square.divisions as i32);
             survey.carried_w += share * outcome.carried_w;
             survey.arriving_w += share * outcome.arriving_w;
@@ -292,12 +292,12 @@ impl Surveyor<'_> {
             flux_w = flux_w * from.media.transmittance(tracer.scene(), hit.distance_m);
         }
         let meeting = tracer.meet(effects, hit, from.ray.direction, &from.media, None);
-        let least_w = LEAST_SHARE * light.start_w;
+        let least_w = MIN_SHARE * light.start_w;
         let taken_w = flux_w * meeting.deposit;
         if !from.steps.is_empty() && taken_w.max_channel() > 0.0 {
             let receiver = Receiver::new(hit.object, Side::met(from.ray.direction, hit.geometric_normal));
             let place = self.place(receiver, hit);
-            match place.filter(|_| taken_w.is_finite() && light.arrivals.len() < MOST_WAYS) {
+            match place.filter(|_| taken_w.is_finite() && light.arrivals.len() < MAX_WAYS) {
                 Some(place) if taken_w.max_channel() >= least_w => light.arrivals.push(Arrival {
                     key: from.key.at(receiver.index(), 0),
                     steps: from.steps.as_slice().into(),
@@ -313,8 +313,8 @@ impl Surveyor<'_> {
             .at(hit.object, tracer.smoothing_group(hit.object, hit.triangle));
         let mut go_on = |branch: Branch| {
             let flux_w = flux_w * branch.share;
-            let is_followed = from.steps.len() < MOST_STEPS.min(self.rules.max_depth as usize)
-                && waiting.len() < MOST_WAYS
+            let is_followed = from.steps.len() < MAX_STEPS.min(self.rules.max_depth as usize)
+                && waiting.len() < MAX_WAYS
                 && flux_w.is_finite();
             if !is_followed || flux_w.max_channel() < least_w {
                 light.lose(flux_w);
@@ -354,7 +354,7 @@ impl Candidate {
         let of_way = |middle| {
             (
                 middle,
-                self.bent_texels(middle) / MOST_BENT_TEXELS,
+                self.bent_texels(middle) / MAX_BENT_TEXELS,
                 self.moves(middle),
             )
         };
@@ -424,7 +424,7 @@ impl Candidate {
         if let Some([first, last]) = &self.hues {
             moves.hues = [moved(first)?, moved(last)?];
         }
-        (moves.lamp_step_texels() < MOST_STEP_TEXELS).then_some(moves)
+        (moves.lamp_step_texels() < MAX_STEP_TEXELS).then_some(moves)
     }
 
     /// How far the light of the middle arrives from where opposite corners say [texels], where two of them say so.

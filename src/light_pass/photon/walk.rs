@@ -370,7 +370,7 @@ impl Photon<'_> {
 }
 
 /// Part of the interval [0, 1) in which a choice has no certain digits left.
-const LEAST_WIDTH: f64 = 1e-7;
+const MIN_WIDTH: f64 = 1e-7;
 
 /// What makes all decisions of a photon: one number that is even among those of its neighbours. Within the part of the
 /// interval that a decision took it is even again, and serves for the next one.
@@ -400,7 +400,7 @@ impl Choice {
         };
         self.number = (self.number - first) / part;
         self.width *= part;
-        if self.width < LEAST_WIDTH {
+        if self.width < MIN_WIDTH {
             (self.number, self.width) = (self.random.next(), 1.0);
         }
         is_below

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec2;
 
-use super::strand::{LightSample, Strand};
+use super::strand::{LatticeRay, PathSegment};
 
 /// Where a sample is kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,17 +28,17 @@ pub struct Corner {
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
     /// Filled in the order of the chunks.
-    pub chunks: Vec<Vec<LightSample>>,
+    pub chunks: Vec<Vec<LatticeRay>>,
 }
 
 impl Samples {
     /// A sample.
-    pub fn get(&self, id: SampleId) -> &LightSample {
+    pub fn get(&self, id: SampleId) -> &LatticeRay {
         &self.chunks[id.chunk as usize][id.index as usize]
     }
 
     /// A strand of a sample.
-    pub fn strand(&self, id: SampleId, strand: u16) -> &Strand {
+    pub fn strand(&self, id: SampleId, strand: u16) -> &PathSegment {
         &self.get(id).strands[usize::from(strand)]
     }
 }
@@ -51,7 +51,7 @@ pub struct Workspace<'a> {
     /// Number of the own chunk.
     pub chunk: u32,
     /// Traced by this task.
-    pub own: Vec<LightSample>,
+    pub own: Vec<LatticeRay>,
     /// Rows of the lattice's own corners, which come first, once for each wavelength.
     corner_rows: u32,
     /// Where this task traced already, by wavelength: cells share corners and edges.
@@ -71,7 +71,7 @@ impl<'a> Workspace<'a> {
     }
 
     /// The sample at a place of the unit square, of one of the wavelengths; traced unless this task did so before.
-    pub fn sample_at(&mut self, node: u32, square: DVec2, trace: impl FnOnce() -> LightSample) -> SampleId {
+    pub fn sample_at(&mut self, node: u32, square: DVec2, trace: impl FnOnce() -> LatticeRay) -> SampleId {
         let key = (node, square.to_array().map(f64::to_bits));
         if let Some(id) = self.known.get(&key) {
             return *id;
@@ -96,7 +96,7 @@ impl<'a> Workspace<'a> {
     }
 
     /// A sample, shared or own.
-    pub fn get(&self, id: SampleId) -> &LightSample {
+    pub fn get(&self, id: SampleId) -> &LatticeRay {
         if id.chunk == self.chunk {
             &self.own[id.index as usize]
         } else {
@@ -104,7 +104,7 @@ impl<'a> Workspace<'a> {
         }
     }
 
-    fn add(&mut self, sample: LightSample) -> SampleId {
+    fn add(&mut self, sample: LatticeRay) -> SampleId {
         self.own.push(sample);
         SampleId {
             chunk: self.chunk,

@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::closeness::Closeness;
-use super::openings::{Opening, narrow_openings};
+use super::closeness::EdgeSearch;
+use super::openings::{Slit, narrow_openings};
 use crate::geometry::Ray;
 use crate::geometry::enclosure::Bounds;
 use crate::light_pass::item_buffer::{self, CELLS_PER_SIDE, ItemBuffer};
@@ -23,7 +23,7 @@ const CELLS_ACROSS_OTHERS: f64 = 8.0;
 const DEEPEST_BODY_LEVEL: u32 = 18;
 
 /// Cells across each of very many casters: enough for their flux.
-const LEAST_ACROSS_CASTERS: f64 = 12.0;
+const MIN_ACROSS_CASTERS: f64 = 12.0;
 
 /// Small casters from which on each is looked at less closely.
 const MANY_CASTERS: usize = 8;
@@ -41,7 +41,7 @@ struct Body {
 
 impl Body {
     /// With so many cells across the opening.
-    fn of(opening: &Opening, across: f64) -> Self {
+    fn of(opening: &Slit, across: f64) -> Self {
         Self {
             ends: opening.ends,
             radius_m: opening.width_m,
@@ -91,7 +91,7 @@ impl SmallBodies {
         launch: &Launch,
         visible: &ItemBuffer,
         cell: DVec2,
-        closeness: Closeness,
+        closeness: EdgeSearch,
     ) -> Self {
         let scene = tracer.scene();
         let mut corners = Bins::default();
@@ -141,7 +141,7 @@ impl SmallBodies {
         let mut bodies = Bins::default();
         for (body, bounds) in &mut small {
             if body.cells_across > CELLS_ACROSS_OTHERS {
-                let least = LEAST_ACROSS_CASTERS.min(body.cells_across);
+                let least = MIN_ACROSS_CASTERS.min(body.cells_across);
                 body.cells_across = (body.cells_across / crowd).max(least);
             }
             book(launch, *bounds, *body, &mut bodies);

@@ -3,14 +3,14 @@
 
 use glam::DVec2;
 
-use super::strand::LightSample;
+use super::strand::LatticeRay;
 use crate::transport::RayDifferential;
 
 /// Cells for each wave in the finest lattice: a cubic patch then follows a sine to about 2 %.
 const CELLS_PER_WAVE: f64 = 4.0;
 
 /// Cells of a whole lattice at most, once they are divided for detail.
-const MOST_CELLS: f64 = 2_097_152.0;
+const MAX_CELLS: f64 = 2_097_152.0;
 
 /// Divisions at most.
 const DEEPEST_LEVEL: u32 = 12;
@@ -31,7 +31,7 @@ impl BumpCells {
     pub fn for_lattice(cells: u64, coarser: i32) -> Self {
         let longer = f64::from(coarser).exp2();
         let finest = (cells as f64 * longer * longer).max(1.0);
-        let divisions = 0.5 * (MOST_CELLS / finest).log2();
+        let divisions = 0.5 * (MAX_CELLS / finest).log2();
         Self {
             per_wave: CELLS_PER_WAVE / longer,
             deepest: (divisions.max(0.0) as u32).min(DEEPEST_LEVEL),
@@ -65,8 +65,8 @@ impl BumpCells {
 
     /// Whether a cell or an edge with the given step in the unit square, divided `level` times for detail, has to be
     /// divided again.
-    pub fn ask_for_finer(&self, samples: &[&LightSample], step: DVec2, level: u32) -> bool {
-        let is_coarse = |sample: &&LightSample| (sample.bump_cells * step.abs()).max_element() > 1.0;
+    pub fn ask_for_finer(&self, samples: &[&LatticeRay], step: DVec2, level: u32) -> bool {
+        let is_coarse = |sample: &&LatticeRay| (sample.bump_cells * step.abs()).max_element() > 1.0;
         let is_rough = samples.iter().any(|sample| sample.is_rough);
         !is_rough && level < self.deepest && samples.iter().any(is_coarse)
     }

@@ -9,7 +9,7 @@ use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
 use super::refine::{Refinement, RoundSet};
 use super::regions::{Outline, regions, triangles};
 use super::spectrum::{LightPart, NODES};
-use super::strand::LightSample;
+use super::strand::LatticeRay;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -17,14 +17,14 @@ use crate::optics::{ColourMatrix, LinearSrgb};
 
 /// How often cells are split whose cuts do not tell what lies in them; what is then left goes on as one small patch per ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Splits {
+pub struct SubdivisionLimits {
     /// Where cuts are ambiguous.
     pub ambiguous: u32,
     /// Where light is shattered besides: it leaves the cell in very many ways.
     pub shattered: u32,
 }
 
-impl Splits {
+impl SubdivisionLimits {
     /// As far as it helps.
     pub const FULL: Self = Self {
         ambiguous: 2,
@@ -57,12 +57,12 @@ pub struct Patch {
     /// What it is.
     pub kind: PatchKind,
     /// What part of the spectrum it carries.
-    pub tone: Tone,
+    pub tone: SpectralTag,
 }
 
 /// The part of a light's spectrum that a patch carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Tone {
+pub enum SpectralTag {
     /// All of a light without wavelengths.
     White,
     /// What one of the traced wavelengths stands for.
@@ -137,11 +137,11 @@ pub struct CellCutter<'a> {
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
     /// How often cells are split.
-    pub splits: Splits,
+    pub splits: SubdivisionLimits,
     /// The light, before its wavelengths part.
     pub light: LightPart<'a>,
     /// What patches carry.
-    pub tone: Tone,
+    pub tone: SpectralTag,
     /// From paths to the light's channels.
     pub channels: ColourMatrix,
     /// Light that has patches already, ascending.
@@ -289,7 +289,7 @@ impl CellCutter<'_> {
         let nodes = 1..self.light.node_count();
         let others = (cell.corners.iter())
             .flat_map(|corner| nodes.clone().filter_map(|node| work.at_node(corner.sample, node)));
-        let samples: Vec<&LightSample> = corners
+        let samples: Vec<&LatticeRay> = corners
             .chain(along.map(|(_, sample)| *sample))
             .chain(others)
             .map(|sample| work.get(sample))
@@ -301,7 +301,7 @@ impl CellCutter<'_> {
     pub fn rounds_beside(&self, own: [Corner; 4], beside: &[Corner], work: &Workspace) -> RoundSet {
         self.refinement.map_or(0, |refinement| {
             let sample = |corner: &Corner| work.get(corner.sample);
-            let beside: Vec<&LightSample> = beside.iter().map(sample).collect();
+            let beside: Vec<&LatticeRay> = beside.iter().map(sample).collect();
             refinement.rounds_beside(own.map(|corner| sample(&corner)), &beside)
         })
     }
@@ -591,7 +591,7 @@ impl CellCutter<'_> {
     /// Books what a surface did with the light of some samples, each by its area of the unit square. What it passed on
     /// is booked against what the strands carry.
     pub(super) fn book(&self, weighted: &[(SampleId, usize, f64)], work: &Workspace, out: &mut CellOutput) {
-        let sum = |of: fn(&super::strand::SurfaceNode) -> LinearSrgb| {
+        let sum = |of: fn(&super::strand::SurfaceFluxRecord) -> LinearSrgb| {
             let sum = weighted.iter().fold(LinearSrgb::BLACK, |sum, &(id, node, area)| {
                 sum + of(&work.get(id).nodes[node]) * area
             });
@@ -671,7 +671,7 @@ pub(super) fn surface_regions(cell: &Cell, signature: PathSignature, work: &Work
 pub(super) fn signatures(
     cell: &Cell,
     work: &Workspace,
-    collect: impl Fn(&LightSample, &mut Vec<PathSignature>),
+    collect: impl Fn(&LatticeRay, &mut Vec<PathSignature>),
 ) -> Vec<PathSignature> {
     let mut found = Vec::new();
     for corner in &cell.corners {

@@ -2,7 +2,7 @@
 
 /// How closely a wavefront is looked at where its light changes its way.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Closeness {
+pub struct EdgeSearch {
     /// Bisections of an edge on which the brightest light changes its way; dimmer light is cut as much more coarsely.
     pub cut_bits: i32,
     /// How often a cell is divided for a sharp corner in it.
@@ -11,7 +11,7 @@ pub struct Closeness {
     pub cells_across_casters: f64,
 }
 
-impl Closeness {
+impl EdgeSearch {
     /// Each border shows on the map. A corner is cut off in a 1,024th of its cell.
     pub const SHARP: Self = Self {
         cut_bits: 8,

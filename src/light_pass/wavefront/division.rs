@@ -23,7 +23,7 @@ const COARSEST_TOLERANCE: f64 = 10.0;
 const DUST_TOLERANCE: f64 = 2.0;
 
 /// Most triangles along a patch.
-const MOST_STEPS: usize = 128;
+const MAX_STEPS: usize = 128;
 
 /// Height of a surface over its middle facet, as a share of what the patch lights, from which it is taken for a jump or a
 /// sharp edge.
@@ -139,7 +139,7 @@ impl Spreader<'_> {
             let even = change / (DENSITY_STEP * tolerance);
             // Of triangles below a texel only those at its border are seen.
             let even = even.min((even * length).sqrt());
-            (straight.max(even).ceil() as usize).clamp(1, MOST_STEPS)
+            (straight.max(even).ceil() as usize).clamp(1, MAX_STEPS)
         };
         (
             steps(

@@ -6,7 +6,7 @@ use super::band::{SampleId, Workspace};
 use super::cell::{CHECK_MISMATCH, Cell, CellCutter, EDGE_ENDS, reach_of};
 use super::edge::{Reach, mismatch};
 use super::patch::PatchShape;
-use super::strand::LightSample;
+use super::strand::LatticeRay;
 use crate::geometry::Ray;
 use crate::light_pass::caustic::path::PathSignature;
 
@@ -147,13 +147,13 @@ impl CellCutter<'_> {
 }
 
 /// Flux from which on light at the corners of a cell is bright [W].
-fn least_bright_w(samples: [&LightSample; 4]) -> f64 {
+fn least_bright_w(samples: [&LatticeRay; 4]) -> f64 {
     let brightest_w = samples.iter().map(|sample| sample.brightest_w);
     brightest_w.fold(0.0, f64::max) * BRIGHT_SHARE
 }
 
 /// The ways of a sample's bright light.
-fn bright(sample: &LightSample, least_w: f64) -> Vec<PathSignature> {
+fn bright(sample: &LatticeRay, least_w: f64) -> Vec<PathSignature> {
     let strands = sample.strands.iter();
     let bright = strands.filter(|strand| strand.flux_w.luminance() > least_w);
     bright.map(|strand| strand.signature).collect()

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::band::{Corner, SampleId, Workspace};
-use super::strand::{LightSample, Strand};
+use super::strand::{LatticeRay, PathSegment};
 use super::trace::StrandTracer;
 use crate::light_pass::caustic::path::PathSignature;
 
@@ -61,7 +61,7 @@ struct Step {
 
 impl Step {
     /// `step` is the vector between the strands in the unit square.
-    fn between(a: &Strand, b: &Strand, step: DVec2) -> Self {
+    fn between(a: &PathSegment, b: &PathSegment, step: DVec2) -> Self {
         let reach_m = [a, b]
             .map(|strand| strand.landing.distance_m())
             .into_iter()
@@ -69,7 +69,7 @@ impl Step {
             .fold(0.0, f64::max);
         let reach_m = if reach_m > 0.0 { reach_m } else { 1.0 };
         let length = |origin: DVec3, direction: DVec3| origin.length() + reach_m * direction.length();
-        let tangent = |strand: &Strand| {
+        let tangent = |strand: &PathSegment| {
             let d = &strand.differential;
             (
                 d.across.origin * step.x + d.down.origin * step.y,
@@ -88,7 +88,7 @@ impl Step {
 
 /// Relative mismatch between what two strands' derivatives say about the step between them and the step itself;
 /// `step` is the vector between them in the unit square. 0 where the wavefront is a parabola between them.
-pub fn mismatch(a: &Strand, b: &Strand, step: DVec2) -> f64 {
+pub fn mismatch(a: &PathSegment, b: &PathSegment, step: DVec2) -> f64 {
     let Step { chord, off_mean, .. } = Step::between(a, b, step);
     if off_mean <= chord * 1e-12 {
         0.0
@@ -101,14 +101,14 @@ pub fn mismatch(a: &Strand, b: &Strand, step: DVec2) -> f64 {
 }
 
 /// How many times longer the step between two strands is than either one's derivatives say.
-fn stretch(a: &Strand, b: &Strand, step: DVec2) -> f64 {
+fn stretch(a: &PathSegment, b: &PathSegment, step: DVec2) -> f64 {
     let Step { chord, tangents, .. } = Step::between(a, b, step);
     let longest = tangents[0].max(tangents[1]);
     // Parallel light does not move at all.
     if chord <= longest { 0.0 } else { chord / longest }
 }
 
-fn is_stretched(a: &LightSample, b: &LightSample, signature: PathSignature, step: DVec2, most: f64) -> bool {
+fn is_stretched(a: &LatticeRay, b: &LatticeRay, signature: PathSignature, step: DVec2, most: f64) -> bool {
     match (a.find(signature), b.find(signature)) {
         (Some(i), Some(j)) => stretch(&a.strands[i], &b.strands[j], step) > most,
         _ => false,
@@ -122,12 +122,12 @@ fn narrowest(share: f64) -> f64 {
 }
 
 /// Whether a step of a strand is so long that it may hide a jump.
-pub fn is_suspicious(a: &LightSample, b: &LightSample, signature: PathSignature, step: DVec2) -> bool {
+pub fn is_suspicious(a: &LatticeRay, b: &LatticeRay, signature: PathSignature, step: DVec2) -> bool {
     is_stretched(a, b, signature, step, SUSPICIOUS_STRETCH)
 }
 
 /// Whether two samples saw light go the same ways.
-pub fn same_ways(a: &LightSample, b: &LightSample) -> bool {
+pub fn same_ways(a: &LatticeRay, b: &LatticeRay) -> bool {
     a.strands.len() == b.strands.len()
         && a.nodes.len() == b.nodes.len()
         && a.strands
@@ -149,7 +149,7 @@ impl Edge {
     }
 
     /// Whether light goes the same ways at both ends, on one sheet.
-    pub fn is_plain(a: &LightSample, b: &LightSample, step: DVec2) -> bool {
+    pub fn is_plain(a: &LatticeRay, b: &LatticeRay, step: DVec2) -> bool {
         same_ways(a, b)
             && a.strands
                 .iter()
@@ -205,7 +205,7 @@ impl Edge {
     fn share(&self, work: &Workspace, signature: PathSignature) -> f64 {
         let ends = [0, self.samples.len() - 1].map(|end| work.get(self.samples[end].1));
         let brightest_w = ends[0].brightest_w.max(ends[1].brightest_w);
-        let flux_w = |sample: &LightSample| Some(sample.strands[sample.find(signature)?].flux_w.luminance());
+        let flux_w = |sample: &LatticeRay| Some(sample.strands[sample.find(signature)?].flux_w.luminance());
         if ends.iter().all(|sample| sample.strands.len() <= MANY_CHANGES) {
             return 1.0;
         }
@@ -228,8 +228,8 @@ impl Edge {
         &self,
         work: &Workspace,
         backwards: bool,
-        is_there: impl Fn(&LightSample) -> bool,
-        is_jump: impl Fn(&LightSample, &LightSample, f64) -> bool,
+        is_there: impl Fn(&LatticeRay) -> bool,
+        is_jump: impl Fn(&LatticeRay, &LatticeRay, f64) -> bool,
     ) -> Reach {
         let last = self.samples.len() - 1;
         let at = |index: usize| self.samples[if backwards { last - index } else { index }];
@@ -275,13 +275,13 @@ const BULGE_SHARE: f64 = 0.1;
 
 /// Whether a border of some light may bulge over an edge that has it at both ends or at neither, as it lies between the
 /// edge and two samples beyond it.
-pub fn may_bulge(ends: [&LightSample; 2], beyond: [&LightSample; 2]) -> bool {
+pub fn may_bulge(ends: [&LatticeRay; 2], beyond: [&LatticeRay; 2]) -> bool {
     let all = [ends[0], ends[1], beyond[0], beyond[1]];
     let brightest_w = all.iter().map(|sample| sample.brightest_w).fold(0.0, f64::max);
-    let has = |sample: &LightSample, signature| sample.find(signature).is_some();
+    let has = |sample: &LatticeRay, signature| sample.find(signature).is_some();
     // The border has the light on one side: one of the ends, or one of those beyond.
     [ends[0], beyond[0]].into_iter().any(|sample| {
-        let bright = |strand: &&Strand| strand.flux_w.luminance() > BULGE_SHARE * brightest_w;
+        let bright = |strand: &&PathSegment| strand.flux_w.luminance() > BULGE_SHARE * brightest_w;
         sample.strands.iter().filter(bright).any(|strand| {
             let here = ends.map(|sample| has(sample, strand.signature));
             let there = beyond.map(|sample| has(sample, strand.signature));
@@ -375,7 +375,7 @@ impl EdgeCutter<'_> {
         Some(edge)
     }
 
-    fn has(sample: &LightSample, signature: PathSignature) -> bool {
+    fn has(sample: &LatticeRay, signature: PathSignature) -> bool {
         sample.find(signature).is_some() || sample.find_node(signature).is_some()
     }
 

@@ -10,10 +10,10 @@ use crate::illumination::parametrisation::coverage::convex_area;
 use crate::scene::{Adjacency, Mesh};
 
 /// Facets that one triangle of rays may reach; beyond it, it has to be cut.
-const MOST_FACETS: usize = 1024;
+const MAX_FACETS: usize = 1024;
 
 /// A part of the triangle's area below this is left to its neighbours.
-const LEAST_SHARE: f64 = 1e-9;
+const MIN_SHARE: f64 = 1e-9;
 
 /// How far from its place on the next facet a ray may be expected, as a share of the triangle's size, while facets count
 /// as one [1], and in any case [texels].
@@ -21,15 +21,15 @@ const EVEN_SHARE: f64 = 0.1;
 const EVEN_TEXELS: f64 = 0.25;
 
 /// How far from 1 the shares of the facets may add up to.
-const MOST_AMISS: f64 = 0.05;
+const MAX_AMISS: f64 = 0.05;
 
 /// Corners of a triangle cut by the three sides of another.
-const MOST_CORNERS: usize = 6;
+const MAX_CORNERS: usize = 6;
 
 /// A part of a triangle of rays on one facet.
 #[derive(Clone, Copy, Debug)]
 pub struct Piece {
-    corners: [DVec2; MOST_CORNERS],
+    corners: [DVec2; MAX_CORNERS],
     len: usize,
     /// Island of the chart that the facet lies on.
     pub island: u32,
@@ -114,14 +114,14 @@ impl Facets<'_> {
                     seen.push(neighbour as u32);
                 }
             }
-            if found.len() > MOST_FACETS {
+            if found.len() > MAX_FACETS {
                 break;
             }
         }
         let whole: f64 = found.iter().map(|piece| piece.share).sum();
         found.iter_mut().for_each(|piece| piece.share /= whole);
         // Between facets that bend away from each other light is counted twice, or not at all, by second order.
-        (found, (whole - 1.0).abs() <= MOST_AMISS)
+        (found, (whole - 1.0).abs() <= MAX_AMISS)
     }
 
     fn chart(&self) -> &Chart {
@@ -149,7 +149,7 @@ impl Facets<'_> {
         }
         let whole = convex_area(&places);
         let mut piece = Piece {
-            corners: [DVec2::ZERO; MOST_CORNERS],
+            corners: [DVec2::ZERO; MAX_CORNERS],
             len: 3,
             island: self.surface.island(triangle as u32),
             share: 0.0,
@@ -160,7 +160,7 @@ impl Facets<'_> {
             piece.cut(facet[side], facet[(side + 1) % 3], winding);
         }
         piece.share = convex_area(&piece.corners[..piece.len]) / whole;
-        (piece.share > LEAST_SHARE).then_some(piece)
+        (piece.share > MIN_SHARE).then_some(piece)
     }
 }
 
@@ -185,7 +185,7 @@ impl Piece {
 
     fn push(&mut self, corner: DVec2) {
         // A convex polygon gains at most one corner per line; rounding may repeat a corner, which adds no area.
-        if self.len < MOST_CORNERS {
+        if self.len < MAX_CORNERS {
             self.corners[self.len] = corner;
             self.len += 1;
         }

@@ -10,7 +10,7 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::Ray;
 use crate::light_pass::caustic::path::PathSignature;
-use crate::transport::HitPlace;
+use crate::transport::RayHit;
 
 /// The start of a light ray: the face of the launch domain, the bits of its place in the unit square, and which of a
 /// spectral light's wavelengths it has.
@@ -23,7 +23,7 @@ pub struct RayKey {
 
 /// Memory that a ray of so many segments takes while it is kept [bytes].
 fn bytes_of(segments: usize) -> u64 {
-    (segments * size_of::<KeptHit>() + size_of::<(RayKey, KeptRay)>()) as u64
+    (segments * size_of::<CachedHit>() + size_of::<(RayKey, KeptRay)>()) as u64
 }
 
 impl RayKey {
@@ -39,27 +39,27 @@ impl RayKey {
 
 /// What one segment of a path met.
 #[derive(Clone, Copy, Debug)]
-pub struct KeptHit {
+pub struct CachedHit {
     /// The way to where the segment starts.
     pub signature: PathSignature,
     /// `None` where it met nothing.
-    pub place: Option<HitPlace>,
+    pub place: Option<RayHit>,
 }
 
 /// All that one light ray met, along all its branches.
 #[derive(Clone, Debug)]
-pub struct FreshRay {
+pub struct TracedRay {
     /// Where it started.
     pub key: RayKey,
     /// In the order in which its branches were followed.
-    pub hits: Box<[KeptHit]>,
+    pub hits: Box<[CachedHit]>,
 }
 
 #[derive(Clone, Debug)]
 struct KeptRay {
     /// Edit after which it was traced.
     edit: u32,
-    hits: Box<[KeptHit]>,
+    hits: Box<[CachedHit]>,
 }
 
 /// What edits did to an object.
@@ -74,7 +74,7 @@ struct Edited {
 
 /// Kept rays of one light.
 #[derive(Clone, Debug, Default)]
-pub struct KeptRays {
+pub struct RayCache {
     rays: HashMap<RayKey, KeptRay>,
     bytes: u64,
     /// Number of the last edit.
@@ -89,7 +89,7 @@ pub struct Known<'a> {
     edited: &'a [Edited],
 }
 
-impl KeptRays {
+impl RayCache {
     /// Memory that they take [bytes], roughly.
     pub fn bytes(&self) -> u64 {
         self.bytes
@@ -114,7 +114,7 @@ impl KeptRays {
     }
 
     /// Keeps what a ray met, unless all would then take more than so many bytes.
-    pub fn insert(&mut self, fresh: FreshRay, most_bytes: u64) {
+    pub fn insert(&mut self, fresh: TracedRay, most_bytes: u64) {
         let old = self
             .rays
             .get(&fresh.key)
@@ -164,13 +164,13 @@ impl KeptRays {
 
 impl Known<'_> {
     /// What the segment met that starts after `signature`, as far as it is kept.
-    pub fn hit(&self, signature: PathSignature) -> Option<Option<HitPlace>> {
+    pub fn hit(&self, signature: PathSignature) -> Option<Option<RayHit>> {
         let hit = self.ray.hits.iter().find(|hit| hit.signature == signature)?;
         Some(hit.place)
     }
 
     /// Whether a segment along the very ray that was traced still meets what it met then.
-    pub fn holds(&self, ray: &Ray, place: Option<HitPlace>) -> bool {
+    pub fn holds(&self, ray: &Ray, place: Option<RayHit>) -> bool {
         let reach_m = place.map_or(f64::INFINITY, |place| place.distance_m);
         let met = place.map(|place| place.object);
         self.edited.iter().all(|edited| match edited.shape {

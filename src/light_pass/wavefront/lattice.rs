@@ -5,12 +5,12 @@ use rayon::prelude::*;
 
 use super::band::{Corner, SampleId, Samples, Workspace};
 use super::bodies::SmallBodies;
-use super::cell::{Cell, CellCutter, CellOutput, Patch, Splits, Tone};
+use super::cell::{Cell, CellCutter, CellOutput, Patch, SpectralTag, SubdivisionLimits};
 use super::edge::{Edge, EdgeCutter, may_bulge};
-use super::kept_rays::{FreshRay, KeptRays};
+use super::kept_rays::{RayCache, TracedRay};
 use super::refine::Refinement;
 use super::spectrum::LightPart;
-use super::strand::LightSample;
+use super::strand::LatticeRay;
 use super::trace::StrandTracer;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
@@ -20,7 +20,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 const CELLS_PER_BAND: f64 = 4096.0;
 
 /// Cells of a row from which on it is traced in parts.
-const MOST_CELLS_OF_ROW: f64 = 4.0 * CELLS_PER_BAND;
+const MAX_CELLS_OF_ROW: f64 = 4.0 * CELLS_PER_BAND;
 
 /// What is traced together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,7 +47,7 @@ pub struct WavefrontLattice<'a> {
     /// What corners alone would miss.
     pub bodies: &'a SmallBodies,
     /// How often cells are split.
-    pub splits: Splits,
+    pub splits: SubdivisionLimits,
     /// Of a light whose wavelengths go different ways; `tracer` is then that of its first node.
     pub light: LightPart<'a>,
 }
@@ -64,7 +64,7 @@ pub struct TracedBand {
     /// What surfaces did with the light on its way.
     pub ledger: LedgerSum,
     /// What rays met that were not known before, in no order that matters.
-    pub fresh: Vec<FreshRay>,
+    pub fresh: Vec<TracedRay>,
     /// Light rays for which something had to be searched.
     pub rays: u64,
     /// Closest-hit queries.
@@ -80,7 +80,7 @@ pub struct TracedBand {
 struct CornerRow {
     /// Index of each column's sample; `NONE` where there is none.
     index: Vec<u32>,
-    samples: Vec<LightSample>,
+    samples: Vec<LatticeRay>,
 }
 
 const NONE: u32 = u32::MAX;
@@ -94,7 +94,7 @@ impl TracedBand {
             .iter()
             .flatten()
             .map(|sample| {
-                size_of::<LightSample>() + size_of_val(&sample.strands[..]) + size_of_val(&sample.nodes[..])
+                size_of::<LatticeRay>() + size_of_val(&sample.strands[..]) + size_of_val(&sample.nodes[..])
             })
             .sum();
         let patches: usize = self.patches.iter().map(|row| size_of_val(&row[..])).sum();
@@ -104,7 +104,7 @@ impl TracedBand {
 
 impl WavefrontLattice<'_> {
     /// The same lattice with rays that were traced before.
-    pub fn knowing<'b>(&'b self, kept: &'b KeptRays) -> WavefrontLattice<'b> {
+    pub fn knowing<'b>(&'b self, kept: &'b RayCache) -> WavefrontLattice<'b> {
         let mut lattice: WavefrontLattice<'b> = *self;
         lattice.tracer.kept = Some(kept);
         lattice
@@ -122,7 +122,7 @@ impl WavefrontLattice<'_> {
         let (mut start, mut cells) = (0, 0.0);
         for row in 0..self.size.1 {
             let of_row = self.expected_cells(face, row);
-            if of_row.iter().sum::<f64>() > MOST_CELLS_OF_ROW {
+            if of_row.iter().sum::<f64>() > MAX_CELLS_OF_ROW {
                 if cells > 0.0 {
                     bands.push(self.whole_rows((start, row)));
                 }
@@ -224,7 +224,7 @@ impl WavefrontLattice<'_> {
             samples.chunks.push(row.samples);
             index.push(row.index);
         }
-        let edges_of_rows: Vec<(Vec<Option<Edge>>, Vec<LightSample>)> = (0..=rows)
+        let edges_of_rows: Vec<(Vec<Option<Edge>>, Vec<LatticeRay>)> = (0..=rows)
             .into_par_iter()
             .map(|row| {
                 let mut work = Workspace::new(&samples, nodes * (rows + 1) + row, rows + 1);
@@ -237,7 +237,7 @@ impl WavefrontLattice<'_> {
             samples.chunks.push(own);
             edges.push(row_edges);
         }
-        let cut: Vec<(CellOutput, Vec<LightSample>)> = (0..rows)
+        let cut: Vec<(CellOutput, Vec<LatticeRay>)> = (0..rows)
             .into_par_iter()
             .map(|row| {
                 let mut work = Workspace::new(&samples, (nodes + 1) * (rows + 1) + row, rows + 1);
@@ -366,8 +366,8 @@ impl WavefrontLattice<'_> {
             splits: self.splits,
             light: self.light,
             tone: match self.light {
-                LightPart::White => Tone::White,
-                LightPart::Spectrum(_) | LightPart::Band(_) => Tone::Node(0),
+                LightPart::White => SpectralTag::White,
+                LightPart::Spectrum(_) | LightPart::Band(_) => SpectralTag::Node(0),
             },
             channels: self.light.channels(),
             done: &[],

@@ -87,13 +87,13 @@ pub(super) fn even_grid(
 }
 
 /// Largest ratio of the cosines at which light falls on the corners of a triangle.
-const MOST_BENT: f64 = 1.2;
+const MAX_BENT: f64 = 1.2;
 
 /// Cosine below which light grazes a surface: elsewhere a patch is divided finely enough by its nine rays.
 const GRAZING: f64 = 0.3;
 
 /// Triangles within this size do not show [texels].
-const LEAST_BENT_TEXELS: f64 = 0.75;
+const MIN_BENT_TEXELS: f64 = 0.75;
 
 /// Triangles within this size need not be divided between facets that lie alike in the map [texels].
 const TINY_TEXELS: f64 = 0.5;
@@ -242,7 +242,7 @@ impl PatchMesh<'_, '_> {
         };
         let places = knots.map(|knot| knot.vertex.place.texel());
         let reach = (places[1] - places[0]).abs().max((places[2] - places[0]).abs());
-        if reach.max_element() <= LEAST_BENT_TEXELS {
+        if reach.max_element() <= MIN_BENT_TEXELS {
             return false;
         }
         let (mut least, mut most) = (1.0_f64, 0.0_f64);
@@ -254,7 +254,7 @@ impl PatchMesh<'_, '_> {
                 (least, most) = (least.min(cosine), most.max(cosine));
             }
         }
-        least < GRAZING && most > MOST_BENT * least
+        least < GRAZING && most > MAX_BENT * least
     }
 
     /// Whether two rays meet one surface, with nothing between that would part their light on the map.

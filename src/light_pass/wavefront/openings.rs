@@ -19,10 +19,10 @@ const NARROWEST_CELLS: f64 = 1e-4;
 const WIDTH_BITS: u32 = 4;
 
 /// Samples along an edge lie half a cell apart, but an edge has these at least.
-const LEAST_SAMPLES: usize = 3;
+const MIN_SAMPLES: usize = 3;
 
 /// Samples of one light's edges at most: beyond, they lie farther apart.
-const MOST_SAMPLES: f64 = 8_192.0;
+const MAX_SAMPLES: f64 = 8_192.0;
 
 /// Least and most cells across an opening: of the least, corners lie in it; of the most, its own corners are resolved.
 const CELLS_ACROSS: (f64, f64) = (4.0, 32.0);
@@ -36,7 +36,7 @@ const PROBES_PER_SIDE: usize = 64;
 
 /// A part of a narrow opening, beside a part of an edge.
 #[derive(Clone, Copy, Debug)]
-pub struct Opening {
+pub struct Slit {
     /// Ends of its middle line [m].
     pub ends: [DVec3; 2],
     /// Across, as the light sees it [m].
@@ -45,7 +45,7 @@ pub struct Opening {
     measure: f64,
 }
 
-impl Opening {
+impl Slit {
     /// As how many squares it is long, and the half ones around its ends.
     fn squares(&self) -> f64 {
         1.0 + self.ends[0].distance(self.ends[1]) / self.width_m
@@ -68,7 +68,7 @@ pub fn narrow_openings(
     launch: &Launch,
     visible: &ItemBuffer,
     cell: DVec2,
-) -> (Vec<Opening>, f64) {
+) -> (Vec<Slit>, f64) {
     let search = Search {
         tracer,
         launch,
@@ -77,7 +77,7 @@ pub fn narrow_openings(
     };
     let edges = search.edges();
     let wanted: f64 = edges.iter().map(|edge| search.samples_wanted(edge)).sum();
-    let thinning = (wanted / MOST_SAMPLES).max(1.0);
+    let thinning = (wanted / MAX_SAMPLES).max(1.0);
     let beside = |edge: &[DVec3; 2]| search.beside(edge, thinning);
     let openings = edges.par_iter().map(beside).collect::<Vec<_>>().concat();
     if openings.is_empty() {
@@ -88,16 +88,16 @@ pub fn narrow_openings(
 }
 
 /// The widest openings that there are cells for, and how many cells lie across each; `share` of all light goes through them.
-fn widest(mut openings: Vec<Opening>, share: f64) -> (Vec<Opening>, f64) {
+fn widest(mut openings: Vec<Slit>, share: f64) -> (Vec<Slit>, f64) {
     openings.sort_by(|a, b| b.width_m.total_cmp(&a.width_m));
     let mut squares = 0.0;
-    let fits = |opening: &&Opening| {
+    let fits = |opening: &&Slit| {
         squares += opening.squares();
         squares * CELLS_ACROSS.0 * CELLS_ACROSS.0 <= CELLS.1 * share
     };
     let count = openings.iter().take_while(fits).count();
     openings.truncate(count);
-    let squares: f64 = openings.iter().map(Opening::squares).sum();
+    let squares: f64 = openings.iter().map(Slit::squares).sum();
     let across = (CELLS.0 * share / squares).sqrt();
     (openings, across.clamp(CELLS_ACROSS.0, CELLS_ACROSS.1))
 }
@@ -170,8 +170,8 @@ impl Search<'_> {
         if cells.is_finite() { 2.0 * cells } else { 0.0 }
     }
 
-    fn beside(&self, edge: &[DVec3; 2], thinning: f64) -> Vec<Opening> {
-        let samples = ((self.samples_wanted(edge) / thinning).ceil() as usize).max(LEAST_SAMPLES);
+    fn beside(&self, edge: &[DVec3; 2], thinning: f64) -> Vec<Slit> {
+        let samples = ((self.samples_wanted(edge) / thinning).ceil() as usize).max(MIN_SAMPLES);
         let place = |share: f64| edge[0].lerp(edge[1], share);
         let along = (edge[1] - edge[0]).normalize_or_zero();
         let of_sample = |sample: usize| {
@@ -181,7 +181,7 @@ impl Search<'_> {
             let of_side = |across: DVec3| {
                 let width_m = self.width_m(ray.at(path_m), across)?;
                 let aside = across * (0.5 * width_m);
-                Some(Opening {
+                Some(Slit {
                     ends: [place(from) + aside, place(to) + aside],
                     width_m,
                     measure: width_m * place(from).distance(place(to)) * self.measure_per_m2(path_m),

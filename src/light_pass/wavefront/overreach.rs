@@ -11,7 +11,7 @@ const TOLERATED_TEXELS: f64 = 8.0;
 
 /// A patch that reaches farther than its rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Overreach {
+pub struct PatchOvershoot {
     /// Face of the launch domain.
     pub face: u32,
     /// Its middle in the unit square.
@@ -24,7 +24,7 @@ pub struct Overreach {
     pub high: DVec2,
 }
 
-impl Overreach {
+impl PatchOvershoot {
     /// Of a patch with the given triangles on one map, whose traced rays fall on it at `traced` [texels]; `None` where it
     /// keeps to them.
     pub fn of(

@@ -4,12 +4,12 @@ use rayon::prelude::*;
 
 use super::cell::Patch;
 use super::coverage::{FluxTriangle, deposit_triangles};
-use super::kept_rays::KeptRays;
+use super::kept_rays::RayCache;
 use super::lattice::{TracedBand, WavefrontLattice};
 use super::receivers::Receivers;
 use super::spread::{SpreadOutput, Spreader};
 use crate::illumination::Receiver;
-use crate::light_pass::caustic::pass::{Listener, PassReport, Stopwatch};
+use crate::light_pass::caustic::pass::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::share::Share;
@@ -25,7 +25,7 @@ const TASKS_AT_ONCE: usize = 64;
 const FIRST_AT_ONCE: usize = 4;
 
 /// Triangles that wait together, about: 72 bytes each.
-const MOST_TRIANGLES: usize = 1 << 21;
+const MAX_TRIANGLES: usize = 1 << 21;
 
 /// Triangles that are deposited between two looks at whether to stop.
 const TRIANGLES_AT_ONCE: usize = 1 << 13;
@@ -76,9 +76,9 @@ impl WavefrontDepositor<'_> {
     pub fn run(
         &self,
         share: Option<Share>,
-        rays: &mut KeptRays,
+        rays: &mut RayCache,
         maps: Option<&mut ReceiverMaps>,
-        listener: &Listener,
+        listener: &ProgressScope,
         room: Room,
     ) -> (PassReport, Option<TracedLight>) {
         let mut report = PassReport::default();
@@ -123,7 +123,7 @@ impl WavefrontDepositor<'_> {
         &self,
         traced: &TracedLight,
         maps: &mut ReceiverMaps,
-        listener: &Listener,
+        listener: &ProgressScope,
     ) -> PassReport {
         let mut report = PassReport::default();
         for band in &traced.bands {
@@ -169,7 +169,7 @@ impl WavefrontDepositor<'_> {
             }
             let triangles: usize = parts.iter().map(SpreadOutput::triangle_count).sum();
             // Neighbouring patches are divided alike.
-            at_once = (MOST_TRIANGLES * tasks.len() / triangles.max(1)).clamp(1, TASKS_AT_ONCE);
+            at_once = (MAX_TRIANGLES * tasks.len() / triangles.max(1)).clamp(1, TASKS_AT_ONCE);
             if let Some(maps) = maps.as_deref_mut() {
                 let lists = parts.iter().flat_map(|part| &part.triangles);
                 let pieces = lists.flat_map(|(receiver, triangles)| {

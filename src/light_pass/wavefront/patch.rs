@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::strand::Strand;
+use super::strand::PathSegment;
 use crate::geometry::Ray;
 
 /// A ray with its derivatives along the patch's own coordinates.
@@ -13,7 +13,7 @@ struct Node {
 }
 
 impl Node {
-    fn of(strand: &Strand) -> Self {
+    fn of(strand: &PathSegment) -> Self {
         Self {
             origin: strand.ray.origin,
             direction: strand.ray.direction,
@@ -21,7 +21,7 @@ impl Node {
     }
 
     /// Derivative of a strand along a step in the unit square.
-    fn slope(strand: &Strand, step: DVec2) -> Self {
+    fn slope(strand: &PathSegment, step: DVec2) -> Self {
         let d = &strand.differential;
         Self {
             origin: d.across.origin * step.x + d.down.origin * step.y,
@@ -82,7 +82,7 @@ pub struct BezierTriangle {
 
 impl PatchShape {
     /// The patch over the rectangle of size `step` between four strands.
-    pub fn coons(strands: [&Strand; 4], step: DVec2) -> Self {
+    pub fn coons(strands: [&PathSegment; 4], step: DVec2) -> Self {
         Self::Coons(Box::new(CoonsPatch {
             corners: strands.map(Node::of),
             across: strands.map(|strand| Node::slope(strand, DVec2::new(step.x, 0.0))),
@@ -91,12 +91,12 @@ impl PatchShape {
     }
 
     /// The same without derivatives.
-    pub fn bilinear(strands: [&Strand; 4]) -> Self {
+    pub fn bilinear(strands: [&PathSegment; 4]) -> Self {
         Self::Bilinear(Box::new(strands.map(|strand| strand.ray)))
     }
 
     /// The patch over a triangle of the unit square.
-    pub fn bezier(strands: [&Strand; 3], squares: [DVec2; 3]) -> Self {
+    pub fn bezier(strands: [&PathSegment; 3], squares: [DVec2; 3]) -> Self {
         let corners = strands.map(Node::of);
         // Control point a third of the way from corner i to corner j.
         let towards = |i: usize, j: usize| {
@@ -120,13 +120,13 @@ impl PatchShape {
     }
 
     /// The same without derivatives.
-    pub fn linear(strands: [&Strand; 3]) -> Self {
+    pub fn linear(strands: [&PathSegment; 3]) -> Self {
         Self::Linear(Box::new(strands.map(|strand| strand.ray)))
     }
 
     /// The rectangle of size `step` around one strand's own place, by its derivatives alone; `low` is the rectangle's
     /// corner relative to the strand.
-    pub fn around(strand: &Strand, low: DVec2, step: DVec2) -> Self {
+    pub fn around(strand: &PathSegment, low: DVec2, step: DVec2) -> Self {
         let at = |offset: DVec2| Node::of(strand).plus(Node::slope(strand, offset)).ray();
         Self::Bilinear(Box::new([
             at(low),

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::overreach::Overreach;
+use super::overreach::PatchOvershoot;
 use super::receivers::Receivers;
-use super::strand::{Landing, LightSample, Strand};
+use super::strand::{Landing, LatticeRay, PathSegment};
 use crate::illumination::Receiver;
 use crate::light_pass::caustic::path::PathSignature;
 
@@ -17,7 +17,7 @@ use crate::light_pass::caustic::path::PathSignature;
 pub const TILE_SIDE: usize = 16;
 
 /// Light below this share of a cell's brightest does not divide it.
-const LEAST_SHARE: f64 = 0.02;
+const MIN_SHARE: f64 = 0.02;
 
 /// Tiles of one map.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -83,8 +83,8 @@ pub struct Round {
 
 impl Round {
     /// For these tiles, after a level with these patches.
-    pub fn new(tiles: RoughTiles, overreaches: &[Overreach]) -> Self {
-        let meets = |patch: &&Overreach| {
+    pub fn new(tiles: RoughTiles, overreaches: &[PatchOvershoot]) -> Self {
+        let meets = |patch: &&PatchOvershoot| {
             let tiles = tiles.get(&patch.receiver);
             tiles.is_some_and(|tiles| tiles.meets(patch.low, patch.high))
         };
@@ -132,7 +132,7 @@ impl Refinement<'_> {
     pub fn is_too_coarse(
         &self,
         (face, low, high): (usize, DVec2, DVec2),
-        samples: &[&LightSample],
+        samples: &[&LatticeRay],
         rounds_before: usize,
     ) -> bool {
         let Some(Round { tiles, .. }) = self.rounds.get(rounds_before) else {
@@ -149,7 +149,7 @@ impl Refinement<'_> {
 
     /// Rounds that divide light beside a cell which not all of its corners have: the border of that light may reach into
     /// the cell, between its corners.
-    pub fn rounds_beside(&self, own: [&LightSample; 4], beside: &[&LightSample]) -> RoundSet {
+    pub fn rounds_beside(&self, own: [&LatticeRay; 4], beside: &[&LatticeRay]) -> RoundSet {
         if self.rounds.is_empty() {
             return 0;
         }
@@ -169,7 +169,7 @@ impl Refinement<'_> {
     }
 
     /// Whether a strand's light may fall on chosen tiles: they meet the box around the places that its corners light.
-    fn falls_on(&self, corners: &[&Strand], tiles: &RoughTiles) -> bool {
+    fn falls_on(&self, corners: &[&PathSegment], tiles: &RoughTiles) -> bool {
         let mut lit: Vec<(Receiver, DVec2, DVec2)> = Vec::new();
         for strand in corners {
             let Landing::Receiver {
@@ -196,12 +196,12 @@ impl Refinement<'_> {
 }
 
 /// Signatures of all strands that are not dim beside the brightest.
-fn bright_signatures(samples: &[&LightSample]) -> Vec<PathSignature> {
+fn bright_signatures(samples: &[&LatticeRay]) -> Vec<PathSignature> {
     let brightest_w = samples
         .iter()
         .map(|sample| sample.brightest_w)
         .fold(0.0, f64::max);
-    let is_bright = |strand: &&Strand| strand.flux_w.luminance() >= LEAST_SHARE * brightest_w;
+    let is_bright = |strand: &&PathSegment| strand.flux_w.luminance() >= MIN_SHARE * brightest_w;
     let strands = samples
         .iter()
         .flat_map(|sample| &sample.strands)
@@ -212,7 +212,7 @@ fn bright_signatures(samples: &[&LightSample]) -> Vec<PathSignature> {
     signatures
 }
 
-fn strands_of<'s>(samples: &[&'s LightSample], signature: PathSignature) -> Vec<&'s Strand> {
+fn strands_of<'s>(samples: &[&'s LatticeRay], signature: PathSignature) -> Vec<&'s PathSegment> {
     samples
         .iter()
         .filter_map(|sample| Some(&sample.strands[sample.find(signature)?]))

@@ -4,13 +4,13 @@
 use super::band::{Corner, SampleId, Workspace};
 use super::bodies::SmallBodies;
 use super::cell::{
-    Cell, CellCutter, CellOutput, Depth, EDGE_ENDS, Patch, Tone, light_regions, reach_of, signatures,
+    Cell, CellCutter, CellOutput, Depth, EDGE_ENDS, Patch, SpectralTag, light_regions, reach_of, signatures,
     surface_regions,
 };
 use super::edge::{Edge, EdgeCutter, Reach, is_suspicious, same_ways};
 use super::regions::{Outline, triangles};
 use super::spectrum::{LightPart, LightSpectrum, NODES};
-use super::strand::LightSample;
+use super::strand::LatticeRay;
 use crate::light_pass::caustic::path::PathSignature;
 
 /// Samples at a cell's corners, wavelength by wavelength.
@@ -57,7 +57,7 @@ impl CellCutter<'_> {
             self.patch(cell, signature, work, out);
             let others = std::array::from_fn(|other| nodes[other + 1]);
             for patch in &mut out.patches[first..] {
-                patch.tone = Tone::Spectrum {
+                patch.tone = SpectralTag::Spectrum {
                     others,
                     parted: !is_one,
                 };
@@ -105,7 +105,7 @@ impl CellCutter<'_> {
     ) {
         for (node, samples) in nodes.iter().enumerate() {
             let of_node = CellCutter {
-                tone: Tone::Node(node as u8),
+                tone: SpectralTag::Node(node as u8),
                 channels: spectrum.nodes[node].channels,
                 done,
                 ..*self
@@ -159,7 +159,7 @@ impl CellCutter<'_> {
         let strands = signatures(cell, work, |sample, found| {
             found.extend(sample.strands.iter().map(|strand| strand.signature));
         });
-        let has_strand = |sample: &LightSample, signature| sample.find(signature).is_some();
+        let has_strand = |sample: &LatticeRay, signature| sample.find(signature).is_some();
         for signature in strands {
             if let Err(place) = shared.done.binary_search(&signature)
                 && is_at_the_same_corners(nodes, work, |sample| has_strand(sample, signature))
@@ -171,7 +171,7 @@ impl CellCutter<'_> {
         let surfaces = signatures(cell, work, |sample, found| {
             found.extend(sample.nodes.iter().map(|node| node.signature));
         });
-        let has_surface = |sample: &LightSample, signature| sample.find_node(signature).is_some();
+        let has_surface = |sample: &LatticeRay, signature| sample.find_node(signature).is_some();
         for signature in surfaces {
             if is_at_the_same_corners(nodes, work, |sample| has_surface(sample, signature))
                 && self.book_shared(spectrum, cell, signature, work, out)
@@ -198,7 +198,7 @@ impl CellCutter<'_> {
             let Some(others) = self.others_of(patch, signature, work) else {
                 return false;
             };
-            patch.tone = Tone::Spectrum { others, parted: true };
+            patch.tone = SpectralTag::Spectrum { others, parted: true };
         }
         out.patches.append(&mut made.patches);
         true
@@ -287,7 +287,7 @@ impl CellCutter<'_> {
             bodies: &none,
             splits: self.splits,
             light: LightPart::White,
-            tone: Tone::Node(node as u8),
+            tone: SpectralTag::Node(node as u8),
             channels: spectrum.nodes[node].channels,
             done: &shared.done,
             booked: &shared.booked,
@@ -354,7 +354,7 @@ impl Rest {
 fn is_at_the_same_corners(
     nodes: &NodeCorners,
     work: &Workspace,
-    is_there: impl Fn(&LightSample) -> bool,
+    is_there: impl Fn(&LatticeRay) -> bool,
 ) -> bool {
     (0..4).all(|corner| {
         let first = is_there(work.get(nodes[0][corner]));

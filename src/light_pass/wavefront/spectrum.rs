@@ -6,7 +6,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::strand::{Landing, Strand};
+use super::strand::{Landing, PathSegment};
 use crate::geometry::Ray;
 use crate::light_pass::spectral_node::{SpectralNode, channels_within, place_of, wavelength_at};
 use crate::optics::spectrum::{Spectrum, xyz_bar};
@@ -17,7 +17,7 @@ use crate::transport::{RayDerivative, Tracer};
 pub const NODES: usize = 3;
 
 /// Most slices of a spectrum, as a power of two.
-const MOST_SLICES_LOG2: u32 = 9;
+const MAX_SLICES_LOG2: u32 = 9;
 
 /// Share of a lamp's colour, at either end, beyond the outermost nodes: Chebyshev's places over the rest.
 const TAIL: f64 = 0.002;
@@ -172,7 +172,7 @@ fn band(lamp: &Spectrum, (low, high): (f64, f64), index: usize, count: usize) ->
 
 /// The narrowest slices.
 fn finest(lamp: &Spectrum, ends: (f64, f64), nodes: [f64; NODES]) -> Vec<Slice> {
-    let count = 1 << MOST_SLICES_LOG2;
+    let count = 1 << MAX_SLICES_LOG2;
     let slice = |index: usize| {
         let range = band(lamp, ends, index, count);
         let within = |weight: &dyn Fn(f64) -> f64| {
@@ -242,14 +242,14 @@ impl Slice {
     /// The strand of its wavelength between those of one signature at the nodes; its flux is in the light's channels.
     ///
     /// `parted`: whether each node stands for the wavelengths around it, as where the others of its light do.
-    pub fn strand(&self, nodes: [&Strand; NODES], parted: bool) -> Strand {
-        let mix = |of: &dyn Fn(&Strand) -> glam::DVec3| {
+    pub fn strand(&self, nodes: [&PathSegment; NODES], parted: bool) -> PathSegment {
+        let mix = |of: &dyn Fn(&PathSegment) -> glam::DVec3| {
             let weighted = nodes.iter().zip(self.weights);
             weighted.fold(glam::DVec3::ZERO, |sum, (strand, weight)| {
                 sum + of(strand) * weight
             })
         };
-        let derivative = |of: &dyn Fn(&Strand) -> RayDerivative| RayDerivative {
+        let derivative = |of: &dyn Fn(&PathSegment) -> RayDerivative| RayDerivative {
             origin: mix(&|strand| of(strand).origin),
             direction: mix(&|strand| of(strand).direction),
         };
@@ -273,7 +273,7 @@ impl Slice {
     }
 
     /// What a factor in RGB on the light of such strands is in each of the light's channels.
-    pub fn factors(&self, nodes: [&Strand; NODES], parted: bool) -> ColourMatrix {
+    pub fn factors(&self, nodes: [&PathSegment; NODES], parted: bool) -> ColourMatrix {
         let parts = nodes.iter().zip(self.matrices(parted));
         let parts = parts.map(|(strand, matrix)| matrix.weighing(strand.flux_w));
         parts.sum::<ColourMatrix>().per_channel()
@@ -285,7 +285,7 @@ impl Slice {
 }
 
 /// Whether the same light lands on one surface at all nodes.
-pub fn lands_alike(nodes: [&Strand; NODES]) -> bool {
+pub fn lands_alike(nodes: [&PathSegment; NODES]) -> bool {
     let first = &nodes[0].landing;
     nodes.iter().all(|strand| match (first, &strand.landing) {
         (Landing::Receiver { receiver, .. }, Landing::Receiver { receiver: other, .. }) => receiver == other,

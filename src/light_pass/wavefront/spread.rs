@@ -4,15 +4,15 @@
 use glam::DVec2;
 
 use super::band::{SampleId, Samples};
-use super::cell::{Patch, PatchKind, Tone};
+use super::cell::{Patch, PatchKind, SpectralTag};
 use super::coverage::FluxTriangle;
 use super::mesh::{PatchMesh, even_grid};
-use super::overreach::Overreach;
+use super::overreach::PatchOvershoot;
 use super::patch::{CoonsPatch, PatchShape};
 use super::receivers::{Beam, Receivers};
 use super::shares::{difference, mean, scaled};
 use super::spectrum::{LightPart, LightSpectrum, NODES, lands_alike};
-use super::strand::{Landing, Strand};
+use super::strand::{Landing, PathSegment};
 use super::virtual_vertex::VirtualRays;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
@@ -62,7 +62,7 @@ pub struct SpreadOutput {
     /// Sizes of lit areas.
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their rays.
-    pub overreaches: Vec<Overreach>,
+    pub overreaches: Vec<PatchOvershoot>,
     /// Luminous flux of all patches [counts], and of those that hold a part of the spectrum in one place: light of other
     /// wavelengths goes other ways there.
     pub in_one_place: [i128; 2],
@@ -110,7 +110,7 @@ impl Tint {
     };
 
     /// Of what one wavelength stands for.
-    fn of_node(channels: ColourMatrix, strands: &[&Strand]) -> Self {
+    fn of_node(channels: ColourMatrix, strands: &[&PathSegment]) -> Self {
         let grey_w = mean(strands.iter().map(|strand| strand.flux_w));
         Self {
             channels,
@@ -136,15 +136,15 @@ enum Course {
 impl Spreader<'_> {
     /// Spreads one patch.
     pub fn spread(&self, patch: &Patch, out: &mut SpreadOutput) {
-        let strands: [&Strand; 4] = patch
+        let strands: [&PathSegment; 4] = patch
             .corners
             .map(|(sample, strand)| self.samples.strand(sample, strand));
         let own = &strands[..patch.corner_count()];
         match (patch.tone, self.light) {
-            (Tone::Spectrum { others, parted }, LightPart::Spectrum(spectrum)) => {
+            (SpectralTag::Spectrum { others, parted }, LightPart::Spectrum(spectrum)) => {
                 self.spread_spectrum(patch, strands, (others, parted), spectrum, out);
             }
-            (Tone::Node(node), light) => {
+            (SpectralTag::Node(node), light) => {
                 let before = out.in_one_place[0];
                 let node = light.node(usize::from(node));
                 let tint = node.map_or(Tint::WHITE, |node| Tint::of_node(node.channels, own));
@@ -153,7 +153,9 @@ impl Spreader<'_> {
                     out.in_one_place[1] += out.in_one_place[0] - before;
                 }
             }
-            (Tone::White | Tone::Spectrum { .. }, _) => self.spread_strands(patch, own, Tint::WHITE, out),
+            (SpectralTag::White | SpectralTag::Spectrum { .. }, _) => {
+                self.spread_strands(patch, own, Tint::WHITE, out)
+            }
         }
     }
 
@@ -161,12 +163,12 @@ impl Spreader<'_> {
     fn spread_spectrum(
         &self,
         patch: &Patch,
-        first: [&Strand; 4],
+        first: [&PathSegment; 4],
         (others, parted): ([[SampleId; 4]; NODES - 1], bool),
         spectrum: &LightSpectrum,
         out: &mut SpreadOutput,
     ) {
-        let nodes: [[&Strand; NODES]; 4] = std::array::from_fn(|corner| {
+        let nodes: [[&PathSegment; NODES]; 4] = std::array::from_fn(|corner| {
             let first = first[corner];
             std::array::from_fn(|node| match node.checked_sub(1) {
                 None => first,
@@ -195,14 +197,14 @@ impl Spreader<'_> {
     }
 
     /// How far the outer wavelengths of a patch land from each other [texels].
-    fn smear(&self, nodes: &[[&Strand; NODES]; 4]) -> f64 {
-        let of_corner = |nodes: &[&Strand; NODES]| {
+    fn smear(&self, nodes: &[[&PathSegment; NODES]; 4]) -> f64 {
+        let of_corner = |nodes: &[&PathSegment; NODES]| {
             let texel_m = nodes.iter().find_map(|strand| {
                 let surface = self.receivers.get(strand.landing.receiver()?)?;
                 let texels = (surface.chart.width * surface.chart.height) as f64;
                 Some((surface.area_m2 / texels).sqrt())
             });
-            let ends = [nodes[1], nodes[2]].map(Strand::landing_point);
+            let ends = [nodes[1], nodes[2]].map(PathSegment::landing_point);
             match (texel_m, ends) {
                 (Some(texel_m), [Some(a), Some(b)]) => a.distance(b) / texel_m,
                 // Some leave, some land: past the horizon of what is lit.
@@ -213,7 +215,7 @@ impl Spreader<'_> {
         nodes.iter().map(of_corner).fold(0.0, f64::max)
     }
 
-    fn spread_strands(&self, patch: &Patch, strands: &[&Strand], tint: Tint, out: &mut SpreadOutput) {
+    fn spread_strands(&self, patch: &Patch, strands: &[&PathSegment], tint: Tint, out: &mut SpreadOutput) {
         let colours = strands
             .iter()
             .map(|strand| tint.channels.apply(strand.flux_w))
@@ -247,12 +249,18 @@ impl Spreader<'_> {
     }
 
     /// Whether the light of a strand is absorbed on its way from the surface it left.
-    pub(super) fn absorbs(&self, strand: &Strand) -> bool {
+    pub(super) fn absorbs(&self, strand: &PathSegment) -> bool {
         self.absorption && strand.media.absorbs(self.receivers.tracer.scene())
     }
 
     /// Notes where the patch's triangles, those beyond the given counts, lie far from its traced rays.
-    fn note_overreach(&self, patch: &Patch, strands: &[&Strand], before: &[usize], out: &mut SpreadOutput) {
+    fn note_overreach(
+        &self,
+        patch: &Patch,
+        strands: &[&PathSegment],
+        before: &[usize],
+        out: &mut SpreadOutput,
+    ) {
         let squares = &patch.squares[..patch.corner_count().max(3)];
         let middle = squares.iter().sum::<DVec2>() / squares.len() as f64;
         for (index, (receiver, list)) in out.triangles.iter().enumerate() {
@@ -266,12 +274,12 @@ impl Spreader<'_> {
                 } if lit == *receiver => Some(self.receivers.get(lit)?.texel(triangle, barycentric)),
                 _ => None,
             });
-            let found = Overreach::of(self.face, middle, *receiver, new, traced);
+            let found = PatchOvershoot::of(self.face, middle, *receiver, new, traced);
             out.overreaches.extend(found);
         }
     }
 
-    fn course(&self, strands: &[&Strand]) -> Course {
+    fn course(&self, strands: &[&PathSegment]) -> Course {
         let landing = |wanted: fn(&Landing) -> bool| strands.iter().all(|strand| wanted(&strand.landing));
         if landing(|landing| matches!(landing, Landing::Specular { .. })) {
             return Course::Onward;
@@ -306,7 +314,7 @@ impl Spreader<'_> {
     }
 
     /// The traced rays from their origins to where they land or leave the scene.
-    fn beam(&self, strands: &[&Strand]) -> Beam {
+    fn beam(&self, strands: &[&PathSegment]) -> Beam {
         Beam::new(strands.iter().map(|strand| {
             let end = strand.landing_point();
             [
@@ -317,12 +325,12 @@ impl Spreader<'_> {
     }
 
     /// All of it goes on; volumes take their share.
-    fn onward(&self, strands: &[&Strand], flux: FluxCount, tint: Tint, out: &mut SpreadOutput) {
+    fn onward(&self, strands: &[&PathSegment], flux: FluxCount, tint: Tint, out: &mut SpreadOutput) {
         let mut passed = flux;
         if self.absorbs(strands[0]) {
             let scene = self.receivers.tracer.scene();
             let transmittance =
-                |strand: &&Strand| strand.media.transmittance(scene, strand.landing.distance_m());
+                |strand: &&PathSegment| strand.media.transmittance(scene, strand.landing.distance_m());
             let left = tint.factors.apply(mean(strands.iter().map(transmittance)));
             passed = scaled(flux, left);
             out.ledger.book(Account::Absorbed, difference(flux, passed));
@@ -333,7 +341,7 @@ impl Spreader<'_> {
     fn over(
         &self,
         patch: &Patch,
-        strands: &[&Strand],
+        strands: &[&PathSegment],
         (flux, flux_w, colours): (FluxCount, LinearSrgb, &[LinearSrgb]),
         tint: Tint,
         plane: Option<Receiver>,
@@ -393,13 +401,13 @@ impl Spreader<'_> {
 }
 
 /// Whether any traced ray leaves the scene.
-fn goes_out(strands: &[&Strand]) -> bool {
+fn goes_out(strands: &[&PathSegment]) -> bool {
     strands
         .iter()
         .any(|strand| matches!(strand.landing, Landing::Escaped))
 }
 
-fn shape_of(patch: &Patch, strands: &[&Strand]) -> PatchShape {
+fn shape_of(patch: &Patch, strands: &[&PathSegment]) -> PatchShape {
     let step = patch.squares[2] - patch.squares[0];
     match (patch.kind, strands) {
         (PatchKind::Rectangle, [a, b, c, d]) => PatchShape::coons([a, b, c, d], step),

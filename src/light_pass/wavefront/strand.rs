@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::kept_rays::FreshRay;
+use super::kept_rays::TracedRay;
 use crate::geometry::Ray;
 use crate::illumination::Receiver;
 use crate::light_pass::caustic::path::PathSignature;
@@ -11,7 +11,7 @@ use crate::transport::{MediumStack, RayDifferential};
 
 /// An outgoing ray after a specular event. Flux is per unit area of the launch domain's unit square.
 #[derive(Clone, Copy, Debug)]
-pub struct Strand {
+pub struct PathSegment {
     /// The way up to and with the event; where the ray goes from here is no part of it.
     pub signature: PathSignature,
     /// Starts at the specular surface.
@@ -82,7 +82,7 @@ impl Landing {
     }
 }
 
-impl Strand {
+impl PathSegment {
     /// The point that is met [m].
     pub fn landing_point(&self) -> Option<DVec3> {
         let distance_m = self.landing.distance_m();
@@ -93,7 +93,7 @@ impl Strand {
 /// What a specular surface did with the light of one path [W per unit square, per channel]: what is not in the
 /// accounts goes on in strands, or into a map.
 #[derive(Clone, Copy, Debug)]
-pub struct SurfaceNode {
+pub struct SurfaceFluxRecord {
     /// The way here, with the surface.
     pub signature: PathSignature,
     /// Whether it is the first surface that the light meets.
@@ -118,13 +118,13 @@ pub struct SurfaceNode {
 
 /// One traced light ray.
 #[derive(Clone, Debug, Default)]
-pub struct LightSample {
+pub struct LatticeRay {
     /// Where it was traced, in the unit square of its face.
     pub square: DVec2,
     /// Outgoing rays, in ascending order of their signatures.
-    pub strands: Vec<Strand>,
+    pub strands: Vec<PathSegment>,
     /// Specular surfaces met, in ascending order of their signatures.
-    pub nodes: Vec<SurfaceNode>,
+    pub nodes: Vec<SurfaceFluxRecord>,
     /// Distance to its first hit [m], where no light goes through what it met.
     pub stopped_m: Option<f64>,
     /// Flux whose first hit is not specular [W per unit square, per channel].
@@ -138,10 +138,10 @@ pub struct LightSample {
     /// Closest-hit queries; 0 where all that it met was known.
     pub segments: u32,
     /// What it met, where not all of that was known.
-    pub fresh: Option<Box<FreshRay>>,
+    pub fresh: Option<Box<TracedRay>>,
 }
 
-impl LightSample {
+impl LatticeRay {
     /// Index of the strand of a signature.
     pub fn find(&self, signature: PathSignature) -> Option<usize> {
         // A handful of strands: a plain search is fastest.

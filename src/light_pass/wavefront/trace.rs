@@ -3,10 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::bumps::BumpCells;
-use super::closeness::Closeness;
-use super::kept_rays::{FreshRay, KeptHit, KeptRays, Known, RayKey};
+use super::closeness::EdgeSearch;
+use super::kept_rays::{CachedHit, Known, RayCache, RayKey, TracedRay};
 use super::spectrum::LightPart;
-use super::strand::{Landing, LightSample, Strand, SurfaceNode};
+use super::strand::{Landing, LatticeRay, PathSegment, SurfaceFluxRecord};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::caustic::path::{PathLimits, PathSignature};
@@ -14,12 +14,12 @@ use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::transport::{
-    Branch, Event, HitPlace, Interaction, MediumStack, RayDerivative, RayDifferential, SurfaceDetail,
+    Branch, Event, Interaction, MediumStack, RayDerivative, RayDifferential, RayHit, SurfaceDetail,
     SurfaceHit, SurfaceScale, Tracer,
 };
 
 /// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
-const MOST_BRANCHES: usize = 512;
+const MAX_BRANCHES: usize = 512;
 
 /// Rays start this far within the border of the domain's unit square.
 const DOMAIN_MARGIN: f64 = 1e-9;
@@ -40,9 +40,9 @@ pub struct StrandTracer<'a> {
     /// Which wavelength of a spectral light; `None` of light without.
     pub wavelength: Option<u32>,
     /// What was traced before.
-    pub kept: Option<&'a KeptRays>,
+    pub kept: Option<&'a RayCache>,
     /// How closely borders are looked for.
-    pub closeness: Closeness,
+    pub closeness: EdgeSearch,
     /// Asks to stop: then rays end at once, and what they give is to be thrown away.
     pub control: &'a Control,
 }
@@ -68,8 +68,8 @@ struct Waiting {
 struct Search<'a> {
     known: Option<Known<'a>>,
     /// What the same light ray met at another wavelength.
-    common: &'a [KeptHit],
-    hits: Vec<KeptHit>,
+    common: &'a [CachedHit],
+    hits: Vec<CachedHit>,
     /// Closest-hit queries.
     searches: u32,
 }
@@ -91,14 +91,14 @@ impl<'a> StrandTracer<'a> {
             bumps: BumpCells::EXACT,
             wavelength: None,
             kept: None,
-            closeness: Closeness::SHARP,
+            closeness: EdgeSearch::SHARP,
             control,
         }
     }
 
     /// The same, but for how closely borders are looked for.
     #[must_use]
-    pub fn with_closeness(self, closeness: Closeness) -> Self {
+    pub fn with_closeness(self, closeness: EdgeSearch) -> Self {
         Self { closeness, ..self }
     }
 
@@ -116,20 +116,20 @@ impl<'a> StrandTracer<'a> {
     }
 
     /// Traces the ray that starts at a point of the unit square of a face.
-    pub fn trace(&self, face: usize, square: DVec2) -> LightSample {
+    pub fn trace(&self, face: usize, square: DVec2) -> LatticeRay {
         self.follow(face, square, None)
     }
 
     /// The same where it was traced at another wavelength: the stretch before the first dispersive surface is not
     /// searched again.
-    pub fn trace_again(&self, face: usize, other: &LightSample) -> LightSample {
+    pub fn trace_again(&self, face: usize, other: &LatticeRay) -> LatticeRay {
         self.follow(face, other.square, other.fresh.as_deref())
     }
 
-    fn follow(&self, face: usize, square: DVec2, other: Option<&FreshRay>) -> LightSample {
-        let mut sample = LightSample {
+    fn follow(&self, face: usize, square: DVec2, other: Option<&TracedRay>) -> LatticeRay {
+        let mut sample = LatticeRay {
             square,
-            ..LightSample::default()
+            ..LatticeRay::default()
         };
         // Just within the domain: its border may be the very border of a surface.
         let square = square.clamp(DVec2::splat(DOMAIN_MARGIN), DVec2::splat(1.0 - DOMAIN_MARGIN));
@@ -165,7 +165,7 @@ impl<'a> StrandTracer<'a> {
         }
         sample.segments = search.searches;
         if search.searches > 0 {
-            sample.fresh = Some(Box::new(FreshRay {
+            sample.fresh = Some(Box::new(TracedRay {
                 key,
                 hits: search.hits.into_boxed_slice(),
             }));
@@ -185,7 +185,7 @@ impl<'a> StrandTracer<'a> {
         from: Waiting,
         floor_w: f64,
         search: &mut Search,
-        sample: &mut LightSample,
+        sample: &mut LatticeRay,
         waiting: &mut Vec<Waiting>,
     ) {
         let (place, is_known) = search.closest(self.tracer, &from);
@@ -233,7 +233,7 @@ impl<'a> StrandTracer<'a> {
         incident: LinearSrgb,
         interaction: &Interaction,
         floor_w: f64,
-        sample: &mut LightSample,
+        sample: &mut LatticeRay,
         waiting: &mut Vec<Waiting>,
     ) {
         let moved_smooth = self
@@ -256,7 +256,7 @@ impl<'a> StrandTracer<'a> {
             Some(_) => LinearSrgb::BLACK,
             None => from.flux_w - incident,
         };
-        let mut node = SurfaceNode {
+        let mut node = SurfaceFluxRecord {
             signature: at_surface,
             first: from.strand.is_none(),
             incident: incident + taken_before,
@@ -284,7 +284,7 @@ impl<'a> StrandTracer<'a> {
                 node.depth += flux_w;
             } else if flux_w.luminance() < floor_w {
                 node.threshold += flux_w;
-            } else if sample.strands.len() >= MOST_BRANCHES {
+            } else if sample.strands.len() >= MAX_BRANCHES {
                 node.unresolved += flux_w;
             } else {
                 let surface = if is_too_fine {
@@ -317,7 +317,7 @@ impl<'a> StrandTracer<'a> {
     }
 
     /// Notes what a surface's normals ask of the lattice, and whether no cell is fine enough for them.
-    fn is_too_fine(&self, hit: &SurfaceHit, at_hit: &RayDifferential, sample: &mut LightSample) -> bool {
+    fn is_too_fine(&self, hit: &SurfaceHit, at_hit: &RayDifferential, sample: &mut LatticeRay) -> bool {
         let detail_m = self.tracer.finest_bump_m(hit.object);
         if detail_m == f64::INFINITY {
             return false;
@@ -342,7 +342,7 @@ fn push(
     differential: RayDifferential,
     signature: PathSignature,
     is_dispersive: bool,
-    sample: &mut LightSample,
+    sample: &mut LatticeRay,
     waiting: &mut Vec<Waiting>,
 ) {
     waiting.push(Waiting {
@@ -356,7 +356,7 @@ fn push(
         is_known: from.is_known,
         is_common: from.is_common && (!is_dispersive || branch.event == Event::Reflection),
     });
-    sample.strands.push(Strand {
+    sample.strands.push(PathSegment {
         signature,
         ray: branch.ray,
         differential,
@@ -370,7 +370,7 @@ fn push(
 
 impl Search<'_> {
     /// Where a segment ends, and whether what goes on from there is as it was when it was kept.
-    fn closest(&mut self, tracer: &Tracer, from: &Waiting) -> (Option<HitPlace>, bool) {
+    fn closest(&mut self, tracer: &Tracer, from: &Waiting) -> (Option<RayHit>, bool) {
         let known = self.known.filter(|_| from.is_known);
         let kept = known.and_then(|known| known.hit(from.signature));
         let common = || {
@@ -387,7 +387,7 @@ impl Search<'_> {
         };
         let is_known = kept == Some(place)
             && known.is_some_and(|known| place.is_none_or(|place| known.leaves_alike(place.object)));
-        self.hits.push(KeptHit {
+        self.hits.push(CachedHit {
             signature: from.signature,
             place,
         });

@@ -6,7 +6,7 @@ use super::facets::FacetPlace;
 use super::patch::PatchShape;
 use super::receivers::{ReceiverSurface, Receivers};
 use super::spread::Spreader;
-use super::strand::{Landing, Strand};
+use super::strand::{Landing, PathSegment};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
@@ -114,7 +114,7 @@ impl<'a> VirtualRays<'a> {
     pub fn new(
         spreader: &Spreader<'a>,
         shape: &'a PatchShape,
-        strands: &[&Strand],
+        strands: &[&PathSegment],
         plane: Option<Receiver>,
         factors: ColourMatrix,
     ) -> Self {
@@ -211,7 +211,9 @@ impl<'a> VirtualRays<'a> {
         let kind = tracer.scene().material_of(hit.object).surface;
         let deposit = match kind {
             SurfaceKind::Diffuse => 1.0,
-            SurfaceKind::Mixed => tracer.interact(&hit, direction, &self.media).deposit.luminance(),
+            SurfaceKind::Mixed | SurfaceKind::Varied => {
+                tracer.interact(&hit, direction, &self.media).deposit.luminance()
+            }
             _ => 0.0,
         };
         let place = if kind.is_receiver() {

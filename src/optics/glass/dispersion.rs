@@ -11,7 +11,7 @@ use crate::optics::wavelength::{C_LINE, D_LINE, F_LINE, VISIBLE};
 /// λ0 of Herzberger's formula [µm], as its author set it.
 const HERZBERGER_UM: f64 = 0.168;
 /// More than any transparent material has, by far.
-const MOST_INDEX: f64 = 10.0;
+const MAX_INDEX: f64 = 10.0;
 
 /// Refractive index n against vacuum or air [1] by wavelength λ [µm], as one of the formulas that people publish.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -95,7 +95,7 @@ impl Dispersion {
             _ => {}
         }
         let n_d = self.formula(D_LINE.micrometres().powi(2));
-        if (1.0..=MOST_INDEX).contains(&n_d) {
+        if (1.0..=MAX_INDEX).contains(&n_d) {
             Ok(self)
         } else {
             Err(GlassError::Index { n_d })

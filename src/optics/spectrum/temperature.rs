@@ -7,7 +7,7 @@ use crate::optics::Nanometres;
 /// hc/k [nm K], exact in the SI of 2019.
 const SECOND_RADIATION_CONSTANT_NM_K: f64 = 1.438_776_877e7;
 /// A lamp farther than this from every black body has no correlated temperature (CIE 15:2018).
-const MOST_DISTANCE_UV: f64 = 0.05;
+const MAX_DISTANCE_UV: f64 = 0.05;
 /// Temperatures [K] among which the nearest is looked for, as reciprocals [1/K].
 const RECIPROCALS: [f64; 2] = [1.0 / 100_000.0, 1.0 / 500.0];
 /// Places of the first, coarse search; colours move evenly with the reciprocal of temperature.
@@ -79,7 +79,7 @@ pub fn correlated_temperature(colour: Xyz) -> Option<CorrelatedTemperature> {
     );
     let distance_uv = distance(reciprocal);
     let is_inside = (RECIPROCALS[0]..=RECIPROCALS[1]).contains(&reciprocal);
-    (is_inside && distance_uv <= MOST_DISTANCE_UV).then_some(CorrelatedTemperature {
+    (is_inside && distance_uv <= MAX_DISTANCE_UV).then_some(CorrelatedTemperature {
         kelvin: 1.0 / reciprocal,
         distance_uv,
     })

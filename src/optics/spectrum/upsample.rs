@@ -15,9 +15,9 @@ use crate::optics::{LinearSrgb, Nanometres};
 /// A channel may be off by this, relative to the brightest.
 const TOLERANCE: f64 = 1e-12;
 /// No colour of the sRGB cube was seen to need half as many.
-const MOST_STEPS: usize = 600;
+const MAX_STEPS: usize = 600;
 /// Above this no more damping helps.
-const MOST_DAMPING: f64 = 1e12;
+const MAX_DAMPING: f64 = 1e12;
 
 /// A smooth factor on light: `scale` times a sigmoid of a parabola, 0 to `scale` at every wavelength.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -191,8 +191,8 @@ fn solve(places: &Places, wanted: DVec3) -> [f64; 3] {
     let mut coefficients = DVec3::new(0.0, 0.0, sigmoid_inverse(mean.clamp(TOLERANCE, 1.0 - TOLERANCE)));
     let (mut error, mut jacobian) = residual(places, coefficients, wanted);
     let mut damping = 1e-4;
-    for _ in 0..MOST_STEPS {
-        if error.abs().max_element() < TOLERANCE || damping > MOST_DAMPING {
+    for _ in 0..MAX_STEPS {
+        if error.abs().max_element() < TOLERANCE || damping > MAX_DAMPING {
             break;
         }
         let next = coefficients - damped_step(error, jacobian, damping);

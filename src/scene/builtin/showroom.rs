@@ -1,4 +1,4 @@
-//! `showroom`: mirror ring, glass ball and water basin on one floor; the scene that the program opens with.
+//! `showroom`: mirror ring, glass ball and water basin on one floor.
 
 use glam::DVec3;
 

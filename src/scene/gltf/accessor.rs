@@ -17,13 +17,33 @@ pub struct Reader<'a> {
     pub buffers: &'a Buffers<'a>,
 }
 
-/// Which formats an attribute may have beside 32-bit floats.
+/// Name of the extension that gives vertices integers.
+const QUANTISATION: &str = "KHR_mesh_quantization";
+
+/// What the numbers of vectors may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formats {
-    /// None.
+    /// 32-bit floats; where the file uses KHR_mesh_quantization, integers of 8 and 16 bits too.
     Float,
-    /// 8 and 16 bits, unsigned, that stand for 0 to 1.
-    FloatOrNormalised,
+    /// The same, and unsigned ones of 8 and 16 bits that stand for 0 to 1.
+    FloatOrShare,
+    /// Floats, and signed integers of 8 and 16 bits that stand for −1 to 1.
+    FloatOrSigned,
+    /// Unsigned integers of 8 and 16 bits.
+    Index,
+}
+
+impl Formats {
+    fn have(self, component: ComponentType, is_normalised: bool, is_quantised: bool) -> bool {
+        match component {
+            ComponentType::F32 => self != Self::Index,
+            ComponentType::U32 => false,
+            ComponentType::U8 | ComponentType::U16 if self == Self::FloatOrShare && is_normalised => true,
+            ComponentType::U8 | ComponentType::U16 if self == Self::Index => !is_normalised,
+            ComponentType::I8 | ComponentType::I16 if self == Self::FloatOrSigned => is_normalised,
+            _ => is_quantised && matches!(self, Self::Float | Self::FloatOrShare),
+        }
+    }
 }
 
 impl Reader<'_> {
@@ -39,7 +59,17 @@ impl Reader<'_> {
         budget: &mut Budget,
     ) -> Result<Vec<[f64; N]>> {
         let accessor = self.get(index, owner)?;
-        let Some(component) = vector_component::<N>(accessor, formats) else {
+        let is_quantised = self.root.extensions_used.iter().any(|name| name == QUANTISATION);
+        let component = match (accessor.type_, accessor.component_type) {
+            (Checked::Valid(shape), Checked::Valid(component)) if shape.multiplicity() == N => {
+                Some(component.0)
+            }
+            _ => None,
+        };
+        let is_normalised = accessor.normalized;
+        let Some(component) =
+            component.filter(|component| formats.have(*component, is_normalised, is_quantised))
+        else {
             return Err(broken(
                 owner,
                 format!(
@@ -48,17 +78,23 @@ impl Reader<'_> {
                 ),
             ));
         };
-        let bytes = self.packed(accessor, N * size(component), owner, budget)?;
+        let bytes = self.packed(accessor, N * component.size(), owner, budget)?;
         budget.take((accessor.count.0).saturating_mul(8 * N as u64), owner)?;
-        let components = bytes
-            .chunks_exact(size(component))
-            .map(|bytes| match (component, bytes) {
-                (ComponentType::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
-                (_, &[a, b]) => f64::from(u16::from_le_bytes([a, b])) / f64::from(u16::MAX),
-                (_, bytes) => f64::from(bytes[0]) / f64::from(u8::MAX),
-            });
-        let numbers: Vec<f64> = components.collect();
+        let numbers = bytes.chunks_exact(component.size());
+        let numbers: Vec<f64> = numbers
+            .map(|bytes| number(component, is_normalised, bytes))
+            .collect();
         Ok(numbers.as_chunks().0.to_vec())
+    }
+
+    /// Whether an accessor has floats, that is, numbers which may have been rounded on their way into the file.
+    pub fn has_floats(&self, index: Index<Accessor>) -> bool {
+        let component = self
+            .root
+            .accessors
+            .get(index.value())
+            .map(|accessor| accessor.component_type);
+        matches!(component, Some(Checked::Valid(component)) if component.0 == ComponentType::F32)
     }
 
     /// Vertex indices.
@@ -83,8 +119,8 @@ impl Reader<'_> {
                 ),
             ));
         }
-        let bytes = self.packed(accessor, size(component), owner, budget)?;
-        Ok(bytes.chunks_exact(size(component)).map(unsigned).collect())
+        let bytes = self.packed(accessor, component.size(), owner, budget)?;
+        Ok(bytes.chunks_exact(component.size()).map(unsigned).collect())
     }
 
     fn get(&self, index: Index<Accessor>, owner: &str) -> Result<&Accessor> {
@@ -199,18 +235,20 @@ impl Reader<'_> {
     }
 }
 
-fn vector_component<const N: usize>(accessor: &Accessor, formats: Formats) -> Option<ComponentType> {
-    let (Checked::Valid(shape), Checked::Valid(component)) = (accessor.type_, accessor.component_type) else {
-        return None;
+/// A little-endian number; where it is normalised, in [−1, 1].
+fn number(component: ComponentType, is_normalised: bool, bytes: &[u8]) -> f64 {
+    let (number, most) = match (component, bytes) {
+        (ComponentType::F32, &[a, b, c, d]) => return f64::from(f32::from_le_bytes([a, b, c, d])),
+        (ComponentType::I16, &[a, b]) => (f64::from(i16::from_le_bytes([a, b])), f64::from(i16::MAX)),
+        (ComponentType::I8, &[a]) => (f64::from(a as i8), f64::from(i8::MAX)),
+        (ComponentType::U16, _) => (f64::from(unsigned(bytes)), f64::from(u16::MAX)),
+        _ => (f64::from(unsigned(bytes)), f64::from(u8::MAX)),
     };
-    let normalised = accessor.normalized
-        && formats == Formats::FloatOrNormalised
-        && matches!(component.0, ComponentType::U8 | ComponentType::U16);
-    (shape.multiplicity() == N && (component.0 == ComponentType::F32 || normalised)).then_some(component.0)
-}
-
-fn size(component: ComponentType) -> usize {
-    component.size()
+    if is_normalised {
+        (number / most).max(-1.0)
+    } else {
+        number
+    }
 }
 
 /// A little-endian number of one, two or four bytes.

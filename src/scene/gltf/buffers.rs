@@ -1,10 +1,12 @@
 //! Binary data of a file: buffers, and views into them.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::path::Path;
 
-use gltf::json::{Index, Root, buffer};
+use gltf::json::{Index, Value, buffer};
 
+use super::meshopt::Compressed;
 use super::report::{Budget, Report};
 use super::uri;
 use crate::error::{Error, Result};
@@ -15,6 +17,8 @@ pub struct Buffers<'a> {
     views: &'a [buffer::View],
     /// `None` for a buffer that is a mere placeholder.
     data: Vec<Option<Cow<'a, [u8]>>>,
+    /// What the compressed views hold, or what is wrong with them; `None` for the others.
+    unpacked: Vec<Option<std::result::Result<Vec<u8>, String>>>,
 }
 
 /// A range of a buffer.
@@ -32,15 +36,28 @@ impl<'a> Buffers<'a> {
     /// # Errors
     /// A buffer that cannot be read or is shorter than the file states; more memory than the budget has.
     pub fn resolve(
-        root: &'a Root,
+        all: &[buffer::Buffer],
+        views: &'a [buffer::View],
         binary: Option<&'a [u8]>,
         folder: &Path,
         budget: &mut Budget,
         report: &mut Report,
     ) -> Result<Self> {
-        let mut data = Vec::with_capacity(root.buffers.len());
-        for (index, buffer) in root.buffers.iter().enumerate() {
+        let mut data = Vec::with_capacity(all.len());
+        let compressed: Vec<_> = views.iter().map(compression).collect();
+        // Where compressed views would lie for readers that cannot unpack them.
+        let spare: HashSet<usize> = views
+            .iter()
+            .zip(&compressed)
+            .filter_map(|(view, compressed)| compressed.as_ref().map(|_| view.buffer.value()))
+            .collect();
+        for (index, buffer) in all.iter().enumerate() {
             let owner = format!("buffer {index}");
+            let is_binary = index == 0 && binary.is_some();
+            if spare.contains(&index) && !is_binary && is_fallback(buffer) {
+                data.push(None);
+                continue;
+            }
             let bytes: Option<Cow<[u8]>> = match (&buffer.uri, binary) {
                 (Some(uri), _) => Some(uri::read(uri, folder, budget.left(), &owner)?.into()),
                 (None, Some(binary)) if index == 0 => Some(binary.into()),
@@ -60,10 +77,42 @@ impl<'a> Buffers<'a> {
             }
             data.push(Some(trimmed(bytes, buffer.byte_length.0, &owner, report)?));
         }
-        Ok(Self {
-            views: &root.buffer_views,
+        let mut buffers = Self {
+            views,
             data,
-        })
+            unpacked: Vec::new(),
+        };
+        for (index, compressed) in compressed.into_iter().enumerate() {
+            let unpacked = match compressed {
+                None => None,
+                Some(Err(error)) => Some(Err(error.to_string())),
+                Some(Ok(stated)) => Some(buffers.unpack(&stated, index, budget)?),
+            };
+            buffers.unpacked.push(unpacked);
+        }
+        Ok(buffers)
+    }
+
+    fn unpack(
+        &self,
+        stated: &Compressed,
+        view: usize,
+        budget: &mut Budget,
+    ) -> Result<std::result::Result<Vec<u8>, String>> {
+        let Some(data) = self.range(stated.buffer, stated.byte_offset, stated.byte_length) else {
+            return Ok(Err("its data does not lie within a buffer".into()));
+        };
+        let Some(bytes) = stated.unpacked_bytes() else {
+            return Ok(Err("its size cannot be right".into()));
+        };
+        budget.take(bytes, &format!("buffer view {view}"))?;
+        Ok(stated.unpack(data).ok_or_else(|| "its data is damaged".into()))
+    }
+
+    fn range(&self, buffer: usize, start: u64, length: u64) -> Option<&[u8]> {
+        let end = start.checked_add(length)?;
+        let range = usize::try_from(start).ok()?..usize::try_from(end).ok()?;
+        self.data.get(buffer)?.as_ref()?.get(range)
     }
 
     /// The bytes of a view. `owner` says who wants them.
@@ -78,27 +127,44 @@ impl<'a> Buffers<'a> {
                 "refers to buffer view {index}, which does not exist"
             )));
         };
+        let stride = view.byte_stride.map(|stride| stride.0);
+        if let Some(unpacked) = &self.unpacked[index] {
+            return match unpacked {
+                Ok(data) => Ok(View { data, stride }),
+                Err(why) => Err(broken(format!(
+                    "needs buffer view {index}, which cannot be unpacked ({why})"
+                ))),
+            };
+        }
         let buffer = view.buffer.value();
-        let Some(Some(data)) = self.data.get(buffer) else {
+        if self.data.get(buffer).is_none_or(Option::is_none) {
             return Err(broken(format!(
                 "needs buffer {buffer}, which does not exist or has no data"
             )));
-        };
+        }
         let start = view.byte_offset.unwrap_or_default().0;
-        let range = start.checked_add(view.byte_length.0).and_then(|end| {
-            let range = usize::try_from(start).ok()?..usize::try_from(end).ok()?;
-            data.get(range)
-        });
-        let Some(data) = range else {
+        let Some(data) = self.range(buffer, start, view.byte_length.0) else {
             return Err(broken(format!(
                 "needs buffer view {index}, which ends beyond its buffer"
             )));
         };
-        Ok(View {
-            data,
-            stride: view.byte_stride.map(|stride| stride.0),
-        })
+        Ok(View { data, stride })
     }
+}
+
+/// What a view states of its compression, if it is compressed.
+fn compression(view: &buffer::View) -> Option<serde_json::Result<Compressed>> {
+    Compressed::stated(&view.extensions.as_ref()?.others)
+}
+
+/// Whether a buffer has nothing of its own, or only what stands in for compressed views.
+fn is_fallback(buffer: &buffer::Buffer) -> bool {
+    let is_marked = |stated: &Value| stated.get("fallback") == Some(&Value::Bool(true));
+    let mut stated = buffer
+        .extensions
+        .iter()
+        .flat_map(|extensions| extensions.others.values());
+    buffer.uri.is_none() || stated.any(is_marked)
 }
 
 /// Exactly the stated bytes of a buffer.

@@ -5,8 +5,9 @@ use serde::Deserialize;
 use serde_json::Map;
 
 use super::extras::Extras;
+use super::pose::Poses;
 use super::report::Report;
-use super::{extensions, faults};
+use super::{extensions, faults, glossiness, names};
 use crate::error::{Error, Result};
 
 /// The typed JSON, with node transforms in double precision beside it.
@@ -18,6 +19,8 @@ pub struct Document {
     pub transforms: Vec<NodeTransform>,
     /// What is stated in `extras`.
     pub extras: Extras,
+    /// What bends meshes.
+    pub poses: Poses,
 }
 
 /// A node's own transform as the file states it, unchecked.
@@ -46,7 +49,9 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     check_version(file, report)?;
     let required = strings(file, "extensionsRequired")?;
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
-    leave_out_what_is_not_read(file, report);
+    let poses = Poses::of(file);
+    prepare(file, report);
+    make_glass_clear(file, report);
     let extras = Extras::of(&value);
     remove_extras(&mut value);
 
@@ -60,6 +65,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
         root,
         transforms,
         extras,
+        poses,
     })
 }
 
@@ -126,34 +132,37 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Takes out animations, skins and morph targets, so that faults in them cannot stop a scene at rest, and fills in
-/// what the typed reader wants although glTF does not.
-fn leave_out_what_is_not_read(file: &mut Map<String, Value>, report: &mut Report) {
-    if file.remove("animations").is_some() {
-        report.warn("animations", "are not played", "the scene is read at rest");
+/// Takes out animations, skins and morph targets, so that faults in them cannot stop a scene at rest, brings old materials
+/// up to date, and fills in what the typed reader wants although glTF does not.
+fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
+    for (index, material) in objects(file.get_mut("materials")).enumerate() {
+        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
+        let owner = format!("material `{}`", names::name(name.as_ref(), "material", index));
+        glossiness::convert(material, &owner, report);
     }
-    file.remove("skins");
-    let (mut skinned, mut morphed) = (false, false);
+    let has_animations = file.remove("animations").is_some();
+    let mut is_bent = file.remove("skins").is_some();
     for node in objects(file.get_mut("nodes")) {
-        skinned |= node.remove("skin").is_some();
-        morphed |= node.remove("weights").is_some();
+        is_bent |= node.remove("skin").is_some();
+        node.remove("weights");
     }
     for mesh in objects(file.get_mut("meshes")) {
-        morphed |= mesh.remove("weights").is_some();
+        mesh.remove("weights");
         for primitive in objects(mesh.get_mut("primitives")) {
-            morphed |= primitive.remove("targets").is_some();
+            is_bent |= primitive.remove("targets").is_some();
         }
     }
-    if skinned {
+    if has_animations {
+        report.warn("animations", "are not played", "the scene is read at rest");
+    }
+    if is_bent {
         report.warn(
-            "skins",
-            "are not applied",
-            "skinned meshes stand in their bind pose",
+            "skins and morph targets",
+            "are read as they are at rest",
+            "pose the scene where it was made",
         );
     }
-    if morphed {
-        report.warn("morph targets", "are not applied", "meshes have their base shape");
-    }
+    name_variants(file, report);
     for scene in objects(file.get_mut("scenes")) {
         scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
     }
@@ -163,6 +172,53 @@ fn leave_out_what_is_not_read(file: &mut Map<String, Value>, report: &mut Report
         .and_then(|punctual| punctual.get_mut("lights"));
     for light in objects(lights) {
         light.remove("extensions");
+    }
+}
+
+fn name_variants(file: &Map<String, Value>, report: &mut Report) {
+    let extensions = file.get("extensions");
+    let stated = extensions.and_then(|all| all.get(extensions::VARIANTS)?.get("variants")?.as_array());
+    let name = |variant: &Value| variant.get("name")?.as_str().map(str::to_owned);
+    let names: Vec<String> = stated
+        .into_iter()
+        .flatten()
+        .enumerate()
+        .map(|(index, variant)| names::name(name(variant).as_ref(), "variant", index))
+        .collect();
+    if !names.is_empty() {
+        report.warn(
+            "materials",
+            format!("have variants, which are left out ({})", names.join(", ")),
+            "the scene has the materials that it begins with",
+        );
+    }
+}
+
+/// A material that transmits light is no metal unless it says so: what glTF assumes would let nothing through.
+fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
+    for (index, material) in objects(file.get_mut("materials")).enumerate() {
+        let extensions = material.get("extensions");
+        let transmission = extensions.and_then(|all| all.get("KHR_materials_transmission"));
+        let factor = transmission.and_then(|stated| stated.get("transmissionFactor"));
+        let states = |pbr: &Map<String, Value>| {
+            pbr.contains_key("metallicFactor") || pbr.contains_key("metallicRoughnessTexture")
+        };
+        let pbr = material.get("pbrMetallicRoughness").and_then(Value::as_object);
+        if factor.and_then(Value::as_f64).is_none_or(|factor| factor <= 0.0) || pbr.is_some_and(states) {
+            continue;
+        }
+        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
+        let pbr = material
+            .entry("pbrMetallicRoughness")
+            .or_insert_with(|| Value::Object(Map::new()));
+        if let Some(pbr) = pbr.as_object_mut() {
+            pbr.insert("metallicFactor".into(), Value::from(0.0));
+            report.warn(
+                format!("material `{}`", names::name(name.as_ref(), "material", index)),
+                "transmits light but does not say that it is no metal; it was read as glass",
+                "state a metallic factor of 0",
+            );
+        }
     }
 }
 

@@ -1,31 +1,43 @@
 //! Which glTF extensions are read, which are passed over, which stop the loading.
 
 use super::report::Report;
+use super::{draco, glossiness, instancing, meshopt, nodes};
 use crate::error::{Error, Result};
 
+/// Name of an extension that gives a scene several sets of materials.
+pub const VARIANTS: &str = "KHR_materials_variants";
+
 /// Read in full, or in the parts that say so in a warning.
-const READ: [&str; 12] = [
+const READ: [&str; 21] = [
     "EXT_lights_area",
+    instancing::NAME,
+    meshopt::NAMES[0],
     "EXT_texture_webp",
+    draco::NAME,
     "KHR_lights_punctual",
     "KHR_materials_clearcoat",
     "KHR_materials_dispersion",
     "KHR_materials_emissive_strength",
     "KHR_materials_ior",
+    glossiness::NAME,
     "KHR_materials_specular",
     "KHR_materials_transmission",
     "KHR_materials_unlit",
+    VARIANTS,
     "KHR_materials_volume",
+    "KHR_mesh_quantization",
+    meshopt::NAMES[1],
+    nodes::VISIBILITY,
+    "KHR_texture_basisu",
     "KHR_texture_transform",
 ];
 
 /// Passed over with a warning even where the file requires them: what is left is still the same scene.
-const LEFT_OUT: [&str; 6] = [
+const LEFT_OUT: [&str; 5] = [
     "KHR_animation_pointer",
     "KHR_materials_anisotropy",
     "KHR_materials_iridescence",
     "KHR_materials_sheen",
-    "KHR_materials_variants",
     "KHR_xmp_json_ld",
 ];
 
@@ -73,16 +85,12 @@ pub fn check(required: &[String], used: &[String], report: &mut Report) -> Resul
 
 /// Materials say themselves what they leave out.
 fn is_named_by_materials(extension: &str) -> bool {
-    extension.starts_with("KHR_materials_") && extension != "KHR_materials_variants"
+    extension.starts_with("KHR_materials_")
 }
 
 fn remedy(extension: &str) -> &'static str {
     match extension {
-        "KHR_draco_mesh_compression" | "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            "export it without mesh compression"
-        }
-        "KHR_mesh_quantization" => "export it without mesh quantization",
-        "KHR_texture_basisu" => "export it with PNG or JPEG images",
+        "EXT_texture_avif" => "export it with PNG or JPEG images",
         _ => "export it without this extension",
     }
 }

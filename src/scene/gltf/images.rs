@@ -5,6 +5,7 @@ use std::io::Cursor;
 use std::path::Path;
 use std::rc::Rc;
 
+use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 use gltf::json::texture::{Sampler, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
@@ -85,6 +86,34 @@ impl<'a> Images<'a> {
         Ok(Some(self.textures.len() - 1))
     }
 
+    /// The texels of a glTF texture, and how it repeats; `None` where it has no image.
+    ///
+    /// # Errors
+    /// More memory than the budget has.
+    pub fn pixels(
+        &mut self,
+        texture: Index<gltf::json::Texture>,
+        owner: &str,
+        budget: &mut Budget,
+        report: &mut Report,
+    ) -> Result<Option<(Rc<RgbaImage>, [Wrap; 2])>> {
+        let Some(image) = self.image_index(texture, owner, report) else {
+            return Ok(None);
+        };
+        let pixels = self.decode(image, budget, report)?;
+        Ok(Some((pixels, self.wrap(texture))))
+    }
+
+    /// Adds a texture that is no image of the file; gives its index among the scene's textures.
+    ///
+    /// # Errors
+    /// More memory than the budget has.
+    pub fn add(&mut self, texture: Texture, budget: &mut Budget) -> Result<usize> {
+        budget.take(size_of_val(&texture.rgba[..]) as u64, &texture.name)?;
+        self.textures.push(texture);
+        Ok(self.textures.len() - 1)
+    }
+
     /// A texture by its index among the scene's textures.
     pub fn get(&self, texture: usize) -> &Texture {
         &self.textures[texture]
@@ -119,16 +148,15 @@ impl<'a> Images<'a> {
         report: &mut Report,
     ) -> Option<usize> {
         let texture = self.root.textures.get(texture.value());
-        let webp = texture.and_then(|texture| {
-            let source = texture
-                .extensions
-                .as_ref()?
-                .others
-                .get("EXT_texture_webp")?
-                .get("source")?;
+        let stated = |name: &str| {
+            let extensions = texture?.extensions.as_ref()?;
+            let source = extensions.others.get(name)?.get("source")?;
             usize::try_from(source.as_u64()?).ok()
-        });
-        let image = webp.or(texture.map(|texture| texture.source.value()));
+        };
+        let image = ["EXT_texture_webp", "KHR_texture_basisu"]
+            .into_iter()
+            .find_map(stated);
+        let image = image.or(texture.map(|texture| texture.source.value()));
         let found = image.filter(|image| *image < self.root.images.len());
         if found.is_none() {
             report.warn(
@@ -203,8 +231,11 @@ fn decode(bytes: &[u8], most_bytes: u64) -> std::result::Result<RgbaImage, Strin
         .with_guessed_format()
         .map_err(|error| format!("cannot be read ({error})"))?;
     let known = [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::WebP];
+    if bytes.starts_with(b"\xabKTX 20\xbb") {
+        return decode_basis(bytes, most_bytes);
+    }
     if !reader.format().is_some_and(|format| known.contains(&format)) {
-        return Err("is neither PNG nor JPEG nor WebP".into());
+        return Err("is neither PNG nor JPEG nor WebP nor Basis Universal".into());
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(LARGEST_SIDE);
@@ -215,4 +246,26 @@ fn decode(bytes: &[u8], most_bytes: u64) -> std::result::Result<RgbaImage, Strin
         .decode()
         .map_err(|error| format!("cannot be decoded ({error})"))?;
     Ok(image.into_rgba8())
+}
+
+/// An image of Basis Universal, in a KTX2 file. What it states is checked first: the transcoder takes its word for it.
+fn decode_basis(bytes: &[u8], most_bytes: u64) -> std::result::Result<RgbaImage, String> {
+    let damaged = |why: String| format!("cannot be decoded ({why})");
+    let file = ktx2::Reader::new(bytes).map_err(|error| damaged(error.to_string()))?;
+    let (width, height) = (file.header().pixel_width, file.header().pixel_height);
+    let texels_bytes = 4 * u64::from(width) * u64::from(height);
+    let unpacked_bytes = file.levels().map(|level| level.uncompressed_byte_length).max();
+    if width.max(height) > LARGEST_SIDE || texels_bytes.max(unpacked_bytes.unwrap_or(0)) > most_bytes / 2 {
+        return Err("is too large".into());
+    }
+    let image = Transcoder::new(bytes).map_err(|error| damaged(format!("{error:?}")))?;
+    if !matches!(
+        image.source_format(),
+        SourceFormat::Etc1s | SourceFormat::UastcLdr
+    ) {
+        return Err("has a format that glTF does not allow".into());
+    }
+    let texels = image.transcode(0, TargetFormat::Rgba32, DecodeFlags::NONE);
+    let texels = texels.map_err(|error| damaged(format!("{error:?}")))?;
+    RgbaImage::from_raw(width, height, texels).ok_or_else(|| "has another size than it states".into())
 }

@@ -3,24 +3,20 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec2};
+use gltf::json::Value;
 use gltf::json::extensions::material as extension;
-use gltf::json::extensions::texture::TextureTransform;
-use gltf::json::material::{AlphaMode, Material as Source};
+use gltf::json::material::Material as Source;
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Value};
-use serde::Deserialize;
 
 use super::document::Document;
 use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
 use super::substance::{self, Substance};
-use super::{extras, names, spectrum, waves};
+use super::{coat, extras, names, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
-use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Volume};
+use crate::scene::{Material, SurfaceKind, Volume};
 use crate::units::LUMENS_PER_WATT;
 
 /// What a primitive without a material has: glTF's default material is a rough metal, which is taken for matte.
@@ -33,14 +29,36 @@ pub fn default() -> Material {
     }
 }
 
+/// Whether it lets light through without being the surface of a body.
+pub fn is_thin(material: &Material) -> bool {
+    material.transmits() && material.volume.is_none()
+}
+
+/// Makes a thin wall clear solid glass.
+pub fn make_solid(thin: &mut Material) {
+    thin.volume = Some(CLEAR);
+    thin.surface = thin.classified();
+    thin.is_solid_by_shape = true;
+}
+
 /// A thin wall as clear solid glass.
 pub fn solid_twin(thin: &Material) -> Material {
-    Material {
-        name: format!("{} (solid)", thin.name),
-        surface: SurfaceKind::Dielectric,
-        volume: Some(CLEAR),
-        ..thin.clone()
-    }
+    let mut solid = thin.clone();
+    solid.name += " (solid)";
+    make_solid(&mut solid);
+    solid
+}
+
+/// The thin wall of which clear solid glass was made.
+pub fn thin_twin(solid: &Material) -> Material {
+    let mut thin = Material {
+        name: format!("{} (thin)", solid.name),
+        volume: None,
+        is_solid_by_shape: false,
+        ..solid.clone()
+    };
+    thin.surface = thin.classified();
+    thin
 }
 
 const CLEAR: Volume = Volume {
@@ -87,19 +105,20 @@ pub fn read_all(
         .collect()
 }
 
-struct Reading<'a, 'b> {
-    owner: String,
-    source: &'a Source,
+/// A material while it is read.
+pub struct Reading<'a, 'b> {
+    pub owner: String,
+    pub source: &'a Source,
     /// As its extras state them.
-    waves: Option<&'a Value>,
-    glass: Option<&'a Value>,
-    metal: Option<&'a Value>,
-    spectrum: Option<&'a Value>,
+    pub waves: Option<&'a Value>,
+    pub glass: Option<&'a Value>,
+    pub metal: Option<&'a Value>,
+    pub spectrum: Option<&'a Value>,
     /// Where the file is.
-    folder: &'a Path,
-    images: &'a mut Images<'b>,
-    budget: &'a mut Budget,
-    report: &'a mut Report,
+    pub folder: &'a Path,
+    pub images: &'a mut Images<'b>,
+    pub budget: &'a mut Budget,
+    pub report: &'a mut Report,
 }
 
 impl Reading<'_, '_> {
@@ -115,6 +134,8 @@ impl Reading<'_, '_> {
             base_colour: self.colour([red, green, blue], "base colour"),
             base_colour_texture: self.base_colour_texture()?,
             alpha_mask: self.alpha_mask(),
+            coverage: None,
+            variation: None,
             metallic: self.share(pbr.metallic_factor.0, "metallic factor"),
             roughness: self.share(pbr.roughness_factor.0, "roughness factor"),
             transmission: self.share(
@@ -125,7 +146,9 @@ impl Reading<'_, '_> {
             glass: None,
             metal: None,
             volume: self.volume(extensions),
-            emitted_radiance: self.emission(extensions)?,
+            is_solid_by_shape: false,
+            emitted_radiance: self.emission(extensions),
+            emission_texture: None,
             emission_spectrum: None,
             polish: 1.0,
             normal_map: None,
@@ -134,33 +157,39 @@ impl Reading<'_, '_> {
                 .and_then(|waves| waves::read(waves, &self.owner, self.report)),
             double_sided: self.source.double_sided,
         };
-        self.take_means(&mut material, transmission)?;
+        self.vary(&mut material, transmission)?;
+        self.blend(&mut material);
+        self.glow(&mut material)?;
         self.emission_spectrum(&mut material)?;
         self.substance(&mut material, extensions)?;
-        material.surface = if extensions.unlit.is_some() {
-            SurfaceKind::Diffuse
-        } else {
+        material.surface = if extensions.unlit.is_none() {
             self.classify(&material)
+        } else if material.coverage.is_some() {
+            (material.metallic, material.roughness, material.transmission) = (0.0, 1.0, 0.0);
+            material.variation = None;
+            SurfaceKind::Varied
+        } else {
+            SurfaceKind::Diffuse
         };
-        if material.surface != SurfaceKind::Dielectric {
+        if !material.transmits() {
             material.volume = None;
         }
-        if let (SurfaceKind::Mixed, Some(specular)) = (material.surface, &extensions.specular) {
+        let is_polish = matches!(material.surface, SurfaceKind::Mixed | SurfaceKind::Varied);
+        if let (true, Some(specular)) = (is_polish, &extensions.specular) {
             material.polish = self.share(specular.specular_factor.0, "specular factor");
         }
-        let is_polish = material.surface == SurfaceKind::Mixed;
         self.coat(&mut material, extensions);
         material.normal_map = self.normal_map(&material)?;
         self.name_what_is_ignored(extensions, &material, is_polish);
         Ok(material)
     }
 
-    fn warn(&mut self, what: impl Into<String>, remedy: &str) {
+    pub(super) fn warn(&mut self, what: impl Into<String>, remedy: &str) {
         self.report.warn(self.owner.clone(), what, remedy);
     }
 
     /// A factor brought into [0, 1]; what is no number counts as 0.
-    fn share(&mut self, value: f32, what: &str) -> f64 {
+    pub(super) fn share(&mut self, value: f32, what: &str) -> f64 {
         let read = if value.is_nan() {
             0.0
         } else {
@@ -238,7 +267,7 @@ impl Reading<'_, '_> {
     }
 
     /// glTF's cd/m² as luminous-equivalent W/(m² sr).
-    fn emission(&mut self, extensions: &extension::Material) -> Result<LinearSrgb> {
+    fn emission(&mut self, extensions: &extension::Material) -> LinearSrgb {
         let mut strength = extensions
             .emissive_strength
             .as_ref()
@@ -250,24 +279,8 @@ impl Reading<'_, '_> {
             );
             strength = 0.0;
         }
-        let mut factor = self.colour(self.source.emissive_factor.0, "emissive factor");
-        if let Some(texture) = self
-            .source
-            .emissive_texture
-            .as_ref()
-            .filter(|_| factor.max_channel() > 0.0)
-        {
-            let linear = |[r, g, b, _]: [u8; 4]| [r, g, b].map(LinearSrgb::decode_channel).into();
-            let mean = self
-                .images
-                .mean(texture.index, linear, &self.owner, self.budget, self.report)?;
-            factor = factor * mean.unwrap_or(LinearSrgb::WHITE);
-            self.warn(
-                "its emissive texture was read as its mean",
-                "split the mesh where it glows",
-            );
-        }
-        Ok(factor * (strength / LUMENS_PER_WATT))
+        let factor = self.colour(self.source.emissive_factor.0, "emissive factor");
+        factor * (strength / LUMENS_PER_WATT)
     }
 
     /// Gives what it emits the spectrum that is stated for it, if any, in place of its colour.
@@ -294,48 +307,6 @@ impl Reading<'_, '_> {
         let luminance = material.emitted_radiance.luminance();
         material.emitted_radiance = spectrum.xyz().to_linear_srgb() * luminance;
         material.emission_spectrum = Some(spectrum);
-        Ok(())
-    }
-
-    /// Multiplies factors by the means of their textures.
-    fn take_means(
-        &mut self,
-        material: &mut Material,
-        transmission: Option<&extension::Transmission>,
-    ) -> Result<()> {
-        let share = |code: u8| f64::from(code) / 255.0;
-        let channels = |[r, g, b, _]: [u8; 4]| LinearSrgb::new(share(r), share(g), share(b));
-        let pbr = &self.source.pbr_metallic_roughness;
-        if let Some(texture) = &pbr.metallic_roughness_texture {
-            let mean = self
-                .images
-                .mean(texture.index, channels, &self.owner, self.budget, self.report)?;
-            let mean = mean.unwrap_or(LinearSrgb::WHITE);
-            material.roughness *= mean.g;
-            material.metallic *= mean.b;
-            self.warn(
-                format!(
-                    "its metallic-roughness texture was read as its mean, metallic {:.2} and roughness {:.2}",
-                    material.metallic, material.roughness
-                ),
-                "split the mesh where the material changes",
-            );
-        }
-        if let Some(texture) =
-            transmission.and_then(|transmission| transmission.transmission_texture.as_ref())
-        {
-            let mean = self
-                .images
-                .mean(texture.index, channels, &self.owner, self.budget, self.report)?;
-            material.transmission *= mean.unwrap_or(LinearSrgb::WHITE).r;
-            self.warn(
-                format!(
-                    "its transmission texture was read as its mean, {:.2}",
-                    material.transmission
-                ),
-                "split the mesh where it is clear",
-            );
-        }
         Ok(())
     }
 
@@ -369,21 +340,12 @@ impl Reading<'_, '_> {
     fn classify(&mut self, material: &Material) -> SurfaceKind {
         let surface = material.classified();
         let roughness = material.roughness;
-        let as_matte = "make it smoother to have it reflect or transmit light";
         let is_metal = material.metallic >= 0.5;
         match surface {
             // Metallic 1 with roughness 1 is what glTF assumes where a file says nothing.
             SurfaceKind::Diffuse if is_metal && (roughness < 1.0 || material.metal.is_some()) => self.warn(
                 format!("is a metal of roughness {roughness:.2}, treated as matte"),
-                as_matte,
-            ),
-            SurfaceKind::Diffuse if !is_metal && material.transmission >= 0.5 => self.warn(
-                format!("transmits light at a roughness of {roughness:.2}, treated as matte"),
-                as_matte,
-            ),
-            SurfaceKind::ThinWall => self.warn(
-                "transmits light but has no thickness, so that it is a thin pane that does not refract",
-                "give it a volume, or read closed meshes as solid with --solid-glass",
+                "make it smoother to have it reflect light",
             ),
             SurfaceKind::Mirror | SurfaceKind::Diffuse | SurfaceKind::Mixed if material.glass.is_some() => {
                 self.warn(
@@ -391,154 +353,13 @@ impl Reading<'_, '_> {
                     "give it transmission and a volume",
                 )
             }
+            SurfaceKind::Varied if material.glass.is_some() => self.warn(
+                "changes from place to place, so that its glass disperses nothing",
+                "split the mesh where the material changes",
+            ),
             _ => {}
         }
         surface
-    }
-
-    /// Set and transform of a texture's coordinates; `None`, with a warning, for a set that is not read.
-    fn placed(
-        &mut self,
-        what: &str,
-        tex_coord: u32,
-        transform: Option<&TextureTransform>,
-    ) -> Option<(usize, DMat3)> {
-        let (uv_set, uv_transform) = coordinates(tex_coord, transform);
-        if uv_set > 1 {
-            self.warn(
-                format!("its {what} follows TEXCOORD_{uv_set} and was left out"),
-                "use TEXCOORD_0 or TEXCOORD_1",
-            );
-            return None;
-        }
-        if uv_transform.is_finite() {
-            return Some((uv_set, uv_transform));
-        }
-        self.warn(
-            "its texture transform is not finite and was ignored",
-            "export the file again",
-        );
-        Some((uv_set, DMat3::IDENTITY))
-    }
-
-    /// A lacquer over the surface, where the file has one.
-    fn coat(&mut self, material: &mut Material, extensions: &extension::Material) {
-        let Some(stated) = extensions.others.get(CLEARCOAT) else {
-            return;
-        };
-        let Ok(stated) = Coat::deserialize(stated) else {
-            return self.warn(
-                "its clearcoat cannot be read and was left out",
-                "export the file again",
-            );
-        };
-        let factor = self.share(stated.clearcoat_factor, "clearcoat factor");
-        let roughness = self.share(stated.clearcoat_roughness_factor, "clearcoat roughness");
-        if factor == 0.0 || extensions.unlit.is_some() {
-            return;
-        }
-        if stated.has_texture() {
-            self.warn(
-                "its clearcoat is read by its factors alone, without textures",
-                "split the mesh where the lacquer changes",
-            );
-        }
-        if let Err(why) = put_on(material, factor, roughness) {
-            self.warn(why, "expect it to look and bake as if it were not there");
-        }
-    }
-
-    /// What bends the normals of a specular surface.
-    fn normal_map(&mut self, material: &Material) -> Result<Option<NormalMap>> {
-        let source = self.source;
-        let Some(stated) = source
-            .normal_texture
-            .as_ref()
-            .filter(|_| material.surface.is_specular())
-        else {
-            return Ok(None);
-        };
-        let others = stated.extensions.as_ref().map(|extensions| &extensions.others);
-        let transform = others
-            .and_then(|others| others.get("KHR_texture_transform"))
-            .and_then(|transform| TextureTransform::deserialize(transform).ok());
-        let Some((uv_set, uv_transform)) =
-            self.placed("normal texture", stated.tex_coord, transform.as_ref())
-        else {
-            return Ok(None);
-        };
-        let scale = widen(stated.scale);
-        let colour = material.base_colour_texture.as_ref();
-        // The graphics card has one set of coordinates for each surface.
-        if colour.is_some_and(|colour| (colour.uv_set, colour.uv_transform) != (uv_set, uv_transform)) {
-            self.warn(
-                "its normal texture follows other coordinates than its base colour and was left out",
-                "give both the same set and transform",
-            );
-            return Ok(None);
-        }
-        if !scale.is_finite() {
-            self.warn(
-                "its normal texture has a scale that is not finite and was left out",
-                "export the file again",
-            );
-            return Ok(None);
-        }
-        let index = Index::new(stated.index.value() as u32);
-        let texture = self
-            .images
-            .texture(index, &self.owner, self.budget, self.report)?;
-        let Some(texture) = texture else {
-            return Ok(None);
-        };
-        let image = TextureRef {
-            texture,
-            uv_set,
-            uv_transform,
-        };
-        let map = NormalMap::new(image, scale, self.images.get(texture));
-        // Also what stands in for an image that could not be read.
-        if map.detail_texels == f64::INFINITY {
-            self.warn(
-                "its normal texture is the same everywhere and was left out",
-                "give it some relief, or none",
-            );
-            return Ok(None);
-        }
-        Ok(Some(map))
-    }
-
-    fn base_colour_texture(&mut self) -> Result<Option<TextureRef>> {
-        let source = self.source;
-        let Some(info) = &source.pbr_metallic_roughness.base_color_texture else {
-            return Ok(None);
-        };
-        let transform = info
-            .extensions
-            .as_ref()
-            .and_then(|extensions| extensions.texture_transform.as_ref());
-        let Some((uv_set, uv_transform)) = self.placed("base colour texture", info.tex_coord, transform)
-        else {
-            return Ok(None);
-        };
-        let texture = Index::new(info.index.value() as u32);
-        let texture = self
-            .images
-            .texture(texture, &self.owner, self.budget, self.report)?;
-        Ok(texture.map(|texture| TextureRef {
-            texture,
-            uv_set,
-            uv_transform,
-        }))
-    }
-
-    /// Where the surface is cut out, if it is.
-    fn alpha_mask(&mut self) -> Option<AlphaMask> {
-        let is_mask = matches!(self.source.alpha_mode, Checked::Valid(AlphaMode::Mask));
-        is_mask.then(|| AlphaMask {
-            cutoff: self.source.alpha_cutoff.map_or(0.5, |cutoff| f64::from(cutoff.0)),
-            factor: self.share(self.source.pbr_metallic_roughness.base_color_factor.0[3], "alpha"),
-        })
     }
 
     fn name_what_is_ignored(
@@ -549,13 +370,7 @@ impl Reading<'_, '_> {
     ) {
         let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
-            Checked::Valid(AlphaMode::Opaque | AlphaMode::Mask) => {}
-            Checked::Valid(AlphaMode::Blend) => {
-                self.warn(
-                    "its alpha mode BLEND was read as opaque",
-                    "use transmission for glass, or MASK to cut it out",
-                );
-            }
+            Checked::Valid(_) => {}
             Checked::Invalid => self.warn(
                 "its alpha mode is unknown and was read as opaque",
                 "export the file again",
@@ -578,7 +393,7 @@ impl Reading<'_, '_> {
             extensions
                 .others
                 .keys()
-                .filter(|key| ![CLEARCOAT, substance::NAME].contains(&key.as_str()))
+                .filter(|key| ![coat::NAME, substance::NAME].contains(&key.as_str()))
                 .map(|key| names::name(Some(key), "extension", 0)),
         );
         if !ignored.is_empty() {
@@ -586,87 +401,6 @@ impl Reading<'_, '_> {
                 format!("its {} was ignored", ignored.join(", ")),
                 "expect it to look and bake as if it were not there",
             );
-        }
-    }
-}
-
-/// Set and transform of a texture's coordinates.
-fn coordinates(tex_coord: u32, transform: Option<&TextureTransform>) -> (usize, DMat3) {
-    let Some(transform) = transform else {
-        return (tex_coord as usize, DMat3::IDENTITY);
-    };
-    let vector = |[x, y]: [f32; 2]| DVec2::new(widen(x), widen(y));
-    // v runs downwards, so that the extension's counter-clockwise turn is a negative one in (u, v).
-    let matrix = DMat3::from_scale_angle_translation(
-        vector(transform.scale.0),
-        -widen(transform.rotation.0),
-        vector(transform.offset.0),
-    );
-    (transform.tex_coord.unwrap_or(tex_coord) as usize, matrix)
-}
-
-/// Name of the extension.
-const CLEARCOAT: &str = "KHR_materials_clearcoat";
-
-/// n of the lacquer, as the extension fixes it.
-const IOR: f64 = 1.5;
-
-/// Reflectance of the lacquer at normal incidence: ((n − 1)/(n + 1))².
-const F0: f64 = 0.04;
-
-/// The lacquer as the file states it; textures are named and not read.
-#[derive(Debug, Default, Deserialize)]
-#[serde(default, rename_all = "camelCase")]
-pub struct Coat {
-    /// Part of the surface that it covers.
-    pub clearcoat_factor: f32,
-    /// Of its surface.
-    pub clearcoat_roughness_factor: f32,
-    clearcoat_texture: Option<Value>,
-    clearcoat_roughness_texture: Option<Value>,
-    clearcoat_normal_texture: Option<Value>,
-}
-
-impl Coat {
-    /// Whether an image changes it from place to place.
-    pub fn has_texture(&self) -> bool {
-        let textures = [
-            &self.clearcoat_texture,
-            &self.clearcoat_roughness_texture,
-            &self.clearcoat_normal_texture,
-        ];
-        textures.iter().any(|texture| texture.is_some())
-    }
-}
-
-/// Puts a lacquer of a factor and a roughness, both in [0, 1], over a material whose class is known.
-///
-/// # Errors
-/// Why it has to be left out, to go after the name of the material.
-pub fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
-    match material.surface {
-        SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => Err(format!(
-            "its clearcoat of roughness {roughness:.2} was left out, as it hardly shines"
-        )),
-        SurfaceKind::Diffuse => {
-            // What is below is matte, whatever it was.
-            (material.metallic, material.transmission, material.volume) = (0.0, 0.0, None);
-            (material.roughness, material.ior, material.polish) = (roughness, IOR, factor);
-            material.surface = SurfaceKind::Mixed;
-            Ok(())
-        }
-        SurfaceKind::Mirror => {
-            // 1 − R = (1 − coat)(1 − metal) at normal incidence; towards grazing angles both tend to 1.
-            let left = 1.0 - factor * F0;
-            material.base_colour = LinearSrgb::WHITE - (LinearSrgb::WHITE - material.base_colour) * left;
-            Ok(())
-        }
-        SurfaceKind::Mixed => {
-            material.polish = factor + (1.0 - factor) * material.polish;
-            Ok(())
-        }
-        SurfaceKind::Dielectric | SurfaceKind::ThinWall => {
-            Err("its clearcoat was left out, as light goes through it".into())
         }
     }
 }

@@ -14,25 +14,33 @@ use report::{Budget, Report};
 use super::{LoadOptions, Scene};
 use crate::error::{Error, Result, Warning};
 use crate::files;
-use crate::scene::{Light, LightKind, LightSize};
+use crate::scene::{Glow, Light, LightKind, LightSize};
 use crate::units::Radiance;
 
 mod accessor;
 mod area_light;
 mod buffers;
+mod coat;
 mod container;
 mod document;
+mod draco;
 mod extensions;
 mod extras;
+mod factors;
 mod faults;
 mod glb;
+mod glossiness;
 pub(super) mod guard;
 mod images;
+mod instancing;
 mod light;
 mod material;
+mod material_textures;
+mod meshopt;
 mod names;
 mod nodes;
 mod numbers;
+mod pose;
 mod primitive;
 mod report;
 mod save;
@@ -109,29 +117,48 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     let mut budget = Budget::new(options.memory_limit_bytes);
     budget.take(bytes.len() as u64, "the file")?;
     let container = container::split(bytes, &mut report)?;
-    let document = document::parse(container.json, &mut report)?;
+    let mut document = document::parse(container.json, &mut report)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let buffers =
-        buffers::Buffers::resolve(&document.root, container.binary, folder, &mut budget, &mut report)?;
+    let views = document.root.buffer_views.clone();
+    let buffers = buffers::Buffers::resolve(
+        &document.root.buffers,
+        &views,
+        container.binary,
+        folder,
+        &mut budget,
+        &mut report,
+    )?;
+    let instanced = instancing::read(&document.root, &buffers, &mut budget)?;
+    instancing::take_apart(&mut document, &instanced);
 
     let mut images = images::Images::new(&document.root, &buffers, folder);
     let materials = material::read_all(&document, folder, &mut images, &mut budget, &mut report)?;
     let mut materials = surface::Materials::new(materials);
     let placed = nodes::place(&document, &mut report)?;
 
+    let stands = placed
+        .iter()
+        .map(|placed| (placed.node, placed.world_from_node))
+        .collect();
+
     let mut scene = Scene::default();
     surface::add_objects(
         &mut scene,
-        surface::Source {
-            root: &document.root,
-            buffers: &buffers,
-            placed: &placed,
-            solid_glass: options.solid_glass,
+        primitive::Source {
+            reader: accessor::Reader {
+                root: &document.root,
+                buffers: &buffers,
+            },
+            poses: &document.poses,
+            stands: &stands,
         },
+        &placed,
+        options.solid_glass,
         &mut materials,
         &mut budget,
         &mut report,
     )?;
+    materials.warn_of_thin_walls(options.solid_glass, &mut report);
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
     let lights = light::all(&document, &placed, folder, &mut report)?;
@@ -175,16 +202,19 @@ pub fn rebase(scene: &mut Scene) {
 /// emitted, its colour has a luminance of 1, and its
 /// spectrum is the material's.
 pub fn add_lights(scene: &mut Scene) {
-    for (object, part) in scene.objects.iter().enumerate() {
-        let material = scene.material_of(object);
-        let emitted = material.emitted_radiance;
-        let spectrum = material.emission_spectrum.clone();
+    for object in 0..scene.objects.len() {
+        let mesh = scene.objects[object].in_scene();
+        let image = scene.material_of(object).emission_texture.as_ref();
+        let glow = image.and_then(|image| Glow::new(mesh, image, &scene.textures[image.texture]));
+        scene.glows.extend(glow.map(|glow| (object, Arc::new(glow))));
+        let emitted = scene.emitted_radiance(object);
         let luminance = emitted.luminance();
+        let part = &scene.objects[object];
         if luminance > 0.0 && part.in_scene().area_m2() > 0.0 {
             scene.lights.push(Light {
                 name: part.name.clone(),
                 colour: emitted / luminance,
-                spectrum,
+                spectrum: scene.material_of(object).emission_spectrum.clone(),
                 kind: LightKind::Surface {
                     object,
                     radiance: Radiance(luminance),
@@ -255,11 +285,22 @@ impl File {
         let bytes = files::read_file(path, most_bytes)?;
         let mut report = Report::default();
         let split = container::split(&bytes, &mut report)?;
-        let document = document::parse(split.json, &mut report)?;
-        let placed = nodes::place(&document, &mut report)?;
+        let mut document = document::parse(split.json, &mut report)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+        let mut glb = Glb::of(&split, &folder, most_bytes)?;
+        if instancing::is_used(&document.root) {
+            let mut budget = Budget::new(most_bytes);
+            let root = &document.root;
+            let (all, views) = (&root.buffers, &root.buffer_views);
+            let buffers =
+                buffers::Buffers::resolve(all, views, split.binary, &folder, &mut budget, &mut report)?;
+            let instanced = instancing::read(root, &buffers, &mut budget)?;
+            instancing::take_apart(&mut document, &instanced);
+            glb.take_apart(&instanced);
+        }
+        let placed = nodes::place(&document, &mut report)?;
         Ok(Self {
-            glb: Glb::of(&split, &folder, most_bytes)?,
+            glb,
             is_binary: split.is_binary,
             bytes,
             folder,

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use glam::{DAffine3, DMat3, DMat4, DQuat, DVec3};
 use gltf::json::camera::{Camera as Source, Type};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Node, Root};
+use gltf::json::{Index, Node, Root, Value};
 
 use super::document::{Document, NodeTransform};
 use super::names;
@@ -25,7 +25,7 @@ pub struct Placed {
     pub world_from_node: DAffine3,
 }
 
-/// The nodes of the default scene (else the first; else all that are nobody's child), parents first.
+/// The nodes of the default scene (else the first; else all that are nobody's child) that are not hidden, parents first.
 ///
 /// # Errors
 /// A reference to a node that does not exist; a transform that is not finite.
@@ -34,11 +34,11 @@ pub fn place(document: &Document, report: &mut Report) -> Result<Vec<Placed>> {
     let mut reached = vec![false; root.nodes.len()];
     let mut placed = Vec::new();
     // A stack of our own: a chain of a million nodes must not exhaust the thread's.
-    let mut waiting: Vec<(usize, DAffine3)> = Vec::new();
+    let mut waiting: Vec<(usize, DAffine3, bool)> = Vec::new();
     for node in top_nodes(root, report).into_iter().rev() {
-        waiting.push((node, DAffine3::IDENTITY));
+        waiting.push((node, DAffine3::IDENTITY, false));
     }
-    while let Some((index, world_from_parent)) = waiting.pop() {
+    while let Some((index, world_from_parent, is_below_hidden)) = waiting.pop() {
         let Some(node) = root.nodes.get(index) else {
             return Err(Error::failure(
                 format!("node {index}"),
@@ -59,18 +59,21 @@ pub fn place(document: &Document, report: &mut Report) -> Result<Vec<Placed>> {
         if !world_from_node.is_finite() {
             return Err(not_finite(&name));
         }
+        let is_hidden = is_below_hidden || is_hidden(node);
         let children = node.children.as_deref().unwrap_or_default();
         waiting.extend(
             children
                 .iter()
                 .rev()
-                .map(|child| (child.value(), world_from_node)),
+                .map(|child| (child.value(), world_from_node, is_hidden)),
         );
-        placed.push(Placed {
-            node: index,
-            name,
-            world_from_node,
-        });
+        if !is_hidden {
+            placed.push(Placed {
+                node: index,
+                name,
+                world_from_node,
+            });
+        }
     }
     let unreached = reached.iter().filter(|reached| !**reached).count();
     if root.scenes.is_empty() && unreached > 0 {
@@ -81,6 +84,17 @@ pub fn place(document: &Document, report: &mut Report) -> Result<Vec<Placed>> {
         );
     }
     Ok(placed)
+}
+
+/// Name of the extension that hides nodes with all below them.
+pub const VISIBILITY: &str = "KHR_node_visibility";
+
+fn is_hidden(node: &Node) -> bool {
+    let stated = node
+        .extensions
+        .as_ref()
+        .and_then(|extensions| extensions.others.get(VISIBILITY));
+    stated.and_then(|stated| stated.get("visible")) == Some(&Value::Bool(false))
 }
 
 fn top_nodes(root: &Root, report: &mut Report) -> Vec<usize> {

@@ -4,14 +4,18 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec2, DVec3, DVec4};
+use gltf::json::Index;
+use gltf::json::accessor::Accessor;
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::accessor::{Formats, Reader};
+use super::pose::{Place, Poses};
 use super::report::{Budget, Report};
-use super::triangles;
+use super::{draco, pose, triangles};
 use crate::error::{Error, Result};
+use crate::optics::LinearSrgb;
 use crate::scene::Mesh;
 
 /// Beyond this [m], squares and volumes leave the range in which they are exact enough to be of use.
@@ -36,8 +40,8 @@ pub fn take_copy(mesh: &Mesh, owner: &str, budget: &mut Budget) -> Result<()> {
 /// The primitives that were read: nodes with the same mesh share them.
 #[derive(Debug, Default)]
 pub struct Primitives {
-    /// By the indices of mesh and primitive.
-    known: HashMap<(usize, usize), Known>,
+    /// By the indices of mesh and primitive, and of the node that bends it, if one does.
+    known: HashMap<(usize, usize, Option<usize>), Known>,
     /// Triangles without an area.
     pub degenerate: usize,
 }
@@ -45,10 +49,32 @@ pub struct Primitives {
 /// A primitive of the file.
 #[derive(Debug)]
 struct Known {
-    /// As the file has it, and whether it has normals; `None` where it has no triangles.
-    source: Option<(Mesh, bool)>,
+    /// `None` where it has no triangles.
+    source: Option<Local>,
     /// What objects were made of it. Which triangles have an area depends on the transform by what it rounds.
     made: Vec<(Variant, Arc<Mesh>)>,
+}
+
+/// A primitive as the file has it.
+#[derive(Debug)]
+struct Local {
+    mesh: Mesh,
+    has_normals: bool,
+    /// Whether its positions were rounded to single precision.
+    is_rounded: bool,
+    /// Mean of its vertices' colours, over the area.
+    colour: Option<LinearSrgb>,
+}
+
+/// What primitives are read from.
+#[derive(Clone, Copy, Debug)]
+pub struct Source<'a> {
+    /// The file's data.
+    pub reader: Reader<'a>,
+    /// What bends meshes.
+    pub poses: &'a Poses,
+    /// Where nodes stand, by their glTF index.
+    pub stands: &'a HashMap<usize, DAffine3>,
 }
 
 /// What two meshes of one primitive differ in.
@@ -78,31 +104,38 @@ impl Variant {
 }
 
 impl Primitives {
-    /// The triangles of a primitive, in coordinates from which `world_from_node` brings them into the world; `None`, with a
-    /// warning, where it has none there.
+    /// The triangles of a primitive, in coordinates from which `world_from_node` brings them into the world, and the mean
+    /// colour of its vertices, if they have any; `None`, with a warning, where it has none there.
     ///
     /// # Errors
     /// Positions that are not finite or too far, indices of vertices that do not exist, broken accessors.
     pub fn read(
         &mut self,
-        reader: Reader,
-        (mesh, index, primitive): (usize, usize, &Primitive),
+        source: Source,
+        (place, primitive): (Place, &Primitive),
         world_from_node: &DAffine3,
         owner: &str,
         budget: &mut Budget,
         report: &mut Report,
-    ) -> Result<Option<Arc<Mesh>>> {
-        let known = match self.known.entry((mesh, index)) {
+    ) -> Result<Option<(Arc<Mesh>, Option<LinearSrgb>)>> {
+        let bent_by = source.poses.is_own(place.node).then_some(place.node);
+        let known = match self.known.entry((place.mesh, place.primitive, bent_by)) {
             Entry::Occupied(known) => known.into_mut(),
-            Entry::Vacant(place) => place.insert(Known {
-                source: read_local(reader, primitive, owner, budget, report)?,
-                made: Vec::new(),
-            }),
+            Entry::Vacant(entry) => {
+                let local = read_local(source, (place, primitive), owner, budget, report)?;
+                entry.insert(Known {
+                    source: local,
+                    made: Vec::new(),
+                })
+            }
         };
-        let Some((source, has_normals)) = &known.source else {
+        let Some(local) = &known.source else {
             return Ok(None);
         };
-        warn_of_rounding(source, world_from_node, owner, report);
+        let (source, has_normals) = (&local.mesh, local.has_normals);
+        if local.is_rounded {
+            warn_of_rounding(source, world_from_node, owner, report);
+        }
         let has_area = have_area(source, world_from_node, owner)?;
         self.degenerate += has_area.iter().filter(|has_area| !**has_area).count();
         if !has_area.contains(&true) {
@@ -119,34 +152,183 @@ impl Primitives {
             has_area,
         };
         if let Some((_, made)) = known.made.iter().find(|(made, _)| *made == variant) {
-            return Ok(Some(Arc::clone(made)));
+            return Ok(Some((Arc::clone(made), local.colour)));
         }
         if !known.made.is_empty() {
             take_copy(source, owner, budget)?;
         }
-        let mut mesh = variant.of(source, *has_normals, owner, report);
+        let mut mesh = variant.of(source, has_normals, owner, report);
         if variant.stands_at_origin {
             mesh = mesh.placed(world_from_node);
         }
         let mesh = Arc::new(mesh);
         known.made.push((variant, Arc::clone(&mesh)));
-        Ok(Some(mesh))
+        Ok(Some((mesh, local.colour)))
     }
 
     /// Forgets a mesh that no other node has.
     pub fn forget(&mut self, mesh: usize) {
-        self.known.retain(|(known, _), _| *known != mesh);
+        self.known.retain(|(known, ..), _| *known != mesh);
     }
 }
 
-/// The primitive in its node's coordinates, and whether the file has normals for it.
+/// What a primitive has of each vertex.
+struct Vertices<'a> {
+    reader: Reader<'a>,
+    primitive: &'a Primitive,
+    unpacked: Option<draco::Unpacked>,
+    owner: &'a str,
+}
+
+impl Vertices<'_> {
+    fn index(&self, semantic: Semantic) -> Option<Index<Accessor>> {
+        self.primitive.attributes.get(&Checked::Valid(semantic)).copied()
+    }
+
+    /// An attribute; `None` where the primitive does not have it.
+    fn read<const N: usize>(
+        &self,
+        semantic: Semantic,
+        formats: Formats,
+        budget: &mut Budget,
+    ) -> Result<Option<Vec<[f64; N]>>> {
+        let Some(index) = self.index(semantic.clone()) else {
+            return Ok(None);
+        };
+        let unpacked = self.unpacked.as_ref().filter(|unpacked| unpacked.has(&semantic));
+        let Some(unpacked) = unpacked else {
+            return self.reader.vectors(index, formats, self.owner, budget).map(Some);
+        };
+        let accessor = self.reader.root.accessors.get(index.value());
+        let is_normalised = accessor.is_some_and(|accessor| accessor.normalized);
+        let read = unpacked.vectors(&semantic, is_normalised);
+        let what = || format!("its Draco data has no {} of {N} numbers", semantic.to_string());
+        read.map(Some)
+            .ok_or_else(|| Error::failure(self.owner, what(), "export the file again"))
+    }
+
+    /// The same for every vertex, or `None`, with a warning where there is another number of them.
+    fn one_each<const N: usize, T: From<[f64; N]>>(
+        &self,
+        (semantic, what): (Semantic, &str),
+        formats: Formats,
+        count: usize,
+        budget: &mut Budget,
+        report: &mut Report,
+    ) -> Result<Option<Vec<T>>> {
+        let read = self.read(semantic, formats, budget)?;
+        let fits = read.filter(|read| one_per_vertex(read.len(), count, what, self.owner, report));
+        Ok(fits.map(convert))
+    }
+
+    /// The mesh as its file has it at rest.
+    fn bent(&self, source: Source, place: Place, mesh: &Mesh, budget: &mut Budget) -> Result<Mesh> {
+        let Source {
+            reader,
+            poses,
+            stands,
+        } = source;
+        let mut bent = mesh.clone();
+        poses.morph(place, &mut bent, reader, self.owner, budget)?;
+        if poses.has_skin(place.node) {
+            let mut influences = Vec::new();
+            for set in 0.. {
+                let joints = self.read(Semantic::Joints(set), Formats::Index, budget)?;
+                let weights = self.read(Semantic::Weights(set), Formats::FloatOrShare, budget)?;
+                let Some(both) = joints.zip(weights) else {
+                    break;
+                };
+                influences.push(both);
+            }
+            let joints = poses.joints(place.node, stands, reader, self.owner, budget)?;
+            pose::hang(&mut bent, &joints, &influences, self.owner)?;
+        }
+        Ok(bent)
+    }
+
+    fn order(&self, vertex_count: usize, budget: &mut Budget) -> Result<Vec<u32>> {
+        let owner = self.owner;
+        let vertices = match (&self.unpacked, self.primitive.indices) {
+            (Some(unpacked), _) => unpacked.indices(),
+            (None, Some(indices)) => self.reader.indices(indices, owner, budget)?,
+            (None, None) => {
+                let count = u32::try_from(vertex_count).map_err(|_| {
+                    Error::failure(owner, "has more vertices than glTF allows", "split the mesh")
+                })?;
+                return Ok((0..count).collect());
+            }
+        };
+        match vertices.iter().find(|vertex| **vertex as usize >= vertex_count) {
+            Some(vertex) => Err(Error::failure(
+                owner,
+                format!("refers to vertex {vertex}, but has only {vertex_count}"),
+                "repair the mesh or export the file again",
+            )),
+            None => Ok(vertices),
+        }
+    }
+
+    /// Mean of the colours over the area of the triangles.
+    fn colour(&self, mesh: &Mesh, budget: &mut Budget, report: &mut Report) -> Result<Option<LinearSrgb>> {
+        let Some(index) = self.index(Semantic::Colors(0)) else {
+            return Ok(None);
+        };
+        let has_alpha = self.reader.root.accessors.get(index.value()).is_some_and(
+            |accessor| matches!(accessor.type_, Checked::Valid(shape) if shape.multiplicity() == 4),
+        );
+        let (which, formats) = ((Semantic::Colors(0), "colours"), Formats::FloatOrShare);
+        let count = mesh.positions.len();
+        let colours: Option<Vec<DVec3>> = if has_alpha {
+            let colours = self.one_each::<4, DVec4>(which, formats, count, budget, report)?;
+            colours.map(|colours| colours.into_iter().map(DVec4::truncate).collect())
+        } else {
+            self.one_each(which, formats, count, budget, report)?
+        };
+        let Some(colours) = colours else {
+            return Ok(None);
+        };
+        let (mut sum, mut area) = (DVec3::ZERO, 0.0);
+        for (triangle, corners) in mesh.triangles.iter().enumerate() {
+            let weight = mesh.triangle_area_m2(triangle);
+            let of_triangle = corners
+                .iter()
+                .map(|vertex| colours[*vertex as usize])
+                .sum::<DVec3>();
+            sum += of_triangle / 3.0 * weight;
+            area += weight;
+        }
+        let mean = sum / area;
+        if !mean.is_finite() {
+            return Ok(None);
+        }
+        let mean = mean.clamp(DVec3::ZERO, DVec3::ONE);
+        // One colour is the same wherever it is averaged, and white is white.
+        let mean = (mean / COLOUR_STEP).round() * COLOUR_STEP;
+        if colours.iter().any(|colour| colour.distance(mean) > SAME_COLOUR) {
+            report.warn(
+                self.owner,
+                "its vertex colours were read as their mean",
+                "use a base colour texture",
+            );
+        }
+        Ok(Some(mean.to_array().into()))
+    }
+}
+
+/// Colours of vertices differ by no more where they are one colour.
+const SAME_COLOUR: f64 = 1e-3;
+
+/// Mean colours are rounded to multiples of this, a power of 2.
+const COLOUR_STEP: f64 = 1.0 / 1_048_576.0;
+
+/// The primitive in its node's coordinates.
 fn read_local(
-    reader: Reader,
-    primitive: &Primitive,
+    source: Source,
+    (place, primitive): (Place, &Primitive),
     owner: &str,
     budget: &mut Budget,
     report: &mut Report,
-) -> Result<Option<(Mesh, bool)>> {
+) -> Result<Option<Local>> {
     let Checked::Valid(mode) = primitive.mode else {
         report.warn(
             owner,
@@ -155,81 +337,81 @@ fn read_local(
         );
         return Ok(None);
     };
-    let attribute = |semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
-    let Some(positions) = attribute(Semantic::Positions) else {
+    let reader = source.reader;
+    let vertices = Vertices {
+        reader,
+        primitive,
+        unpacked: draco::unpack(reader, primitive, owner, budget)?,
+        owner,
+    };
+    let Some(positions) = vertices.read(Semantic::Positions, Formats::Float, budget)? else {
         report.warn(owner, "has no positions and was skipped", "export the file again");
         return Ok(None);
     };
-    let positions: Vec<DVec3> = convert(reader.vectors(positions, Formats::Float, owner, budget)?);
-    budget.take(positions.len() as u64 * VERTEX_BYTES, owner)?;
-    let vertices = read_vertex_order(reader, primitive, positions.len(), owner, budget)?;
-    budget.take(vertices.len() as u64 * TRIANGLE_BYTES, owner)?;
-    let Some(triangles) = assemble(&vertices, mode, owner, report) else {
+    let positions: Vec<DVec3> = convert(positions);
+    let count = positions.len();
+    budget.take(count as u64 * VERTEX_BYTES, owner)?;
+    let order = vertices.order(count, budget)?;
+    budget.take(order.len() as u64 * TRIANGLE_BYTES, owner)?;
+    let mode = if vertices.unpacked.is_some() {
+        Mode::Triangles
+    } else {
+        mode
+    };
+    let Some(triangles) = assemble(&order, mode, owner, report) else {
         return Ok(None);
     };
-    let normals: Option<Vec<DVec3>> = match attribute(Semantic::Normals) {
-        Some(index) => Some(convert(reader.vectors(index, Formats::Float, owner, budget)?)),
-        None => None,
-    };
-    let normals =
-        normals.filter(|normals| one_per_vertex(normals.len(), positions.len(), "normals", owner, report));
+    let normals: Option<Vec<DVec3>> = vertices.one_each(
+        (Semantic::Normals, "normals"),
+        Formats::Float,
+        count,
+        budget,
+        report,
+    )?;
     let mut uv_sets = [None, None];
     for (set, uvs) in uv_sets.iter_mut().enumerate() {
-        if let Some(index) = attribute(Semantic::TexCoords(set as u32)) {
-            let read: Vec<DVec2> =
-                convert(reader.vectors(index, Formats::FloatOrNormalised, owner, budget)?);
-            let fits = one_per_vertex(read.len(), positions.len(), "texture coordinates", owner, report);
-            *uvs = fits.then(|| finite_uvs(read, owner, report));
-        }
-    }
-    if primitive
-        .attributes
-        .contains_key(&Checked::Valid(Semantic::Colors(0)))
-    {
-        report.warn(
-            owner,
-            "its vertex colours are ignored",
-            "use a base colour texture",
-        );
+        let which = (Semantic::TexCoords(set as u32), "texture coordinates");
+        let read = vertices.one_each(which, Formats::FloatOrShare, count, budget, report)?;
+        *uvs = read.map(|read| finite_uvs(read, owner, report));
     }
     let [uv0, uv1] = uv_sets;
     let has_normals = normals.is_some();
-    let normals = normals.unwrap_or_else(|| vec![DVec3::ZERO; positions.len()]);
-    let mesh = Mesh {
+    let mut mesh = Mesh {
+        normals: normals.unwrap_or_else(|| vec![DVec3::ZERO; count]),
         positions,
-        normals,
         uv0,
         uv1,
         triangles,
     };
-    Ok(Some((mesh, has_normals)))
+    let colour = vertices.colour(&mesh, budget, report).unwrap_or_else(|error| {
+        report.warn(
+            error.location,
+            format!("{}; its colours were left out", error.what),
+            error.remedy,
+        );
+        None
+    });
+    if source.poses.bend(place) {
+        match vertices.bent(source, place, &mesh, budget) {
+            Ok(bent) => mesh = bent,
+            Err(error) => report.warn(
+                error.location,
+                format!("{}; it was left as it is", error.what),
+                error.remedy,
+            ),
+        }
+    }
+    let positions = vertices.index(Semantic::Positions);
+    Ok(Some(Local {
+        mesh,
+        has_normals,
+        is_rounded: positions.is_some_and(|index| reader.has_floats(index)),
+        colour,
+    }))
 }
 
 fn convert<const N: usize, T: From<[f64; N]>>(vectors: Vec<[f64; N]>) -> Vec<T> {
     vectors.into_iter().map(T::from).collect()
-}
-
-fn read_vertex_order(
-    reader: Reader,
-    primitive: &Primitive,
-    vertex_count: usize,
-    owner: &str,
-    budget: &mut Budget,
-) -> Result<Vec<u32>> {
-    let Some(indices) = primitive.indices else {
-        let count = u32::try_from(vertex_count)
-            .map_err(|_| Error::failure(owner, "has more vertices than glTF allows", "split the mesh"))?;
-        return Ok((0..count).collect());
-    };
-    let vertices = reader.indices(indices, owner, budget)?;
-    match vertices.iter().find(|vertex| **vertex as usize >= vertex_count) {
-        Some(vertex) => Err(Error::failure(
-            owner,
-            format!("refers to vertex {vertex}, but has only {vertex_count}"),
-            "repair the mesh or export the file again",
-        )),
-        None => Ok(vertices),
-    }
 }
 
 fn assemble(vertices: &[u32], mode: Mode, owner: &str, report: &mut Report) -> Option<Vec<[u32; 3]>> {

@@ -5,34 +5,34 @@ use crate::error::{Error, Result, Warning};
 /// Warnings: the same thing met at several places is said once.
 #[derive(Debug, Default)]
 pub struct Report {
-    found: Vec<Finding>,
+    found: Vec<CheckResult>,
     left_out: usize,
 }
 
 #[derive(Debug)]
-struct Finding {
+struct CheckResult {
     what: String,
     remedy: String,
     locations: Vec<String>,
 }
 
 /// More would bury the ones that matter.
-const MOST_FINDINGS: usize = 60;
+const MAX_FINDINGS: usize = 60;
 
 /// Places that a warning names before it only counts them.
-const MOST_LOCATIONS: usize = 4;
+const MAX_LOCATIONS: usize = 4;
 
 impl Report {
     /// Notes something repaired or ignored.
     pub fn warn(&mut self, location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) {
         let (location, what, remedy) = (location.into(), what.into(), remedy.into());
-        let same = |known: &&mut Finding| known.what == what && known.remedy == remedy;
+        let same = |known: &&mut CheckResult| known.what == what && known.remedy == remedy;
         if let Some(known) = self.found.iter_mut().find(same) {
             if !known.locations.contains(&location) {
                 known.locations.push(location);
             }
-        } else if self.found.len() < MOST_FINDINGS {
-            self.found.push(Finding {
+        } else if self.found.len() < MAX_FINDINGS {
+            self.found.push(CheckResult {
                 what,
                 remedy,
                 locations: vec![location],
@@ -44,7 +44,7 @@ impl Report {
 
     /// All of them, in the order they were first met.
     pub fn into_warnings(self) -> Vec<Warning> {
-        let mut warnings: Vec<Warning> = self.found.into_iter().map(Finding::into_warning).collect();
+        let mut warnings: Vec<Warning> = self.found.into_iter().map(CheckResult::into_warning).collect();
         if self.left_out > 0 {
             warnings.push(Warning::new(
                 "glTF",
@@ -56,9 +56,9 @@ impl Report {
     }
 }
 
-impl Finding {
+impl CheckResult {
     fn into_warning(self) -> Warning {
-        let named = self.locations.len().min(MOST_LOCATIONS);
+        let named = self.locations.len().min(MAX_LOCATIONS);
         let mut location = self.locations[..named].join(", ");
         if self.locations.len() > named {
             location += &format!(" and {} more", self.locations.len() - named);

@@ -20,7 +20,7 @@ use crate::scene::Light;
 pub const KEY: &str = "spectrum";
 
 /// More than any table of a lamp takes [bytes].
-const MOST_CSV_BYTES: u64 = 16 << 20;
+const MAX_CSV_BYTES: u64 = 16 << 20;
 
 /// What is stated for a light: by its node, or else by its entry in a list of lights.
 pub fn stated<'a>(
@@ -75,7 +75,7 @@ fn by_name_or_file(stated: &str, folder: &Path, owner: &str) -> Result<Spectrum>
     if !is_file {
         return illuminant(stated).map_err(|error| of_file(error.at(owner)));
     }
-    let bytes = uri::read(stated, folder, MOST_CSV_BYTES, owner)?;
+    let bytes = uri::read(stated, folder, MAX_CSV_BYTES, owner)?;
     let no_text = |_| Error::failure(owner, format!("its `{KEY}` is no text file"), "save it as UTF-8");
     let table = String::from_utf8(bytes).map_err(no_text)?;
     read_lamp(&table)

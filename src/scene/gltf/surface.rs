@@ -1,91 +1,82 @@
 //! The objects of a scene: every primitive of every placed node.
 
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
-use gltf::json::{Root, mesh};
+use glam::DAffine3;
+use gltf::json::mesh;
 
-use super::accessor::Reader;
-use super::buffers::Buffers;
 use super::nodes::Placed;
+use super::pose::Place;
 use super::primitive::{self, Primitives};
 use super::report::{Budget, Report};
 use super::{material, names};
 use crate::error::{Error, Result};
-use crate::scene::closed::is_closed;
-use crate::scene::{Material, Mesh, Object, Scene, SurfaceKind, instances};
+use crate::optics::LinearSrgb;
+use crate::scene::closed::{has_volume, is_closed};
+use crate::scene::{Material, Mesh, Object, Scene, instances};
 
-/// What objects are read from.
-#[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
-    /// The typed JSON.
-    pub root: &'a Root,
-    /// Its binary data.
-    pub buffers: &'a Buffers<'a>,
-    /// The scene's nodes.
-    pub placed: &'a [Placed],
-    /// Reads thin walls as solid glass where their mesh is closed.
-    pub solid_glass: bool,
-}
-
-/// Adds all objects, and to `materials` (in file order so far) those that the file only implies.
+/// Adds all objects, and to `materials` (in file order so far) those that the file only implies. `solid_glass` reads thin
+/// walls as solid glass where their mesh encloses space.
 ///
 /// # Errors
 /// A mesh that does not exist, or as [`Primitives::read`].
 pub fn add_objects(
     scene: &mut Scene,
-    source: Source,
+    source: primitive::Source,
+    placed: &[Placed],
+    solid_glass: bool,
     materials: &mut Materials,
     budget: &mut Budget,
     report: &mut Report,
 ) -> Result<()> {
-    let reader = Reader {
-        root: source.root,
-        buffers: source.buffers,
-    };
+    let root = source.reader.root;
     let mut primitives = Primitives::default();
-    let mut uses = vec![0; source.root.meshes.len()];
-    let meshes = source
-        .placed
-        .iter()
-        .filter_map(|placed| source.root.nodes[placed.node].mesh);
+    let mut closed = HashMap::new();
+    let mut uses = vec![0; root.meshes.len()];
+    let meshes = placed.iter().filter_map(|placed| root.nodes[placed.node].mesh);
     for mesh in meshes {
         if let Some(uses) = uses.get_mut(mesh.value()) {
             *uses += 1;
         }
     }
-    for placed in source.placed {
-        let Some(mesh_index) = source.root.nodes[placed.node].mesh else {
+    for placed in placed {
+        let Some(mesh_index) = root.nodes[placed.node].mesh else {
             continue;
         };
-        let Some(mesh) = source.root.meshes.get(mesh_index.value()) else {
+        let Some(mesh) = root.meshes.get(mesh_index.value()) else {
             return Err(Error::failure(
                 format!("node `{}`", placed.name),
                 format!("has mesh {}, which does not exist", mesh_index.value()),
                 "export the file again",
             ));
         };
+        // Joints place what they bend, wherever its node stands.
+        let world_from_node = match source.poses.has_skin(placed.node) {
+            true => DAffine3::IDENTITY,
+            false => placed.world_from_node,
+        };
         for (index, part) in mesh.primitives.iter().enumerate() {
             let owner = owner(mesh, mesh_index.value(), index);
-            let read = primitives.read(
-                reader,
-                (mesh_index.value(), index, part),
-                &placed.world_from_node,
-                &owner,
-                budget,
-                report,
-            )?;
-            let Some(mesh) = read else {
+            let place = Place {
+                node: placed.node,
+                mesh: mesh_index.value(),
+                primitive: index,
+            };
+            let read = primitives.read(source, (place, part), &world_from_node, &owner, budget, report)?;
+            let Some((mesh, colour)) = read else {
                 continue;
             };
             let mut object = Object::new(placed.name.as_str(), (placed.node, index), 0, mesh);
-            object.place(placed.world_from_node);
+            object.place(world_from_node);
             let material = materials.of_primitive(part, &owner, report);
-            let material = if source.solid_glass {
-                materials.as_solid(material, &object, report)
-            } else {
-                material
+            let is_solid = || {
+                let mesh = object.mesh();
+                let mut is_closed = || *closed.entry(Arc::as_ptr(mesh)).or_insert_with(|| is_closed(mesh));
+                solid_glass && has_volume(object.in_scene()) && is_closed()
             };
+            let material = materials.thin_or_solid(material, is_solid);
+            let material = materials.tinted(material, colour);
             materials.check_coordinates(material, object.mesh(), &placed.name, report);
             object.material = material;
             scene.objects.push(object);
@@ -115,7 +106,7 @@ fn take_copies(objects: &[Object], budget: &mut Budget) -> Result<()> {
     let mut known = HashSet::new();
     for (object, is_instance) in objects
         .iter()
-        .zip(instances::find(objects, instances::MOST_COPIED))
+        .zip(instances::find(objects, instances::MAX_COPIED))
     {
         if !known.insert(Arc::as_ptr(object.mesh())) && !is_instance {
             let owner = format!("node `{}`", object.name);
@@ -138,8 +129,10 @@ pub struct Materials {
     all: Vec<Material>,
     in_file: usize,
     default: Option<usize>,
-    /// The solid twin of each of the file's materials.
-    solid: Vec<Option<usize>>,
+    /// What became of each thin wall among the file's materials: as which it is used, and its twin of the other kind.
+    thin: HashMap<usize, (bool, Option<usize>)>,
+    /// The twins in other colours: of which material, by what it is multiplied, and which it is.
+    tinted: Vec<(usize, LinearSrgb, usize)>,
 }
 
 impl Materials {
@@ -148,7 +141,8 @@ impl Materials {
         Self {
             in_file: in_file.len(),
             default: None,
-            solid: vec![None; in_file.len()],
+            thin: HashMap::new(),
+            tinted: Vec::new(),
             all: in_file,
         }
     }
@@ -176,30 +170,70 @@ impl Materials {
         })
     }
 
-    /// The material that a thin wall has as a solid, where its mesh is closed; any other stays.
-    fn as_solid(&mut self, material: usize, object: &Object, report: &mut Report) -> usize {
-        if self.all[material].surface != SurfaceKind::ThinWall {
+    /// The material of a thin wall for a mesh that is solid or not; any other stays. The first mesh decides what the
+    /// material itself becomes, and meshes of the other kind have a twin of it.
+    fn thin_or_solid(&mut self, material: usize, is_solid: impl FnOnce() -> bool) -> usize {
+        let is_known = self.thin.contains_key(&material);
+        if !is_known && !material::is_thin(&self.all[material]) {
             return material;
         }
-        if !is_closed(&object.copy_in_scene()) {
+        let is_solid = is_solid();
+        let (own, twin) = self.thin.entry(material).or_insert((is_solid, None));
+        if *own == is_solid {
+            if !is_known && is_solid {
+                material::make_solid(&mut self.all[material]);
+            }
+            return material;
+        }
+        *twin.get_or_insert_with(|| {
+            let own = &self.all[material];
+            let made = if is_solid {
+                material::solid_twin(own)
+            } else {
+                material::thin_twin(own)
+            };
+            self.all.push(made);
+            self.all.len() - 1
+        })
+    }
+
+    /// Warns of the thin walls that are left.
+    pub fn warn_of_thin_walls(&self, solid_glass: bool, report: &mut Report) {
+        for material in self.all.iter().filter(|material| material::is_thin(material)) {
             report.warn(
-                format!("node `{}`", object.name),
-                "is not closed, so that it stays a pane without thickness",
-                "close its mesh to make it solid glass",
+                format!("material `{}`", material.name),
+                "transmits light but has no thickness, so that it is a thin pane that does not refract",
+                if solid_glass {
+                    "give it a volume, or close its mesh, to make it solid glass"
+                } else {
+                    "give it a volume, or leave --solid-glass on"
+                },
             );
+        }
+    }
+
+    /// The material with its base colour multiplied, where that changes it.
+    fn tinted(&mut self, material: usize, colour: Option<LinearSrgb>) -> usize {
+        let Some(colour) = colour.filter(|colour| *colour != LinearSrgb::WHITE) else {
             return material;
+        };
+        let same = |known: &&(usize, LinearSrgb, usize)| (known.0, known.1) == (material, colour);
+        if let Some((.., twin)) = self.tinted.iter().find(same) {
+            return *twin;
         }
-        if let Some(solid) = self.solid[material] {
-            return solid;
-        }
-        self.all.push(material::solid_twin(&self.all[material]));
-        let solid = self.all.len() - 1;
-        self.solid[material] = Some(solid);
-        solid
+        let twin = self.all.len();
+        let own = &self.all[material];
+        self.all.push(Material {
+            name: format!("{} (tinted)", own.name),
+            base_colour: own.base_colour * colour,
+            ..own.clone()
+        });
+        self.tinted.push((material, colour, twin));
+        twin
     }
 
     fn check_coordinates(&self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) {
-        let Some(texture) = &self.all[material].base_colour_texture else {
+        let Some(texture) = self.all[material].coordinates() else {
             return;
         };
         let uvs = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };

@@ -50,8 +50,8 @@ fn read_data(data: &str, owner: &str) -> Result<Vec<u8>> {
 /// The file that a URI names, where it may be read.
 pub fn file(uri: &str, folder: &Path) -> Option<PathBuf> {
     // Data, and texts that no system takes for a name.
-    const MOST_BYTES: usize = 1024;
-    if uri.len() > MOST_BYTES {
+    const MAX_BYTES: usize = 1024;
+    if uri.len() > MAX_BYTES {
         return None;
     }
     path_within(folder, uri, "").ok()

@@ -5,8 +5,8 @@
 //! done there, once. All decisions on the way have to be the same in every shard: what depends on what the light did is
 //! refused.
 
-mod labour;
 mod pass_sums;
+mod shard_role;
 
 use std::time::Instant;
 
@@ -19,8 +19,8 @@ use crate::session::clock::Clock;
 use crate::session::light_level::LightStates;
 use crate::session::{BakeResult, BakeSession, Timings};
 use crate::settings::{BakeSettings, MapResolution};
-pub(super) use labour::Labour;
 pub(super) use pass_sums::PassSums;
+pub(super) use shard_role::ShardRole;
 
 /// What a shard gives.
 #[derive(Clone, Debug)]
@@ -108,16 +108,16 @@ impl BakeSession {
         self.threads.of(settings)?.install(|| {
             let (whole, mut clock) = (Stopwatch::start(), Clock::default());
             let ground = self.ground(settings, progress, control, (&mut clock, Instant::now()));
-            let mut labour = Labour::shard(share);
+            let mut role = ShardRole::shard(share);
             let mut states = LightStates::default();
-            ground.bake(&self.sizes, &mut states, &mut clock, &mut labour, &mut ())?;
+            ground.bake(&self.sizes, &mut states, &mut clock, &mut role, &mut ())?;
             if control.is_cancelled() {
                 return Err(Error::cancelled(&self.scene.source));
             }
             clock.total = whole.elapsed();
             let (timings_s, cpu_s) = clock.timings();
             Ok(ShardSums {
-                passes: labour.into_passes(),
+                passes: role.into_passes(),
                 timings_s,
                 cpu_s,
             })
@@ -138,13 +138,13 @@ impl BakeSession {
         check(settings)?;
         // What was kept of other bakes is not what the shards began from.
         self.lights = LightStates::default();
-        let mut labour = Labour::merge(shards);
+        let mut role = ShardRole::merge(shards);
         let threads = self.threads.of(settings)?;
-        let result = threads.install(|| self.bake_here(settings, progress, control, None, &mut labour))?;
+        let result = threads.install(|| self.bake_here(settings, progress, control, None, &mut role))?;
         if control.is_cancelled() {
             return Err(Error::cancelled(&self.scene.source));
         }
-        labour.finish()?;
+        role.finish()?;
         Ok(result)
     }
 }

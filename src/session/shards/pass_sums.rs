@@ -20,7 +20,7 @@ const MOST_OF_AN_ACCOUNT: i128 = 1 << 100;
 const MOST_OF_A_COUNT: u64 = 1 << 56;
 
 /// No time is longer [s].
-const MOST_SECONDS: f64 = 1e12;
+const MAX_SECONDS: f64 = 1e12;
 
 /// Effort of the compression: more is much slower and hardly smaller.
 const COMPRESSION: i32 = 1;
@@ -110,7 +110,7 @@ fn whole(reader: &mut impl Read) -> io::Result<u64> {
 
 fn seconds(reader: &mut impl Read) -> io::Result<f64> {
     let value = f64::from_le_bytes(read(reader)?);
-    let is_time = (0.0..=MOST_SECONDS).contains(&value);
+    let is_time = (0.0..=MAX_SECONDS).contains(&value);
     is_time.then_some(value).ok_or_else(|| damaged("a time is none"))
 }
 

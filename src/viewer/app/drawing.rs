@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use super::{App, BesideShown, MOST_REPORTS, MapsOnDevice};
+use super::{App, BesideShown, MAX_REPORTS, MapsOnDevice};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
 use crate::eye_pass::renderer::{EyeQuality, GpuMs, Renderer, Uploaded};
@@ -17,7 +17,7 @@ use crate::plan;
 use crate::scene::Scene;
 use crate::scene::load::was_dark;
 use crate::viewer::background::{Background, Wake};
-use crate::viewer::graphics::{FORMAT, Making, SAMPLES, texture};
+use crate::viewer::graphics::{FORMAT, RenderOptions, SAMPLES, texture};
 use crate::viewer::model::Model;
 use crate::viewer::panel::{Display, Quantity};
 use crate::viewer::timing::Made;
@@ -105,7 +105,7 @@ impl App {
         }
         let is_compiling = wanted != EffectSwitch::Off && chains == EffectSwitch::Off;
         graphics.set_stand_in(is_compiling && !self.model.maps().is_empty());
-        graphics.set_making(Making {
+        graphics.set_making(RenderOptions {
             chains,
             dispersion: self.model.choices.settings.effects.get(Effect::Dispersion),
             white_balance,
@@ -132,7 +132,7 @@ impl App {
         self.is_refining = true;
         if graphics.draw_picture(&view, self.pace.walking())? {
             self.pictures += 1;
-            self.reports_due = MOST_REPORTS;
+            self.reports_due = MAX_REPORTS;
         }
         Ok(())
     }

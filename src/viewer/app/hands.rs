@@ -10,19 +10,19 @@ use super::{App, PIXELS_PER_NOTCH};
 use crate::geometry::Ray;
 use crate::scene::Camera;
 use crate::viewer::command::{Command, FilmCommand};
-use crate::viewer::gizmo::{self, Held};
-use crate::viewer::lens::Lens;
-use crate::viewer::navigation::{BOOKMARKS, HeldKeys, Travel};
+use crate::viewer::gizmo::{self, GizmoTarget};
+use crate::viewer::lens::Viewport;
+use crate::viewer::navigation::{BOOKMARKS, HeldKeys, NavigationMode};
 
 /// A press that moves farther than this before it is let go is no click [pixels].
 const CLICK_PIXELS: f64 = 4.0;
 
 /// What a way to get about means, when it was chosen.
-fn travel_notice(travel: Travel) -> String {
+fn travel_notice(travel: NavigationMode) -> String {
     match travel {
-        Travel::Fly => "Flying: W A S D E Q, through walls too.",
-        Travel::Walk => "Walking: W A S D, eyes 1.6 m above the ground, stopped by walls.",
-        Travel::Orbit => {
+        NavigationMode::Fly => "Flying: W A S D E Q, through walls too.",
+        NavigationMode::Walk => "Walking: W A S D, eyes 1.6 m above the ground, stopped by walls.",
+        NavigationMode::Orbit => {
             "Orbiting what is straight ahead: drag with the right mouse button, wheel for nearer and farther."
         }
     }
@@ -171,7 +171,7 @@ impl App {
         let light = gizmo::light_at(&lens, self.model.scene(), place).filter(|_| marks);
         let gaze = lens.gaze(place);
         match light {
-            Some(light) => self.model.hold(Held::Light(light)),
+            Some(light) => self.model.hold(GizmoTarget::Light(light)),
             None => self.model.pick(gaze),
         }
         self.request_redraw();
@@ -202,9 +202,9 @@ impl App {
     }
 
     /// The picture, and where the pointer is in it.
-    fn pointed<'a>(&self, camera: &'a Camera) -> Option<(Lens<'a>, egui::Pos2)> {
+    fn pointed<'a>(&self, camera: &'a Camera) -> Option<(Viewport<'a>, egui::Pos2)> {
         let picture = self.picture_rect;
-        Some((Lens { camera, picture }, self.pointer_points()?))
+        Some((Viewport { camera, picture }, self.pointer_points()?))
     }
 
     /// The ray from the eye through the pointer.

@@ -14,11 +14,11 @@ use crate::scene::Camera;
 use crate::scene::changes::Change;
 use crate::settings::BakeSettings;
 use crate::viewer::filming::Film;
-use crate::viewer::navigation::{BOOKMARKS, Travel};
+use crate::viewer::navigation::{BOOKMARKS, NavigationMode};
 use crate::viewer::panel::Display;
 
 /// Most that is read of one file [bytes]: far more than anything here takes.
-const MOST_BYTES: u64 = 16 << 20;
+const MAX_BYTES: u64 = 16 << 20;
 /// Names that are tried for a file that is set aside.
 const NUMBERS: std::ops::RangeInclusive<u32> = 1..=99;
 
@@ -110,7 +110,7 @@ fn read<T: DeserializeOwned>(path: &Path) -> ReadBack<T> {
     if !path.exists() {
         return (None, None);
     }
-    let read = read_file(path, MOST_BYTES).map_err(|error| error.to_string());
+    let read = read_file(path, MAX_BYTES).map_err(|error| error.to_string());
     let parsed = read.and_then(|bytes| serde_json::from_slice(&bytes).map_err(|error| error.to_string()));
     match parsed {
         Ok(value) => (Some(value), None),
@@ -155,7 +155,7 @@ pub struct KeptViews {
     /// `None` for the file's first.
     pub camera: Option<Camera>,
     /// How it gets about.
-    pub travel: Travel,
+    pub travel: NavigationMode,
     /// Views under the numbers from 1 on.
     pub bookmarks: [Option<Camera>; BOOKMARKS],
 }

@@ -36,7 +36,7 @@ impl Snapshot {
 
 /// Keeps scenes in a folder; dropping it writes what is still to be written.
 #[derive(Debug)]
-pub struct Keeper {
+pub struct Autosaver {
     folder: ConfigFolder,
     /// As it was handed over last, or read back.
     known: Option<Snapshot>,
@@ -45,7 +45,7 @@ pub struct Keeper {
     writing: Background<(), ()>,
 }
 
-impl Keeper {
+impl Autosaver {
     /// Keeps nothing yet.
     pub fn new(folder: ConfigFolder) -> Self {
         Self {
@@ -112,7 +112,7 @@ impl Keeper {
     }
 }
 
-impl Drop for Keeper {
+impl Drop for Autosaver {
     fn drop(&mut self) {
         self.settle();
     }

@@ -8,7 +8,7 @@ use rfd::FileDialog;
 use winit::window::Window;
 
 use self::config::{ConfigFolder, Kept, ReadBack};
-use self::keeper::{Keeper, Stamps, changed};
+use self::keeper::{Autosaver, Stamps, changed};
 use crate::error::{Error, Result};
 use crate::scene::{LoadOptions, Scene, load};
 use crate::viewer::background::{Background, Task, Wake};
@@ -56,7 +56,7 @@ pub struct Files {
     /// Watches the files of the scene in the window.
     watch: Background<(), Stamps>,
     /// Keeps what the user does.
-    pub keeper: Option<Keeper>,
+    pub keeper: Option<Autosaver>,
     config: Option<ConfigFolder>,
 }
 
@@ -73,7 +73,7 @@ impl Files {
             refusal: None,
             warning,
             watch: Background::new("watch", wake),
-            keeper: options.config.clone().map(Keeper::new),
+            keeper: options.config.clone().map(Autosaver::new),
             config: options.config.clone(),
         }
     }
@@ -280,7 +280,7 @@ impl Dialog {
 }
 
 /// Most that are remembered.
-pub const MOST_RECENT: usize = 10;
+pub const MAX_RECENT: usize = 10;
 
 /// Files that were opened, the newest first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -289,11 +289,11 @@ pub struct Recent {
 }
 
 impl Recent {
-    /// Those of a list that are still there; each once, at most [`MOST_RECENT`].
+    /// Those of a list that are still there; each once, at most [`MAX_RECENT`].
     pub fn of(paths: impl IntoIterator<Item = PathBuf>) -> Self {
         let mut recent = Self::default();
         for path in paths {
-            if recent.paths.len() < MOST_RECENT && path.is_file() && !recent.paths.contains(&path) {
+            if recent.paths.len() < MAX_RECENT && path.is_file() && !recent.paths.contains(&path) {
                 recent.paths.push(path);
             }
         }

@@ -28,7 +28,7 @@ pub(super) struct Restored {
 
 /// What was kept and not taken over, to be kept on until it is changed: a look at other maps takes no edits away.
 #[derive(Debug, Default)]
-pub(super) struct LeftAlone {
+pub(super) struct IgnoredState {
     changes: Vec<Change>,
     /// What stood against them, and the settings.
     settings: Option<(BakeSettings, Value)>,
@@ -92,7 +92,7 @@ impl Model {
             log::warn!("{sentence}");
             self.files.warning = warning;
         }
-        self.left_alone = LeftAlone::default();
+        self.left_alone = IgnoredState::default();
         if let (Some(kept), Some(what)) = (&kept, what) {
             self.restore(kept, what);
             if !what.edits {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::Model;
 use super::keeping::Restored;
 use super::picking::Placing;
-use super::seeking::Sought;
+use super::seeking::PendingSearch;
 use crate::error::Result;
 use crate::scene::changes::Change;
 use crate::scene::{Scene, load};
@@ -115,7 +115,7 @@ impl Model {
         self.player = None;
         self.picking = None;
         self.placing = Placing::default();
-        self.sought = Sought::default();
+        self.sought = PendingSearch::default();
         self.choices.watches = false;
         self.edits = EditedScene::new(scene);
         self.exposure_is_kept = self.find_again(Some(Restored::ALL));

@@ -8,7 +8,7 @@ use super::Model;
 use crate::geometry::Ray;
 use crate::scene::{Edit, LightEdit};
 use crate::transport::Tracer;
-use crate::viewer::gizmo::Held;
+use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::panel::Placed;
 use serde_json::json;
 
@@ -87,13 +87,13 @@ impl Model {
     }
 
     /// Gives handles to a light or an object.
-    pub fn hold(&mut self, held: Held) {
+    pub fn hold(&mut self, held: GizmoTarget) {
         self.picking = None;
         self.choices.selection.hold(Some(held));
         let scene = self.edits.scene();
         let name = match held {
-            Held::Light(light) => &scene.lights[light].name,
-            Held::Object(object) => &scene.objects[object].name,
+            GizmoTarget::Light(light) => &scene.lights[light].name,
+            GizmoTarget::Object(object) => &scene.objects[object].name,
         };
         self.log.write("picked", json!({"name": name}));
     }
@@ -102,12 +102,12 @@ impl Model {
     pub fn frame(&mut self, aspect: f64) {
         let whole_m = self.navigator.radius_m();
         let ball = match self.choices.selection.held() {
-            Some(Held::Object(object)) => {
+            Some(GizmoTarget::Object(object)) => {
                 let bounds = self.scene().objects.get(object);
                 let bounds = bounds.and_then(|object| object.bounds());
                 bounds.map(|(low, high)| (0.5 * (low + high), 0.5 * (high - low).length()))
             }
-            Some(Held::Light(light)) => {
+            Some(GizmoTarget::Light(light)) => {
                 let light = self.scene().lights.get(light);
                 let position = light.and_then(|light| light.kind.position());
                 position.map(|position| (position, AROUND_LIGHT * whole_m))
@@ -129,7 +129,7 @@ impl Model {
         };
         self.picking = None;
         match surfaces.closest_place(&gaze) {
-            Some(place) => self.hold(Held::Object(place.object as usize)),
+            Some(place) => self.hold(GizmoTarget::Object(place.object as usize)),
             None => self.choices.selection.hold(None),
         }
     }

@@ -9,7 +9,7 @@ use crate::geometry::Ray;
 use crate::scene::Edit;
 use crate::transport::Tracer;
 use crate::viewer::brightest::{self, Spot};
-use crate::viewer::gizmo::Held;
+use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::new_light::{Aim, NewLight};
 use crate::viewer::probe;
 
@@ -26,14 +26,14 @@ const HALVINGS: i32 = 6;
 
 /// What is to be done once surfaces are known.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sought {
+pub(super) struct PendingSearch {
     pub light: Option<NewLight>,
     pub brightest: bool,
 }
 
 impl Model {
     /// Does something as soon as the surfaces of the scene are known.
-    pub(super) fn seek(&mut self, what: impl FnOnce(&mut Sought)) {
+    pub(super) fn seek(&mut self, what: impl FnOnce(&mut PendingSearch)) {
         what(&mut self.sought);
         self.poll_sought();
     }
@@ -68,7 +68,7 @@ impl Model {
         let is_added = self.edit(&Edit::AddLight(Arc::new(added)));
         self.edits.release();
         if is_added {
-            self.hold(Held::Light(scene.lights.len()));
+            self.hold(GizmoTarget::Light(scene.lights.len()));
         }
     }
 

@@ -41,10 +41,10 @@ const TONE_MAPS: [(ToneMap, &str, &str); 5] = [
 ];
 
 /// Ends of what can be typed as an end of the scale [W/m²].
-const LEAST_W_M2: f64 = 1e-9;
-const MOST_W_M2: f64 = 1e9;
+const MIN_W_M2: f64 = 1e-9;
+const MAX_W_M2: f64 = 1e9;
 /// Of the upper end over the lower one.
-const LEAST_RATIO: f64 = 1.01;
+const MIN_RATIO: f64 = 1.01;
 
 /// What the slider of the white balance begins at: D65.
 const DAYLIGHT_KELVIN: f64 = 6504.0;
@@ -197,8 +197,8 @@ fn range(ui: &mut Ui, choice: &mut ScaleChoice, model: &Model) -> Response {
                     .on_hover_text(about("From, to").what);
                 shown / factor
             };
-            choice.typed_w_m2[0] = field("Scale: from", low, LEAST_W_M2..=high / LEAST_RATIO);
-            choice.typed_w_m2[1] = field("Scale: to", high, low * LEAST_RATIO..=MOST_W_M2);
+            choice.typed_w_m2[0] = field("Scale: from", low, MIN_W_M2..=high / MIN_RATIO);
+            choice.typed_w_m2[1] = field("Scale: to", high, low * MIN_RATIO..=MAX_W_M2);
         }
     })
     .response

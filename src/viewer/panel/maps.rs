@@ -21,9 +21,9 @@ use crate::viewer::flat_map::{self, Shown};
 /// Side of a thumbnail [points].
 const THUMBNAIL: f32 = 40.0;
 /// Height of the list at most: six maps [points].
-const MOST_HEIGHT: f32 = 6.0 * (THUMBNAIL + 4.0);
+const MAX_HEIGHT: f32 = 6.0 * (THUMBNAIL + 4.0);
 /// Thumbnails that are made in one frame: a millisecond each.
-const MOST_AT_ONCE: usize = 4;
+const MAX_AT_ONCE: usize = 4;
 
 const LOOK: &str = "Shows the map large, with the irradiance under the pointer.";
 const ONE: &str = "Writes this map to an .exr file of its own in the working folder: each layer, their sum and the error \
@@ -58,11 +58,11 @@ pub fn show(
         ui.label(format!("{} in {memory}", counted(model.maps().len(), "map")));
         export::all(ui, "Export all", maps_folder, model, commands);
     });
-    let mut still_to_make = MOST_AT_ONCE;
+    let mut still_to_make = MAX_AT_ONCE;
     // What stands below is not to be far away.
     let list = ScrollArea::vertical()
         .id_salt("maps")
-        .max_height(MOST_HEIGHT)
+        .max_height(MAX_HEIGHT)
         .auto_shrink([false, true]);
     list.show(ui, |ui| {
         for (index, map) in model.maps().iter().enumerate() {

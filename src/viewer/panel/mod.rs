@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 pub use self::scene::{Placed, Selection};
 use super::command::{Choices, Command, CompareCommand, FilmCommand};
 use super::model::Model;
-use super::navigation::{Navigator, Travel};
+use super::navigation::{NavigationMode, Navigator};
 pub use super::views::Quantity;
 use super::views::ScaleChoice;
 use crate::error::Warning;
@@ -276,13 +276,13 @@ fn titled(ui: &mut Ui, name: &str, title: RichText, open: bool, add: impl FnOnce
 }
 
 /// Shows the keys for a way to get about at a speed [m/s].
-fn keys(ui: &mut Ui, travel: Travel, speed_m_per_s: f64) {
+fn keys(ui: &mut Ui, travel: NavigationMode, speed_m_per_s: f64) {
     let (way, wheel) = match travel {
-        Travel::Fly | Travel::Walk => (
+        NavigationMode::Fly | NavigationMode::Walk => (
             "hold to look around",
             format!("speed ±5 % a notch, now {speed_m_per_s:.3} m/s"),
         ),
-        Travel::Orbit => ("hold to turn around it", "nearer, farther".to_owned()),
+        NavigationMode::Orbit => ("hold to turn around it", "nearer, farther".to_owned()),
     };
     let now = format!("fly, walk, orbit; now {}", travel.name());
     let lines = [

@@ -8,7 +8,7 @@ use crate::light_pass::explain::LightPath;
 use crate::transport::Event;
 use crate::units::LUMENS_PER_WATT;
 use crate::viewer::probe::{Probed, ProbedTexel};
-use crate::viewer::sketching::Sketched;
+use crate::viewer::sketching::PreviewFlags;
 
 const TURN_ON: &str = "Click on a surface to see what lights it (P): irradiance and its error, and the light paths that \
                        come there, drawn through every glass surface. Looks through glass and over mirrors to what is \
@@ -20,12 +20,12 @@ const PATCHES: &str = "Outlines what lies between four neighbouring light rays t
                        bright, folded ones are where the wavefront overlaps. Far thinner than the bake's patches; changes \
                        nothing in a bake.";
 /// Paths that are listed: the strongest.
-const MOST_LISTED: usize = 8;
+const MAX_LISTED: usize = 8;
 
 /// Shows the section.
 pub fn show(
     ui: &mut Ui,
-    (is_on, sketched): (&mut bool, &mut Sketched),
+    (is_on, sketched): (&mut bool, &mut PreviewFlags),
     model: &Model,
     commands: &mut Vec<Command>,
 ) {
@@ -57,7 +57,7 @@ pub fn show(
 }
 
 /// What is drawn of the way that all light takes.
-fn sketch(ui: &mut Ui, sketched: &mut Sketched, model: &Model) {
+fn sketch(ui: &mut Ui, sketched: &mut PreviewFlags, model: &Model) {
     ui.horizontal(|ui| {
         ui.label("Draw");
         ui.checkbox(&mut sketched.hits, "hits").on_hover_text(HITS);
@@ -114,15 +114,15 @@ fn paths(ui: &mut Ui, probed: &Probed, model: &Model) {
     if told.paths.is_empty() {
         ui.label("No light path leads here.");
     }
-    for path in told.paths.iter().take(MOST_LISTED) {
+    for path in told.paths.iter().take(MAX_LISTED) {
         ui.label(format!("{}  {}", percent(probed.share(path)), chain(path, model)));
     }
-    if told.paths.len() > MOST_LISTED {
-        let rest: f64 = told.paths[MOST_LISTED..]
+    if told.paths.len() > MAX_LISTED {
+        let rest: f64 = told.paths[MAX_LISTED..]
             .iter()
             .map(|path| probed.share(path))
             .sum();
-        let more = counted(told.paths.len() - MOST_LISTED, "path");
+        let more = counted(told.paths.len() - MAX_LISTED, "path");
         ui.label(format!("{}  {more} more", percent(rest)));
     }
     if !told.is_complete {

@@ -7,7 +7,7 @@ use super::control::{CONTROL_WIDTH, Entry, about, counted, pick, row, rows, sett
 use super::{Command, Model, bake, glass, light_colour, light_size, waves};
 use crate::optics::LinearSrgb;
 use crate::scene::{Edit, LightEdit, LightKind, MaterialEdit, Motion, Scene, SurfaceKind, why_light_stays};
-use crate::viewer::gizmo::Held;
+use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::new_light::NewLight;
 
 /// The slider's ends, as factors of the strength in the file.
@@ -62,11 +62,11 @@ enum Hand {
 
 impl Selection {
     /// What has handles in the picture.
-    pub fn held(&self) -> Option<Held> {
+    pub fn held(&self) -> Option<GizmoTarget> {
         match self.hand {
             Hand::Nothing => None,
-            Hand::Light | Hand::Place | Hand::Aim => Some(Held::Light(self.light)),
-            Hand::Object => Some(Held::Object(self.object)),
+            Hand::Light | Hand::Place | Hand::Aim => Some(GizmoTarget::Light(self.light)),
+            Hand::Object => Some(GizmoTarget::Object(self.object)),
         }
     }
 
@@ -80,14 +80,14 @@ impl Selection {
     }
 
     /// Something was picked in the picture, or let go.
-    pub fn hold(&mut self, held: Option<Held>) {
+    pub fn hold(&mut self, held: Option<GizmoTarget>) {
         self.hand = match held {
             None => Hand::Nothing,
-            Some(Held::Light(light)) => {
+            Some(GizmoTarget::Light(light)) => {
                 self.light = light;
                 Hand::Light
             }
-            Some(Held::Object(object)) => {
+            Some(GizmoTarget::Object(object)) => {
                 self.object = object;
                 Hand::Object
             }

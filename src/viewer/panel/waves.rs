@@ -10,7 +10,7 @@ use crate::scene::waves::STEEPEST_SLOPE;
 use crate::scene::{Edit, MaterialEdit, Wave, Waves};
 
 /// Least height that a drag starts from [m].
-const LEAST_HEIGHT_M: f64 = 1e-6;
+const MIN_HEIGHT_M: f64 = 1e-6;
 /// Slopes nearer than this are the same.
 const SAME_SLOPE: f64 = 1e-9;
 
@@ -62,7 +62,7 @@ fn slope(ui: &mut Ui, list: &mut [Wave], in_file: &[Wave]) {
     }
     for wave in list.iter_mut() {
         // Flat waves rise too, all alike.
-        wave.amplitude_m = wave.amplitude_m.max(LEAST_HEIGHT_M);
+        wave.amplitude_m = wave.amplitude_m.max(MIN_HEIGHT_M);
     }
     let present = of(list);
     for wave in list.iter_mut() {
@@ -77,7 +77,7 @@ fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
         .horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().interact_size.x = 58.0;
-            let fine = |value: f64| 0.01 * value.max(LEAST_HEIGHT_M);
+            let fine = |value: f64| 0.01 * value.max(MIN_HEIGHT_M);
             let (height_speed, length_speed) = (fine(wave.amplitude_m), fine(wave.wavelength_m));
             number(ui, &mut wave.amplitude_m, 5, |shown| {
                 shown.speed(height_speed).range(0.0..=f64::MAX).prefix("A: ")

@@ -11,8 +11,7 @@ use nephroid::scene::{Edit, Mesh, Scene};
 use nephroid::session::{BakeResult, BakeSession};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
-use support::brute_force::brute;
-use support::tools::{at, bits, caustic, map_of, set, settings};
+use support::tools::{at, bits, brute, caustic, map_of, set, settings};
 
 pub fn session(scene: &Scene) -> BakeSession {
     BakeSession::new(Arc::new(scene.clone())).expect("a session")

@@ -309,6 +309,15 @@ fn beside_the_map_and_nowhere_is_booked() {
         let corners = [[1.0 + dx, 1.0 + dy], [4.0 + dx, 1.5 + dy], [2.0 + dx, 4.0 + dy]];
         let (_, report) = deposit((6, 6), &[grey(corners)]);
         assert_eq!(report.outside, all);
+        let in_tiles = tiles::chart(Some(tiles::mixed()));
+        let flux = [FLUX, FLUX / 3, 7];
+        let far = triangle(corners.map(|[x, y]| [x + 1e4 * dx, y + 1e4 * dy]), flux);
+        let mut nowhere = far;
+        nowhere.corners[1].x = f64::NAN;
+        let (_, report) = deposit_on(&in_tiles, &[far, nowhere, far], 3);
+        let once = flux.map(i128::from);
+        let twice = once.map(|count| 2 * count);
+        assert_eq!((report.outside, report.non_finite), (twice, once), "in tiles");
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use nephroid::illumination::{Chart, IlluminationMap, Receiver};
-use nephroid::light_pass::indirect::{LEAST_PASSES, Network};
+use nephroid::light_pass::indirect::{MIN_PASSES, Network};
 use nephroid::optics::LinearSrgb;
 use nephroid::plan::Effect;
 use nephroid::progress::Control;
@@ -133,7 +133,7 @@ fn under_even_light(parts: Vec<(Mesh, Material)>, maps: &[(usize, usize)], rays:
     let charts: Vec<Arc<Chart>> = maps.iter().map(chart).collect();
     let mut network = Network::new(&scene, &charts);
     let count = network.element_count();
-    let passes = vec![LEAST_PASSES; count];
+    let passes = vec![MIN_PASSES; count];
     assert!(network.trace(&tracer, &passes, (rays, 0), (&(), &Control::default())));
     network.solve(&vec![LinearSrgb::WHITE; count], &passes).irradiance
 }

@@ -10,7 +10,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::{LightKind, Scene};
 use nephroid::settings::LayerKind;
-use nephroid::transport::{Event, HitPlace, Tracer};
+use nephroid::transport::{Event, RayHit, Tracer};
 
 use crate::bake::common::{CAUSTIC_AND_DIRECT, floor, with_layers};
 use support::tools::{at, bake, builtin_scene, map_of, set};
@@ -38,7 +38,7 @@ fn target(tracer: &Tracer, map: &IlluminationMap, texel: usize) -> Target {
     let (triangle, barycentric) = { weights }
         .find(|(_, weights)| is_within(weights))
         .expect("the map is full");
-    let hit = tracer.surface_at(&HitPlace {
+    let hit = tracer.surface_at(&RayHit {
         object: chart.object() as u32,
         triangle: triangle as u32,
         barycentric,

@@ -1,30 +1,19 @@
-//! Soft caustics: lights with a size and rough surfaces, against brute force, against their limits, and against the law of
-//! energy.
+//! Soft caustics, and bodies within bodies: against brute force, against their limits, and against the law of energy.
+
+use std::f64::consts::TAU;
 
 use glam::DVec3;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{LightKind, LightSize, PanelShape, Scene};
+use nephroid::scene::{Mesh, Scene};
 use nephroid::settings::{BakeSettings, Estimator};
-use nephroid::units::Radiance;
+use nephroid::units::Flux;
 
 use crate::bake::common::{floor, off_brute_force, rmse, session, towards};
+use support::hard_scenes::{roughened, under_square_lamp, under_the_suns_disc};
 use support::tools::{at, bake, builtin_scene, energy_fault, photons, set, settings};
-
-/// The ring with a square lamp of a side [m] that shines downwards, with the same intensity on its axis whatever its side.
-fn ring_under_square_lamp(side_m: f64) -> Scene {
-    let mut scene = builtin_scene("ring");
-    scene.lights[0].kind = LightKind::Panel {
-        centre: scene.lights[0].kind.position().expect("a point light"),
-        across: DVec3::X * (0.5 * side_m),
-        down: DVec3::Z * (0.5 * side_m),
-        shape: PanelShape::Rectangle,
-        radiance: Radiance(8.0 / (side_m * side_m)),
-    };
-    scene
-}
 
 /// Photons until a target is reached, with maps of `side` texels each way.
 fn soft(target: f64, side: usize) -> BakeSettings {
@@ -34,7 +23,7 @@ fn soft(target: f64, side: usize) -> BakeSettings {
 #[test]
 fn a_square_lamp_tends_to_a_point() {
     let map_at = |side_m: f64| {
-        let scene = ring_under_square_lamp(side_m);
+        let scene = under_square_lamp("ring", side_m);
         let result = bake(scene.clone(), &soft(0.02, 32));
         assert_eq!(energy_fault(&result), None);
         floor(&result, &scene)
@@ -44,16 +33,6 @@ fn a_square_lamp_tends_to_a_point() {
     // The blur is as wide as the lamp: caustics of about a texel's width change by at least its 0.7th power.
     assert!(off[0] > 0.15, "{off:?}");
     assert!(off.windows(2).all(|pair| pair[1] < 0.65 * pair[0]), "{off:?}");
-}
-
-/// A scene whose specular materials have a roughness.
-fn roughened(name: &str, roughness: f64) -> Scene {
-    let mut scene = builtin_scene(name);
-    let specular = |material: &&mut nephroid::scene::Material| material.surface.is_specular();
-    for material in scene.materials.iter_mut().filter(specular) {
-        material.roughness = roughness;
-    }
-    scene
 }
 
 /// A plate of frosted glass over the floor.
@@ -70,13 +49,9 @@ fn frosted_plate() -> Scene {
 /// What is off brute force may be twice the estimate, as everywhere; rough surfaces are within 3 %.
 #[test]
 fn soft_light_is_as_brute_force_has_it() {
-    let mut sun = builtin_scene("nephroid");
-    sun.lights[0].size = LightSize::Angle {
-        diameter_rad: 0.53_f64.to_radians(),
-    };
     let cases = [
-        ("square lamp", ring_under_square_lamp(0.3), 0.02, false),
-        ("sun of 0.53°", sun, 0.02, false),
+        ("square lamp", under_square_lamp("ring", 0.3), 0.02, false),
+        ("sun of 0.53°", under_the_suns_disc(), 0.02, false),
         ("roughness 0.05", roughened("mirror", 0.05), 0.025, true),
         ("roughness 0.2", roughened("mirror", 0.2), 0.025, true),
         ("roughness 0.5", roughened("mirror", 0.5), 0.025, true),
@@ -118,7 +93,7 @@ fn a_rough_white_mirror_loses_nothing() {
 fn soft_light_is_refused_by_what_cannot_carry_it() {
     for (scene, cause) in [
         (roughened("mirror", 0.2), "is rough"),
-        (ring_under_square_lamp(0.2), "has a size"),
+        (under_square_lamp("ring", 0.2), "has a size"),
     ] {
         for settings in [at(2_000.0, 16), settings(2_000.0, 16)] {
             let refused = session(&scene).bake(&settings, &(), &Control::default());
@@ -136,4 +111,78 @@ fn soft_light_is_refused_by_what_cannot_carry_it() {
         });
         assert_eq!(energy_fault(&bake(scene, &off)), None, "{cause}");
     }
+}
+
+/// A closed body of revolution around the y axis: each straight piece of its profile (radius, height) [m] has normals of
+/// its own, to the right of the way along it.
+fn lathe(profile: &[(f64, f64)], segments: u32) -> Mesh {
+    let mut mesh = Mesh::default();
+    for pair in profile.windows(2) {
+        let [(r0, y0), (r1, y1)] = [pair[0], pair[1]];
+        let first = mesh.positions.len() as u32;
+        for segment in 0..=segments {
+            let (sine, cosine) = (TAU * f64::from(segment % segments) / f64::from(segments)).sin_cos();
+            let outwards = DVec3::new(cosine, 0.0, sine);
+            let normal = (outwards * (y1 - y0) - DVec3::Y * (r1 - r0)).normalize();
+            for (r, y) in [(r0, y0), (r1, y1)] {
+                mesh.positions.push(outwards * r + DVec3::Y * y);
+                mesh.normals.push(normal);
+            }
+        }
+        for segment in 0..segments {
+            let [a, b, c, d] = [0, 1, 2, 3].map(|corner| first + 2 * segment + corner);
+            // None of the triangles that an end on the axis leaves without area.
+            if r0 > 0.0 {
+                mesh.triangles.push([a, b, c]);
+            }
+            if r1 > 0.0 {
+                mesh.triangles.push([c, b, d]);
+            }
+        }
+    }
+    mesh
+}
+
+/// A glass of water with a ball in it; the water reaches so far into the glass [m].
+fn glass_of_water(overlap_m: f64) -> Scene {
+    let mut scene = parts::reference_scene(1.0);
+    let cup = [
+        (0.0, 0.20),
+        (0.30, 0.20),
+        (0.30, 0.80),
+        (0.26, 0.80),
+        (0.26, 0.24),
+        (0.0, 0.24),
+    ];
+    let side = 0.26 + overlap_m;
+    let water = [
+        (0.0, 0.24 - overlap_m),
+        (side, 0.24 - overlap_m),
+        (side, 0.65),
+        (0.0, 0.65),
+    ];
+    let ball = shapes::sphere(DVec3::new(0.05, 0.42, -0.02), 0.1, 5);
+    for (name, mesh, ior) in [
+        ("glass", lathe(&cup, 256), 1.5),
+        ("water", lathe(&water, 256), 1.333),
+        ("ball", ball, 1.6),
+    ] {
+        parts::add(&mut scene, name, mesh, parts::dielectric(name, ior));
+    }
+    let lamp = DVec3::new(0.25, 2.2, 0.15);
+    scene.lights.push(parts::point_light("lamp", lamp, Flux(100.0)));
+    scene
+}
+
+#[test]
+fn water_in_a_glass_as_by_brute_force() {
+    let scene = glass_of_water(0.002);
+    let result = bake(scene.clone(), &towards(0.03, 48));
+    assert_eq!(energy_fault(&result), None);
+    let (off, deposited_w) = off_brute_force(&result, &scene, 230_000, 0.2);
+    assert!(
+        (deposited_w[0] / deposited_w[1] - 1.0).abs() < 0.01,
+        "{deposited_w:?}"
+    );
+    assert!(off < 0.04, "off by {off}");
 }

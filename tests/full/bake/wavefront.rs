@@ -1,14 +1,17 @@
-//! The wavefront estimator against an independent solver, and by its counters.
+//! The wavefront estimator against an independent solver, and by its counters; and real files made by others
+//! (`../shared/scenes`, where it is there), baked without a fault.
 
 use glam::{DMat3, DVec3};
+use nephroid::effect::Effect;
+use nephroid::illumination::IlluminationMap;
+use nephroid::optics::LinearSrgb;
 use nephroid::scene::{LoadOptions, load};
 use nephroid::session::BakeResult;
 
 use crate::bake::common::{floor, rmse, towards};
-use support::hard_scenes;
 use support::references::references;
-use support::tools::{at, bake, builtin_scene, energy_fault, map_of, set, settings, transformed};
-use support::{assert_close, project_file, reference_map, shared_or_skip};
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, photons, set, settings, transformed};
+use support::{assert_close, hard_scenes, or_skip, project_file, reference_map, shared_or_skip};
 
 /// The others are in the quick tests.
 #[test]
@@ -187,4 +190,50 @@ fn a_floor_of_two_objects_takes_the_same_light() {
         let deposited = |result: &BakeResult| result.ledgers[0].energy_w.deposited;
         assert_close(deposited(&cut), deposited(&whole), 5e-4, name);
     }
+}
+
+/// The first texel that holds no light there can be: not finite, or negative. Light of one wavelength lies outside sRGB, so
+/// that a channel may be negative where wavelengths part; its luminance may not, but for what single precision rounds off.
+fn impossible_texel(map: &IlluminationMap, wavelengths_part: bool) -> Option<[f32; 3]> {
+    let fits = |&[r, g, b]: &[f32; 3]| {
+        let light = LinearSrgb::new(f64::from(r), f64::from(g), f64::from(b));
+        let most = r.abs().max(g.abs()).max(b.abs());
+        let is_light = if wavelengths_part {
+            light.luminance() >= -f64::from(4.0 * f32::EPSILON * most)
+        } else {
+            r.min(g).min(b) >= 0.0
+        };
+        most.is_finite() && is_light
+    };
+    let mut texels = map.layers.iter().flat_map(|layer| &layer.irradiance);
+    texels.find(|texel| !fits(texel)).copied()
+}
+
+#[test]
+fn real_files_bake() {
+    let folder = or_skip!(shared_or_skip("scenes"));
+    let entries = std::fs::read_dir(folder).expect("a readable folder");
+    let files = entries.map(|entry| entry.expect("an entry").path());
+    let is_glb = |path: &std::path::PathBuf| path.extension().is_some_and(|extension| extension == "glb");
+    let mut files: Vec<_> = files.filter(is_glb).collect();
+    files.sort();
+    assert!(files.len() >= 13, "only {} files", files.len());
+    let options = LoadOptions {
+        default_light: true,
+        ..LoadOptions::default()
+    };
+    let mut lit = 0;
+    for file in files {
+        let scene = load(file.to_str().expect("a readable path"), &options).expect("a valid file");
+        let name = scene.name.clone();
+        let result = bake(scene, &photons(3e4, 64));
+        assert_eq!(energy_fault(&result), None, "{name}");
+        let parts = result.plan.is_on(Effect::Dispersion);
+        for map in &result.maps {
+            assert_eq!(impossible_texel(map, parts), None, "{name}");
+        }
+        let mut ledgers = result.ledgers.iter();
+        lit += usize::from(ledgers.any(|ledger| ledger.energy_w.deposited > 0.0));
+    }
+    assert!(lit >= 4, "caustic light arrives in {lit} files only");
 }

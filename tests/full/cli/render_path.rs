@@ -3,8 +3,8 @@
 use serde_json::{Value, json};
 
 use nephroid::scene::builtin;
-use support::program::{Run, Sandbox};
-use support::skip;
+use support::program::{Run, Sandbox, number};
+use support::{or_skip, skip};
 
 const QUICK: &str = "--density 1e4 --map-resolution 64 --size 48x32";
 
@@ -17,10 +17,6 @@ fn run(sandbox: &Sandbox, test: &str, line: &str) -> Option<Run> {
     }
     assert_eq!(run.code, 0, "{line}: {}", run.stderr);
     Some(run)
-}
-
-fn number(value: &Value) -> f64 {
-    value.as_f64().unwrap_or_else(|| panic!("no number: {value}"))
 }
 
 /// Median, 95 % and largest, in order.
@@ -56,9 +52,7 @@ fn frames_are_timed_with_and_without_chains() {
     sandbox
         .succeed("bake builtin:showroom -o maps --density 1e4 --map-resolution 64 --layers caustic,direct");
     let line = "render builtin:showroom --path walk.json --stats --maps maps --size 48x32";
-    let Some(text) = run(&sandbox, "frame times", line) else {
-        return;
-    };
+    let text = or_skip!(run(&sandbox, "frame times", line));
     for told in [
         "raster alone",
         "with chains",
@@ -139,9 +133,7 @@ fn frames_are_the_pictures_of_render() {
     sandbox.write("still.json", path.to_string());
     let shown = format!("{QUICK} --exposure 1 --tone-map agx");
     let line = format!("render builtin:mirror --path still.json -o frames {shown} --json");
-    let Some(made) = run(&sandbox, "frames that are kept", &line) else {
-        return;
-    };
+    let made = or_skip!(run(&sandbox, "frames that are kept", &line));
     assert!(made.json()["stats"].is_null(), "nothing was timed");
     let names = ["frame-00001.png", "frame-00002.png", "frame-00003.png"];
     assert_eq!(sandbox.files("frames"), names);
@@ -167,9 +159,7 @@ fn a_turntable_goes_around_in_equal_steps() {
             "render builtin:mirror --turntable {frames} -o {folder} {QUICK} --estimator wavefront --exposure 1 --tone-map neutral --json"
         )
     };
-    let Some(four) = run(&sandbox, "turntable", &turn(4, "four")) else {
-        return;
-    };
+    let four = or_skip!(run(&sandbox, "turntable", &turn(4, "four")));
     let report = four.json();
     assert_eq!(
         (&report["frames"], &report["path"]),

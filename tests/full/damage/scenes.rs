@@ -14,18 +14,17 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::RadiantIntensity;
 use serde_json::json;
 
-use super::mutate::{Damage, effort};
-use super::watch::{Tally, Way, alone, attack};
+use super::mutate::{Damage, Tally, Way, alone, attack, effort};
 use support::glb::{Glb, load_bytes, load_path};
-use support::shared_or_skip;
 use support::sound::scene_fault;
 use support::tools::{at, builtin_scene, energy_fault, photons};
+use support::{or_skip, shared_or_skip};
 
 /// Most memory that loading may take by itself [bytes].
 const LIMIT_BYTES: u64 = 64 << 20;
 
 /// Memory that a small bake may take [bytes].
-const MOST_BYTES_OF_BAKE: usize = 512 << 20;
+const MAX_BYTES_OF_BAKE: usize = 512 << 20;
 
 /// Memory that a file of so many bytes may take: the limit twice, since data is copied on its way, and what its text
 /// takes as a document.
@@ -129,7 +128,7 @@ fn attack_scene(path: &Path, tally: &Tally, bakes: &Tally) {
                 return fault;
             }
             let bytes = std::fs::read(copy_of(file)).expect("it was written");
-            let result = bakes.watch((&name, &bytes), MOST_BYTES_OF_BAKE, || bake(scene));
+            let result = bakes.watch((&name, &bytes), MAX_BYTES_OF_BAKE, || bake(scene));
             result.and_then(|result| bake_fault(&result))
         });
         std::fs::write(copy_of(file), whole).expect("can be written");
@@ -138,9 +137,7 @@ fn attack_scene(path: &Path, tally: &Tally, bakes: &Tally) {
 
 #[test]
 fn files_of_the_validator() {
-    let Some(folder) = shared_or_skip("validator") else {
-        return;
-    };
+    let folder = or_skip!(shared_or_skip("validator"));
     alone(|| {
         let (tally, bakes) = (Tally::default(), Tally::default());
         let is_scene = |path: &PathBuf| {
@@ -176,6 +173,45 @@ fn a_small_scene() {
         let subject = ("small.glb", whole, Damage::scene as Way);
         attack(&tally, bounds, &[subject], read, |scene| scene_fault(&scene));
         tally.expect(90, 90);
+    });
+}
+
+/// Compressed data is unpacked by what it says of itself.
+#[test]
+fn compressed_scenes() {
+    let golden = |name: &str| {
+        let path = format!("{}/tests/goldens/gltf/{name}", env!("CARGO_MANIFEST_DIR"));
+        std::fs::read(path).expect("the file is part of the project")
+    };
+    let with_image = |name: &str| {
+        let mut file = Glb::triangle();
+        let view = file.push_view(&golden(name));
+        file.push("images", json!({ "bufferView": view }));
+        file.push(
+            "textures",
+            json!({ "extensions": { "KHR_texture_basisu": { "source": 0 } } }),
+        );
+        let texture = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
+        file.with_material(texture).bytes()
+    };
+    alone(|| {
+        for (name, whole) in [
+            ("draco.glb", golden("draco.glb")),
+            ("draco_sequential.glb", golden("draco_sequential.glb")),
+            ("meshopt.glb", golden("meshopt.glb")),
+            ("etc1s.glb", with_image("etc1s.ktx2")),
+            ("uastc.glb", with_image("uastc.ktx2")),
+        ] {
+            assert!(load_bytes(&whole, &options()).is_ok(), "{name}");
+            let (tally, bounds) = (Tally::default(), (1_000, most_bytes(whole.len() + 10_000)));
+            let read = |bytes: &[u8]| load_bytes(bytes, &options());
+            let subjects = [
+                (name, whole.clone(), Damage::scene as Way),
+                (name, whole, Damage::binary as Way),
+            ];
+            attack(&tally, bounds, &subjects, read, |scene| scene_fault(&scene));
+            tally.expect(90, 90);
+        }
     });
 }
 

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings};
 use nephroid::eye_pass::wavelengths::{
-    MOST_PER_PICTURE, SeenWavelength, bands, of_picture, share_below, shift_of_sample,
+    MAX_PER_PICTURE, SeenWavelength, bands, of_picture, share_below, shift_of_sample,
 };
 use nephroid::eye_pass::{Picture, View};
 use nephroid::optics::spectrum::Xyz;
@@ -75,7 +75,7 @@ fn every_set_of_wavelengths_adds_up_to_one() {
         assert!(off < 1e-12, "{off} with {} wavelengths", set.len());
         assert!(set.iter().all(|seen| VISIBLE.contains(&seen.wavelength)));
     }
-    assert!((0..256).all(|index| of_picture(index).len() <= MOST_PER_PICTURE));
+    assert!((0..256).all(|index| of_picture(index).len() <= MAX_PER_PICTURE));
 }
 
 #[test]

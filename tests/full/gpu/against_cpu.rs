@@ -11,7 +11,7 @@ use nephroid::illumination::tiles::{self, COARSEST, TileLayout};
 use nephroid::illumination::{Chart, IlluminationMap};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{AlphaMask, Environment, LightKind, Material, Scene, SurfaceKind};
+use nephroid::scene::{AlphaMask, Environment, LightKind, Material, Scene, SurfaceKind, Variation};
 use nephroid::settings::LayerKind;
 use nephroid::transport::Tracer;
 
@@ -221,6 +221,33 @@ fn masks() -> Vec<Case> {
     cases
 }
 
+/// Sheets that are metal, clear, polished or not there from place to place, over a lit floor, and lit themselves.
+fn mixtures() -> Vec<Case> {
+    let mut image = four_colours();
+    image.rgba[1][3] = 120;
+    let of = |(transmission, coverage): (f64, Option<f64>)| {
+        let mut case = under(
+            "mixture",
+            SurfaceKind::Varied,
+            LinearSrgb::new(0.9, 0.6, 0.3),
+            0.5,
+        );
+        case.scene.textures.push(image.clone().into());
+        let sheet = &mut case.scene.materials[1];
+        (sheet.metallic, sheet.roughness) = (1.0, 0.25);
+        (sheet.transmission, sheet.coverage) = (transmission, coverage);
+        sheet.base_colour_texture = coverage.map(|_| texture_reference());
+        sheet.variation = Some(Variation {
+            image: texture_reference(),
+            surface: SurfaceKind::Varied,
+        });
+        case.maps.push(floor_map(1, 1, 1, vec![[2.0, 1.0, 4.0]]));
+        (case.of_peak, case.few) = (0.01, 0.004);
+        case
+    };
+    [(0.8, None), (0.0, Some(0.7))].into_iter().map(of).collect()
+}
+
 /// A mirror ball and a glass ball over a dark floor, the sky ahead, and back over the seam of its image with the pole in
 /// view; channels that end at the balls' outlines, or go on over many surfaces, may differ.
 fn skies() -> Vec<Case> {
@@ -259,7 +286,7 @@ fn skies() -> Vec<Case> {
 #[test]
 fn device_shows_what_the_cpu_shows() {
     let mut faults = Vec::new();
-    for case in floors().iter().chain(&masks()).chain(&skies()) {
+    for case in floors().iter().chain(&masks()).chain(&mixtures()).chain(&skies()) {
         let mut rig = or_skip!(Rig::at(AS_CPU, &case.scene, &case.maps));
         // Means of several places too, where the picture is small.
         let sides: &[u32] = if case.view.width < 100 { &[1, 3] } else { &[1] };

@@ -17,8 +17,7 @@ use nephroid::transport::Tracer;
 use nephroid::units::Flux;
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
-use support::bump_scenes::by_image;
-use support::effect_scenes::all;
+use support::effect_scenes::{all, by_image};
 use support::flip::mean_flip;
 use support::scenes::{bits, seen, view_of};
 use support::tools::{bake, builtin_scene, photons, set, settings};

@@ -1,18 +1,25 @@
-//! The device's search for the nearest triangle against the CPU's, ray by ray.
+//! The device's rays: its search for the nearest triangle against the CPU's and against the exact answer, and shadow rays
+//! from lamps against the baked layer.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
-use nephroid::eye_pass::renderer::probe;
+use glam::{DMat3, DVec2, DVec3};
+use nephroid::eye_pass::renderer::{ProbedHit, probe};
+use nephroid::eye_pass::{Picture, View};
 use nephroid::geometry::Ray;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Mesh, Scene};
+use nephroid::scene::{Light, LightKind, Mesh, PanelShape, Scene, Volume};
+use nephroid::settings::LayerKind;
+use nephroid::transport::Tracer;
+use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
+use rayon::prelude::*;
 
-use crate::gpu::judge::{Answer, Judge, Verdict};
-use crate::gpu::rig::{gpu, or_skip};
-use support::tools::builtin_scene;
+use crate::gpu::rig::{AS_CPU, Rig, gpu, or_skip, unlike};
+use support::floors::{diffuse, floor_scene};
+use support::scenes::{light, view};
+use support::tools::{at, bake, builtin_scene, set};
 
 /// Evenly spread numbers that are the same in every run (SplitMix64).
 pub struct Numbers(u64);
@@ -187,4 +194,373 @@ fn no_ray_leaves_a_closed_surface() {
     let rays = Numbers::new(9).rays(&scene, (DVec3::ZERO, 0.8), 1, 250_000);
     let hits = probe(gpu, &scene, &rays).expect("the device holds it");
     assert!(hits.iter().all(Option::is_some));
+}
+
+pub type Answer = Option<ProbedHit>;
+/// A triangle and the distance to it in local units.
+type Met = Option<(usize, f64)>;
+type Corners = [DVec3; 3];
+
+/// How far beside the asked ray the answered one may lie, in units in which the scene's radius is 1/2 to 1. With
+/// u = 2⁻²⁴, rays that start within 1.2 radii and so at most 2.2 units to go: rounding the origin moves it by u, the
+/// corners by u/2, their difference by 2u, and the direction turns by √3·u over 2.2 units; shear, product and
+/// difference round to another 8u. Each along both axes of the plane across the ray's main axis: 2⁻¹⁹ = 32u.
+const EPSILON: f64 = 1.0 / (1 << 19) as f64;
+
+/// What is said of an answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Verdict {
+    /// Nothing on both.
+    Missed,
+    /// The same triangle.
+    Met,
+    /// Another triangle that a ray beside the asked one meets.
+    Beside,
+    /// None of these.
+    Wrong,
+}
+
+/// Tells right from wrong answers.
+pub struct Judge {
+    tracer: Tracer,
+    /// Of the first triangle of each object.
+    firsts: Vec<usize>,
+    /// In local units.
+    corners: Vec<Corners>,
+    centre: DVec3,
+    scale: f64,
+}
+
+/// A ray in local units, and what lies across it.
+struct Across {
+    origin: DVec3,
+    direction: DVec3,
+    axes: [DVec3; 2],
+}
+
+impl Across {
+    fn flat(&self, corners: &Corners) -> [DVec2; 3] {
+        let flat = |off: DVec3| DVec2::new(off.dot(self.axes[0]), off.dot(self.axes[1]));
+        corners.map(|corner| flat(corner - self.origin))
+    }
+
+    /// From the ray to a triangle; 0 where it goes through.
+    fn aside(&self, corners: &Corners) -> f64 {
+        let flat = self.flat(corners);
+        let sides = [0, 1, 2].map(|i| flat[i].perp_dot(flat[(i + 1) % 3]));
+        if sides.iter().all(|side| *side > 0.0) || sides.iter().all(|side| *side < 0.0) {
+            return 0.0;
+        }
+        let to_edge = |i: usize| {
+            let (from, along) = (flat[i], flat[(i + 1) % 3] - flat[i]);
+            let share = -from.dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+            (from + along * share.clamp(0.0, 1.0)).length()
+        };
+        to_edge(0).min(to_edge(1)).min(to_edge(2))
+    }
+
+    /// Where along the ray a triangle begins and ends.
+    fn reach(&self, corners: &Corners) -> (f64, f64) {
+        let [a, b, c] = corners.map(|corner| (corner - self.origin).dot(self.direction));
+        (a.min(b).min(c), a.max(b).max(c))
+    }
+
+    /// Bound of the error of the distance to a triangle: every corner, and with it every share, moves by EPSILON.
+    fn distance_bound(&self, corners: &Corners) -> f64 {
+        let (low, high) = self.reach(corners);
+        let [a, b, c] = self.flat(corners);
+        let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+        let narrow = (b - a).perp_dot(c - a).abs() / longest.max(f64::MIN_POSITIVE);
+        EPSILON + (high - low) * (3.0 * EPSILON / narrow.max(f64::MIN_POSITIVE)).min(1.0)
+    }
+}
+
+impl Judge {
+    pub fn new(scene: Arc<Scene>) -> Self {
+        let tracer = Tracer::new(scene.clone());
+        let (centre, scale) = (tracer.frame().centre, tracer.frame().scale);
+        let (mut firsts, mut corners) = (Vec::new(), Vec::new());
+        for object in &scene.objects {
+            firsts.push(corners.len());
+            let mesh = object.mesh_in_scene();
+            let local = |triangle| mesh.corners(triangle).map(|corner| (corner - centre) * scale);
+            corners.extend((0..mesh.triangles.len()).map(local));
+        }
+        Self {
+            tracer,
+            firsts,
+            corners,
+            centre,
+            scale,
+        }
+    }
+
+    pub fn bounding_sphere(&self) -> (DVec3, f64) {
+        let (low, high) = self.tracer.scene().bounds().expect("it has triangles");
+        let centre = low * 0.5 + high * 0.5;
+        (centre, (high - centre).length())
+    }
+
+    pub fn all(&self, rays: &[Ray], answers: &[Answer]) -> Vec<Verdict> {
+        assert_eq!(rays.len(), answers.len());
+        let pairs = rays.par_iter().zip(answers);
+        pairs.map(|(ray, answer)| self.verdict(ray, answer)).collect()
+    }
+
+    /// The CPU's answer.
+    fn exact(&self, ray: &Ray) -> Met {
+        let hit = self.tracer.closest_place(ray)?;
+        let triangle = self.firsts[hit.object as usize] + hit.triangle as usize;
+        Some((triangle, hit.distance_m * self.scale))
+    }
+
+    fn verdict(&self, ray: &Ray, answer: &Answer) -> Verdict {
+        let x = ray.direction.any_orthonormal_vector();
+        let across = Across {
+            origin: (ray.origin - self.centre) * self.scale,
+            direction: ray.direction,
+            axes: [x, ray.direction.cross(x)],
+        };
+        let exact = self.exact(ray);
+        let found = answer.map(|hit| (hit.triangle as usize, hit.distance_m * self.scale));
+        let is_right = match (exact, found) {
+            (None, None) => return Verdict::Missed,
+            (Some((a, exact)), Some((b, found))) if a == b => {
+                let is_near = (found - exact).abs() <= across.distance_bound(&self.corners[a]);
+                return if is_near { Verdict::Met } else { Verdict::Wrong };
+            }
+            _ => self.is_shared(&across, exact, found) || self.is_beside(ray, &across, exact, found),
+        };
+        if is_right { Verdict::Beside } else { Verdict::Wrong }
+    }
+
+    /// Another triangle at the same distance, the ray passing both.
+    fn is_shared(&self, across: &Across, exact: Met, found: Met) -> bool {
+        let (Some((a, exact)), Some((b, found))) = (exact, found) else {
+            return false;
+        };
+        let (a, b) = (&self.corners[a], &self.corners[b]);
+        let bound = across.distance_bound(a) + across.distance_bound(b);
+        across.aside(a).max(across.aside(b)) <= EPSILON && (exact - found).abs() <= bound
+    }
+
+    /// One of the answers is of a triangle that the other one went past.
+    fn is_beside(&self, ray: &Ray, across: &Across, exact: Met, found: Met) -> bool {
+        let reached = |met: Met| met.map_or(f64::INFINITY, |met| met.1);
+        if let Some((triangle, distance)) = found
+            && distance < reached(exact)
+        {
+            // The CPU sees past it: without a gap, for it leaves none.
+            let corners = &self.corners[triangle];
+            let (low, high) = across.reach(corners);
+            let is_at = (low - EPSILON..=high + EPSILON).contains(&distance);
+            return across.aside(corners) <= EPSILON && is_at;
+        }
+        let Some((passed, _)) = exact else {
+            return false;
+        };
+        // The device went past it: so must a ray beside this one on the CPU, and meet what the device met.
+        let is_like = |beside: Met, passed: f64| match (beside, found) {
+            (None, None) => true,
+            (Some((a, _)), Some((b, _))) if a == b => true,
+            (Some((_, at)), Some((b, distance))) => {
+                (passed + at - distance).abs() <= across.distance_bound(&self.corners[b])
+            }
+            _ => false,
+        };
+        let rings = [(16, 0.05), (64, 0.2), (256, 0.5), (512, 1.0)];
+        let mut offsets = rings.into_iter().flat_map(|(steps, share)| {
+            let turn = TAU / f64::from(steps);
+            (0..steps).map(move |step| DVec2::from_angle(turn * f64::from(step)) * share * EPSILON)
+        });
+        let sees_as_the_device = |offset: DVec2| {
+            let moved = (across.axes[0] * offset.x + across.axes[1] * offset.y) / self.scale;
+            let origin = ray.origin + moved;
+            is_like(self.exact(&Ray { origin, ..*ray }), 0.0)
+        };
+        if offsets.any(sees_as_the_device) {
+            return true;
+        }
+        // Around the origin it may have been behind: then the device met what comes next.
+        let Some(hit) = self.tracer.closest_hit(ray) else {
+            return false;
+        };
+        let corners = &self.corners[passed];
+        let distance = hit.distance_m * self.scale;
+        let is_around = distance <= across.distance_bound(corners) && across.reach(corners).0 <= EPSILON;
+        is_around && is_like(self.exact(&hit.spawn(ray.direction)), distance)
+    }
+}
+
+fn lamp(colour: [f64; 3], kind: LightKind) -> Light {
+    Light {
+        colour: colour.into(),
+        ..light(kind)
+    }
+}
+
+/// One lamp of each kind, each of a colour of its own.
+fn lamps() -> [Light; 3] {
+    let point = LightKind::Point {
+        position: DVec3::new(0.1, 0.9, 0.2),
+        intensity: RadiantIntensity(2.0),
+    };
+    let spot = LightKind::Spot {
+        position: DVec3::new(0.8, 0.7, 0.4),
+        direction: DVec3::new(-0.3, -1.0, 0.1).normalize(),
+        intensity: RadiantIntensity(3.0),
+        inner_cone_rad: 0.2,
+        outer_cone_rad: 0.5,
+    };
+    let sun = LightKind::Sun {
+        direction: DVec3::new(0.4, -1.0, -0.3).normalize(),
+        normal_irradiance: Irradiance(2.0),
+    };
+    [
+        lamp([1.0, 0.2, 0.1], point),
+        lamp([0.1, 1.0, 0.3], spot),
+        lamp([0.2, 0.3, 1.0], sun),
+    ]
+}
+
+/// A floor with a matte box, a glass ball that casts a shadow, and a mirror behind them.
+fn scene(lights: Vec<Light>) -> Scene {
+    let mut scene = floor_scene(diffuse(LinearSrgb::grey(0.8)));
+    let cuboid = shapes::cuboid(DVec3::new(0.3, 0.0, 0.5), DVec3::new(0.5, 0.2, 0.7));
+    let grey = parts::matte("box", LinearSrgb::grey(0.5));
+    parts::add(&mut scene, "box", cuboid, grey);
+    let ball = shapes::sphere(DVec3::new(0.7, 0.15, 0.7), 0.1, 3);
+    parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
+    let mirror = shapes::cuboid(DVec3::new(0.0, 0.0, -0.1), DVec3::new(1.0, 0.6, -0.05));
+    parts::add(&mut scene, "mirror", mirror, parts::mirror());
+    scene.lights = lights;
+    scene
+}
+
+fn ahead() -> View {
+    view(
+        DVec3::new(0.45, 0.7, 1.7),
+        DVec3::new(0.5, 0.1, 0.3),
+        0.8,
+        [150, 100],
+    )
+}
+
+fn by_layer(scene: &Scene) -> Picture {
+    let settings = set(at(500.0, 512), |s| s.layers = vec![LayerKind::Direct]);
+    let maps = bake(scene.clone(), &settings).maps;
+    let mut rig = Rig::at(AS_CPU, scene, &maps).expect("there is a device");
+    rig.picture(&ahead())
+}
+
+/// A renderer that traces lamps.
+fn tracing(scene: &Scene) -> Option<Rig<'static>> {
+    let mut rig = Rig::at(AS_CPU, scene, &[])?;
+    rig.renderer.set_traces_lights(true);
+    Some(rig)
+}
+
+/// Fails unless shadow rays show what the baked layer shows, which is returned.
+#[track_caller]
+fn assert_traced(rig: &mut Rig) -> Picture {
+    let (found, expected) = (rig.picture(&ahead()), by_layer(&rig.scene));
+    let off = unlike(&expected, &found);
+    assert!(off < 0.02, "{:?} {off}", rig.scene.lights[0].kind);
+    expected
+}
+
+#[test]
+fn shadow_rays_show_the_baked_layer() {
+    let all = lamps();
+    for lights in all.iter().map(|lamp| vec![lamp.clone()]).chain([all.to_vec()]) {
+        let mut scene = scene(lights);
+        let mut rig = or_skip!(tracing(&scene));
+        let before = assert_traced(&mut rig);
+        // The comparison sees that a lamp has moved.
+        for light in &mut scene.lights {
+            light.kind = light.kind.moved(DVec3::new(0.1, 0.0, 0.0));
+            if let LightKind::Sun { direction, .. } = &mut light.kind {
+                *direction = DVec3::NEG_Y;
+            }
+        }
+        rig.set_scene(&scene);
+        assert!(unlike(&before, &assert_traced(&mut rig)) > 0.1);
+    }
+}
+
+#[test]
+fn moved_object_takes_its_shadow_along() {
+    let mut scene = scene(lamps().to_vec());
+    let mut rig = or_skip!(tracing(&scene));
+    let before = rig.picture(&ahead());
+    let mesh = scene.objects[1].mesh_in_scene_mut();
+    mesh.positions.iter_mut().for_each(|corner| corner.x -= 0.2);
+    rig.set_scene(&scene);
+    assert!(unlike(&before, &assert_traced(&mut rig)) > 0.02);
+}
+
+/// Under water, which takes its share on the way.
+#[test]
+fn water_weakens_shadow_rays_as_the_layer() {
+    let [point, ..] = lamps();
+    let mut scene = floor_scene(diffuse(LinearSrgb::grey(0.8)));
+    let mut water = parts::dielectric("water", 1.33);
+    water.volume = Some(Volume {
+        attenuation_distance_m: 0.5,
+        attenuation_colour: LinearSrgb::new(0.3, 0.7, 0.9),
+    });
+    let body = shapes::cuboid(DVec3::new(-1.0, -0.5, -1.0), DVec3::new(2.0, 1.2, 2.5));
+    parts::add(&mut scene, "water", body, water);
+    scene.lights = vec![point];
+    let mut rig = or_skip!(tracing(&scene));
+    let expected = assert_traced(&mut rig);
+    // The comparison sees what the water takes.
+    scene.materials[1].volume = None;
+    assert!(unlike(&expected, &by_layer(&scene)) > 0.1);
+}
+
+/// While hands move, a lamp with a surface is its middle: so small a one is nothing else.
+#[test]
+fn small_surfaces_are_traced_as_their_middles() {
+    let half_m = 1e-3;
+    let (centre, colour) = (DVec3::new(0.3, 0.8, 0.6), [1.0, 0.6, 0.2]);
+    let radiance = Radiance(0.5 / (4.0 * half_m * half_m));
+    let panel = |down: DVec3| LightKind::Panel {
+        centre,
+        across: DVec3::X * half_m,
+        down: down * half_m,
+        shape: PanelShape::Rectangle,
+        radiance,
+    };
+    // It shines up, on nothing; turned, down.
+    let mut up = or_skip!(tracing(&scene(vec![lamp(colour, panel(DVec3::NEG_Z))])));
+    let dark = up.picture(&ahead());
+    assert!(dark.radiance.iter().flatten().all(|channel| *channel == 0.0));
+    up.set_scene(&scene(vec![lamp(colour, panel(DVec3::Z))]));
+    let expected = assert_traced(&mut up);
+
+    // The same lamp as a surface that glows.
+    let mut glowing = scene(vec![lamp(colour, LightKind::Surface { object: 4, radiance })]);
+    let mut patch = shapes::floor([-half_m, half_m], [-half_m, half_m], 0.0);
+    patch.positions.iter_mut().for_each(|corner| *corner += centre);
+    patch.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
+    patch.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    let mut material = parts::matte("lamp", LinearSrgb::BLACK);
+    material.double_sided = false;
+    parts::add(&mut glowing, "lamp", patch, material);
+    let found = tracing(&glowing).expect("there is a device").picture(&ahead());
+    assert!(unlike(&expected, &found) < 0.02, "{}", unlike(&expected, &found));
+}
+
+#[test]
+fn lamps_cost_nothing_where_not_traced() {
+    let mut scene = scene(lamps().to_vec());
+    scene.objects.truncate(2);
+    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &[]));
+    rig.picture(&ahead());
+    let counts = rig.renderer.counts();
+    assert_eq!((counts.pipelines, counts.chain_bytes), (1, 0));
+    rig.renderer.set_traces_lights(true);
+    rig.picture(&ahead());
+    assert!(rig.renderer.counts().chain_bytes > 0);
 }

@@ -14,15 +14,14 @@ use nephroid::viewer::walking::EYE_M;
 use serde_json::Value;
 
 use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, picture, position, wait_until};
+use support::or_skip;
 
 /// The caustic alone, coarse enough to be baked in a second, by the estimator whose sigma changes the picture most.
 const RING: &str = "builtin:ring --estimator splat --density 10000 --map-resolution 128 --layers caustic";
 
 #[test]
 fn picture_is_saved_flown_and_resized() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(&screen, RING);
     viewer.wait_for("exposure", |_| true);
     let rest = viewer.wait_for("rest", |_| true);
@@ -134,9 +133,7 @@ fn fly(viewer: &mut Viewer<'_>, seen: &RgbImage, rest: &Value) {
 
 #[test]
 fn views_maps_worth_and_split_are_shown() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(&screen, RING);
     viewer.wait_for_bake();
     views(&mut viewer);
@@ -273,9 +270,7 @@ fn split(viewer: &mut Viewer<'_>) {
 
 #[test]
 fn exposure_suits_a_room_that_is_walked() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(
         &screen,
         "builtin:showroom --map-resolution 64 --max-error 50% --camera basin",
@@ -350,4 +345,34 @@ fn walk(viewer: &mut Viewer<'_>, rest: &Value) {
     // On foot again: over the place that was kept, on the ground.
     assert!((back - start).with_y(0.0).length() < 1e-6, "{back}, {start}");
     viewer.screenshot_that("from elsewhere", |seen| difference(&shot, seen) > 0.05);
+}
+
+const GALLERY: &str = "builtin:gallery --preset draft --layers caustic,direct,indirect";
+
+/// Direct and indirect light come before any caustic, and the exposure that suits them stays.
+#[test]
+fn the_room_is_lit_before_its_caustics() {
+    let screen = or_skip!(Screen::start());
+    let mut viewer = Viewer::open(&screen, GALLERY);
+    let first = viewer.wait_for("level", |_| true);
+    assert_eq!((&first["rays"], &first["shown"]), (&0.into(), &true.into()));
+    let stops = |event: Value| event["exposure_stops"].as_f64().expect("a number");
+    let exposed = stops(viewer.wait_for("exposure", |_| true));
+    viewer.wait_for("level", |level| level["rays"].as_u64() > Some(0));
+    let moved = stops(viewer.wait_for("exposure", |_| true)) - exposed;
+    assert!(moved.abs() <= 0.5, "{moved} stops");
+    viewer.close();
+}
+
+/// Whether it is asked to close or its window is taken away, whatever it is at.
+#[test]
+fn it_ends_quietly_while_it_bakes() {
+    let screen = or_skip!(Screen::start());
+    for what_comes_first in ["upload", "level", "exposure"] {
+        for end in [Viewer::close, Viewer::destroy] {
+            let mut viewer = Viewer::open(&screen, GALLERY);
+            viewer.wait_for(what_comes_first, |_| true);
+            end(viewer);
+        }
+    }
 }

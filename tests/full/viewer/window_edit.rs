@@ -8,6 +8,7 @@ use serde_json::Value;
 
 use super::scene_file;
 use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, picture, pixel_of};
+use support::or_skip;
 
 /// The caustic alone, refined until its error is small: several levels, and a bake of seconds, so that no window is so slow
 /// that it sees the last maps only.
@@ -31,9 +32,7 @@ fn is_edit_of(target: &str) -> impl Fn(&Value) -> bool {
 
 #[test]
 fn handles_and_lamps_are_pulled_and_undone() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(&screen, REFINED);
     let (done, _) = viewer.wait_for_bake();
     assert!(
@@ -116,9 +115,7 @@ fn handles_and_lamps_are_pulled_and_undone() {
 /// why it is bright where it is brightest.
 #[test]
 fn dark_file_is_lit_and_its_spot_explained() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let folder = tempfile::tempdir().expect("a folder");
     let dark = scene_file::glb(folder.path(), "dark", "0");
     let coarse = "--max-error 20% --map-resolution 64";
@@ -165,9 +162,7 @@ fn dark_file_is_lit_and_its_spot_explained() {
 /// What is clicked in the picture is what is told of, and what the panel changes.
 #[test]
 fn glass_ball_is_probed_and_bends_otherwise() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(
         &screen,
         "builtin:ball --estimator wavefront --density 20000 --map-resolution 128 --layers caustic,direct",

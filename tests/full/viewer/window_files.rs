@@ -1,15 +1,26 @@
-//! Scenes opened, dropped, kept, filmed and read again, in a real window.
+//! In a real window: scenes opened, dropped, kept, filmed and read again; how long a bake is said to take still; and hands
+//! that know nothing.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use glam::DVec3;
+use nephroid::progress::Stage;
 use nephroid::scene::CameraPath;
+use nephroid::session::CostPoint;
+use nephroid::settings::BakeSettings;
 use nephroid::viewer::files::config::ConfigFolder;
+use nephroid::viewer::time_left::{in_words, time_left_s};
+use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 use serde_json::{Value, json};
 
 use super::scene_file;
-use support::desktop::{ALIKE, Screen, Viewer, difference, picture, position, wait_until};
+use crate::damage::mutate::{Damage, effort};
+use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, picture, position, wait_until};
 use support::file_drop::drop_file;
+use support::or_skip;
+use support::tools::{at, bake, builtin_scene, set};
 
 /// Coarse enough to be baked in a second.
 const COARSE: &str = "--density 300 --map-resolution 32";
@@ -25,9 +36,7 @@ fn wait_for_scene(viewer: &mut Viewer<'_>, name: &str) {
 
 #[test]
 fn scenes_take_each_others_place() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(&screen, &format!("builtin:slab {COARSE}"));
     viewer.wait_for_bake();
     let slab = viewer.screenshot();
@@ -82,9 +91,7 @@ fn scenes_take_each_others_place() {
 /// of one is not.
 #[test]
 fn killed_window_comes_back_and_watches() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let folder = tempfile::tempdir().expect("a folder");
     let config = folder.path().join("config");
     let path = scene_file::glb(folder.path(), "kept", "30");
@@ -143,9 +150,7 @@ fn killed_window_comes_back_and_watches() {
 
 #[test]
 fn path_is_recorded_played_and_filmed() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(&screen, "builtin:ring --density 1000 --map-resolution 64");
     let start = position(&viewer.wait_for_bake().1);
     viewer.hands("mousemove 900 300 key k");
@@ -189,4 +194,210 @@ fn path_is_recorded_played_and_filmed() {
         assert!(moved > 1000, "{moved} pixels differ from frame to frame");
     }
     viewer.close();
+}
+
+/// Of one part; there are at most three.
+const PART: Duration = Duration::from_secs(20);
+const MAX_PARTS: usize = 3;
+/// Deeds between two looks at the clock.
+const DEEDS: usize = 12;
+
+/// Everything that the window has a meaning for, and some that it has none for.
+const KEYS: &str = "w a s d q e c f r h v m p k g 1 2 9 ctrl+1 ctrl+2 ctrl+z ctrl+y ctrl+shift+z Escape Tab shift+Tab space \
+    Return Up Down Left Right Page_Down Home BackSpace Delete 0 5 minus period F1 F12 x question shift+w alt+a";
+const HELD: [&str; 8] = ["w", "a", "s", "d", "q", "e", "shift", "ctrl"];
+
+/// Something to do, for xdotool.
+fn deed(random: &mut Damage, window: &str) -> String {
+    let (width, height) = (SIZE.0 as usize, SIZE.1 as usize);
+    // As often over the panel as over the picture.
+    let x = if random.below(2) == 0 {
+        random.below(360)
+    } else {
+        random.below(width)
+    };
+    let y = random.below(height);
+    match random.below(20) {
+        0..=5 => format!("key {} ", random.one_of(&KEYS.split(' ').collect::<Vec<_>>())),
+        6 | 7 => format!(
+            "{} {} ",
+            random.one_of(&["keydown", "keyup"]),
+            random.one_of(&HELD)
+        ),
+        8..=12 => format!("mousemove {x} {y} click 1 "),
+        13 => format!("mousemove {x} {y} click 3 "),
+        14 | 15 => format!(
+            "mousemove {x} {y} click --repeat 3 --delay 5 {} ",
+            4 + random.below(2)
+        ),
+        16..=18 => {
+            let button = random.one_of(&[1, 1, 3]);
+            let (to_x, to_y) = (random.below(width), y + random.below(9));
+            let way = format!(
+                "mousemove {} {to_y} sleep 0.02 mousemove {to_x} {to_y}",
+                (x + to_x) / 2
+            );
+            format!("mousemove {x} {y} mousedown {button} sleep 0.02 {way} sleep 0.02 mouseup {button} ")
+        }
+        _ => format!(
+            "windowsize {window} {} {} ",
+            300 + random.below(1000),
+            200 + random.below(600)
+        ),
+    }
+}
+
+#[test]
+fn random_input_breaks_nothing() {
+    let screen = or_skip!(Screen::start());
+    let mut viewer = Viewer::open(&screen, "builtin:ring --map-resolution 128 --max-error 0.05%");
+    let mut random = Damage::to("hands", 0);
+    let start = Instant::now();
+    while start.elapsed() < PART * effort().clamp(1, MAX_PARTS) as u32 {
+        let deeds: String = (0..DEEDS).map(|_| deed(&mut random, viewer.place().1)).collect();
+        viewer.hasty_hands(&deeds);
+        assert!(viewer.runs(), "it ended: {}", viewer.stderr());
+    }
+    // Everything is let go, and whatever is baked now is stopped.
+    let let_go: String = HELD.iter().map(|key| format!("keyup {key} ")).collect();
+    let size = format!("windowsize {} {} {}", viewer.place().1, SIZE.0, SIZE.1);
+    viewer.hands(&format!("{let_go} mouseup 1 mouseup 3 {size}"));
+    viewer.forget();
+    viewer.hands("mousemove 900 300 key Escape");
+    viewer.hands("key Escape");
+    for bad in ["fault", "device_lost"] {
+        assert!(viewer.all(bad).is_empty(), "{:?}", viewer.all(bad));
+    }
+    let (stderr, log) = viewer.close();
+    for bad in ["alidation", "overflow"] {
+        assert!(!stderr.contains(bad), "{stderr}");
+    }
+    tell_waits(&log);
+}
+
+/// How long events waited while it baked: percentiles in order, of some events.
+fn tell_waits(log: &[Value]) {
+    let told = log.iter().rfind(|event| event["event"] == "latency");
+    let waits = &told.expect("it is told at the end")["while_baking"];
+    assert!(waits["count"].as_u64() > Some(20), "{waits}");
+    let ms = ["p50_ms", "p95_ms", "p99_ms", "max_ms"].map(|name| waits[name].as_f64().expect("a number"));
+    assert!(ms.is_sorted() && ms[0] > 0.0, "{waits}");
+    println!("events while it baked waited {ms:?} ms: half, 95 %, 99 %, all of them");
+}
+
+/// Both bakes would take minutes: whoever waited for one would see it done.
+#[test]
+fn long_bake_leaves_room_for_input_and_ends() {
+    let screen = or_skip!(Screen::start());
+    let long = "builtin:ring --density 3e7";
+    let mut viewer = Viewer::open(&screen, &format!("{long} --estimator splat --layers caustic"));
+    for step in 0..40 {
+        // To and fro between the panel and the picture; every eighth time the camera is set back to where it is.
+        let (x, y) = if step % 2 == 0 {
+            (100, 200 + 5 * step)
+        } else {
+            (700 + 5 * step, 300)
+        };
+        let key = if step % 8 == 7 { "key c" } else { "" };
+        viewer.hasty_hands(&format!("mousemove {x} {y} {key} sleep 0.1"));
+    }
+    // It closes while it reads and while it bakes.
+    viewer.open_sections(&["Scene"]);
+    viewer.type_into("TextInput", "File", "builtin:showroom");
+    viewer.wait_for("opening", |_| true);
+    let (_, log) = viewer.close();
+    assert!(
+        log.iter().all(|event| event["event"] != "done"),
+        "it baked all the time"
+    );
+    tell_waits(&log);
+
+    // So it does by a signal. The bake begins before the window is there.
+    let viewer = Viewer::open(&screen, long);
+    assert_eq!(viewer.signal("TERM").code(), Some(143));
+}
+
+fn request(settings: BakeSettings) -> BakeRequest {
+    BakeRequest::new(Arc::new(builtin_scene("ring")), settings)
+}
+
+/// So many seconds after the start, at a share of a stage that began then.
+fn left(wanted: &BakeRequest, level: Option<&BakedLevel>, fraction: f64, seconds: f64) -> Option<f64> {
+    let (stage, since) = (Stage::Caustic, Instant::now());
+    let state = BakeState::Baking {
+        stage,
+        fraction,
+        since,
+    };
+    time_left_s(&state, wanted, level, since + Duration::from_secs_f64(seconds))
+}
+
+#[test]
+fn nothing_is_said_where_nothing_is_known() {
+    let wanted = request(BakeSettings::default());
+    for state in [BakeState::Idle, BakeState::Done, BakeState::Cancelled] {
+        assert_eq!(time_left_s(&state, &wanted, None, Instant::now()), None);
+    }
+    assert_eq!(left(&wanted, None, 0.01, 5.0), None);
+}
+
+#[test]
+fn a_stage_keeps_its_pace_within_a_limit() {
+    for (max_time_s, expected) in [
+        (None, 12.0),
+        (Some(10.0), 6.0),
+        (Some(100.0), 12.0),
+        (Some(3.0), 0.0),
+    ] {
+        let wanted = request(set(BakeSettings::default(), |s| s.max_time_s = max_time_s));
+        let left = left(&wanted, None, 0.25, 4.0).expect("it is known");
+        assert!((left - expected).abs() < 1e-9, "{left} s with {max_time_s:?}");
+    }
+}
+
+#[test]
+fn the_course_tells_what_is_left_of_it() {
+    let wanted = request(set(BakeSettings::default(), |s| s.max_error = Some(0.01)));
+    let point = |cpu_s, error| CostPoint {
+        rays: 1000,
+        cpu_s,
+        wall_s: cpu_s / 2.0,
+        bytes: 0,
+        error,
+        is_coarse: false,
+        is_by_photons: false,
+    };
+    let mut level = BakedLevel {
+        serial: 1,
+        request: wanted.clone(),
+        level: 1,
+        is_final: false,
+        result: bake(builtin_scene("ring"), &at(10.0, 8)),
+        seconds: 3.0,
+    };
+    level.result.course = vec![point(2.0, 0.04), point(6.0, 0.02)];
+    let after = |level: &BakedLevel, seconds| left(&wanted, Some(level), 0.5, seconds);
+    let at_level = after(&level, 3.0).expect("it is known");
+    // Half the error takes more than nothing and, at an exponent of at most 2, at most three times as much again; two
+    // threads work.
+    assert!(at_level > 0.0 && at_level <= 0.5 * 3.0 * 6.0, "{at_level}");
+    // A second later a second less, and never less than none.
+    let later = after(&level, 4.0).expect("it is known");
+    assert!((at_level - later - 1.0).abs() < 1e-9, "{at_level}, {later}");
+    assert_eq!(after(&level, 1e6), Some(0.0));
+    // Maps of another bake say nothing of this one.
+    level.request.settings.seed = 9;
+    assert_eq!(after(&level, 3.0), None);
+}
+
+#[test]
+fn times_are_told_as_well_as_they_are_known() {
+    for (seconds, words) in [
+        (0.2, "about a second left"),
+        (41.7, "about 42 s left"),
+        (130.0, "about 3 min left"),
+        (7300.0, "about 3 h left"),
+    ] {
+        assert_eq!(in_words(seconds), words);
+    }
 }

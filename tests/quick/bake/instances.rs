@@ -2,7 +2,7 @@
 
 use glam::DAffine3;
 use nephroid::scene::Object;
-use nephroid::scene::instances::{MOST_COPIED, find};
+use nephroid::scene::instances::{MAX_COPIED, find};
 
 use crate::prelude::*;
 use support::tools::{at, bake, caustic, energy_fault, map_of, photons};
@@ -31,7 +31,7 @@ fn balls(is_shared: bool) -> Scene {
         }
         scene.objects.push(ball);
     }
-    let instances = find(&scene.objects, MOST_COPIED);
+    let instances = find(&scene.objects, MAX_COPIED);
     let instances = instances.iter().filter(|is_instance| **is_instance);
     assert_eq!(instances.count(), if is_shared { 4 } else { 0 });
     scene

@@ -1,17 +1,14 @@
 //! Photons against brute force, against the law of energy, and against themselves.
 
-use glam::DVec3;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::luminance;
+use nephroid::scene::Scene;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{LightKind, LightSize, Material, PanelShape, Scene};
 use nephroid::session::BakeResult;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
-use nephroid::units::Radiance;
 
-use support::brute_force::brute;
-use support::hard_scenes::cut_glass;
-use support::tools::{bake, bits, builtin_scene, caustic, energy_fault, map_of, photons};
+use support::hard_scenes::{cut_glass, roughened, under_square_lamp, under_the_suns_disc};
+use support::tools::{bake, bits, brute, builtin_scene, caustic, energy_fault, map_of, photons};
 
 const SIDE: usize = 64;
 const BLOCK: usize = 8;
@@ -20,35 +17,6 @@ const FINE: MapResolution = MapResolution::Fixed {
     width: 256,
     height: 256,
 };
-
-fn ring_under_square_lamp() -> Scene {
-    let mut scene = builtin_scene("ring");
-    scene.lights[0].kind = LightKind::Panel {
-        centre: scene.lights[0].kind.position().expect("a point light"),
-        across: DVec3::X * 0.15,
-        down: DVec3::Z * 0.15,
-        shape: PanelShape::Rectangle,
-        radiance: Radiance(80.0),
-    };
-    scene
-}
-
-fn nephroid_under_the_sun() -> Scene {
-    let mut scene = builtin_scene("nephroid");
-    scene.lights[0].size = LightSize::Angle {
-        diameter_rad: 0.53_f64.to_radians(),
-    };
-    scene
-}
-
-fn frosted_ball(roughness: f64) -> Scene {
-    let mut scene = builtin_scene("ball");
-    let is_glass = |material: &&mut Material| material.surface.is_specular();
-    for material in scene.materials.iter_mut().filter(is_glass) {
-        material.roughness = roughness;
-    }
-    scene
-}
 
 /// Green glass around a lamp, so that paths absorb, split and start inside a body.
 fn lamp_in_green_glass() -> Scene {
@@ -95,9 +63,10 @@ fn photons_are_unbiased() {
     for (what, scene, density_per_sr) in [
         ("glass ball", builtin_scene("ball"), 1e6),
         ("cut glass", cut_glass(), 1e6),
-        ("square lamp", ring_under_square_lamp(), 1e5),
-        ("disc of the sun", nephroid_under_the_sun(), 2e6),
-        ("frosted ball", frosted_ball(0.3), 1e6),
+        ("square lamp", under_square_lamp("ring", 0.3), 1e5),
+        ("disc of the sun", under_the_suns_disc(), 2e6),
+        ("frosted ball", roughened("ball", 0.3), 1e6),
+        ("ball as rough as can be", roughened("ball", 1.0), 1e6),
         ("lamp in green glass", lamp_in_green_glass(), 3e4),
     ] {
         let result = bake(scene.clone(), &photons(density_per_sr, SIDE));
@@ -164,7 +133,7 @@ fn threads_change_no_photon() {
             filter: Some(true),
             ..photons(3e5, SIDE)
         };
-        bake(frosted_ball(0.3), &settings)
+        bake(roughened("ball", 0.3), &settings)
     });
     assert_eq!(one.maps.len(), three.maps.len());
     for (a, b) in one.maps.iter().zip(&three.maps) {
@@ -175,7 +144,7 @@ fn threads_change_no_photon() {
 /// The target is met by the true error too, within a factor of two; and filtering reaches it with fewer photons.
 #[test]
 fn targets_are_met_and_filtering_saves_photons() {
-    let scene = frosted_ball(0.3);
+    let scene = roughened("ball", 0.3);
     let [raw, filtered] = [false, true].map(|filter| {
         let settings = BakeSettings {
             max_error: Some(0.15),
@@ -227,25 +196,26 @@ fn errors_of_few_filtered_photons_are_numbers() {
     assert!(errors.all(|error| *error >= 0.0 && *error < f32::MAX));
 }
 
-/// Pure colours lie outside of sRGB, filtered too; their luminance is never negative.
+/// Pure colours lie outside of sRGB; their luminance is never negative, whatever bundles and photons have of it.
 #[test]
-fn filtered_spectra_are_light() {
-    let settings = BakeSettings {
-        filter: Some(true),
-        ..photons(3e4, SIDE)
-    };
-    let scene = builtin_scene("spectrum");
-    let result = bake(scene, &settings);
-    assert_eq!(energy_fault(&result), None);
-    let layers = result.maps.iter().filter_map(|map| map.layer(LayerKind::Caustic));
-    let texels: Vec<[f32; 3]> = layers
-        .flat_map(|layer| layer.irradiance.iter().copied())
-        .collect();
-    assert!(texels.iter().flatten().any(|channel| *channel < 0.0));
-    // Counts are whole numbers.
-    let mean = texels.iter().map(luminance).sum::<f64>() / texels.len() as f64;
-    let least = texels.iter().map(luminance).fold(f64::INFINITY, f64::min);
-    assert!(least >= -1e-6 * mean, "{least} of {mean}");
+fn spectra_are_light() {
+    for filter in [true, false] {
+        let settings = BakeSettings {
+            filter: Some(filter),
+            ..photons(3e4, SIDE)
+        };
+        let result = bake(builtin_scene("spectrum"), &settings);
+        assert_eq!(energy_fault(&result), None);
+        let layers = result.maps.iter().filter_map(|map| map.layer(LayerKind::Caustic));
+        let texels: Vec<[f32; 3]> = layers
+            .flat_map(|layer| layer.irradiance.iter().copied())
+            .collect();
+        assert!(texels.iter().flatten().any(|channel| *channel < 0.0));
+        // Counts are whole numbers.
+        let mean = texels.iter().map(luminance).sum::<f64>() / texels.len() as f64;
+        let least = texels.iter().map(luminance).fold(f64::INFINITY, f64::min);
+        assert!(least >= -1e-6 * mean, "filter {filter}: {least} of {mean}");
+    }
 }
 
 /// Smooth light is for patches, light that goes very many ways for photons.
@@ -263,5 +233,5 @@ fn auto_takes_what_costs_less() {
         result.counts.cells == 0
     };
     assert!(!carried(builtin_scene("ring")), "a smooth mirror");
-    assert!(carried(frosted_ball(0.2)), "rough glass");
+    assert!(carried(roughened("ball", 0.2)), "rough glass");
 }

@@ -1,11 +1,7 @@
 //! The program as a user runs it: options, streams, exit codes, files.
 
-mod compare;
-mod errors;
 mod inspect;
-mod render;
 mod smoke;
-mod study;
 mod usage;
 
 use std::process::Command;

@@ -1,14 +1,10 @@
 //! Files for other programs, read back by readers that are not ours.
 
-mod folders;
 mod glb;
-mod ktx2;
-mod map_files;
 mod maps;
-mod shards;
 mod textures;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use nephroid::error::Error;
 use nephroid::export::map_folder::MapFolder;
@@ -18,7 +14,7 @@ use nephroid::export::{FloatImage, Quantity};
 use nephroid::session::BakeResult;
 
 use crate::prelude::*;
-use support::program::read_json;
+use support::program::{names, read_json};
 use support::tools::{at, bake};
 
 struct Baked {
@@ -97,16 +93,6 @@ fn linear_of_srgb(code: u16) -> f64 {
     } else {
         ((share + 0.055) / 1.055).powf(2.4)
     }
-}
-
-fn names(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("it is there");
-    let name = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("listed").file_name();
-    let mut names: Vec<String> = entries
-        .map(|entry| name(entry).into_string().expect("text"))
-        .collect();
-    names.sort();
-    names
 }
 
 /// Two boxes of one mesh, one of them mirrored, with colours at their vertices (position + 0.5), before a mirror.

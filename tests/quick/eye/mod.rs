@@ -4,8 +4,6 @@ mod charts;
 mod direct;
 mod display;
 mod pictures;
-mod texel_areas;
-mod white_balance;
 
 fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> T {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).build();

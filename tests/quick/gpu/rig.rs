@@ -9,6 +9,7 @@ use nephroid::gpu::{Gpu, readback};
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::Scene;
 
+pub use support::or_skip;
 use support::skip;
 
 pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
@@ -37,16 +38,15 @@ pub fn own_gpu(limits: impl FnOnce(&mut wgpu::Limits)) -> Option<Gpu> {
     Some(small.expect("less is always granted"))
 }
 
-/// What it holds, or the end of a test whose skip was counted.
-macro_rules! or_skip {
-    ($option:expr) => {
-        match $option {
-            Some(found) => found,
-            None => return,
-        }
-    };
+/// Share of the channels that differ by more than 1 % of themselves, or of a tenth of the brightest: borders of shadows,
+/// which a map softens over a texel, and outlines.
+pub fn unlike(a: &Picture, b: &Picture) -> f64 {
+    let channels = || a.radiance.iter().flatten().zip(b.radiance.iter().flatten());
+    let peak = channels().fold(0.0_f32, |peak, (a, _)| peak.max(*a));
+    assert!(peak > 0.0, "it is not dark");
+    let far = channels().filter(|(a, b)| (*a - *b).abs() > 0.01 * a.max(0.1 * peak));
+    far.count() as f64 / (3 * a.radiance.len()) as f64
 }
-pub(crate) use or_skip;
 
 /// A renderer, and what it shows.
 pub struct Rig<'a> {

@@ -1,20 +1,20 @@
 //! Ray differentials against finite differences of traced rays.
 
 use nephroid::light_pass::caustic::path::PathLimits;
-use nephroid::light_pass::caustic::setup::{Aim, Aiming};
-use nephroid::light_pass::wavefront::strand::{Landing, Strand};
+use nephroid::light_pass::caustic::setup::{Aim, CullMode};
+use nephroid::light_pass::wavefront::strand::{Landing, PathSegment};
 use nephroid::light_pass::wavefront::trace::StrandTracer;
 use nephroid::settings::ItemBufferKind;
 use nephroid::transport::EffectSet;
 
 use crate::prelude::*;
-use support::bump_scenes::by_image;
+use support::effect_scenes::by_image;
 
 /// Compares derivatives of the strand that carries most, at places over the domain, with central differences over a
 /// step of the unit square; returns the root mean square of the relative difference and how many places there were.
 fn mismatch(scene: Scene, step: f64) -> (f64, usize) {
     let tracer = Tracer::new(Arc::new(scene));
-    let aim = Aim::take(&tracer, ItemBufferKind::Equal, Aiming::Everything, true);
+    let aim = Aim::take(&tracer, ItemBufferKind::Equal, CullMode::Everything, true);
     let launch = &aim.lights[0].launch;
     let limits = PathLimits {
         max_depth: 4,
@@ -28,9 +28,9 @@ fn mismatch(scene: Scene, step: f64) -> (f64, usize) {
     for face in 0..launch.face_count() {
         for index in 0..900 {
             let square = (DVec2::new((index % 30) as f64, (index / 30) as f64) + 0.47) / 30.0;
-            let strand = |offset: DVec2| -> Option<Strand> {
+            let strand = |offset: DVec2| -> Option<PathSegment> {
                 let sample = rays.trace(face, square + offset);
-                let lands = |strand: &&Strand| matches!(strand.landing, Landing::Receiver { .. });
+                let lands = |strand: &&PathSegment| matches!(strand.landing, Landing::Receiver { .. });
                 sample.strands.iter().find(lands).copied()
             };
             for (axis, along) in [(0, DVec2::X), (1, DVec2::Y)] {

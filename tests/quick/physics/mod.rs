@@ -2,10 +2,8 @@
 
 mod colour;
 mod differentials;
-mod false_colours;
 mod fresnel;
 mod glass;
-mod lights;
 mod metal_paths;
 mod metals;
 mod refraction;

@@ -1,10 +1,13 @@
-//! What becomes of light at a floor: interfaces within other bodies, polish, micro-facets.
+//! What becomes of light at a floor: interfaces within other bodies, polish, micro-facets; how lamps fall off, and how
+//! units multiply.
 
 use std::f64::consts::TAU;
 
+use nephroid::light_pass::emitter::EmitterKind;
 use nephroid::optics::fresnel::{dielectric_reflectance, thin_wall_reflectance};
 use nephroid::transport::microfacets::Facet;
 use nephroid::transport::{EffectSet, Event, Interaction, SurfaceHit};
+use nephroid::units::{Area, Irradiance, RadiantIntensity, SolidAngle};
 
 use crate::prelude::*;
 use support::scenes::middles;
@@ -76,6 +79,59 @@ fn polish_reflects_where_it_covers() {
             );
             near(back + shares.deposit.g, 1.0, 1e-12, "the rest is deposited");
         }
+    }
+}
+
+/// A mixture shares light out as its classes do, by their shares of the surface.
+#[test]
+fn mixtures_are_the_sum_of_their_classes() {
+    let direction = dvec3(0.7, -1.0, 0.2).normalize();
+    let of = |surface: SurfaceKind, metallic: f64, transmission: f64, coverage: Option<f64>| {
+        let material = Material {
+            metallic,
+            transmission,
+            coverage,
+            ..smooth(surface, 1.0)
+        };
+        let met = met(material, direction, &MediumStack::default());
+        let share = |branch: Option<nephroid::transport::Branch>| {
+            branch.map_or(LinearSrgb::BLACK, |branch| branch.share)
+        };
+        [
+            share(met.reflection),
+            share(met.transmission),
+            met.deposit,
+            met.absorbed,
+        ]
+    };
+    let alone = |surface| of(surface, 0.0, 0.0, None);
+    let [metal, clear, body] = [SurfaceKind::Mirror, SurfaceKind::ThinWall, SurfaceKind::Mixed].map(alone);
+    let passed = [
+        LinearSrgb::BLACK,
+        LinearSrgb::WHITE,
+        LinearSrgb::BLACK,
+        LinearSrgb::BLACK,
+    ];
+    for (metallic, transmission, coverage) in [
+        (0.25, 0.5, None),
+        (1.0, 0.5, None),
+        (0.0, 0.0, Some(0.3)),
+        (0.5, 0.0, Some(0.8)),
+    ] {
+        let mixed = of(SurfaceKind::Varied, metallic, transmission, coverage);
+        let there = coverage.unwrap_or(1.0);
+        let through = there * (1.0 - metallic) * transmission;
+        let rest = there * (1.0 - metallic) * (1.0 - transmission);
+        let mut sum = LinearSrgb::BLACK;
+        for part in 0..4 {
+            let expected = metal[part] * (there * metallic)
+                + clear[part] * through
+                + body[part] * rest
+                + passed[part] * (1.0 - there);
+            near(mixed[part], expected, 1e-12, (metallic, transmission, part));
+            sum += mixed[part];
+        }
+        near(sum, LinearSrgb::WHITE, 1e-12, "all of the light");
     }
 }
 
@@ -180,4 +236,72 @@ fn clear_rough_glass_absorbs_nothing() {
         }
     }
     assert!(total > 100, "{total} facets reflect totally");
+}
+
+fn spot(inner_cone_rad: f64, outer_cone_rad: f64) -> EmitterKind {
+    EmitterKind::Spot {
+        position: DVec3::ZERO,
+        direction: DVec3::NEG_Y,
+        inner_cone_rad,
+        outer_cone_rad,
+    }
+}
+
+/// Unit direction at `angle` from the spot's axis.
+fn off_axis(angle: f64) -> DVec3 {
+    dvec3(angle.sin(), -angle.cos(), 0.0)
+}
+
+#[test]
+fn lights_have_their_falloff() {
+    let (soft, hard) = (spot(0.3, 0.5), spot(0.4, 0.4));
+    let point = EmitterKind::Point {
+        position: DVec3::ZERO,
+    };
+    let sun = EmitterKind::Parallel {
+        direction: DVec3::NEG_Y,
+    };
+    for (light, angle, expected) in [
+        (&soft, 0.0, 1.0),
+        (&soft, 0.299, 1.0),
+        (&soft, 0.501, 0.0),
+        (&soft, PI, 0.0),
+        (&hard, 0.399_999, 1.0),
+        (&hard, 0.400_001, 0.0),
+        (&point, 0.0, 1.0),
+        (&point, 3.0, 1.0),
+        (&sun, 1.0, 1.0),
+        (&sun, 3.0, 1.0),
+    ] {
+        assert_eq!(light.falloff(off_axis(angle)), expected, "{light:?} at {angle}");
+    }
+    // Half-way in the cosine a quarter is left: the square of 1/2.
+    let cosine = 0.5 * (0.3f64.cos() + 0.5f64.cos());
+    near(soft.falloff(off_axis(cosine.acos())), 0.25, 1e-12, "half-way");
+}
+
+#[test]
+fn units_multiply_lawfully() {
+    let flux = RadiantIntensity(2.0) * SolidAngle(4.0 * PI);
+    near(flux.0, 8.0 * PI, 1e-12, "into the whole sphere");
+    // On a sphere of 3 m around it that is I/r².
+    near((flux / Area(4.0 * PI * 9.0)).0, 2.0 / 9.0, 1e-15, "on a sphere");
+    near(
+        Irradiance(PI).diffuse_radiance(1.0).0,
+        1.0,
+        1e-15,
+        "a white Lambert surface",
+    );
+}
+
+proptest! {
+    #![proptest_config(support::law(4096))]
+
+    #[test]
+    fn falloff_falls(outer in 0.05..1.57f64, share in 0.0..1.0f64, a in 0.0..3.1f64, b in 0.0..3.1f64) {
+        let light = spot(outer * share, outer);
+        let (near, far) = (light.falloff(off_axis(a.min(b))), light.falloff(off_axis(a.max(b))));
+        prop_assert!((0.0..=1.0).contains(&near) && (0.0..=1.0).contains(&far));
+        prop_assert!(near >= far);
+    }
 }

@@ -226,48 +226,22 @@ fn prism_has_minimum_deviation() {
     }
 }
 
-/// Where a ray meets the wall of `spectrum`.
-fn at_wall(origin: DVec3, direction: DVec3) -> DVec3 {
-    origin + direction * ((-0.6 - origin.z) / direction.z)
-}
-
-/// On the way through a flat face of a mesh, from where it is met.
-fn through_face(mesh: &Mesh, origin: DVec3, direction: DVec3, eta: f64) -> (DVec3, DVec3) {
-    let ray = |triangle: usize| {
-        let [a, b, c] = mesh.corners(triangle);
-        let normal = (b - a).cross(c - a).normalize();
-        let distance = (a - origin).dot(normal) / direction.dot(normal);
-        let point = origin + direction * distance;
-        let is_inside = [(a, b), (b, c), (c, a)]
-            .iter()
-            .all(|(from, to)| (*to - *from).cross(point - *from).dot(normal) >= 0.0);
-        (distance > 1e-9 && is_inside).then_some((distance, point, normal))
-    };
-    let hits = (0..mesh.triangles.len()).filter_map(ray);
-    let (_, point, normal) = hits.min_by(|a, b| a.0.total_cmp(&b.0)).expect("it meets a face");
-    let facing = if direction.dot(normal) > 0.0 {
-        -normal
-    } else {
-        normal
-    };
-    (point, refract(direction, facing, eta).expect("it goes through"))
-}
-
-/// One reflection within a ball, from where a ray meets it: the way of a rainbow's light.
-fn through_ball(centre: DVec3, radius: f64, origin: DVec3, direction: DVec3, n: f64) -> (DVec3, DVec3) {
-    let meet = |origin: DVec3, direction: DVec3, first: bool| {
-        let to = origin - centre;
-        let half = to.dot(direction);
-        let root = (half * half - to.length_squared() + radius * radius).sqrt();
-        let point = origin + direction * (if first { -half - root } else { -half + root });
-        (point, (point - centre).normalize())
-    };
-    let (point, normal) = meet(origin, direction, true);
-    let inside = refract(direction, normal, n).expect("it enters");
-    let (point, normal) = meet(point, inside, false);
-    let back = reflect(inside, normal);
-    let (point, normal) = meet(point, back, false);
-    (point, refract(back, -normal, 1.0 / n).expect("it leaves"))
+/// A ray of one wavelength behind a solid that it enters and leaves, after reflections within.
+fn behind(tracer: &Tracer, mut ray: Ray, reflections: usize) -> Ray {
+    let mut media = MediumStack::default();
+    for step in 0..reflections + 2 {
+        let hit = tracer.closest_hit(&ray).expect("it meets the solid");
+        let met = tracer.interact(&hit, ray.direction, &media);
+        let is_reflected = (1..=reflections).contains(&step);
+        let branch = if is_reflected {
+            met.reflection
+        } else {
+            met.transmission
+        };
+        let branch = branch.expect("light goes on");
+        (ray, media) = (branch.ray, branch.media);
+    }
+    ray
 }
 
 /// Whether a point is in the picture of the scene's first camera, 3 wide and 2 high.
@@ -281,36 +255,25 @@ fn is_in_view(scene: &Scene, point: DVec3) -> bool {
 
 #[test]
 fn spectra_fall_on_the_wall_in_view() {
-    let scene = built_in("spectrum");
-    let (prism, ball) = (object(&scene, "prism"), object(&scene, "ball"));
-    let glass = &scene.materials[prism.material];
-    let (low, high) = ball.mesh_in_scene().bounds().expect("has vertices");
-    let centre = 0.5 * (low + high);
+    let tracer = Tracer::new(Arc::new(built_in("spectrum")));
+    let scene = tracer.scene();
     let beam = |index: usize| match scene.lights[index].kind {
         LightKind::Spot {
-            position, direction, ..
-        } => (position, direction),
+            position: origin,
+            direction,
+            ..
+        } => Ray { origin, direction },
         other => panic!("{other:?} is no beam"),
     };
-    let hits = |nm: f64| {
-        let n = glass.index_at(Nanometres(nm));
-        let (origin, direction) = beam(0);
-        let (entry, inside) = through_face(prism.mesh_in_scene(), origin, direction, n);
-        let (exit, out) = through_face(prism.mesh_in_scene(), entry, inside, 1.0 / n);
-        let (origin, direction) = beam(1);
-        let (last, back) = through_ball(centre, 0.06, origin, direction, n);
-        [at_wall(exit, out), at_wall(last, back)]
-    };
-    let [violet, green, red] = [400.0, 550.0, 700.0].map(hits);
-    for (index, what, least_m) in [(0, "prism", 0.08), (1, "ball", 0.015)] {
-        let places = [violet[index], green[index], red[index]];
-        for place in places {
-            assert!(
-                (0.0..1.0).contains(&place.y) && place.x.abs() < 1.3,
-                "{what}: {place} is off the wall"
-            );
-            assert!(is_in_view(&scene, place), "{what}: {place}");
-        }
+    for (index, what, reflections, least_m) in [(0, "prism", 0, 0.08), (1, "ball", 1, 0.015)] {
+        let places = [400.0, 550.0, 700.0].map(|nm| {
+            let at = tracer.at_wavelength(Nanometres(nm));
+            let out = behind(&at, beam(index), reflections);
+            let hit = at.closest_hit(&out).expect("the wall");
+            assert_eq!(scene.objects[hit.object].name, "wall", "{what}");
+            assert!(is_in_view(scene, hit.point), "{what}: {}", hit.point);
+            hit.point
+        });
         let spread = places[0].distance(places[2]);
         assert!(spread > least_m, "{what}: {spread} m from violet to red");
         let share = places[0].distance(places[1]) / spread;
@@ -320,9 +283,12 @@ fn spectra_fall_on_the_wall_in_view() {
         );
     }
     // Rays beside the middle of the ball's beam leave it alike: a rainbow, not a blur.
-    let n = glass.index_at(D_LINE);
-    let (origin, direction) = beam(1);
-    let way = |aside_m: f64| through_ball(centre, 0.06, origin + DVec3::X * aside_m, direction, n).1;
+    let at = tracer.at_wavelength(D_LINE);
+    let way = |aside_m: f64| {
+        let mut ray = beam(1);
+        ray.origin.x += aside_m;
+        behind(&at, ray, 1).direction
+    };
     assert!(way(0.001).angle_between(way(-0.001)) < 1e-3);
 }
 

@@ -172,8 +172,7 @@ fn roughness_changes_the_class() {
     let [floor, glass] = [0, 1].map(|material| scene.materials[material].clone());
     for (material, to, expected) in [
         (&glass, 0.3, SurfaceKind::Dielectric),
-        (&glass, 0.6, SurfaceKind::Dielectric),
-        (&glass, 0.61, SurfaceKind::Diffuse),
+        (&glass, 1.0, SurfaceKind::Dielectric),
         (&floor, 0.3, SurfaceKind::Mixed),
         (&parts::mirror(), 0.2, SurfaceKind::Mirror),
         (&parts::mirror(), 0.5, SurfaceKind::Mirror),

@@ -7,17 +7,10 @@ use nephroid::error::Result;
 use nephroid::files::{read_file, write_atomically};
 
 use crate::prelude::*;
+use support::program::names;
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     write_atomically(path, |writer| writer.write_all(bytes))
-}
-
-fn names_in(folder: &Path) -> Vec<String> {
-    let entries = std::fs::read_dir(folder).expect("folder can be listed");
-    let name = |entry: io::Result<std::fs::DirEntry>| entry.expect("listed").file_name();
-    entries
-        .map(|entry| name(entry).to_string_lossy().into_owned())
-        .collect()
 }
 
 #[test]
@@ -40,7 +33,7 @@ fn files_are_written_whole_or_not_at_all() {
         "a.bin: does not fit on the disk; free some space",
     );
     assert_eq!(read_file(&path, 1000).expect("still there"), b"old");
-    assert_eq!(names_in(folder.path()), ["a.bin"]);
+    assert_eq!(names(folder.path()), ["a.bin"]);
 }
 
 #[test]

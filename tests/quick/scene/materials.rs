@@ -40,13 +40,7 @@ fn surfaces_are_classified() {
         (0.0, 0.0, &flat, ThinWall, "thin pane"),
         (0.0, 0.31, &none, Diffuse, ""),
         (0.0, 0.6, &solid, Dielectric, ""),
-        (
-            0.0,
-            0.7,
-            &solid,
-            Diffuse,
-            "transmits light at a roughness of 0.70",
-        ),
+        (0.0, 1.0, &solid, Dielectric, ""),
     ] {
         let factors = factors(metallic, roughness);
         let json = json!({ "name": "m", "pbrMetallicRoughness": factors, "extensions": extensions });
@@ -104,35 +98,56 @@ fn values_out_of_range_are_brought_back() {
     let (read, scene) = material(json!({
         "name": "m",
         "pbrMetallicRoughness": { "baseColorFactor": [2.0, -1.0, 0.5, 1.0], "roughnessFactor": 7.0 },
-        "alphaMode": "BLEND",
     }));
     assert_eq!(read.base_colour.to_array(), [1.0, 0.0, 0.5]);
     assert_eq!(read.roughness, 1.0);
     warns(&scene, "material `m` | base colour of 2 was read as 1");
     warns(&scene, "material `m` | roughness factor of 7");
-    warns(&scene, "material `m` | alpha mode BLEND was read as opaque");
 }
 
 #[test]
-fn solid_glass_fills_closed_thin_walls() {
+fn closed_meshes_of_glass_are_solid_unless_asked_otherwise() {
     let glass = json!({
         "name": "glass",
         "pbrMetallicRoughness": factors(0.0, 0.0),
         "extensions": { "KHR_materials_transmission": { "transmissionFactor": 1.0 } },
     });
-    let filling = options(|options| options.solid_glass = true);
-    let kind = |scene: &Scene| scene.material_of(0).surface;
+    let thin = options(|options| options.solid_glass = false);
     let closed = Glb::tetrahedron().with_material(glass.clone());
-    assert_eq!(kind(&closed.scene()), SurfaceKind::ThinWall);
-    let solid = closed.load_with(&filling).expect("loads");
-    assert_eq!(kind(&solid), SurfaceKind::Dielectric);
-    assert!(solid.material_of(0).volume.is_some());
-    let open = Glb::triangle()
-        .with_material(glass)
-        .load_with(&filling)
-        .expect("loads");
-    assert_eq!(kind(&open), SurfaceKind::ThinWall);
-    warns(&open, "node `tri` | is not closed");
+    for (file, options, expected) in [
+        (&closed, &LoadOptions::default(), SurfaceKind::Dielectric),
+        (&closed, &thin, SurfaceKind::ThinWall),
+        (
+            &Glb::triangle().with_material(glass),
+            &LoadOptions::default(),
+            SurfaceKind::ThinWall,
+        ),
+    ] {
+        let scene = file.load_with(options).expect("loads");
+        let read = scene.material_of(0);
+        let is_solid = expected == SurfaceKind::Dielectric;
+        assert_eq!((read.surface, read.name.as_str()), (expected, "glass"));
+        assert_eq!(
+            (read.volume.is_some(), read.is_solid_by_shape),
+            (is_solid, is_solid)
+        );
+        if is_solid {
+            warns_not(&scene);
+        } else {
+            warns(&scene, "material `glass` | thin pane");
+        }
+    }
+    // One material on both: the first mesh has it, the other a twin.
+    let mut both = closed;
+    let opened = both.json["meshes"][0].clone();
+    let mesh = both.push("meshes", opened);
+    let three = both.push_indices(&[0, 1, 2]);
+    both.json["meshes"][mesh]["primitives"][0]["indices"] = json!(three);
+    both.push_root(json!({ "mesh": mesh }));
+    let scene = both.scene();
+    let kinds = [0, 1].map(|object| scene.material_of(object).surface);
+    assert_eq!(kinds, [SurfaceKind::Dielectric, SurfaceKind::ThinWall]);
+    assert_eq!(scene.material_of(1).name, "glass (thin)");
 }
 
 fn png(pixels: &[[u8; 4]], width: u32) -> Vec<u8> {
@@ -469,6 +484,126 @@ fn lacquer_is_polish_over_matte_and_adds_to_metal() {
     }
     let (bare, _) = lacquered(0.0, 1.0, json!({}));
     assert_eq!(bare.surface, SurfaceKind::Diffuse);
+}
+
+/// A material with an image of two texels as one of its textures, and what is told of it.
+fn with_image(pixels: [[u8; 4]; 2], stated: Value) -> (Material, Scene) {
+    let mut file = textured(&png(&pixels, 2), json!({ "index": 0 }));
+    let index = file.push("materials", stated);
+    file.json["meshes"][0]["primitives"][0]["material"] = json!(index);
+    let scene = file.scene();
+    (scene.material_of(0).clone(), scene)
+}
+
+#[test]
+fn textures_of_factors_make_surfaces_vary() {
+    use SurfaceKind::{Diffuse, Mirror, Mixed, ThinWall, Varied};
+    let stated = |factors: Value, transmission: Value| {
+        let extensions = json!({ "KHR_materials_transmission": transmission });
+        json!({ "name": "m", "pbrMetallicRoughness": factors, "extensions": extensions })
+    };
+    let image = json!({ "index": 0 });
+    let metallic_roughness = json!({ "metallicRoughnessTexture": image });
+    let clear = json!({ "metallicFactor": 0.0, "roughnessFactor": 0.1 });
+    let by_image = json!({ "transmissionFactor": 1.0, "transmissionTexture": image });
+    for (first, second, factors, transmission, surface, has_image) in [
+        // Red is transmission; green is roughness and blue metallic.
+        (
+            [0, 0, 255],
+            [0, 255, 0],
+            &metallic_roughness,
+            json!({}),
+            Varied,
+            true,
+        ),
+        (
+            [0, 9, 255],
+            [0, 99, 250],
+            &metallic_roughness,
+            json!({}),
+            Mirror,
+            true,
+        ),
+        ([0, 9, 0], [0, 50, 0], &metallic_roughness, json!({}), Mixed, true),
+        (
+            [0, 200, 0],
+            [0, 255, 0],
+            &metallic_roughness,
+            json!({}),
+            Diffuse,
+            false,
+        ),
+        (
+            [0, 9, 255],
+            [9, 10, 255],
+            &metallic_roughness,
+            json!({}),
+            Mirror,
+            false,
+        ),
+        ([0, 0, 0], [255, 0, 0], &clear, by_image.clone(), Varied, true),
+        ([200, 0, 0], [255, 9, 9], &clear, by_image, ThinWall, false),
+    ] {
+        let opaque = |[r, g, b]: [u8; 3]| [r, g, b, 255];
+        let json = stated(factors.clone(), transmission);
+        let (read, scene) = with_image([opaque(first), opaque(second)], json.clone());
+        assert_eq!(
+            (read.surface, read.variation.is_some()),
+            (surface, has_image),
+            "{json}"
+        );
+        assert_eq!(read.classified(), surface, "edits keep it");
+        assert!(
+            !scene.warnings.iter().any(|warning| warning.what.contains("mean")),
+            "{json}"
+        );
+        // Its image gives the factors back.
+        if let Some(variation) = &read.variation {
+            let texel = scene.textures[variation.image.texture].sample(dvec2(0.25, 0.5));
+            let [r, g, b] = first.map(|code| f64::from(code) / 255.0);
+            let expected = if has_image && factors == &metallic_roughness {
+                [1.0, g, b]
+            } else {
+                [r, 1.0, 1.0]
+            };
+            near(texel.to_array(), expected, 0.005, json);
+        }
+    }
+    let other = json!({ "index": 0, "texCoord": 1 });
+    let factors = json!({ "metallicRoughnessTexture": other, "baseColorTexture": image });
+    let (read, scene) = with_image([[0, 0, 255, 255], [0, 255, 0, 255]], stated(factors, json!({})));
+    assert!(read.variation.is_none());
+    warns(&scene, "material `m` | follow different coordinates");
+}
+
+#[test]
+fn what_alpha_blends_is_there_in_part() {
+    let clear = json!({ "KHR_materials_transmission": { "transmissionFactor": 1.0 } });
+    let stated = |alpha: f64, extensions: &Value| {
+        json!({ "name": "m", "alphaMode": "BLEND", "extensions": extensions,
+            "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 }, "baseColorFactor": [0.5, 0.5, 0.5, alpha],
+                "metallicFactor": 0.0 } })
+    };
+    let none = json!({});
+    for (alphas, factor, coverage, is_cut) in [
+        ([255, 255], 1.0, None, false),
+        ([255, 0], 1.0, None, true),
+        ([255, 99], 1.0, Some(1.0), false),
+        ([255, 255], 0.25, Some(0.25), false),
+    ] {
+        let (read, scene) = with_image(alphas.map(|alpha| [255, 255, 255, alpha]), stated(factor, &none));
+        assert_eq!(
+            (read.coverage, read.alpha_mask.is_some()),
+            (coverage, is_cut),
+            "{alphas:?}"
+        );
+        assert_eq!(read.surface == SurfaceKind::Varied, coverage.is_some());
+        warns_not(&scene);
+    }
+    let (glass, scene) = with_image([[255; 4]; 2], stated(0.25, &clear));
+    assert_eq!((glass.surface, glass.coverage), (SurfaceKind::ThinWall, None));
+    near(glass.base_colour.g, 0.875, 1e-12, "a lighter tint");
+    warns(&scene, "material `m` | lighter tint");
 }
 
 /// glTF 2.0, 3.9.4: a surface is there where alpha is greater than or equal to the cutoff.

@@ -3,6 +3,7 @@
 mod builtins;
 mod camera_paths;
 mod collections;
+mod compressed;
 mod edits;
 mod files;
 mod lights;

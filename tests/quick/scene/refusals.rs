@@ -50,17 +50,21 @@ fn required_extensions_are_refused_or_left_out() {
         file.json["extensionsRequired"] = json!([name]);
         file
     };
-    for name in [
-        "KHR_draco_mesh_compression",
-        "EXT_meshopt_compression",
-        "KHR_mesh_quantization",
-        "KHR_texture_basisu",
-        "ACME_unheard_of",
+    for (name, remedy) in [
+        ("EXT_texture_avif", "export it with PNG or JPEG images"),
+        ("ACME_unheard_of", "export it without this extension"),
     ] {
-        let words = format!("requires {name}, which is not supported; export it");
+        let words = format!("requires {name}, which is not supported; {remedy}");
         requiring(name).assert_refused(&words);
     }
     for name in [
+        "EXT_mesh_gpu_instancing",
+        "EXT_meshopt_compression",
+        "KHR_draco_mesh_compression",
+        "KHR_materials_variants",
+        "KHR_mesh_quantization",
+        "KHR_meshopt_compression",
+        "KHR_texture_basisu",
         "KHR_materials_volume",
         "KHR_materials_specular",
         "KHR_texture_transform",

@@ -41,7 +41,7 @@ fn use_it(model: &mut Model) {
     assert!(model.navigator.set_bookmark(0));
     model.navigator.look(dvec2(40.0, 0.0));
     assert!(model.navigator.set_bookmark(8));
-    model.travel(Travel::Orbit);
+    model.travel(NavigationMode::Orbit);
     model.choices.settings.seed = 7;
     model.choices.display.exposure_stops = 1.5;
     act(model, change(intensity(0, 5.0)));
@@ -67,7 +67,7 @@ fn what_was_set_is_found_again() {
     assert_eq!(second.choices.settings, settings);
     near(second.choices.display.exposure_stops, 1.5, 1e-12, "exposure");
     assert!(second.exposure_is_kept);
-    assert_eq!(second.navigator.travel(), Travel::Orbit);
+    assert_eq!(second.navigator.travel(), NavigationMode::Orbit);
     assert_eq!(second.scene().lights, scene.lights);
     for (number, bookmark) in views.bookmarks.iter().enumerate() {
         assert_eq!(bookmark.is_some(), [0, 8].contains(&number));
@@ -194,6 +194,6 @@ fn a_scene_that_is_left_is_kept() {
         // A new scene is baked as the one before.
         assert_eq!(model.choices.settings.seed, 7);
     }
-    assert_eq!(model.navigator.travel(), Travel::Orbit);
+    assert_eq!(model.navigator.travel(), NavigationMode::Orbit);
     assert!(model.poll_files().is_none());
 }

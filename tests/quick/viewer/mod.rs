@@ -1,31 +1,18 @@
 //! The window: its parts without a display.
 
 mod config;
-mod course_plot;
-mod effects;
-mod exporting;
-mod exposure;
-mod false_colours;
 mod files;
 mod filming;
 mod fixtures;
-mod flat_map;
-mod frame_times;
-mod gizmo;
 mod headless;
-mod history;
-mod latency;
 mod lights;
 mod model;
 mod navigation;
 mod pace;
 mod panel;
-mod save_scene;
 mod scene_edits;
 #[allow(dead_code, reason = "full tests use the rest")]
 mod scene_file;
-mod screenshot;
-mod sketching;
 mod views;
 #[cfg(target_os = "linux")]
 mod window;
@@ -50,14 +37,14 @@ use nephroid::progress::Stage;
 use nephroid::scene::changes::Change;
 use nephroid::scene::load::save;
 use nephroid::session::StopReason;
-use nephroid::settings::{Estimator, LEAST_MAX_ERROR, Sigma};
+use nephroid::settings::{Estimator, MIN_MAX_ERROR, Sigma};
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::command::{Choices, Command, CompareCommand, FilmCommand};
 use nephroid::viewer::edits::EditedScene;
 use nephroid::viewer::exporting::{Export, ExportState};
-use nephroid::viewer::gizmo::Held;
+use nephroid::viewer::gizmo::GizmoTarget;
 use nephroid::viewer::model::{Model, QUIET};
-use nephroid::viewer::navigation::Travel;
+use nephroid::viewer::navigation::NavigationMode;
 use nephroid::viewer::new_light::NewLight;
 use nephroid::viewer::panel::{Display, LayerShown, Quantity};
 use nephroid::viewer::worker::{BakeState, BakedLevel};

@@ -1,7 +1,13 @@
-//! How well pictures are made, by how long those before took.
+//! How well pictures are made by how long those before took, how long events wait, the graph of device times, and the plot
+//! of error against time.
 
 use nephroid::eye_pass::renderer::EyeQuality;
+use nephroid::session::CostPoint;
+use nephroid::session::forecast::forecast;
 use nephroid::viewer::pace::Pace;
+use nephroid::viewer::panel::accuracy::course::{Curve, Frame};
+use nephroid::viewer::panel::frame_graph::{columns, scale_ms};
+use nephroid::viewer::timing::{FrameTimes, Latencies, PICTURES, Percentiles};
 
 use super::*;
 
@@ -81,4 +87,227 @@ fn hands_do_not_wait_for_a_picture() {
     let early = start + Duration::from_millis(100);
     assert!(pace.pause(early) > Duration::ZERO);
     assert_eq!(pace.pause(early + pace.pause(early)), Duration::ZERO);
+}
+
+const MS: Duration = Duration::from_millis(1);
+
+#[test]
+fn percentiles_are_of_the_waits_by_nearest_rank() {
+    let waits = (1..=200).rev().map(|index| index * MS);
+    let told = Percentiles::of(waits).expect("there are some");
+    let found = [told.p50_ms, told.p95_ms, told.p99_ms, told.max_ms].map(f64::round);
+    assert_eq!((found, told.count), ([100.0, 190.0, 198.0, 200.0], 200));
+    let one = Percentiles::of([7 * MS]).expect("one is enough");
+    assert_eq!([one.p50_ms, one.max_ms].map(f64::round), [7.0, 7.0]);
+    assert_eq!(Percentiles::of([]), None);
+}
+
+/// What comes while a frame is made is met after it: it has waited since some moment of the frame, at worst its first.
+#[test]
+fn events_of_a_busy_window_count_from_when_they_can_have_come() {
+    let start = Instant::now();
+    let at = |ms: u32| start + ms * MS;
+    let mut latencies = Latencies::default();
+    latencies.begin_turn(at(0));
+    latencies.end_turn(at(1));
+    // It waited: the event has just come.
+    latencies.begin_turn(at(50));
+    latencies.meet(at(50), false);
+    latencies.show(at(90));
+    latencies.end_turn(at(90));
+    assert_eq!(latencies.otherwise().map(|told| told.max_ms.round()), Some(40.0));
+    assert_eq!(latencies.while_baking(), None);
+
+    // There at once: it may have come right after the last turn began.
+    latencies.begin_turn(at(90));
+    latencies.meet(at(91), true);
+    latencies.end_turn(at(92));
+    latencies.begin_turn(at(95));
+    latencies.show(at(100));
+    assert_eq!(
+        latencies.while_baking().map(|told| told.max_ms.round()),
+        Some(50.0)
+    );
+    // Shown once, counted once.
+    latencies.show(at(200));
+    assert_eq!(latencies.while_baking().map(|told| told.count), Some(1));
+}
+
+#[test]
+fn only_the_last_waits_are_remembered() {
+    let mut latencies = Latencies::default();
+    let now = Instant::now();
+    for index in 0..10_100_u32 {
+        latencies.begin_turn(now);
+        latencies.meet(now, true);
+        latencies.show(now + if index < 100 { 500 * MS } else { MS });
+    }
+    let told = latencies.while_baking().expect("many");
+    assert_eq!((told.count, told.max_ms.round()), (10_000, 1.0));
+}
+
+fn of<const N: usize>(pictures: [[f64; 3]; N]) -> FrameTimes {
+    let mut times = FrameTimes::default();
+    for [opaque, specular, tone_mapping] in pictures {
+        times.push(GpuMs {
+            opaque,
+            specular,
+            tone_mapping,
+        });
+    }
+    times
+}
+
+fn with_times(times: Option<FrameTimes>) -> Headless {
+    let mut panel = Headless::new(BakeSettings::default());
+    panel.tell(|model| model.picture.frame_times = times);
+    panel.open_part("Frame time");
+    panel
+}
+
+#[test]
+fn oldest_pictures_are_forgotten() {
+    let mut ramp = [[0.0; 3]; PICTURES + 30];
+    for (index, picture) in ramp.iter_mut().enumerate() {
+        picture[0] = index as f64;
+    }
+    let times = of(ramp);
+    assert_eq!(times.iter().len(), PICTURES);
+    let ends = [times.iter().next(), times.newest()].map(|ms| ms.map(|ms| ms.opaque));
+    assert_eq!(ends, [Some(30.0), Some(149.0)]);
+    assert_eq!(of([[1.0, 2.0, 3.0], [4.0, 0.0, 0.5]]).longest_ms(), 6.0);
+    assert_eq!(FrameTimes::default().longest_ms(), 0.0);
+}
+
+#[test]
+fn scale_holds_the_longest_picture() {
+    let longest = [0.0, 0.1, 0.11, 3.0, 16.7, 51.0, 1e9];
+    for (longest, scale) in longest.into_iter().zip([0.1, 0.1, 0.2, 5.0, 20.0, 100.0, 1e5]) {
+        near(scale_ms(longest) / scale, 1.0, 1e-12, longest);
+    }
+}
+
+#[test]
+fn passes_are_stacked_newest_at_the_right() {
+    let rect = Rect::from_min_max(pos2(10.0, 100.0), pos2(10.0 + PICTURES as f32, 180.0));
+    let columns = columns(&of([[2.0, 4.0, 1.0], [1.0, 0.0, 30.0]]), 8.0, rect);
+    // Eight milliseconds are eighty points; what is beyond the scale ends at the top.
+    let expected = [
+        (128.0, [(160.0, 180.0), (120.0, 160.0), (110.0, 120.0)]),
+        (129.0, [(170.0, 180.0), (170.0, 170.0), (100.0, 170.0)]),
+    ];
+    let expected = expected.map(|(left, bars)| {
+        bars.map(|(top, bottom)| Rect::from_min_max(pos2(left, top), pos2(left + 1.0, bottom)))
+    });
+    assert_eq!(columns, expected);
+    assert_eq!(columns[1][0].right(), rect.right());
+}
+
+#[test]
+fn newest_time_is_told_in_numbers() {
+    let mut panel = with_times(Some(of([[9.0, 9.0, 9.0], [1.25, 3.5, 0.25]])));
+    let passes = ["opaque 1.25", "specular 3.50", "tone mapping 0.25"];
+    panel.assert_says(&passes);
+    panel.assert_says(&["Frame time (5.00 ms)"]);
+    let graph = "Device times of 2 pictures, at most 27.00 ms";
+    panel.hover(Role::Image, graph);
+    panel.assert_says(&["the newest at the right"]);
+    let rect = panel.named(Role::Image, graph).rect();
+    assert!(Headless::is_inside(rect) && rect.width() > 250.0 && rect.height() > 40.0);
+    // The section stays open though its title is another.
+    panel.tell(|model| model.picture.frame_times = Some(of([[0.5, 0.0, 0.25]])));
+    panel.assert_says(&["Frame time (0.75 ms)", "specular 0.00"]);
+}
+
+#[test]
+fn untimed_devices_are_not_shown_as_fast() {
+    with_times(None).assert_says(&["does not tell how long it takes"]);
+    let panel = with_times(Some(FrameTimes::default()));
+    panel.assert_says(&["Known with the first picture."]);
+    assert!(!panel.says("0.00 ms"));
+}
+
+fn towards(target: f64) -> BakeSettings {
+    with(BakeSettings::default(), |it| it.max_error = Some(target))
+}
+
+/// The part open, after three levels: half the error for three times the time.
+fn panel(settings: BakeSettings) -> Headless {
+    let mut panel = Headless::new(settings);
+    panel.tell_level(|last| {
+        last.is_final = false;
+        let point = |level: i32| CostPoint {
+            rays: 1000 << level,
+            cpu_s: 0.2 * 3_f64.powi(level),
+            wall_s: 0.1 * 3_f64.powi(level),
+            bytes: 0,
+            error: 0.2 * 0.5_f64.powi(level),
+            is_coarse: false,
+            is_by_photons: false,
+        };
+        last.result.course = (0..3).map(point).collect();
+    });
+    panel.open_part("Error against time");
+    panel
+}
+
+fn plot(panel: &Headless) -> Rect {
+    let plot = panel.find(Role::Image, |name| name.starts_with("Error against time: "));
+    plot.expect("there is a plot").rect()
+}
+
+#[test]
+fn target_stands_where_the_forecast_has_it() {
+    let panel = panel(towards(0.01));
+    let last = panel.model.last.as_deref().expect("a level");
+    let curve = Curve::new(panel.settings(), last).expect("errors are known");
+    let expected = forecast(&last.result.course, 0.01, Estimator::Wavefront);
+    assert!(expected.is_some() && curve.target == expected);
+    assert_eq!(curve.past.len(), 3);
+    assert_eq!(curve.presets.len(), 3, "draft, preview and final are marked");
+    // Draft was met on the way.
+    assert!(curve.presets[0].1.factor == 1.0 && curve.presets[2].1.factor > 1.0);
+    let is_slower_when_better = curve.future.is_sorted_by(|a, b| a.wall_s <= b.wall_s);
+    assert!(is_slower_when_better, "{:?}", curve.future);
+
+    let rect = Rect::from_min_max(pos2(10.0, 20.0), pos2(330.0, 140.0));
+    let frame = Frame::around(&curve, rect);
+    for point in &curve.past {
+        let place = frame.place(point.wall_s, point.error);
+        assert!(rect.contains(place), "{place}");
+        let (seconds, error) = frame.at(place);
+        near(seconds / point.wall_s, 1.0, 1e-4, "time");
+        near(error / point.error, 1.0, 1e-4, "error");
+    }
+    let at = frame.place(1.0, 0.1);
+    assert!(at.y < frame.place(1.0, 0.01).y, "errors go up");
+    assert!(at.x < frame.place(2.0, 0.1).x, "time goes right");
+
+    panel.assert_says(&["5.0 % after 0.90 s; to 1 %: about"]);
+    let rect = plot(&panel);
+    assert!(Headless::is_inside(rect) && rect.width() > 250.0 && rect.height() > 80.0);
+    let mut unknown = last.clone();
+    unknown.result.course.clear();
+    assert_eq!(Curve::new(panel.settings(), &unknown), None);
+}
+
+#[test]
+fn drag_along_the_curve_sets_the_target() {
+    let mut panel = panel(towards(0.05));
+    let rect = plot(&panel);
+    let lower = rect.center_bottom() - vec2(0.0, 0.2 * rect.height());
+    panel.drag_at(rect.center(), lower);
+    let target = panel.settings().max_error.expect("still an error");
+    assert!((0.0015..0.02).contains(&target), "{target}");
+    let percent = (target * 1e6).round() / 1e4;
+    panel.assert_says(&[&format!("to {percent} %")]);
+}
+
+#[test]
+fn a_time_stays_a_time() {
+    let mut panel = panel(with(towards(MIN_MAX_ERROR), |it| it.max_time_s = Some(1.0)));
+    let rect = plot(&panel);
+    panel.click_at(rect.right_center() - vec2(0.1 * rect.width(), 0.0));
+    let limit_s = panel.settings().max_time_s.expect("still a time");
+    assert!(limit_s > 1.0, "{limit_s}");
 }

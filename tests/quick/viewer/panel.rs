@@ -69,9 +69,9 @@ fn sliders_set_one_value() {
         sigma
     }
     let timed = BakeSettings {
-        max_error: Some(LEAST_MAX_ERROR),
+        max_error: Some(MIN_MAX_ERROR),
         max_time_s: Some(10.0),
-        density_per_sr: BakeSettings::starting_density_per_sr(LEAST_MAX_ERROR),
+        density_per_sr: BakeSettings::starting_density_per_sr(MIN_MAX_ERROR),
         ..BakeSettings::default()
     };
     type Field = fn(&mut BakeSettings) -> &mut f64;
@@ -146,7 +146,7 @@ fn bake_ends_by_density_error_or_time() {
         ..BakeSettings::default()
     });
     let starting = BakeSettings::starting_density_per_sr(0.03);
-    let timed = |time_s| (Some(LEAST_MAX_ERROR), Some(time_s));
+    let timed = |time_s| (Some(MIN_MAX_ERROR), Some(time_s));
     panel.choose("Bake until", "max error");
     assert_eq!(ends(&panel), (Some(0.03), None, starting));
     panel.type_into("Max error [%]", "0.5");

@@ -4,6 +4,7 @@ use image::RgbImage;
 
 use super::*;
 use support::desktop::{SIZE, Screen, Viewer, difference, pixel_of};
+use support::or_skip;
 
 /// Luminance of display values [0, 1], of a square of 5 pixels around a point of the floor.
 fn brightness(shot: &RgbImage, floor: DVec3) -> f64 {
@@ -18,9 +19,7 @@ fn brightness(shot: &RgbImage, floor: DVec3) -> f64 {
 
 #[test]
 fn light_arrives_and_sigma_bakes_again() {
-    let Some(screen) = Screen::start() else {
-        return;
-    };
+    let screen = or_skip!(Screen::start());
     // With the estimator whose sigma changes the picture most; coarse enough to be baked in a second.
     let coarse = "--estimator splat --density 10000 --map-resolution 128 --layers caustic";
     let mut viewer = Viewer::open(&screen, &format!("builtin:ring {coarse}"));

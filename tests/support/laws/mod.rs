@@ -18,7 +18,7 @@ use crate::tools::{at, bake, photons, settings};
 const BOOKS_BOUND: f64 = 1e-6;
 
 /// Photons that tell watts to a percent.
-const LEAST_PHOTONS: f64 = 2e4;
+const MIN_PHOTONS: f64 = 2e4;
 
 /// Whether the long variants of cases are asked for.
 pub fn is_long() -> bool {
@@ -248,7 +248,7 @@ fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<(&'static str, Bak
     };
     let few = bake(scene.clone(), &photons).counts.rays.max(1);
     let many = BakeSettings {
-        density_per_sr: photons.density_per_sr * (LEAST_PHOTONS / few as f64).max(1.0),
+        density_per_sr: photons.density_per_sr * (MIN_PHOTONS / few as f64).max(1.0),
         ..photons.clone()
     };
     let chosen = BakeSettings {
@@ -353,7 +353,7 @@ fn run(table: Table) -> Vec<Row> {
 }
 
 /// Prints a group's table and writes those of all groups so far to `laws/laws.md` in the build folder.
-#[allow(clippy::print_stdout, reason = "the README quotes it")]
+#[allow(clippy::print_stdout, reason = "the guide quotes it")]
 fn publish(group: &'static str, rows: &[Row]) {
     let mut table = format!("\n## {group}\n\n| case | scene | law | measured | bound | verdict |\n|---|---|---|---|---|---|\n");
     table.extend(rows.iter().map(Row::line));

@@ -15,7 +15,7 @@ use crate::illumination::accumulator::FluxCount;
 const TRIANGLES_PER_CHUNK: usize = 8192;
 
 /// Fewer triangles are not worth dividing.
-const LEAST_TRIANGLES: usize = 1024;
+const MIN_TRIANGLES: usize = 1024;
 
 /// Bands per thread, so that none waits long for the last.
 const BANDS_PER_THREAD: usize = 4;
@@ -69,7 +69,7 @@ pub fn deposit(
 ) -> (CoverageReport, Vec<usize>) {
     let mut report = CoverageReport::default();
     let mut done = Done::default();
-    if triangles.len() < LEAST_TRIANGLES || rayon::current_num_threads() == 1 {
+    if triangles.len() < MIN_TRIANGLES || rayon::current_num_threads() == 1 {
         book_outside(triangles, &mut report);
         done = add(triangles.iter().enumerate(), size, 0..size.1, texels, ground);
     } else {

@@ -59,7 +59,7 @@ pub struct Piece {
 }
 
 /// Runs below this [texels] count as this: the factor stays finite, and no area is lost that a number could hold.
-const LEAST_RUN: f64 = 1e-100;
+const MIN_RUN: f64 = 1e-100;
 
 fn four(f: impl Fn(usize) -> f64) -> [f64; 4] {
     [f(0), f(1), f(2), f(3)]
@@ -122,7 +122,7 @@ impl Sides {
             run,
             height,
             // Without a run there is no area along it: anything finite will do as a factor.
-            per_square: four(|side| 0.5 * height[side] / most(run[side], LEAST_RUN)),
+            per_square: four(|side| 0.5 * height[side] / most(run[side], MIN_RUN)),
         }
     }
 }

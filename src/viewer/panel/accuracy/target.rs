@@ -3,7 +3,7 @@
 use egui::{Response, Slider, SliderClamping, Ui};
 use strum::EnumMessage;
 
-use crate::settings::{BakeSettings, Estimator, LEAST_MAX_ERROR, MapResolution, Preset};
+use crate::settings::{BakeSettings, Estimator, MIN_MAX_ERROR, MapResolution, Preset};
 use crate::viewer::panel::control::{self, CONTROL_WIDTH, choice, setting};
 
 /// The first time that is offered [s].
@@ -28,7 +28,7 @@ impl Target {
     /// An error that is no target stands beside a time: as far as that goes.
     pub fn of(settings: &BakeSettings) -> Self {
         match (settings.max_error, settings.max_time_s) {
-            (Some(error), Some(time_s)) if error <= LEAST_MAX_ERROR => Self::Time(time_s),
+            (Some(error), Some(time_s)) if error <= MIN_MAX_ERROR => Self::Time(time_s),
             (Some(error), _) => Self::Error(error),
             (None, Some(time_s)) => Self::Time(time_s),
             (None, None) => Self::Density,
@@ -41,7 +41,7 @@ impl Target {
         (settings.max_error, settings.max_time_s) = match self {
             Self::Density => (None, None),
             Self::Error(error) => (Some(error), None),
-            Self::Time(time_s) if settings.estimator.refines() => (Some(LEAST_MAX_ERROR), Some(time_s)),
+            Self::Time(time_s) if settings.estimator.refines() => (Some(MIN_MAX_ERROR), Some(time_s)),
             Self::Time(time_s) => (None, Some(time_s)),
         };
         match settings.max_error {

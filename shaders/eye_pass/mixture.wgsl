@@ -1,0 +1,54 @@
+// What a place of a surface is made of; twin of scene/mixture.rs.
+
+// Polish on what is rougher is matte, and so are metals that are rougher than the second.
+const SPECULAR_ROUGHNESS_LIMIT: f32 = 0.3;
+const METAL_ROUGHNESS_LIMIT: f32 = 0.6;
+
+// Shares of a surface, which add up to one.
+struct Mixture {
+    metal: f32,
+    clear: f32,
+    body: f32,
+    hole: f32,
+    // Part of the body that is polished.
+    polish: f32,
+}
+
+// Where images multiply transmission, roughness and metallic, and base colour has an alpha.
+fn mixture_of(object: ObjectRecord, factors: vec3f, alpha: f32) -> Mixture {
+    let there = select(object.coverage * alpha, 1.0, object.coverage < 0.0);
+    let roughness = object.roughness * factors.y;
+    let metallic = object.metallic * factors.z;
+    let metal = select(0.0, there * metallic, roughness <= METAL_ROUGHNESS_LIMIT);
+    let clear = there * (1.0 - metallic) * object.transmission * factors.x;
+    let polish = select(0.0, object.polish, roughness <= SPECULAR_ROUGHNESS_LIMIT);
+    return Mixture(metal, clear, max(there - metal - clear, 0.0), 1.0 - there, polish);
+}
+
+// Alpha of the base colour's image; 1 without one.
+fn alpha_at(object: ObjectRecord, uv: vec2f, level: f32) -> f32 {
+    if object.texture == NO_IMAGE {
+        return 1.0;
+    }
+    return value_at(texture_tiles, object.texture, uv, level).a;
+}
+
+// What the body of a surface takes of light: part of it, and how much of that polish covers.
+struct Taking {
+    share: f32,
+    polish: f32,
+}
+
+fn taking_of(object: ObjectRecord, mixture: Mixture) -> Taking {
+    switch object.surface {
+        case SURFACE_MIXED: {
+            return Taking(1.0, object.polish);
+        }
+        case SURFACE_VARIED: {
+            return Taking(mixture.body, mixture.polish);
+        }
+        default: {
+            return Taking(1.0, 0.0);
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! What an object that glows by an image sends from each of its triangles.
+
+use glam::DVec2;
+
+use super::texture::{Texture, TextureRef};
+use super::{InScene, Scene};
+use crate::optics::LinearSrgb;
+
+/// Steps along an edge of a triangle in which its image is looked at.
+const STEPS: (f64, f64) = (4.0, 64.0);
+
+/// Brightness of an object over the mean of its image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Glow {
+    /// Mean of the image over the surface.
+    pub mean: LinearSrgb,
+    /// Luminance of each triangle's mean over that of all.
+    pub by_triangle: Vec<f64>,
+}
+
+impl Glow {
+    /// Of a mesh with an image; `None` where it is black or has no coordinates.
+    pub fn new(mesh: InScene, image: &TextureRef, texture: &Texture) -> Option<Self> {
+        let (mut sum, mut area_m2) = (LinearSrgb::BLACK, 0.0);
+        let mut luminances = Vec::with_capacity(mesh.triangle_count());
+        for triangle in 0..mesh.triangle_count() {
+            let mean = triangle_mean(mesh, image, texture, triangle)?;
+            let triangle_m2 = mesh.triangle_area_m2(triangle);
+            sum += mean * triangle_m2;
+            area_m2 += triangle_m2;
+            luminances.push(mean.luminance());
+        }
+        let mean = sum / area_m2;
+        let luminance = mean.luminance();
+        (luminance > 0.0).then(|| Self {
+            mean,
+            by_triangle: luminances.into_iter().map(|of| of / luminance).collect(),
+        })
+    }
+
+    /// Radiance over that of the whole for a white texel of the image.
+    pub fn per_colour(&self) -> LinearSrgb {
+        self.mean.map(|mean| if mean > 0.0 { mean.recip() } else { 0.0 })
+    }
+}
+
+/// Mean of an image over a triangle, at places as close as its texels.
+fn triangle_mean(mesh: InScene, image: &TextureRef, texture: &Texture, triangle: usize) -> Option<LinearSrgb> {
+    let at = |barycentric| image.place(mesh, triangle, barycentric);
+    let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
+    let [a, b, c] = [at([1.0, 0.0, 0.0])?, at([0.0, 1.0, 0.0])?, at([0.0, 0.0, 1.0])?].map(|uv| uv * size);
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let steps = longest.clamp(STEPS.0, STEPS.1) as u32;
+    let mut sum = LinearSrgb::BLACK;
+    for row in 0..steps {
+        for column in 0..steps {
+            // Middles of the small triangles that the steps divide it into, those that are turned over mirrored back.
+            let [x, y] = [column, row].map(|step| (f64::from(step) + 1.0 / 3.0) / f64::from(steps));
+            let (x, y) = if x + y > 1.0 { (1.0 - x, 1.0 - y) } else { (x, y) };
+            sum += texture.sample(at([1.0 - x - y, x, y])?);
+        }
+    }
+    Some(sum / f64::from(steps * steps))
+}
+
+impl Scene {
+    /// What the radiance of an object that glows is multiplied by at a place: white where it is the same everywhere.
+    pub fn glow_at(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> LinearSrgb {
+        let Some(glow) = self.glows.get(&object) else {
+            return LinearSrgb::WHITE;
+        };
+        let image = self.material_of(object).emission_texture.as_ref();
+        let placed = image.and_then(|image| self.placed_texture(image, (object, triangle), barycentric));
+        placed.map_or(LinearSrgb::WHITE, |(texture, uv)| {
+            texture.sample(uv) * glow.per_colour()
+        })
+    }
+}

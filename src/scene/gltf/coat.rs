@@ -1,0 +1,106 @@
+//! KHR_materials_clearcoat: a lacquer over a surface.
+
+use gltf::json::Value;
+use gltf::json::extensions::material as extension;
+use serde::Deserialize;
+
+use super::material::Reading;
+use crate::optics::LinearSrgb;
+use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
+use crate::scene::{Material, SurfaceKind};
+
+/// Name of the extension.
+pub const NAME: &str = "KHR_materials_clearcoat";
+
+/// n of the lacquer, as the extension fixes it.
+const IOR: f64 = 1.5;
+
+/// Reflectance of the lacquer at normal incidence: ((n − 1)/(n + 1))².
+const F0: f64 = 0.04;
+
+impl Reading<'_, '_> {
+    /// A lacquer over the surface, where the file has one.
+    pub(super) fn coat(&mut self, material: &mut Material, extensions: &extension::Material) {
+        let Some(stated) = extensions.others.get(NAME) else {
+            return;
+        };
+        let Ok(stated) = Coat::deserialize(stated) else {
+            return self.warn(
+                "its clearcoat cannot be read and was left out",
+                "export the file again",
+            );
+        };
+        let factor = self.share(stated.clearcoat_factor, "clearcoat factor");
+        let roughness = self.share(stated.clearcoat_roughness_factor, "clearcoat roughness");
+        if factor == 0.0 || extensions.unlit.is_some() {
+            return;
+        }
+        if stated.has_texture() {
+            self.warn(
+                "its clearcoat is read by its factors alone, without textures",
+                "split the mesh where the lacquer changes",
+            );
+        }
+        if let Err(why) = put_on(material, factor, roughness) {
+            self.warn(why, "expect it to look and bake as if it were not there");
+        }
+    }
+}
+
+/// The lacquer as the file states it; textures are named and not read.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Coat {
+    /// Part of the surface that it covers.
+    clearcoat_factor: f32,
+    /// Of its surface.
+    clearcoat_roughness_factor: f32,
+    clearcoat_texture: Option<Value>,
+    clearcoat_roughness_texture: Option<Value>,
+    clearcoat_normal_texture: Option<Value>,
+}
+
+impl Coat {
+    /// Whether an image changes it from place to place.
+    fn has_texture(&self) -> bool {
+        let textures = [
+            &self.clearcoat_texture,
+            &self.clearcoat_roughness_texture,
+            &self.clearcoat_normal_texture,
+        ];
+        textures.iter().any(|texture| texture.is_some())
+    }
+}
+
+/// Puts a lacquer of a factor and a roughness, both in [0, 1], over a material whose class is known.
+///
+/// # Errors
+/// Why it has to be left out, to go after the name of the material.
+fn put_on(material: &mut Material, factor: f64, roughness: f64) -> Result<(), String> {
+    match material.surface {
+        SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => Err(format!(
+            "its clearcoat of roughness {roughness:.2} was left out, as it hardly shines"
+        )),
+        SurfaceKind::Diffuse => {
+            // What is below is matte, whatever it was.
+            (material.metallic, material.transmission, material.volume) = (0.0, 0.0, None);
+            (material.roughness, material.ior, material.polish) = (roughness, IOR, factor);
+            material.surface = SurfaceKind::Mixed;
+            Ok(())
+        }
+        SurfaceKind::Mirror => {
+            // 1 − R = (1 − coat)(1 − metal) at normal incidence; towards grazing angles both tend to 1.
+            let left = 1.0 - factor * F0;
+            material.base_colour = LinearSrgb::WHITE - (LinearSrgb::WHITE - material.base_colour) * left;
+            Ok(())
+        }
+        SurfaceKind::Mixed => {
+            material.polish = factor + (1.0 - factor) * material.polish;
+            Ok(())
+        }
+        SurfaceKind::Dielectric | SurfaceKind::ThinWall => {
+            Err("its clearcoat was left out, as light goes through it".into())
+        }
+        SurfaceKind::Varied => Err("its clearcoat was left out, as what it covers varies".into()),
+    }
+}

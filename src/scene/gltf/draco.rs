@@ -1,0 +1,117 @@
+//! KHR_draco_mesh_compression: the vertices and triangles of a primitive in one compressed block.
+
+use std::collections::BTreeMap;
+
+use draco_core::{DataType, DecodeLimits, DecoderBuffer, Mesh, MeshDecoder};
+use gltf::json::Index;
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::validation::Checked;
+use serde::Deserialize;
+
+use super::accessor::Reader;
+use super::guard;
+use super::report::Budget;
+use crate::error::{Error, Result};
+
+/// Name of the extension.
+pub const NAME: &str = "KHR_draco_mesh_compression";
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Stated {
+    buffer_view: u32,
+    /// The block's own numbers of its attributes.
+    attributes: BTreeMap<String, u32>,
+}
+
+/// A block, unpacked.
+pub struct Unpacked {
+    mesh: Mesh,
+    attributes: BTreeMap<String, u32>,
+}
+
+/// The block of a primitive; `None` where it has none, or its data lies in the file without compression too.
+///
+/// # Errors
+/// A damaged block, more memory than the budget has.
+pub fn unpack(
+    reader: Reader,
+    primitive: &Primitive,
+    owner: &str,
+    budget: &mut Budget,
+) -> Result<Option<Unpacked>> {
+    let extensions = primitive.extensions.as_ref();
+    let Some(stated) = extensions.and_then(|extensions| extensions.others.get(NAME)) else {
+        return Ok(None);
+    };
+    let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+    let accessor = positions.and_then(|index| reader.root.accessors.get(index.value()));
+    if accessor.is_some_and(|accessor| accessor.buffer_view.is_some()) {
+        return Ok(None);
+    }
+    let damaged = |why: &str| {
+        let what = format!("its Draco data cannot be unpacked ({why})");
+        Error::failure(owner, what, "export the file again")
+    };
+    let stated = Stated::deserialize(stated).map_err(|error| damaged(&error.to_string()))?;
+    let data = reader.buffers.view(Index::new(stated.buffer_view), owner)?.data;
+
+    // Unpacking takes several times the memory of what comes of it.
+    let most = budget.left() / 4;
+    let limits = DecodeLimits::default()
+        .with_max_points(most / 12)
+        .with_max_faces(most / 12)
+        .with_max_decoded_bytes(most);
+    let mut mesh = Mesh::new();
+    let unpacked = guard::without_panic(|| {
+        let mut buffer = DecoderBuffer::new(data).with_limits(limits);
+        MeshDecoder::new().decode(&mut buffer, &mut mesh)
+    });
+    match unpacked {
+        Some(Ok(())) => {}
+        Some(Err(error)) => return Err(damaged(&error.to_string().replace('\n', " "))),
+        None => return Err(damaged("it breaks off")),
+    }
+    let bytes = 12 * mesh.num_faces() as u64 + 12 * mesh.num_points() as u64 * stated.attributes.len() as u64;
+    budget.take(bytes, owner)?;
+    Ok(Some(Unpacked {
+        mesh,
+        attributes: stated.attributes,
+    }))
+}
+
+impl Unpacked {
+    /// Three indices of vertices per triangle.
+    pub fn indices(&self) -> Vec<u32> {
+        let faces = self.mesh.faces().iter().flatten();
+        faces.map(|point| point.0).collect()
+    }
+
+    /// An attribute, of numbers in [−1, 1] where integers are `normalised`; `None` where the block does not have it so.
+    pub fn vectors<const N: usize>(&self, semantic: &Semantic, normalised: bool) -> Option<Vec<[f64; N]>> {
+        let id = *self.attributes.get(&semantic.to_string())?;
+        let attribute = self.mesh.attribute_by_unique_id(id)?;
+        if usize::from(attribute.num_components()) != N {
+            return None;
+        }
+        let scale = match attribute.data_type() {
+            DataType::Int8 if normalised => f64::from(i8::MAX),
+            DataType::Uint8 if normalised => f64::from(u8::MAX),
+            DataType::Int16 if normalised => f64::from(i16::MAX),
+            DataType::Uint16 if normalised => f64::from(u16::MAX),
+            _ => 1.0,
+        };
+        let numbers = attribute.read_f32s(self.mesh.num_points(), N);
+        let vectors = numbers.as_chunks::<N>().0.iter();
+        Some(
+            vectors
+                .map(|vector| vector.map(|number| f64::from(number) / scale))
+                .collect(),
+        )
+    }
+
+    /// Whether the block has an attribute.
+    pub fn has(&self, semantic: &Semantic) -> bool {
+        self.attributes.contains_key(&semantic.to_string())
+    }
+}

@@ -1,0 +1,141 @@
+//! Textures of factors: transmission, roughness and metallic from place to place, in one image.
+
+use std::collections::BTreeMap;
+use std::rc::Rc;
+
+use glam::DMat3;
+use image::RgbaImage;
+
+use crate::optics::LinearSrgb;
+use crate::scene::texture::Wrap;
+use crate::scene::{Material, SurfaceKind, Texture};
+
+/// A surface is of one class unless more than this part of it is of others.
+const MOST_OF_OTHERS: f64 = 0.01;
+
+/// Factors that differ by less are the same everywhere: two steps of an 8-bit image.
+const EVEN: f64 = 2.0 / 255.0;
+
+/// Linear channels of an image.
+pub struct FactorImage {
+    pub pixels: Rc<RgbaImage>,
+    pub wrap: [Wrap; 2],
+    /// Set and transform of its coordinates; `None` for a set that is not read.
+    pub place: Option<(usize, DMat3)>,
+}
+
+impl FactorImage {
+    fn mean(&self, channel: usize) -> f64 {
+        let codes = self.pixels.pixels().map(|pixel| f64::from(pixel.0[channel]));
+        let sum = codes.fold(0.0, |sum, code| sum + code / 255.0);
+        sum / f64::from(self.pixels.width() * self.pixels.height())
+    }
+
+    /// The texel nearest to one of an image of another size.
+    fn code(&self, channel: usize, place: [u32; 2], [width, height]: [u32; 2]) -> u8 {
+        let scaled =
+            |at: u32, own: u32, other: u32| (u64::from(at) * u64::from(own) / u64::from(other)) as u32;
+        let x = scaled(place[0], self.pixels.width(), width);
+        let y = scaled(place[1], self.pixels.height(), height);
+        self.pixels.get_pixel(x, y).0[channel]
+    }
+}
+
+/// The textures of a material's factors, at least one of them.
+pub struct Factors<'a> {
+    pub transmission: Option<&'a FactorImage>,
+    pub metallic_roughness: Option<&'a FactorImage>,
+}
+
+impl Factors<'_> {
+    fn images(&self) -> impl Iterator<Item = &FactorImage> {
+        [self.transmission, self.metallic_roughness].into_iter().flatten()
+    }
+
+    /// Means of transmission, roughness and metallic.
+    pub fn mean(&self) -> LinearSrgb {
+        let of = |image: Option<&FactorImage>, channel| image.map_or(1.0, |image| image.mean(channel));
+        LinearSrgb::new(
+            of(self.transmission, 0),
+            of(self.metallic_roughness, 1),
+            of(self.metallic_roughness, 2),
+        )
+    }
+
+    /// Set and transform of the coordinates of all images, and of another one if there is one; `None` where they differ.
+    pub fn place(&self, other: Option<(usize, DMat3)>) -> Option<(usize, DMat3)> {
+        let mut places = self.images().map(|image| image.place).chain(other.map(Some));
+        let first = places.next()??;
+        places.all(|place| place == Some(first)).then_some(first)
+    }
+
+    fn size(&self) -> [u32; 2] {
+        self.images().fold([1; 2], |[width, height], image| {
+            [width.max(image.pixels.width()), height.max(image.pixels.height())]
+        })
+    }
+
+    /// Codes of transmission, roughness and metallic, row by row.
+    fn codes(&self) -> impl Iterator<Item = [u8; 3]> {
+        let size = self.size();
+        let of = move |image: Option<&FactorImage>, channel, place| {
+            image.map_or(u8::MAX, |image| image.code(channel, place, size))
+        };
+        let places = (0..size[1]).flat_map(move |y| (0..size[0]).map(move |x| [x, y]));
+        places.map(move |place| {
+            [
+                of(self.transmission, 0, place),
+                of(self.metallic_roughness, 1, place),
+                of(self.metallic_roughness, 2, place),
+            ]
+        })
+    }
+
+    /// The class of a surface whose factors they multiply; `None` where their means serve as well: where they are the
+    /// same everywhere, or the roughness of a single class is.
+    pub fn class(&self, material: &Material) -> Option<SurfaceKind> {
+        let whole = [material.transmission, material.roughness, material.metallic];
+        let (mut low, mut high) = ([u8::MAX; 3], [0; 3]);
+        let mut counts: BTreeMap<SurfaceKind, u64> = BTreeMap::new();
+        for codes in self.codes() {
+            for channel in 0..3 {
+                low[channel] = low[channel].min(codes[channel]);
+                high[channel] = high[channel].max(codes[channel]);
+            }
+            let at = |channel: usize| whole[channel] * f64::from(codes[channel]) / 255.0;
+            *counts.entry(Material::class_of(at(2), at(1), at(0))).or_default() += 1;
+        }
+        let differs = |channel: usize| {
+            whole[channel] * (f64::from(high[channel]) - f64::from(low[channel])) / 255.0 >= EVEN
+        };
+        let all: u64 = counts.values().sum();
+        let (&most, &count) = counts.iter().max_by_key(|(_, count)| **count)?;
+        let is_one = count as f64 >= (1.0 - MOST_OF_OTHERS) * all as f64;
+        match is_one {
+            true => differs(1).then_some(most),
+            false => (0..3).any(differs).then_some(SurfaceKind::Varied),
+        }
+    }
+
+    /// One image of all of them, encoded as colours are.
+    pub fn texture(&self, name: String) -> Texture {
+        let encoded: Vec<u8> = (0..=u8::MAX)
+            .map(|code| (LinearSrgb::encode_channel(f64::from(code) / 255.0) * 255.0).round() as u8)
+            .collect();
+        let encode = |code: u8| encoded[usize::from(code)];
+        let [width, height] = self.size();
+        Texture {
+            name,
+            width,
+            height,
+            rgba: self
+                .codes()
+                .map(|codes| {
+                    let [r, g, b] = codes.map(encode);
+                    [r, g, b, u8::MAX]
+                })
+                .collect(),
+            wrap: self.images().next().map_or([Wrap::Repeat; 2], |image| image.wrap),
+        }
+    }
+}

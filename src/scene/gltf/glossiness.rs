@@ -1,0 +1,106 @@
+//! KHR_materials_pbrSpecularGlossiness, which glTF's first years had: turned into what came of it.
+
+use gltf::json::Value;
+use serde::Deserialize;
+use serde_json::{Map, json};
+
+use super::report::Report;
+
+/// Name of the extension.
+pub const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
+
+/// Reflectance at normal incidence of what is no metal.
+const F0: f64 = 0.04;
+
+#[derive(Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Stated {
+    diffuse_factor: [f64; 4],
+    diffuse_texture: Value,
+    specular_factor: [f64; 3],
+    glossiness_factor: f64,
+    specular_glossiness_texture: Value,
+}
+
+impl Default for Stated {
+    fn default() -> Self {
+        Self {
+            diffuse_factor: [1.0; 4],
+            diffuse_texture: Value::Null,
+            specular_factor: [1.0; 3],
+            glossiness_factor: 1.0,
+            specular_glossiness_texture: Value::Null,
+        }
+    }
+}
+
+/// Gives a material that is stated in that way alone its metallic-roughness model.
+pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Report) {
+    let own = material.get("pbrMetallicRoughness").and_then(Value::as_object);
+    if own.is_some_and(|own| !own.is_empty()) {
+        return;
+    }
+    let extensions = material.get_mut("extensions").and_then(Value::as_object_mut);
+    let Some(stated) = extensions.and_then(|extensions| extensions.remove(NAME)) else {
+        return;
+    };
+    let Ok(stated) = Stated::deserialize(stated) else {
+        report.warn(
+            owner,
+            "its specular-glossiness cannot be read",
+            "export the file again",
+        );
+        return;
+    };
+    let [red, green, blue, alpha] = stated.diffuse_factor;
+    let diffuse = [red, green, blue];
+    let specular = stated.specular_factor;
+    // A texture tells metals from others where no factor can: most of what has one is none.
+    let is_told = stated.specular_glossiness_texture.is_null();
+    let metallic = if is_told { metallic(diffuse, specular) } else { 0.0 };
+    let base = |channel: usize| {
+        let left = (1.0 - F0) * (1.0 - metallic).max(1e-3);
+        let of_diffuse = diffuse[channel] * (1.0 - strongest(specular)) / left;
+        let of_specular = (specular[channel] - F0 * (1.0 - metallic)) / metallic.max(1e-3);
+        let share = metallic * metallic;
+        (of_diffuse * (1.0 - share) + of_specular * share).clamp(0.0, 1.0)
+    };
+    let colour = match stated.diffuse_texture.is_null() && is_told {
+        true => [base(0), base(1), base(2)],
+        false => diffuse,
+    };
+    let roughness = (1.0 - stated.glossiness_factor).clamp(0.0, 1.0);
+    let mut converted = json!({
+        "baseColorFactor": [colour[0], colour[1], colour[2], alpha],
+        "metallicFactor": metallic,
+        "roughnessFactor": roughness,
+    });
+    if !stated.diffuse_texture.is_null() {
+        converted["baseColorTexture"] = stated.diffuse_texture;
+    }
+    material.insert("pbrMetallicRoughness".into(), converted);
+    report.warn(
+        owner,
+        format!(
+            "its specular-glossiness was read as metallic {metallic:.2} and roughness {roughness:.2}, without its texture"
+        ),
+        "convert it with `gltf-transform metalrough`",
+    );
+}
+
+fn strongest(colour: [f64; 3]) -> f64 {
+    colour.into_iter().fold(0.0, f64::max)
+}
+
+/// How metallic a surface is that reflects so much, diffusely and like a mirror: the root of a quadratic equation which the
+/// extension's text derives.
+fn metallic(diffuse: [f64; 3], specular: [f64; 3]) -> f64 {
+    let brightness = |[r, g, b]: [f64; 3]| (0.299 * r * r + 0.587 * g * g + 0.114 * b * b).sqrt();
+    let (diffuse, mirrored) = (brightness(diffuse), brightness(specular));
+    if mirrored <= F0 {
+        return 0.0;
+    }
+    let b = diffuse * (1.0 - strongest(specular)) / (1.0 - F0) + mirrored - 2.0 * F0;
+    let discriminant = (b * b - 4.0 * F0 * (F0 - mirrored)).max(0.0);
+    ((discriminant.sqrt() - b) / (2.0 * F0)).clamp(0.0, 1.0)
+}

@@ -1,0 +1,156 @@
+//! EXT_mesh_gpu_instancing: one node whose mesh stands at many places, taken apart into a node for each.
+
+use glam::DVec4;
+use gltf::json::{Index, Node, Root, Value};
+use serde::Deserialize;
+use serde_json::json;
+
+use super::accessor::{Formats, Reader};
+use super::buffers::Buffers;
+use super::document::{Document, NodeTransform};
+use super::glb::Glb;
+use super::names;
+use super::report::Budget;
+use crate::error::{Error, Result};
+
+/// Name of the extension.
+pub const NAME: &str = "EXT_mesh_gpu_instancing";
+
+/// Bytes that a node takes.
+const NODE_BYTES: u64 = 1000;
+
+#[derive(Default, Deserialize)]
+#[serde(default, rename_all = "UPPERCASE")]
+struct Attributes {
+    translation: Option<u32>,
+    rotation: Option<u32>,
+    scale: Option<u32>,
+}
+
+/// A node that is taken apart.
+#[derive(Debug)]
+pub struct Instanced {
+    node: usize,
+    /// What its parts are called.
+    names: Vec<String>,
+    /// Where they stand below it.
+    transforms: Vec<NodeTransform>,
+}
+
+/// Whether a file has such nodes.
+pub fn is_used(root: &Root) -> bool {
+    root.nodes.iter().any(|node| stated(node).is_some())
+}
+
+fn stated(node: &Node) -> Option<&Value> {
+    node.mesh?;
+    node.extensions.as_ref()?.others.get(NAME)?.get("attributes")
+}
+
+/// All such nodes of a file.
+///
+/// # Errors
+/// Places that cannot be read or are not equally many, more memory than the budget has.
+pub fn read(root: &Root, buffers: &Buffers, budget: &mut Budget) -> Result<Vec<Instanced>> {
+    let reader = Reader { root, buffers };
+    let mut all = Vec::new();
+    for (index, node) in root.nodes.iter().enumerate() {
+        let Some(stated) = stated(node) else {
+            continue;
+        };
+        let name = names::name(node.name.as_ref(), "node", index);
+        let owner = format!("node `{name}`");
+        let broken = |what: String| Error::failure(&owner, what, "export the file again");
+        let attributes = Attributes::deserialize(stated)
+            .map_err(|error| broken(format!("its instances cannot be read ({error})")))?;
+        let mut read = |index: Option<u32>| {
+            let index = index.map(Index::new);
+            index
+                .map(|index| reader.vectors::<3>(index, Formats::Float, &owner, budget))
+                .transpose()
+        };
+        let (translations, scales) = (read(attributes.translation)?, read(attributes.scale)?);
+        let rotations = attributes.rotation.map(Index::new);
+        let rotations = rotations
+            .map(|index| reader.vectors::<4>(index, Formats::FloatOrSigned, &owner, budget))
+            .transpose()?;
+        let counts = [
+            translations.as_ref().map(Vec::len),
+            rotations.as_ref().map(Vec::len),
+            scales.as_ref().map(Vec::len),
+        ];
+        let count = counts.into_iter().flatten().max().unwrap_or(0);
+        if counts.into_iter().flatten().any(|other| other != count) {
+            return Err(broken(
+                "its instances have unlike numbers of places, turns and sizes".into(),
+            ));
+        }
+        budget.take(count as u64 * NODE_BYTES, &owner)?;
+        let transform = |instance: usize| NodeTransform {
+            matrix: None,
+            translation: translations.as_ref().map(|all| all[instance]),
+            rotation: rotations.as_ref().map(|all| unit(all[instance])),
+            scale: scales.as_ref().map(|all| all[instance]),
+        };
+        all.push(Instanced {
+            node: index,
+            names: (1..=count).map(|number| format!("{name}_{number:04}")).collect(),
+            transforms: (0..count).map(transform).collect(),
+        });
+    }
+    Ok(all)
+}
+
+/// Integers make a turn only nearly unit.
+fn unit(rotation: [f64; 4]) -> [f64; 4] {
+    DVec4::from(rotation)
+        .try_normalize()
+        .map_or(rotation, DVec4::into)
+}
+
+/// Gives a document a node for each instance.
+pub fn take_apart(document: &mut Document, instanced: &[Instanced]) {
+    for whole in instanced {
+        let first = document.root.nodes.len();
+        let mesh = document.root.nodes[whole.node].mesh.take();
+        for (name, transform) in whole.names.iter().zip(&whole.transforms) {
+            document.root.nodes.push(Node {
+                name: Some(name.clone()),
+                mesh,
+                ..Node::default()
+            });
+            document.transforms.push(transform.clone());
+            document.extras.nodes.push(Value::Null);
+        }
+        let children = (first..document.root.nodes.len()).map(|child| Index::new(child as u32));
+        let node = &mut document.root.nodes[whole.node];
+        node.children.get_or_insert_default().extend(children);
+    }
+}
+
+impl Glb {
+    /// The same for a document to be written.
+    pub(super) fn take_apart(&mut self, instanced: &[Instanced]) {
+        for whole in instanced {
+            let node = format!("/nodes/{}", whole.node);
+            let mesh = self.json.pointer(&format!("{node}/mesh")).cloned();
+            for (name, transform) in whole.names.iter().zip(&whole.transforms) {
+                let mut part = json!({ "name": name, "mesh": mesh });
+                let numbers = [
+                    ("translation", transform.translation.map(|all| json!(all))),
+                    ("rotation", transform.rotation.map(|all| json!(all))),
+                    ("scale", transform.scale.map(|all| json!(all))),
+                ];
+                for (key, numbers) in numbers {
+                    if let Some(numbers) = numbers {
+                        part[key] = numbers;
+                    }
+                }
+                let part = self.push("/nodes", part);
+                self.push(&format!("{node}/children"), json!(part));
+            }
+            self.remove(&format!("{node}/mesh"));
+            self.remove(&format!("{node}/extensions/{NAME}"));
+        }
+    }
+}

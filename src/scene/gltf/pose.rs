@@ -1,0 +1,216 @@
+//! Morph targets and skins at rest: meshes bent as their file's first look has them.
+
+use std::collections::HashMap;
+
+use glam::{DAffine3, DMat4, DVec3};
+use gltf::json::{Index, Value};
+use serde::Deserialize;
+use serde_json::Map;
+
+use super::accessor::{Formats, Reader};
+use super::report::Budget;
+use crate::error::{Error, Result};
+use crate::scene::Mesh;
+use crate::scene::mesh::cofactors;
+
+/// What bends meshes, as the file states it. Faults in it cost the pose and not the scene, so it is read by itself.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Poses {
+    nodes: Vec<Maybe<Node>>,
+    meshes: Vec<Maybe<Morphed>>,
+    skins: Vec<Maybe<Skin>>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+enum Maybe<T> {
+    Read(T),
+    Broken(serde::de::IgnoredAny),
+}
+
+impl<T> Maybe<T> {
+    fn get(&self) -> Option<&T> {
+        match self {
+            Self::Read(read) => Some(read),
+            Self::Broken(_) => None,
+        }
+    }
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+struct Node {
+    skin: Option<usize>,
+    weights: Vec<f64>,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+struct Morphed {
+    weights: Vec<f64>,
+    primitives: Vec<Targets>,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+struct Targets {
+    targets: Vec<HashMap<String, u32>>,
+}
+
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Skin {
+    joints: Vec<usize>,
+    inverse_bind_matrices: Option<u32>,
+}
+
+/// For each vertex four joints of its skin, and their weights.
+pub type Influences = (Vec<[f64; 4]>, Vec<[f64; 4]>);
+
+/// A primitive of a mesh at a node.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    pub node: usize,
+    pub mesh: usize,
+    pub primitive: usize,
+}
+
+impl Poses {
+    /// Those of a file.
+    pub fn of(file: &Map<String, Value>) -> Self {
+        Self::deserialize(file).unwrap_or_default()
+    }
+
+    /// Whether a node has a skin, which stands where its joints do.
+    pub fn has_skin(&self, node: usize) -> bool {
+        self.node(node).is_some_and(|node| node.skin.is_some())
+    }
+
+    /// Whether a node bends its mesh by itself, so that no other node can share it.
+    pub fn is_own(&self, node: usize) -> bool {
+        let node = self.node(node);
+        node.is_some_and(|node| node.skin.is_some() || !node.weights.is_empty())
+    }
+
+    /// Whether a primitive is bent.
+    pub fn bend(&self, place: Place) -> bool {
+        let mesh = self.meshes.get(place.mesh).and_then(Maybe::get);
+        let part = mesh.and_then(|mesh| mesh.primitives.get(place.primitive));
+        self.has_skin(place.node) || part.is_some_and(|part| !part.targets.is_empty())
+    }
+
+    fn node(&self, node: usize) -> Option<&Node> {
+        self.nodes.get(node)?.get()
+    }
+
+    /// Moves a mesh by its morph targets.
+    ///
+    /// # Errors
+    /// Targets that do not fit the mesh.
+    pub fn morph(
+        &self,
+        place: Place,
+        mesh: &mut Mesh,
+        reader: Reader,
+        owner: &str,
+        budget: &mut Budget,
+    ) -> Result<()> {
+        let Some(morphed) = self.meshes.get(place.mesh).and_then(Maybe::get) else {
+            return Ok(());
+        };
+        let of_node = self.node(place.node).map(|node| &node.weights);
+        let weights = of_node
+            .filter(|weights| !weights.is_empty())
+            .unwrap_or(&morphed.weights);
+        let targets = morphed.primitives.get(place.primitive).map(|part| &part.targets);
+        for (weight, target) in weights.iter().zip(targets.into_iter().flatten()) {
+            if *weight == 0.0 || !weight.is_finite() {
+                continue;
+            }
+            for (key, moved) in [("POSITION", &mut mesh.positions), ("NORMAL", &mut mesh.normals)] {
+                let Some(index) = target.get(key) else {
+                    continue;
+                };
+                let deltas = reader.vectors::<3>(Index::new(*index), Formats::Float, owner, budget)?;
+                if deltas.len() != moved.len() {
+                    return Err(unlike(owner));
+                }
+                for (moved, delta) in moved.iter_mut().zip(deltas) {
+                    *moved += *weight * DVec3::from(delta);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// What brings vertices that hang on the joints of a node's skin into the world.
+    ///
+    /// # Errors
+    /// A skin that does not exist, or whose joints do not stand in the scene.
+    pub fn joints(
+        &self,
+        node: usize,
+        stands: &HashMap<usize, DAffine3>,
+        reader: Reader,
+        owner: &str,
+        budget: &mut Budget,
+    ) -> Result<Vec<DMat4>> {
+        let skin = self.node(node).and_then(|node| self.skins.get(node.skin?)?.get());
+        let skin = skin.ok_or_else(|| unlike(owner))?;
+        budget.take((skin.joints.len() * size_of::<DMat4>()) as u64, owner)?;
+        let inverse = match skin.inverse_bind_matrices {
+            None => vec![DMat4::IDENTITY; skin.joints.len()],
+            Some(index) => {
+                let read = reader.vectors::<16>(Index::new(index), Formats::Float, owner, budget)?;
+                read.iter().map(DMat4::from_cols_array).collect()
+            }
+        };
+        if inverse.len() < skin.joints.len() {
+            return Err(unlike(owner));
+        }
+        let pairs = skin.joints.iter().zip(inverse);
+        let matrix = |(joint, inverse)| Some(DMat4::from(*stands.get(joint)?) * inverse);
+        pairs
+            .map(matrix)
+            .collect::<Option<_>>()
+            .ok_or_else(|| unlike(owner))
+    }
+}
+
+/// Puts the vertices of a mesh where the joints that they hang on have them in the world.
+///
+/// # Errors
+/// Vertices that hang on joints which do not exist, or on nothing.
+pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[Influences], owner: &str) -> Result<()> {
+    let mut sums = vec![DMat4::ZERO; mesh.positions.len()];
+    for (indices, weights) in influences {
+        if indices.len() != sums.len() || weights.len() != sums.len() {
+            return Err(unlike(owner));
+        }
+        for ((sum, indices), weights) in sums.iter_mut().zip(indices).zip(weights) {
+            for (index, weight) in indices.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+                let joint = joints.get(*index as usize).ok_or_else(|| unlike(owner))?;
+                *sum += *joint * *weight;
+            }
+        }
+    }
+    for (vertex, sum) in sums.into_iter().enumerate() {
+        // Weights need not add up to exactly 1.
+        let matrix = DAffine3::from_mat4(sum * sum.w_axis.w.recip());
+        if !matrix.is_finite() {
+            return Err(unlike(owner));
+        }
+        mesh.positions[vertex] = matrix.transform_point3(mesh.positions[vertex]);
+        mesh.normals[vertex] = (cofactors(matrix.matrix3) * mesh.normals[vertex]).normalize_or_zero();
+    }
+    Ok(())
+}
+
+fn unlike(owner: &str) -> Error {
+    Error::failure(
+        owner,
+        "its morph targets or its skin do not fit its vertices",
+        "export the file again",
+    )
+}

@@ -1,0 +1,141 @@
+//! Who does the work of a pass: the bake itself, one shard of it, or shards that have done it before.
+
+use std::io;
+
+use super::ShardSource;
+use super::pass_sums::PassSums;
+use crate::error::{Error, Result};
+use crate::light_pass::receiver_maps::ChartFor;
+use crate::light_pass::share::Share;
+
+/// Who does the work.
+pub(in crate::session) enum ShardRole {
+    /// This bake alone.
+    Alone,
+    /// This bake, its share.
+    Shard { share: Share, passes: Vec<Vec<u8>> },
+    /// Others have done it.
+    Merge(Merging),
+}
+
+/// Sums of shards, pass by pass.
+pub(in crate::session) struct Merging {
+    shards: Box<dyn ShardSource>,
+    /// Number of the next pass.
+    next: usize,
+}
+
+impl ShardRole {
+    pub(super) fn shard(share: Share) -> Self {
+        Self::Shard {
+            share,
+            passes: Vec::new(),
+        }
+    }
+
+    pub(super) fn merge(shards: Box<dyn ShardSource>) -> Self {
+        Self::Merge(Merging { shards, next: 0 })
+    }
+
+    /// Whether a bake is cut.
+    pub(in crate::session) fn is_cut(&self) -> bool {
+        !matches!(self, Self::Alone)
+    }
+
+    /// Whether maps are only a part of what they will be.
+    pub(in crate::session) fn is_shard(&self) -> bool {
+        matches!(self, Self::Shard { .. })
+    }
+
+    /// The share of the next pass; `None` where nobody shares.
+    pub(in crate::session) fn share(&self) -> Option<Share> {
+        match self {
+            Self::Shard { share, passes } => Some(share.shifted(passes.len() as u64)),
+            Self::Alone | Self::Merge(_) => None,
+        }
+    }
+
+    /// Writes down what a shard did.
+    pub(in crate::session) fn note(&mut self, sums: &PassSums) -> Result<()> {
+        if let Self::Shard { share, passes } = self
+            && !sums.report.cancelled
+        {
+            let encoded = sums.encode(*share, passes.len()).map_err(|error| {
+                Error::failure(
+                    "--shard",
+                    format!("its sums cannot be packed ({error})"),
+                    "report this",
+                )
+            });
+            passes.push(encoded?);
+        }
+        Ok(())
+    }
+
+    /// What a shard did.
+    pub(super) fn into_passes(self) -> Vec<Vec<u8>> {
+        match self {
+            Self::Shard { passes, .. } => passes,
+            Self::Alone | Self::Merge(_) => Vec::new(),
+        }
+    }
+
+    /// Whether shards have sums of no other passes than those that were asked for.
+    pub(super) fn finish(&self) -> Result<()> {
+        let Self::Merge(merging) = self else {
+            return Ok(());
+        };
+        match (0..merging.shards.shard_count())
+            .find(|&shard| merging.shards.pass_count(shard) != merging.next)
+        {
+            None => Ok(()),
+            Some(shard) => Err(merging.other_passes(shard)),
+        }
+    }
+}
+
+impl Merging {
+    /// The sum of the next pass over all shards.
+    ///
+    /// # Errors
+    /// A shard that has no such pass, or whose sums are damaged.
+    pub(in crate::session) fn pass(&mut self, chart_for: &ChartFor, mut sums: PassSums) -> Result<PassSums> {
+        let number = self.next;
+        self.next += 1;
+        let mut shares = Vec::new();
+        for shard in 0..self.shards.shard_count() {
+            if number >= self.shards.pass_count(shard) {
+                return Err(self.other_passes(shard));
+            }
+            let bytes = self.shards.pass(shard, number)?;
+            let share = sums.add_encoded(number, &bytes, chart_for);
+            shares.push(share.map_err(|error| self.unreadable(shard, &error))?);
+        }
+        shares.sort_unstable();
+        let count = shares.len() as u32;
+        if !shares.into_iter().eq((1..=count).map(|number| (number, count))) {
+            return Err(Error::failure(
+                self.shards.name(0),
+                "a part of the lattice is in no shard, or in two",
+                "bake all shards again",
+            ));
+        }
+        Ok(sums)
+    }
+
+    fn other_passes(&self, shard: usize) -> Error {
+        Error::failure(
+            self.shards.name(shard),
+            "it does not hold the passes of this bake",
+            "bake the shard again with the program that merges",
+        )
+    }
+
+    fn unreadable(&self, shard: usize, error: &io::Error) -> Error {
+        Error::failure(
+            self.shards.name(shard),
+            format!("its sums are damaged ({error})"),
+            "bake this shard again",
+        )
+    }
+}

@@ -1,0 +1,338 @@
+//! Parts of the window without a display: the whole panel on small and on dense screens, lights that are added, scenes that
+//! other programs change, files of theirs that are edited and saved, and frames that are written.
+
+use std::fs;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use egui::accesskit::Role;
+use egui::pos2;
+use glam::{DVec2, DVec3};
+use nephroid::effect::EffectSwitches;
+use nephroid::eye_pass::{ToneMap, View};
+use nephroid::geometry::Ray;
+use nephroid::optics::LinearSrgb;
+use nephroid::optics::spectrum::xyz::IDENTITY;
+use nephroid::scene::load::save;
+use nephroid::scene::{
+    Camera, Edit, Light, LightEdit, LightKind, LoadOptions, MaterialEdit, Motion, builtin, turntable,
+};
+use nephroid::settings::{BakeSettings, Estimator, Sigma};
+use nephroid::transport::Tracer;
+use nephroid::viewer::ViewerOptions;
+use nephroid::viewer::background::Wake;
+use nephroid::viewer::command::Command;
+use nephroid::viewer::exporting::{ExportState, Exporter};
+use nephroid::viewer::files::FilesOptions;
+use nephroid::viewer::filming::Shooting;
+use nephroid::viewer::new_light::{Aim, NewLight};
+use serde_json::Value;
+
+use super::fixtures::{
+    act, added, bake, change, edited, folder, intensity, model, options, read, scene, set, until, wait_for,
+};
+use super::headless::{Headless, SCREEN, splats};
+use super::scene_file;
+
+fn shooting(frames: usize) -> Shooting {
+    let scene = Arc::new(scene());
+    let first = Camera::framing("all", scene.bounds().expect("it has surfaces"), 1.5);
+    Shooting {
+        maps: Vec::new(),
+        cameras: turntable::around(&scene, &first, frames),
+        view: View {
+            camera: first,
+            width: 48,
+            height: 32,
+            exposure_stops: 0.0,
+            tone_map: ToneMap::None,
+            background: LinearSrgb::WHITE,
+        },
+        effects: EffectSwitches::default(),
+        white_balance: IDENTITY,
+        name: "turntable",
+        scene,
+    }
+}
+
+#[test]
+fn frames_are_written_and_can_be_stopped() {
+    let folder = folder();
+    let news = Arc::new(AtomicUsize::new(0));
+    let of_thread = Arc::clone(&news);
+    let mut exporter = Exporter::new(&Wake::new(move || {
+        of_thread.fetch_add(1, Ordering::SeqCst);
+    }));
+    exporter.film(shooting(3), folder.path().to_owned());
+    assert_eq!(exporter.state, ExportState::Filming { done: 0, total: 3 });
+    wait_for("the film", || exporter.poll());
+    let path = match &exporter.state {
+        ExportState::Done(path) => path.clone(),
+        ExportState::Failed(sentence) if sentence.contains("adapter") => {
+            return support::skip("frames from the window", sentence);
+        }
+        other => panic!("{other:?}"),
+    };
+    assert!(news.load(Ordering::SeqCst) >= 4, "each frame, and the end");
+    assert!(path.ends_with("nephroid-test-turntable-0001"), "{path:?}");
+    let files = fs::read_dir(&path).expect("a folder");
+    let mut names: Vec<_> = files.map(|file| file.expect("a file").file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["frame-00001.png", "frame-00002.png", "frame-00003.png"]);
+    let frame = image::open(path.join(&names[0])).expect("a PNG").to_rgb8();
+    assert_eq!(frame.dimensions(), (48, 32));
+    assert_eq!(
+        frame.get_pixel(0, 0).0,
+        [255; 3],
+        "nothing is before the background"
+    );
+    assert!(frame.pixels().any(|pixel| pixel.0 != [255; 3]), "the scene is");
+
+    // One that is stopped says so.
+    exporter.film(shooting(10_000), folder.path().to_owned());
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    exporter.stop();
+    wait_for("the end", || exporter.poll());
+    assert!(
+        matches!(exporter.state, ExportState::Failed(_)),
+        "{:?}",
+        exporter.state
+    );
+}
+
+#[test]
+fn camera_settings_and_edits_stay() {
+    let folder = folder();
+    let path = scene_file::gltf(folder.path(), "watched", "300");
+    let mut model = model(&ViewerOptions {
+        scene: Arc::new(read(&path)),
+        files: FilesOptions {
+            watch: true,
+            ..FilesOptions::default()
+        },
+        ..options("ring")
+    });
+    let rough = Edit::Material(1, MaterialEdit::Roughness(0.25));
+    act(&mut model, change(rough));
+    model.navigator.look(DVec2::new(100.0, 30.0));
+    set(&mut model, |it| {
+        (it.settings.seed, it.settings.estimator) = (7, Estimator::Photon)
+    });
+    bake(&mut model);
+    let (gaze, was) = (model.navigator.camera().forward, Arc::clone(model.scene()));
+
+    // Half a file says what is wrong with it, and the scene stays.
+    scene_file::break_off(&path);
+    until(&mut model, "refused", |model| model.files.refusal.is_some());
+    assert!(Arc::ptr_eq(model.scene(), &was));
+    let sentence = model.files.refusal.clone().expect("it is refused");
+    assert!(sentence.contains("watched.gltf"), "{sentence}");
+
+    // The next change tries again: a lamp ten times as strong.
+    scene_file::gltf(folder.path(), "watched", "3000");
+    until(&mut model, "read again", |model| {
+        !Arc::ptr_eq(model.scene(), &was)
+    });
+    assert!(model.files.refusal.is_none());
+    let times = model.scene().lights[0].kind.strength() / was.lights[0].kind.strength();
+    assert!((times - 10.0).abs() < 1e-9, "{times}");
+    assert_eq!(model.scene().materials[1].roughness, 0.25, "the edit stays");
+    assert_eq!(model.choices.settings.seed, 7);
+    assert!(model.navigator.camera().forward.distance(gaze) < 1e-12);
+    let [mesh, before] = [model.scene(), &was].map(|scene| scene.objects[0].mesh_in_scene());
+    assert!(Arc::ptr_eq(mesh, before), "what is the same is shared");
+    assert!(
+        !model.maps().is_empty(),
+        "shapes are the same, so that there is light meanwhile"
+    );
+
+    // So does a change of the buffer alone.
+    let now = Arc::clone(model.scene());
+    let buffer = folder.path().join("watched.bin");
+    let mut bytes = fs::read(&buffer).expect("it is there");
+    bytes[..4].copy_from_slice(&(-2.0_f32).to_le_bytes());
+    fs::write(&buffer, bytes).expect("it is written");
+    until(&mut model, "read again", |model| {
+        !Arc::ptr_eq(model.scene(), &now)
+    });
+    assert_eq!(model.scene().objects[0].mesh_in_scene().positions[0].x, -2.0);
+    // A material that is gone takes its edits with it.
+    let text = fs::read_to_string(&path).expect("it is there");
+    fs::write(&path, text.replace("\"silver\"", "\"gold\"")).expect("it is written");
+    until(&mut model, "warned", |model| model.files.warning.is_some());
+    let warning = model.files.warning.clone().expect("it is told");
+    assert!(warning.contains("`silver`"), "{warning}");
+    assert_eq!(model.edits().history().undoable(), 0);
+}
+
+#[test]
+fn new_lights_have_room_and_suit_the_exposure() {
+    for name in ["ring", "ball", "pool", "showroom"] {
+        let scene = Arc::new(builtin::build(name).expect("it is built in"));
+        let tracer = Tracer::new(Arc::clone(&scene));
+        let (low, high) = scene.bounds().expect("there are surfaces");
+        let radius_m = 0.5 * (high - low).length();
+        let middle = 0.5 * (low + high);
+        for from in [
+            DVec3::new(1.0, 1.2, 1.5),
+            DVec3::new(-2.0, 0.7, 0.1),
+            DVec3::Y * 2.0,
+        ] {
+            let gaze = Ray {
+                origin: middle + from * radius_m,
+                direction: -from.normalize(),
+            };
+            let aim = Aim::of(&tracer, &gaze, middle);
+            for stops in [0.0, -3.0] {
+                for kind in NewLight::ALL {
+                    let light = kind.make((&tracer, radius_m), &aim, stops, &scene);
+                    let lit = edited(&scene, &[added(light.clone())]);
+                    assert_eq!(lit.lights.len(), scene.lights.len() + 1);
+                    assert!(scene.lights.iter().all(|other| other.name != light.name));
+                    suits(&tracer, &light, &aim, 4.0 * f64::exp2(-stops));
+                }
+            }
+        }
+    }
+}
+
+/// Nothing stands between a light and what it is for, which faces it, and its irradiance across the way is that.
+fn suits(tracer: &Tracer, light: &Light, aim: &Aim, irradiance_w_m2: f64) {
+    let strength = light.kind.strength();
+    if let LightKind::Sun { direction, .. } = light.kind {
+        assert_eq!(strength, irradiance_w_m2);
+        assert!(direction.is_normalized() && direction.y < 0.0);
+        return;
+    }
+    let position = light.kind.position().expect("it has a place");
+    let way = aim.point - position;
+    assert!(way.dot(aim.normal) < 0.0, "{light:?} is behind {aim:?}");
+    let ray = Ray {
+        origin: position,
+        direction: way.normalize(),
+    };
+    let met = tracer.closest_place(&ray).expect("it is aimed at a surface");
+    let share = met.distance_m / way.length();
+    assert!((share - 1.0).abs() < 1e-3, "{light:?} is hidden from {aim:?}");
+    let per_m2 = way.length_squared().recip();
+    let found = match light.kind {
+        // Of a panel that is small against its distance: radiance times solid angle.
+        LightKind::Panel { across, down, .. } => {
+            let normal = across.cross(down);
+            assert!(normal.normalize().dot(way.normalize()) > 0.999);
+            strength * 4.0 * normal.length() * per_m2
+        }
+        _ => strength * per_m2,
+    };
+    assert!((found / irradiance_w_m2 - 1.0).abs() < 1e-9, "{found} W/m²");
+    if let LightKind::Spot { direction, .. } = light.kind {
+        assert!(direction.dot(way.normalize()) > 1.0 - 1e-9);
+    }
+}
+
+/// As the program opens it, the same on a dense screen, and the smallest.
+const SCREENS: [((f32, f32), f32); 3] = [SCREEN, (SCREEN.0, 2.0), ((700.0, 400.0), 2.0)];
+
+#[test]
+fn every_control_says_what_it_does() {
+    for screen in SCREENS {
+        let mut panel = Headless::opened(splats(), screen);
+        // Of the splats' panel all, and what only the wavefront estimator has.
+        panel.choose("Bake until", "max time");
+        panel.assert_names();
+        for (role, name, _) in panel.controls() {
+            panel.move_to(pos2(690.0, 300.0));
+            panel.settle();
+            let before = panel.texts();
+            panel.hover(role, &name);
+            assert!(
+                !panel.texts().is_subset(&before),
+                "{role:?} {name:?} says nothing on {screen:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn nothing_is_cut_off_or_overlaps() {
+    let adaptive = BakeSettings {
+        sigma: Sigma::Adaptive,
+        density_per_sr: 102_400_000.0,
+        ..splats()
+    };
+    for screen in SCREENS {
+        for settings in [splats(), adaptive.clone(), BakeSettings::default()] {
+            let mut panel = Headless::opened(settings, screen);
+            // With what sets them back beside them.
+            let edits = [
+                Edit::Light(0, LightEdit::Position(DVec3::new(-10.75, -20.125, -30.25))),
+                Edit::Place(0, Motion::turned(0.0, DVec3::splat(-1.125))),
+            ];
+            panel.tell(|model| {
+                for edit in edits {
+                    model.apply(Command::Edit(edit));
+                }
+            });
+            panel.choose("Tone map", "ACES");
+            panel.click(Role::RadioButton, "caustic");
+            panel.assert_layout();
+        }
+    }
+}
+
+/// What an edit may touch; every other member of a file is to stay.
+const TOUCHED: [&str; 5] = ["nodes", "materials", "extensions", "extensionsUsed", "buffers"];
+
+#[test]
+fn real_files_are_saved_with_edits() {
+    let sources = support::or_skip!(support::shared_or_skip("scenes"));
+    let folder = folder();
+    let target = folder.path().join("saved.glb");
+    let sources = fs::read_dir(sources).expect("a readable folder");
+    let mut sources: Vec<_> = sources.map(|entry| entry.expect("an entry").path()).collect();
+    sources.retain(|path| path.extension().is_some_and(|extension| extension == "glb"));
+    let saved = sources.iter().filter(|source| is_saved(source, &target)).count();
+    // Some hold what no edit may change.
+    assert!(saved > sources.len() / 2, "{saved} of {}", sources.len());
+}
+
+/// Edits the first of everything, saves and reads back.
+fn is_saved(source: &Path, target: &Path) -> bool {
+    let loaded = read(source);
+    let mut edits = vec![
+        Edit::Material(0, MaterialEdit::Roughness(0.375)),
+        Edit::Material(0, MaterialEdit::Ior(1.75)),
+        Edit::Place(0, Motion::turned(0.0, DVec3::new(0.125, 0.25, -0.5))),
+    ];
+    let double = loaded
+        .lights
+        .first()
+        .map(|light| intensity(0, 2.0 * light.kind.strength()));
+    edits.extend(double.filter(|edit| edit.apply(&loaded).is_ok()));
+    let scene = edited(&loaded, &edits);
+    if save(target, &loaded, &scene, &LoadOptions::default()).is_err() {
+        return false;
+    }
+    let read = read(target);
+    let extent_m = scene.bounds().map_or(1.0, |(low, high)| (high - low).length());
+    let shift = read.origin_world - scene.origin_world;
+    for (a, b) in read.objects.iter().zip(&scene.objects) {
+        let mut corners = a
+            .mesh_in_scene()
+            .positions
+            .iter()
+            .zip(&b.mesh_in_scene().positions);
+        assert!(corners.all(|(a, b)| (*a + shift).distance(*b) < 1e-9 * extent_m));
+    }
+    assert_eq!(read.lights.len(), scene.lights.len());
+    let [before, after] = [source, target].map(|path| -> Value {
+        let text = scene_file::text_of(path);
+        serde_json::from_str(text.trim_end_matches(['\0', ' '])).expect("it is JSON")
+    });
+    for (name, value) in before.as_object().expect("an object") {
+        let is_same = TOUCHED.contains(&name.as_str()) || after[name] == *value;
+        assert!(is_same, "{name} of {}", source.display());
+    }
+    true
+}

@@ -1,0 +1,196 @@
+//! Surfaces that change from place to place are the sum of their parts.
+
+use nephroid::scene::{Glow, Variation};
+use nephroid::units::Radiance;
+use support::floors::texture_reference;
+use support::meshes::{floor, quad};
+use support::scenes::{chart, direct, flux_w, light, scene};
+use support::tools::{bake, bits, caustic, energy_fault, photons};
+
+use crate::prelude::*;
+
+/// Texels along a side of the image, and of each of its squares: an even number of them, so that light and dark ones are
+/// each other's mirror images.
+const TEXELS: usize = 256;
+const SQUARE: usize = 64;
+
+/// A chessboard of two texels, or all of one.
+fn board(of: impl Fn(bool) -> [u8; 4]) -> Texture {
+    let is_light = |texel: usize| (texel % TEXELS / SQUARE + texel / TEXELS / SQUARE).is_multiple_of(2);
+    Texture {
+        name: "board".into(),
+        width: TEXELS as u32,
+        height: TEXELS as u32,
+        rgba: (0..TEXELS * TEXELS).map(|texel| of(is_light(texel))).collect(),
+        wrap: [Wrap::ClampToEdge; 2],
+    }
+}
+
+/// A plate of the material, with the image, between a floor and a ceiling under which a lamp hangs.
+fn lit(material: Material, image: Texture) -> Scene {
+    let mut scene = Scene::default();
+    parts::add(&mut scene, "plate", floor(0.5, 0.0), material);
+    parts::add(&mut scene, "floor", floor(4.0, -1.0), Material::default());
+    let ceiling = quad(dvec3(-4.0, 1.5, -4.0), DVec3::Z * 8.0, DVec3::X * 8.0);
+    parts::add(&mut scene, "ceiling", ceiling, Material::default());
+    scene.textures.push(Arc::new(image));
+    scene
+        .lights
+        .push(support::scenes::point_light(dvec3(0.0, 1.0, 0.0), 10.0));
+    scene
+}
+
+/// What the plate takes part in, and the caustic light of floor and ceiling [W].
+fn fluxes(scene: &Scene) -> [f64; 3] {
+    let result = bake(scene.clone(), &photons(3e5, 64));
+    assert_eq!(energy_fault(&result), None);
+    let on = |object: usize| -> f64 {
+        let maps = result.maps.iter().filter(|map| map.chart.object() == object);
+        maps.map(|map| {
+            let light = caustic(map).into_iter().enumerate();
+            light
+                .map(|(texel, e)| e * map.chart.texel_area_m2(texel))
+                .sum::<f64>()
+        })
+        .sum()
+    };
+    [result.ledgers[0].energy_w.emitted, on(1), on(2)]
+}
+
+/// By factors of the image.
+fn varied(material: Material) -> Material {
+    Material {
+        surface: SurfaceKind::Varied,
+        base_colour: LinearSrgb::WHITE,
+        variation: Some(Variation {
+            image: texture_reference(),
+            surface: SurfaceKind::Varied,
+        }),
+        ..material
+    }
+}
+
+/// Transmission, roughness and metallic of two kinds of squares, 0 or 255, and the factors that they multiply.
+#[test]
+fn boards_are_half_of_each_kind() {
+    let of = |transmission, roughness, metallic| Material {
+        transmission,
+        roughness,
+        metallic,
+        ..Material::default()
+    };
+    let covered = Material {
+        coverage: Some(1.0),
+        base_colour_texture: Some(texture_reference()),
+        roughness: 1.0,
+        ..Material::default()
+    };
+    for (what, material, light, dark) in [
+        (
+            "mirror and matte",
+            varied(of(0.0, 1.0, 1.0)),
+            [0, 0, 255, 255],
+            [0, 255, 0, 255],
+        ),
+        (
+            "mirror and polish",
+            varied(of(0.0, 0.0, 1.0)),
+            [0, 0, 255, 255],
+            [0, 0, 0, 255],
+        ),
+        (
+            "rough and smooth",
+            varied(of(0.0, 0.5, 1.0)),
+            [0, 255, 255, 255],
+            [0, 0, 255, 255],
+        ),
+        (
+            "clear and matte",
+            varied(of(1.0, 0.4, 0.0)),
+            [255; 4],
+            [0, 255, 255, 255],
+        ),
+        (
+            "there and not",
+            Material {
+                variation: None,
+                ..varied(covered)
+            },
+            [255; 4],
+            [255, 255, 255, 0],
+        ),
+    ] {
+        let scene = |of: &dyn Fn(bool) -> [u8; 4]| lit(material.clone(), board(of));
+        let mixed = fluxes(&scene(&|is_light| if is_light { light } else { dark }));
+        let [bright, dim] = [light, dark].map(|all| fluxes(&scene(&|_| all)));
+        println!("{what}: {mixed:?} of {bright:?} and {dim:?}");
+        for (place, flux_w) in mixed.into_iter().enumerate() {
+            let expected_w = 0.5 * (bright[place] + dim[place]);
+            // Four standard errors of two hundred thousand photons.
+            near(flux_w, expected_w, 0.01 * expected_w + 1e-3, (what, place));
+        }
+    }
+}
+
+#[test]
+fn boards_do_not_depend_on_threads() {
+    let material = varied(Material {
+        transmission: 1.0,
+        roughness: 0.4,
+        ..Material::default()
+    });
+    let image = board(|is_light| if is_light { [255; 4] } else { [0, 99, 255, 255] });
+    let scene = lit(material, image);
+    let baked = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let result = pool
+            .expect("threads")
+            .install(|| bake(scene.clone(), &photons(3e4, 32)));
+        result.maps.iter().map(bits).collect::<Vec<_>>()
+    };
+    assert!(baked(1) == baked(3));
+}
+
+/// Flux on a floor under a lamp of radiance 10 W/(m² sr) where its image is white [W].
+fn shone_by(image: Option<Texture>) -> f64 {
+    let lamp = Material {
+        emitted_radiance: LinearSrgb::grey(10.0),
+        emission_texture: image.is_some().then(texture_reference),
+        double_sided: false,
+        ..Material::default()
+    };
+    let hanging = quad(dvec3(-0.5, 1.0, -0.5), DVec3::Z, DVec3::X);
+    let mut scene = scene(
+        vec![(floor(2.0, 0.0), Material::default()), (hanging, lamp)],
+        vec![],
+    );
+    if let Some(image) = image {
+        let glow = Glow::new(scene.objects[1].mesh_in_scene(), &texture_reference(), &image);
+        scene.glows.insert(1, Arc::new(glow.expect("it glows")));
+        scene.textures.push(Arc::new(image));
+    }
+    let radiance = Radiance(scene.emitted_radiance(1).luminance());
+    scene
+        .lights
+        .push(light(LightKind::Surface { object: 1, radiance }));
+    let tracer = Tracer::new(Arc::new(scene));
+    let chart = chart(&tracer, 0, 16, 16);
+    flux_w(&chart, &direct(&tracer, &chart))
+}
+
+#[test]
+fn glowing_boards_are_half_of_each_kind() {
+    let (light, dark) = ([255; 4], [99, 99, 99, 255]);
+    let mixed_w = shone_by(Some(board(|is_light| if is_light { light } else { dark })));
+    let [bright_w, dim_w] = [light, dark].map(|all| shone_by(Some(board(|_| all))));
+    println!("{mixed_w} of {bright_w} and {dim_w}, evenly {}", shone_by(None));
+    // Without an image it is exact; each place of one with an image stands for a patch as wide as all of them leave it.
+    near(bright_w, shone_by(None), 0.05 * bright_w, "a white image is none");
+    near(
+        dim_w / bright_w,
+        LinearSrgb::decode_channel(99),
+        1e-3,
+        "as bright as its image",
+    );
+    near(mixed_w, 0.5 * (bright_w + dim_w), 0.02 * mixed_w, "half of each");
+}
