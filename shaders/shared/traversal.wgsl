@@ -17,31 +17,49 @@ struct Triangle {
     order: u32,
 }
 
-// A mesh where it stands. The first one is local, nodes and all.
+@group(1) @binding(1) var<storage, read> nodes: array<Node>;
+@group(1) @binding(2) var<storage, read> triangles: array<Triangle>;
+
+// Count of a node that is an instance.
+const INSTANCE: u32 = 0xffffffffu;
+// In place of an object; of triangles that were moved away.
+const NO_OBJECT: u32 = 0xffffffffu;
+// In place of an instance: triangles and nodes are local.
+const LOCAL: u32 = 0xffffffffu;
+
+// A mesh where it stands.
 struct Instance {
-    // Rows of the way from its coordinates to local ones, and from those to what its nodes have.
-    from_mesh: array<vec4f, 3>,
-    to_nodes: array<vec4f, 3>,
+    // From local coordinates to those of its nodes, and from those of the mesh to local ones.
+    to_nodes: mat4x3f,
+    from_mesh: mat4x3f,
     root: u32,
     // None where its triangles are local and have their own numbers.
     object: u32,
     // Added to those of its triangles.
     first_index: u32,
     first_order: u32,
+    // By which boxes are widened, in coordinates of the nodes: what rounding on the way there moves rays.
     margin: f32,
-    is_mirrored: u32,
-    padding0: u32,
-    padding1: u32,
+    is_mirrored: bool,
 }
 
-@group(1) @binding(1) var<storage, read> nodes: array<Node>;
-@group(1) @binding(2) var<storage, read> triangles: array<Triangle>;
-@group(1) @binding(8) var<storage, read> instances: array<Instance>;
-
-// Count of a node that is an instance.
-const INSTANCE: u32 = 0xffffffffu;
-// In place of an object; of triangles that were moved away.
-const NO_OBJECT: u32 = 0xffffffffu;
+// It takes four nodes.
+fn instance_at(index: u32) -> Instance {
+    let a = nodes[index];
+    let b = nodes[index + 1u];
+    let c = nodes[index + 2u];
+    let d = nodes[index + 3u];
+    return Instance(
+        mat4x3f(a.low, a.high, b.low, b.high),
+        mat4x3f(c.low, c.high, d.low, d.high),
+        a.first,
+        a.count,
+        b.first,
+        b.count,
+        bitcast<f32>(c.first),
+        c.count != 0u,
+    );
+}
 
 // In place of a triangle where nothing is met.
 const NO_TRIANGLE: u32 = 0xffffffffu;
@@ -117,41 +135,30 @@ fn slabs(origin: vec3f, direction: vec3f, margin: f32) -> Slabs {
     return Slabs(origin + margin, origin - margin, 1.0 / safe);
 }
 
-fn moved(rows: array<vec4f, 3>, place: vec3f) -> vec3f {
-    let v = vec4f(place, 1.0);
-    return vec3f(dot(rows[0], v), dot(rows[1], v), dot(rows[2], v));
-}
-
 // Distances along a ray are the same in the coordinates of an instance's nodes.
-fn slabs_in(instance: u32, origin: vec3f, direction: vec3f) -> Slabs {
-    if instance == 0u {
-        return slabs(origin, direction, 0.0);
-    }
-    let at = instances[instance];
-    let rows = at.to_nodes;
-    let along = vec3f(dot(rows[0].xyz, direction), dot(rows[1].xyz, direction), dot(rows[2].xyz, direction));
+fn slabs_in(at: Instance, origin: vec3f, direction: vec3f) -> Slabs {
     let far = max(abs(origin.x), max(abs(origin.y), abs(origin.z)));
-    return slabs(moved(rows, origin), along, at.margin * max(far, 1.0));
+    let begin = at.to_nodes * vec4f(origin, 1.0);
+    return slabs(begin, at.to_nodes * vec4f(direction, 0.0), at.margin * max(far, 1.0));
 }
 
 // A triangle as an instance has it.
 fn placed(triangle: Triangle, instance: u32) -> Triangle {
-    if instance == 0u {
+    if instance == LOCAL {
         return triangle;
     }
-    let at = instances[instance];
+    let at = instance_at(instance);
     if at.object == NO_OBJECT {
         return triangle;
     }
-    let b = moved(at.from_mesh, triangle.b);
-    let c = moved(at.from_mesh, triangle.c);
-    let is_mirrored = at.is_mirrored != 0u;
+    let b = at.from_mesh * vec4f(triangle.b, 1.0);
+    let c = at.from_mesh * vec4f(triangle.c, 1.0);
     return Triangle(
-        moved(at.from_mesh, triangle.a),
+        at.from_mesh * vec4f(triangle.a, 1.0),
         at.object,
-        select(b, c, is_mirrored),
+        select(b, c, at.is_mirrored),
         at.first_index + triangle.first_index,
-        select(c, b, is_mirrored),
+        select(c, b, at.is_mirrored),
         at.first_order + triangle.order,
     );
 }
@@ -218,7 +225,7 @@ struct Search {
     index: u32,
     is_over: bool,
     count: u32,
-    // Whose triangles are searched, where any are.
+    // Whose triangles are searched.
     instance: u32,
     // How many nodes wait that lie over instances: those after them are of the one that is searched.
     outside: u32,
@@ -231,7 +238,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
     let outside = slabs(origin, direction, 0.0);
     var boxes = outside;
     var waiting: array<vec2f, STACK>;
-    var search = Search(Hit(NO_TRIANGLE, limit, vec3f(0.0), 0u), 0u, 0u, false, 0u, 0u, 0u);
+    var search = Search(Hit(NO_TRIANGLE, limit, vec3f(0.0), LOCAL), 0u, 0u, false, 0u, LOCAL, 0u);
     loop {
         var first = 0u;
         var end = 0u;
@@ -240,8 +247,9 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             if node.count == INSTANCE {
                 search.instance = node.first;
                 search.outside = search.count;
-                search.index = instances[node.first].root;
-                boxes = slabs_in(node.first, origin, direction);
+                let at = instance_at(node.first);
+                search.index = at.root;
+                boxes = slabs_in(at, origin, direction);
                 continue;
             }
             if node.count > 0u {
@@ -262,7 +270,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             } else if search.count > 0u {
                 // It may be farther than what was found since: then its children are.
                 if search.count == search.outside {
-                    search.outside = 0u;
+                    search.instance = LOCAL;
                     boxes = outside;
                 }
                 search.count -= 1u;
@@ -289,7 +297,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
         var has_next = false;
         while search.count > 0u && !has_next {
             if search.count == search.outside {
-                search.outside = 0u;
+                search.instance = LOCAL;
                 boxes = outside;
             }
             search.count -= 1u;

@@ -1,5 +1,4 @@
-//! Closest and any hits among many triangles: obvhs finds the candidates in single precision, the decision is made in
-//! double precision.
+//! What rays may meet among many triangles: obvhs builds the hierarchy in single precision.
 
 use glam::{DVec3, Vec3A};
 use obvhs::{
@@ -8,9 +7,9 @@ use obvhs::{
     bvh2::{Bvh2, builder::build_bvh2},
 };
 
+use super::Ray;
 use super::packed::{self, PackedBvh, PackedNode};
 use super::wide::{WideBvh, WideRay};
-use super::{Ray, triangle::ShearedRay};
 
 /// Boxes are widened by this share of the scene's size, so that no rounding of the single-precision box test can lose
 /// a hit: origin, direction and slab distances err by at most some 2⁻²⁰ of the size.
@@ -26,20 +25,7 @@ const BUILD: BvhBuildParams = BvhBuildParams {
 /// lose their precision out there.
 const FAR_RADII: f64 = 4.0;
 
-/// Where a ray met a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriangleHit {
-    /// Index in the order that the triangles were given to [`TriangleBvh::build`].
-    pub triangle: u32,
-    /// Its place among the hierarchy's leaves, for [`TriangleBvh::corners`].
-    pub slot: u32,
-    /// Distance from the ray's origin [m].
-    pub distance_m: f64,
-    /// Of the three corners; they add up to 1.
-    pub barycentric: [f64; 3],
-}
-
-/// A bounding volume hierarchy over triangles.
+/// A bounding volume hierarchy over triangles, or over boxes.
 ///
 /// Single-precision coordinates are relative to the triangles' centre and scaled by a power of two to a radius of
 /// about one, so that neither a far nor a tiny nor a huge scene loses precision.
@@ -74,16 +60,35 @@ impl TriangleBvh {
     /// Builds the hierarchy. Corners must be finite; triangles without area are allowed and never hit.
     pub fn build(triangles: &[[DVec3; 3]]) -> Self {
         let frame = Frame::around(triangles.iter().flatten());
+        Self::over(triangles, frame, BUILD, |corner| frame.local(corner))
+    }
+
+    /// Over boxes by their minimum and maximum corner [m], in the coordinates of something around them.
+    pub fn over_boxes(boxes: &[(DVec3, DVec3)], frame: Frame) -> Self {
+        let build = BvhBuildParams {
+            max_prims_per_leaf: 1,
+            ..BUILD
+        };
+        let corners: Vec<[DVec3; 3]> = boxes.iter().map(|&(low, high)| [low, high, high]).collect();
+        // A triangle in one point is never clearly missed: its box decides.
+        Self::over(&corners, frame, build, |_| DVec3::ZERO)
+    }
+
+    fn over(
+        triangles: &[[DVec3; 3]],
+        frame: Frame,
+        build: BvhBuildParams,
+        tested: impl Fn(DVec3) -> DVec3,
+    ) -> Self {
         let aabbs: Vec<Aabb> = triangles.iter().map(|corners| frame.aabb(corners)).collect();
         let mut build_time = std::time::Duration::ZERO;
-        let bvh = build_bvh2(&aabbs, BUILD, &mut build_time);
+        let bvh = build_bvh2(&aabbs, build, &mut build_time);
         let corners: Vec<[DVec3; 3]> = bvh
             .primitive_indices
             .iter()
             .map(|&triangle| triangles[triangle as usize])
             .collect();
-        let local = |corner: DVec3| frame.local(corner);
-        let singles: Vec<[DVec3; 3]> = corners.iter().map(|corners| corners.map(local)).collect();
+        let singles: Vec<[DVec3; 3]> = corners.iter().map(|corners| corners.map(&tested)).collect();
         Self {
             wide: WideBvh::new(&bvh, &singles),
             bvh,
@@ -92,73 +97,17 @@ impl TriangleBvh {
         }
     }
 
-    /// Hands out the slots of all triangles that a ray may meet before `end_m`, near ones first as a rule. `meet` gives the
-    /// distance [m] beyond which nothing is looked for any more; `None` ends the search.
-    pub fn search(&self, ray: &Ray, end_m: f64, meet: impl FnMut(u32) -> Option<f64>) {
-        self.frame.search(&self.wide, ray, end_m, meet);
-    }
-
-    /// The nearest triangle in front of the ray's origin, from either side.
-    pub fn closest_hit(&self, ray: &Ray) -> Option<TriangleHit> {
-        self.closest_hit_where(ray, |_, _| true)
-    }
-
-    /// The same among those places of triangles, by their barycentric coordinates, where something is there.
-    pub fn closest_hit_where(
-        &self,
-        ray: &Ray,
-        is_there: impl Fn(u32, [f64; 3]) -> bool,
-    ) -> Option<TriangleHit> {
-        let mut best: Option<TriangleHit> = None;
-        let sheared = ShearedRay::new(ray);
-        let (local, advanced_m) = self.frame.local_ray(ray, f64::INFINITY);
-        self.wide.search(local, |slot| {
-            let Some((distance_m, barycentric)) = sheared.intersect(&self.corners[slot]) else {
-                return f32::INFINITY;
-            };
-            let triangle = self.bvh.primitive_indices[slot];
-            // Of surfaces at the same distance the first given, whatever the hierarchy looks like.
-            if best.is_some_and(|hit| (hit.distance_m, hit.triangle) <= (distance_m, triangle)) {
-                return f32::INFINITY;
-            }
-            if !is_there(triangle, barycentric) {
-                return f32::INFINITY;
-            }
-            best = Some(TriangleHit {
-                triangle,
-                slot: slot as u32,
-                distance_m,
-                barycentric,
-            });
-            self.frame.local_distance(distance_m, advanced_m)
+    /// Hands out the slots of all triangles or boxes that a ray may meet before `end_m`, near ones first as a rule. `meet`
+    /// gives a distance [m] beyond which nothing is looked for any more, infinite where it knows of none; `None` ends the
+    /// search.
+    #[inline(always)]
+    pub fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
+        let (local, advanced_m) = self.frame.local_ray(ray, end_m);
+        self.wide.search(local, |slot| match meet(slot as u32) {
+            Some(end_m) if end_m.is_finite() => self.frame.local_distance(end_m, advanced_m),
+            Some(_) => f32::INFINITY,
+            None => -1.0,
         });
-        best
-    }
-
-    /// Whether any triangle lies on the ray before `distance_m` (exclusive).
-    pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
-        self.is_blocked_where(ray, distance_m, |_, _| true)
-    }
-
-    /// The same by those places of triangles where something is there.
-    pub fn is_blocked_where(
-        &self,
-        ray: &Ray,
-        distance_m: f64,
-        is_there: impl Fn(u32, [f64; 3]) -> bool,
-    ) -> bool {
-        let sheared = ShearedRay::new(ray);
-        let (local, _) = self.frame.local_ray(ray, distance_m);
-        let mut is_blocked = false;
-        self.wide.search(local, |slot| {
-            is_blocked = sheared
-                .intersect(&self.corners[slot])
-                .is_some_and(|(hit_m, barycentric)| {
-                    hit_m < distance_m && is_there(self.bvh.primitive_indices[slot], barycentric)
-                });
-            if is_blocked { -1.0 } else { f32::INFINITY }
-        });
-        is_blocked
     }
 
     /// The node around all triangles; `None` without any.
@@ -172,14 +121,27 @@ impl TriangleBvh {
     /// The hierarchy for devices, in its own coordinates or in those of something larger around it.
     pub fn packed(&self, frame: &Frame) -> PackedBvh {
         let local = |place: DVec3| to_single(frame.local(place));
-        let mut nodes = packed::nodes(&self.bvh);
-        if *frame != self.frame {
-            for node in &mut nodes {
-                let moved = |place: [f32; 3]| local(self.frame.place(Vec3A::from_array(place)));
-                node.low = (moved(node.low) - BOX_MARGIN).to_array();
-                node.high = (moved(node.high) + BOX_MARGIN).to_array();
-            }
-        }
+        let placed = |corner: Vec3A, margin: f32| {
+            let is_same = *frame == self.frame;
+            let placed = if is_same {
+                corner
+            } else {
+                local(self.frame.place(corner)) + margin
+            };
+            placed.to_array()
+        };
+        let count = if self.corners.is_empty() {
+            0
+        } else {
+            self.bvh.nodes.len()
+        };
+        let nodes = self.bvh.nodes[..count].iter().map(|node| PackedNode {
+            low: placed(node.aabb().min, -BOX_MARGIN),
+            first: node.first_index,
+            high: placed(node.aabb().max, BOX_MARGIN),
+            count: node.prim_count,
+        });
+        let nodes: Vec<PackedNode> = nodes.collect();
         let corners = self.corners.iter();
         PackedBvh {
             corners: corners
@@ -196,7 +158,7 @@ impl TriangleBvh {
         &self.frame
     }
 
-    /// The triangle in a slot, by its index in the order that they were given.
+    /// The triangle or box in a slot, by its index in the order that they were given.
     pub fn triangle(&self, slot: u32) -> u32 {
         self.bvh.primitive_indices[slot as usize]
     }
@@ -204,11 +166,6 @@ impl TriangleBvh {
     /// Corners of the triangle in a slot [m].
     pub fn corners(&self, slot: u32) -> &[DVec3; 3] {
         &self.corners[slot as usize]
-    }
-
-    /// Number of triangles.
-    pub fn triangle_count(&self) -> usize {
-        self.corners.len()
     }
 }
 
@@ -244,18 +201,9 @@ impl Frame {
         self.centre + local.as_dvec3() * (1.0 / self.scale)
     }
 
-    fn aabb<const N: usize>(&self, points: &[DVec3; N]) -> Aabb {
+    fn aabb(&self, points: &[DVec3; 3]) -> Aabb {
         let aabb = Aabb::from_points(&points.map(|point| to_single(self.local(point))));
         Aabb::new(aabb.min - BOX_MARGIN, aabb.max + BOX_MARGIN)
-    }
-
-    fn search(&self, wide: &WideBvh, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
-        let (local, advanced_m) = self.local_ray(ray, end_m);
-        wide.search(local, |slot| match meet(slot as u32) {
-            Some(end_m) if end_m.is_finite() => self.local_distance(end_m, advanced_m),
-            Some(_) => f32::INFINITY,
-            None => -1.0,
-        });
     }
 
     /// The ray in single-precision coordinates, with the distance [m] by which its origin was advanced.
@@ -284,61 +232,6 @@ impl Frame {
     }
 }
 
-/// A bounding volume hierarchy over boxes.
-pub struct BoxBvh {
-    bvh: Bvh2,
-    wide: WideBvh,
-    frame: Frame,
-}
-
-impl std::fmt::Debug for BoxBvh {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("BoxBvh")
-            .field("boxes", &self.bvh.primitive_indices.len())
-            .finish_non_exhaustive()
-    }
-}
-
-impl BoxBvh {
-    /// Builds the hierarchy over boxes by their minimum and maximum corners [m].
-    pub fn build(boxes: &[[DVec3; 2]]) -> Self {
-        Self::within(boxes, Frame::around(boxes.iter().flatten()))
-    }
-
-    /// In the coordinates of something larger around them.
-    pub fn within(boxes: &[[DVec3; 2]], frame: Frame) -> Self {
-        const BUILD_BOXES: BvhBuildParams = BvhBuildParams {
-            max_prims_per_leaf: 1,
-            ..BUILD
-        };
-        let aabbs: Vec<Aabb> = boxes.iter().map(|corners| frame.aabb(corners)).collect();
-        let mut build_time = std::time::Duration::ZERO;
-        let bvh = build_bvh2(&aabbs, BUILD_BOXES, &mut build_time);
-        Self {
-            // A triangle without area is never clearly missed: its box decides.
-            wide: WideBvh::new(&bvh, &vec![[DVec3::ZERO; 3]; boxes.len()]),
-            bvh,
-            frame,
-        }
-    }
-
-    /// The nodes for devices; a leaf's `first` is a box.
-    pub fn packed(&self) -> Vec<PackedNode> {
-        let mut nodes = packed::nodes(&self.bvh);
-        for leaf in nodes.iter_mut().filter(|node| node.count > 0) {
-            leaf.first = self.bvh.primitive_indices[leaf.first as usize];
-        }
-        nodes
-    }
-
-    /// Hands out all boxes that a ray may meet before `end_m`, as [`TriangleBvh::search`] does triangles.
-    pub fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
-        self.frame.search(&self.wide, ray, end_m, |slot| {
-            meet(self.bvh.primitive_indices[slot as usize])
-        });
-    }
-}
-
 /// A node of the hierarchy, for searches other than along rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Node<'a> {
@@ -364,12 +257,11 @@ impl<'a> Node<'a> {
         (!node.is_leaf()).then(|| [child(node.first_index), child(node.first_index + 1)])
     }
 
-    /// Index and corners of each triangle of a leaf; nothing for other nodes.
+    /// Slot and corners of each triangle of a leaf; nothing for other nodes.
     pub fn triangles(&self) -> impl Iterator<Item = (u32, &'a [DVec3; 3])> + use<'a> {
-        let TriangleBvh { bvh, corners, .. } = self.hierarchy;
-        let node = &bvh.nodes[self.index];
-        let first = node.first_index as usize;
-        (first..first + node.prim_count as usize).map(|slot| (bvh.primitive_indices[slot], &corners[slot]))
+        let node = &self.hierarchy.bvh.nodes[self.index];
+        let corners = &self.hierarchy.corners;
+        (node.first_index..node.first_index + node.prim_count).map(|slot| (slot, &corners[slot as usize]))
     }
 }
 

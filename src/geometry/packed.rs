@@ -1,7 +1,5 @@
 //! A hierarchy in single precision, as devices traverse it.
 
-use obvhs::bvh2::Bvh2;
-
 /// A node: its box and what is in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PackedNode {
@@ -30,25 +28,8 @@ pub struct PackedBvh {
     pub depth: usize,
 }
 
-/// The nodes of a hierarchy; none where it is over nothing.
-pub(super) fn nodes(bvh: &Bvh2) -> Vec<PackedNode> {
-    let count = match bvh.primitive_indices.len() {
-        0 => 0,
-        _ => bvh.nodes.len(),
-    };
-    let nodes = bvh.nodes[..count].iter();
-    nodes
-        .map(|node| PackedNode {
-            low: node.aabb().min.to_array(),
-            first: node.first_index,
-            high: node.aabb().max.to_array(),
-            count: node.prim_count,
-        })
-        .collect()
-}
-
 /// Nodes above the deepest node.
-pub fn depth(nodes: &[PackedNode]) -> usize {
+pub(super) fn depth(nodes: &[PackedNode]) -> usize {
     let mut deepest = 0;
     let mut waiting: Vec<(usize, usize)> = nodes.first().map(|_| (0, 0)).into_iter().collect();
     while let Some((index, above)) = waiting.pop() {

@@ -45,7 +45,12 @@ impl Glow {
 }
 
 /// Mean of an image over a triangle, at places as close as its texels.
-fn triangle_mean(mesh: InScene, image: &TextureRef, texture: &Texture, triangle: usize) -> Option<LinearSrgb> {
+fn triangle_mean(
+    mesh: InScene,
+    image: &TextureRef,
+    texture: &Texture,
+    triangle: usize,
+) -> Option<LinearSrgb> {
     let at = |barycentric| image.place(mesh, triangle, barycentric);
     let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
     let [a, b, c] = [at([1.0, 0.0, 0.0])?, at([0.0, 1.0, 0.0])?, at([0.0, 0.0, 1.0])?].map(|uv| uv * size);

@@ -7,7 +7,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::mesh::{InScene, Placement};
-use super::{Mesh, Scene};
+use super::{Mesh, Scene, instances};
 
 /// One mesh primitive of one node: the unit that has a material and, when light reaches it, an illumination map.
 #[derive(Clone, Debug)]
@@ -45,6 +45,7 @@ struct Found {
     /// A copy in scene coordinates.
     mesh: OnceLock<Arc<Mesh>>,
     bounds: OnceLock<Option<(DVec3, DVec3)>>,
+    can_share: OnceLock<bool>,
 }
 
 impl fmt::Debug for Found {
@@ -184,6 +185,12 @@ impl Object {
     /// Smallest box around the mesh in the scene, as minimum and maximum corner [m]; `None` without vertices.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         *self.shape.found.bounds.get_or_init(|| self.in_scene().bounds())
+    }
+
+    /// Whether its mesh can be met and drawn in its own coordinates, together with other objects that have it.
+    pub fn can_share(&self) -> bool {
+        let is_sound = || instances::is_sound(&self.shape.mesh, &self.shape.world_from_object);
+        *self.shape.found.can_share.get_or_init(is_sound)
     }
 
     /// The mesh in scene coordinates, to be changed: from then on those are its own.

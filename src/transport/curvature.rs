@@ -29,70 +29,30 @@ pub enum NormalField {
 
 /// Triangles around each vertex of a mesh, ascending.
 #[derive(Debug)]
-pub struct TrianglesAround {
-    /// Index after the last triangle of each vertex.
-    ends: Vec<u32>,
-    triangles: Vec<u32>,
-}
+pub struct TrianglesAround(Vec<Vec<u32>>);
 
 impl TrianglesAround {
     /// Of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
-        let mut ends = vec![0_u32; mesh.positions.len()];
-        let vertices = || mesh.triangles.iter().flatten().map(|&vertex| vertex as usize);
-        vertices().for_each(|vertex| ends[vertex] += 1);
-        let mut end = 0;
-        for count in &mut ends {
-            (*count, end) = (end, end + *count);
+        let mut around = vec![Vec::new(); mesh.positions.len()];
+        for (triangle, vertices) in (0..).zip(&mesh.triangles) {
+            vertices
+                .iter()
+                .for_each(|&vertex| around[vertex as usize].push(triangle));
         }
-        let mut triangles = vec![0; end as usize];
-        for (corner, vertex) in vertices().enumerate() {
-            triangles[ends[vertex] as usize] = (corner / 3) as u32;
-            ends[vertex] += 1;
+        Self(around)
+    }
+
+    /// Average of the triangles around a vertex, by area.
+    fn operator(&self, mesh: InScene, vertex: usize) -> ShapeOperator {
+        let (mut sum, mut sum_m2) = (DMat3::ZERO, 0.0);
+        let triangles = self.0[vertex].iter();
+        for (operator, area_m2) in triangles.filter_map(|&triangle| of_triangle(mesh, triangle as usize)) {
+            sum += operator * area_m2;
+            sum_m2 += area_m2;
         }
-        Self { ends, triangles }
-    }
-
-    fn at(&self, vertex: usize) -> &[u32] {
-        let begin = if vertex == 0 { 0 } else { self.ends[vertex - 1] };
-        &self.triangles[begin as usize..self.ends[vertex] as usize]
-    }
-
-    #[inline(never)]
-    fn operators(&self, mesh: InScene, vertices: [usize; 3]) -> [ShapeOperator; 3] {
-        vertices.map(|vertex| {
-            let mut sum = Average::EMPTY;
-            for &triangle in self.at(vertex) {
-                sum.add(of_triangle(mesh, triangle as usize));
-            }
-            sum.operator()
-        })
-    }
-}
-
-/// Average of the triangles around a vertex, by area.
-#[derive(Clone, Copy)]
-struct Average {
-    sum: DMat3,
-    area_m2: f64,
-}
-
-impl Average {
-    const EMPTY: Self = Self {
-        sum: DMat3::ZERO,
-        area_m2: 0.0,
-    };
-
-    fn add(&mut self, triangle: Option<(DMat3, f64)>) {
-        if let Some((operator, area_m2)) = triangle {
-            self.sum += operator * area_m2;
-            self.area_m2 += area_m2;
-        }
-    }
-
-    fn operator(self) -> ShapeOperator {
-        if self.area_m2 > 0.0 {
-            ShapeOperator::from_matrix(self.sum * self.area_m2.recip())
+        if sum_m2 > 0.0 {
+            ShapeOperator::from_matrix(sum * sum_m2.recip())
         } else {
             ShapeOperator::default()
         }
@@ -102,14 +62,13 @@ impl Average {
 impl NormalField {
     /// Of a mesh in scene coordinates, known.
     pub fn new(mesh: &Mesh) -> Self {
-        let mut sums = vec![Average::EMPTY; mesh.positions.len()];
-        for (triangle, vertices) in mesh.triangles.iter().enumerate() {
-            let found = of_triangle(mesh.into(), triangle);
-            for &vertex in vertices {
-                sums[vertex as usize].add(found);
-            }
-        }
-        Self::Known(sums.into_iter().map(Average::operator).collect())
+        let around = TrianglesAround::of(mesh);
+        let vertices = 0..mesh.positions.len();
+        Self::Known(
+            vertices
+                .map(|vertex| around.operator(mesh.into(), vertex))
+                .collect(),
+        )
     }
 
     /// The normal's change [1] for a step along the surface [m] at a point of a triangle.
@@ -117,7 +76,7 @@ impl NormalField {
         let corners = mesh.triangle(triangle).map(|vertex| vertex as usize);
         let operators = match self {
             Self::Known(vertices) => corners.map(|vertex| vertices[vertex]),
-            Self::Found(around) => around.operators(mesh, corners),
+            Self::Found(around) => corners.map(|vertex| around.operator(mesh, vertex)),
         };
         let weighted = operators.iter().zip(barycentric);
         weighted

@@ -15,7 +15,7 @@ use super::smoothing::smoothing_groups;
 use super::tracer::RayHit;
 use crate::geometry::bvh::{self, Frame};
 use crate::geometry::triangle::ShearedRay;
-use crate::geometry::{BoxBvh, Ray, TriangleBvh};
+use crate::geometry::{Ray, TriangleBvh};
 use crate::scene::mesh::Placement;
 use crate::scene::{Mesh, Object, Scene, instances};
 
@@ -27,12 +27,15 @@ const FAR_RADII: f64 = 4.0;
 #[derive(Debug)]
 pub(super) struct Hierarchy {
     pub(super) copied: Arc<Copied>,
-    /// Of each object, whether it was moved away from its copy, which is passed over then; empty where none was.
-    pub(super) moved: Vec<bool>,
+    /// Objects that were moved away from their copies, which are passed over then; ascending.
+    pub(super) moved: Vec<usize>,
+    /// The meshes of instances.
+    pub(super) meshes: Vec<Arc<SharedMesh>>,
+    /// By their objects, ascending.
     pub(super) instances: Vec<Instance>,
     /// Over the instances' boxes.
-    above: BoxBvh,
-    most_copied: usize,
+    pub(super) above: TriangleBvh,
+    max_copied: usize,
     /// Single-precision coordinates of devices.
     pub(super) frame: Frame,
 }
@@ -60,27 +63,33 @@ pub(super) struct SharedMesh {
 #[derive(Debug)]
 pub(super) struct Instance {
     pub(super) object: u32,
+    /// Its place among the meshes.
+    pub(super) mesh: usize,
     pub(super) shared: Arc<SharedMesh>,
     pub(super) placement: Option<Placement>,
     object_from_world: DAffine3,
     pub(super) bounds: (DVec3, DVec3),
 }
 
+/// A triangle: its slot in the hierarchy of an instance's mesh, or in that of what is copied.
+type Found<'a> = (Option<&'a Instance>, u32);
+
 /// What a ray met, and the corners of that triangle in the scene [m].
 pub(super) type Met = (RayHit, [DVec3; 3]);
 
 impl Hierarchy {
-    /// Of a scene. `most_copied`: see [`instances::MAX_COPIED`].
-    pub(super) fn new(scene: &Scene, most_copied: usize) -> Self {
-        let is_instance = instances::find(&scene.objects, most_copied);
+    /// Of a scene. `max_copied`: see [`instances::MAX_COPIED`].
+    pub(super) fn new(scene: &Scene, max_copied: usize) -> Self {
+        let is_instance = instances::find(&scene.objects, max_copied);
         let copied = Arc::new(Copied::new(scene, &is_instance));
         let none = Self {
             frame: *copied.bvh.frame(),
             copied,
             moved: Vec::new(),
+            meshes: Vec::new(),
             instances: Vec::new(),
-            above: BoxBvh::build(&[]),
-            most_copied,
+            above: TriangleBvh::build(&[]),
+            max_copied,
         };
         none.with_instances(scene, &is_instance)
     }
@@ -89,10 +98,10 @@ impl Hierarchy {
     pub(super) fn edited(&self, was: &Scene, is: &Scene) -> Self {
         let objects = || was.objects.iter().zip(&is.objects);
         let can_move = |(was, is): (&Object, &Object)| {
-            was.stands_as(is) || (Arc::ptr_eq(was.mesh(), is.mesh()) && instances::is_possible(is))
+            was.stands_as(is) || (Arc::ptr_eq(was.mesh(), is.mesh()) && is.can_share())
         };
         if !objects().all(can_move) {
-            return Self::new(is, self.most_copied);
+            return Self::new(is, self.max_copied);
         }
         let is_instance = objects()
             .enumerate()
@@ -103,41 +112,58 @@ impl Hierarchy {
 
     /// With other instances; those that were copied are passed over there.
     fn with_instances(&self, scene: &Scene, is_instance: &[bool]) -> Self {
-        let mut meshes: HashMap<*const Mesh, Arc<SharedMesh>> = HashMap::new();
-        for instance in &self.instances {
-            meshes.insert(Arc::as_ptr(&instance.shared.mesh), Arc::clone(&instance.shared));
+        let known = self
+            .meshes
+            .iter()
+            .map(|shared| (Arc::as_ptr(&shared.mesh), shared));
+        let known: HashMap<_, _> = known.collect();
+        let (mut meshes, mut places) = (Vec::new(), HashMap::new());
+        let mut instances = Vec::new();
+        for (object, stands) in scene
+            .objects
+            .iter()
+            .enumerate()
+            .filter(|(object, _)| is_instance[*object])
+        {
+            let mesh = stands.mesh();
+            let place = *places.entry(Arc::as_ptr(mesh)).or_insert_with(|| {
+                let known = known.get(&Arc::as_ptr(mesh));
+                meshes.push(known.map_or_else(|| Arc::new(SharedMesh::new(mesh)), |known| Arc::clone(known)));
+                meshes.len() - 1
+            });
+            instances.push(Instance {
+                object: object as u32,
+                mesh: place,
+                shared: Arc::clone(&meshes[place]),
+                placement: stands.placement().cloned(),
+                object_from_world: stands.world_from_object().inverse(),
+                bounds: stands.bounds().unwrap_or_default(),
+            });
         }
-        let objects = (0..scene.objects.len()).filter(|&object| is_instance[object]);
-        let instance = |object: usize| {
-            let mesh = scene.objects[object].mesh();
-            let shared = meshes.entry(Arc::as_ptr(mesh));
-            let shared = shared.or_insert_with(|| Arc::new(SharedMesh::new(mesh)));
-            Instance::new(object, &scene.objects[object], Arc::clone(shared))
-        };
-        let instances: Vec<Instance> = objects.map(instance).collect();
-        let mut moved = vec![false; scene.objects.len()];
-        for &object in &self.copied.objects {
-            moved[object] = is_instance[object];
-        }
-        if !moved.contains(&true) {
-            moved.clear();
-        }
-        let boxes = instances.iter().map(|instance| instance.bounds.into());
+        let copied = &self.copied.objects;
+        let moved: Vec<usize> = copied
+            .iter()
+            .copied()
+            .filter(|object| is_instance[*object])
+            .collect();
         let bounds = scene.objects.iter().filter_map(Object::bounds);
         let corners: Vec<DVec3> = bounds.flat_map(|(low, high)| [low, high]).collect();
+        let frame = Frame::around(corners.iter());
+        let boxes: Vec<(DVec3, DVec3)> = instances.iter().map(|instance| instance.bounds).collect();
         Self {
             copied: Arc::clone(&self.copied),
-            frame: Frame::around(corners.iter()),
             moved,
-            above: BoxBvh::build(&boxes.collect::<Vec<_>>()),
+            meshes,
+            above: TriangleBvh::over_boxes(&boxes, frame),
             instances,
-            most_copied: self.most_copied,
+            max_copied: self.max_copied,
+            frame,
         }
     }
 
     /// Whether what is met of an object's copy is not there any more.
-    pub(super) fn is_moved(&self, object: u32) -> bool {
-        is_moved(&self.moved, object)
+    pub(super) fn is_moved(&self, object: usize) -> bool {
+        self.moved.binary_search(&object).is_ok()
     }
 
     /// The nearest place in front of a ray's origin where something is there; of places at the same distance, that of the
@@ -148,57 +174,30 @@ impl Hierarchy {
         ray: &Ray,
         is_there: impl Fn(usize, usize, [f64; 3]) -> bool,
     ) -> Option<Met> {
-        let Copied { bvh, triangles, .. } = &*self.copied;
-        let hit = bvh.closest_hit_where(ray, |triangle, barycentric| {
-            let (object, triangle) = triangles[triangle as usize];
-            !self.is_moved(object) && is_there(object as usize, triangle as usize, barycentric)
-        });
-        let met = hit.map(|hit| {
-            let (object, triangle) = triangles[hit.triangle as usize];
-            let place = RayHit {
+        let sheared = ShearedRay::new(ray);
+        let mut best: Option<Met> = None;
+        self.search(ray, f64::INFINITY, |corners, found| {
+            let nothing = Some(f64::INFINITY);
+            let Some((distance_m, barycentric)) = sheared.intersect(corners) else {
+                return nothing;
+            };
+            let Some((object, triangle)) = self.triangle(found) else {
+                return nothing;
+            };
+            let is_nearer = best.is_none_or(|(hit, _)| {
+                (distance_m, object, triangle) < (hit.distance_m, hit.object, hit.triangle)
+            });
+            if !is_nearer || !is_there(object as usize, triangle as usize, barycentric) {
+                return nothing;
+            }
+            let hit = RayHit {
                 object,
                 triangle,
-                barycentric: hit.barycentric,
-                distance_m: hit.distance_m,
+                barycentric,
+                distance_m,
             };
-            // They lie where the search just was, those of the mesh do not.
-            (place, *bvh.corners(hit.slot))
-        });
-        if self.instances.is_empty() {
-            return met;
-        }
-        self.closest_instance(ray, met, is_there)
-    }
-
-    #[inline(never)]
-    fn closest_instance(
-        &self,
-        ray: &Ray,
-        mut best: Option<Met>,
-        is_there: impl Fn(usize, usize, [f64; 3]) -> bool,
-    ) -> Option<Met> {
-        let sheared = ShearedRay::new(ray);
-        let end_m = |best: &Option<Met>| best.map_or(f64::INFINITY, |(hit, _)| hit.distance_m);
-        self.above.search(ray, end_m(&best), |index| {
-            let instance = &self.instances[index as usize];
-            instance.search(ray, end_m(&best), |triangle, corners| {
-                if let Some((distance_m, barycentric)) = sheared.intersect(&corners) {
-                    let (object, first) = (instance.object, (distance_m, instance.object, triangle));
-                    let is_nearer =
-                        best.is_none_or(|(hit, _)| first < (hit.distance_m, hit.object, hit.triangle));
-                    if is_nearer && is_there(object as usize, triangle as usize, barycentric) {
-                        let place = RayHit {
-                            object,
-                            triangle,
-                            barycentric,
-                            distance_m,
-                        };
-                        best = Some((place, corners));
-                    }
-                }
-                Some(end_m(&best))
-            });
-            Some(end_m(&best))
+            best = Some((hit, *corners));
+            Some(distance_m)
         });
         best
     }
@@ -210,27 +209,61 @@ impl Hierarchy {
         distance_m: f64,
         is_there: impl Fn(usize, usize, [f64; 3]) -> bool,
     ) -> bool {
-        let Copied { bvh, triangles, .. } = &*self.copied;
-        let by_copied = bvh.is_blocked_where(ray, distance_m, |triangle, barycentric| {
-            let (object, triangle) = triangles[triangle as usize];
-            !self.is_moved(object) && is_there(object as usize, triangle as usize, barycentric)
-        });
-        if by_copied || self.instances.is_empty() {
-            return by_copied;
-        }
         let sheared = ShearedRay::new(ray);
         let mut is_blocked = false;
-        self.above.search(ray, distance_m, |index| {
-            let instance = &self.instances[index as usize];
-            instance.search(ray, distance_m, |triangle, corners| {
-                is_blocked = sheared.intersect(&corners).is_some_and(|(hit_m, barycentric)| {
-                    hit_m < distance_m && is_there(instance.object as usize, triangle as usize, barycentric)
-                });
-                (!is_blocked).then_some(distance_m)
+        self.search(ray, distance_m, |corners, found| {
+            let hit = sheared.intersect(corners);
+            is_blocked = hit.is_some_and(|(hit_m, barycentric)| {
+                let is_there = |(object, triangle)| is_there(object as usize, triangle as usize, barycentric);
+                hit_m < distance_m && self.triangle(found).is_some_and(is_there)
             });
-            (!is_blocked).then_some(distance_m)
+            (!is_blocked).then_some(f64::INFINITY)
         });
         is_blocked
+    }
+
+    /// Hands out all triangles that a ray may meet before `end_m`, with their corners in the scene, as
+    /// [`TriangleBvh::search`] does.
+    #[inline(always)]
+    fn search(&self, ray: &Ray, mut end_m: f64, mut meet: impl FnMut(&[DVec3; 3], Found) -> Option<f64>) {
+        let bvh = &self.copied.bvh;
+        bvh.search(ray, end_m, |slot| {
+            let met_m = meet(bvh.corners(slot), (None, slot));
+            end_m = end_m.min(met_m.unwrap_or(0.0));
+            met_m
+        });
+        if !self.instances.is_empty() && end_m > 0.0 {
+            self.search_instances(ray, end_m, &mut meet);
+        }
+    }
+
+    // Out of the way of scenes without any.
+    #[inline(never)]
+    fn search_instances(
+        &self,
+        ray: &Ray,
+        mut end_m: f64,
+        meet: &mut dyn FnMut(&[DVec3; 3], Found) -> Option<f64>,
+    ) {
+        self.above.search(ray, end_m, |place| {
+            let instance = &self.instances[self.above.triangle(place) as usize];
+            instance.search(ray, end_m, |corners, slot| {
+                let met_m = meet(corners, (Some(instance), slot));
+                end_m = end_m.min(met_m.unwrap_or(0.0));
+                met_m
+            });
+            (end_m > 0.0).then_some(end_m)
+        });
+    }
+
+    /// Object and triangle within it; `None` where that was moved away.
+    fn triangle(&self, (instance, slot): Found) -> Option<(u32, u32)> {
+        let Copied { bvh, triangles, .. } = &*self.copied;
+        match instance {
+            Some(instance) => Some((instance.object, instance.shared.bvh.triangle(slot))),
+            None => Some(triangles[bvh.triangle(slot) as usize])
+                .filter(|(object, _)| !self.is_moved(*object as usize)),
+        }
     }
 
     /// What all instances of an object's mesh share; `None` where the object is none.
@@ -243,23 +276,17 @@ impl Hierarchy {
 
     /// The nodes around all triangles.
     pub(super) fn roots(&self) -> Vec<SceneNode<'_>> {
-        let copied = self.copied.bvh.root().map(|node| SceneNode {
-            node,
-            owner: Owner::Copied(&self.copied.triangles, &self.moved),
-        });
-        let instances = self.instances.iter().filter_map(|instance| {
+        let roots = self.instances.iter().map(Some);
+        let roots = std::iter::once(None).chain(roots).filter_map(|instance| {
+            let bvh = instance.map_or(&self.copied.bvh, |instance| &instance.shared.bvh);
             Some(SceneNode {
-                node: instance.shared.bvh.root()?,
-                owner: Owner::Instance(instance),
+                hierarchy: self,
+                instance,
+                node: bvh.root()?,
             })
         });
-        copied.into_iter().chain(instances).collect()
+        roots.collect()
     }
-}
-
-/// By a list of what was moved, which is empty where nothing was.
-fn is_moved(moved: &[bool], object: u32) -> bool {
-    moved.get(object as usize).is_some_and(|is_moved| *is_moved)
 }
 
 impl Copied {
@@ -299,20 +326,10 @@ impl SharedMesh {
 }
 
 impl Instance {
-    fn new(object: usize, stands: &Object, shared: Arc<SharedMesh>) -> Self {
-        Self {
-            object: object as u32,
-            shared,
-            placement: stands.placement().cloned(),
-            object_from_world: stands.world_from_object().inverse(),
-            bounds: stands.bounds().unwrap_or_default(),
-        }
-    }
-
     /// Hands out all triangles that a ray may meet before `end_m`, with their corners in the scene, as
     /// [`TriangleBvh::search`] does.
     #[inline]
-    fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32, [DVec3; 3]) -> Option<f64>) {
+    fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(&[DVec3; 3], u32) -> Option<f64>) {
         let (low, high) = self.bounds;
         let towards_m = (low * 0.5 + high * 0.5 - ray.origin).dot(ray.direction);
         let advanced_m = (towards_m - FAR_RADII * 0.5 * (high - low).length()).max(0.0);
@@ -325,7 +342,7 @@ impl Instance {
         let local_m = |distance_m: f64| ((distance_m - advanced_m) * scale).max(0.0);
         let bvh = &self.shared.bvh;
         bvh.search(&local, local_m(end_m), |slot| {
-            meet(bvh.triangle(slot), self.placed(bvh.corners(slot))).map(local_m)
+            meet(&self.placed(bvh.corners(slot)), slot).map(local_m)
         });
     }
 
@@ -340,27 +357,16 @@ impl Instance {
 /// A node of a hierarchy of the scene, for searches other than along rays.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneNode<'a> {
+    hierarchy: &'a Hierarchy,
+    instance: Option<&'a Instance>,
     node: bvh::Node<'a>,
-    owner: Owner<'a>,
-}
-
-/// Whose triangles they are.
-#[derive(Clone, Copy, Debug)]
-enum Owner<'a> {
-    /// Object and triangle by index, and which of these objects were moved.
-    Copied(&'a [(u32, u32)], &'a [bool]),
-    Instance(&'a Instance),
 }
 
 impl<'a> SceneNode<'a> {
     /// A box around all triangles of the node, a little too large, as minimum and maximum corner [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let (low, high) = self.node.bounds();
-        let Owner::Instance(Instance {
-            placement: Some(placement),
-            ..
-        }) = self.owner
-        else {
+        let Some(placement) = self.instance.and_then(|instance| instance.placement.as_ref()) else {
             return (low, high);
         };
         let transform = placement.world_from_object();
@@ -374,81 +380,63 @@ impl<'a> SceneNode<'a> {
 
     /// The two nodes that share out its triangles; `None` for a leaf.
     pub fn children(&self) -> Option<[Self; 2]> {
-        let owner = self.owner;
-        Some(self.node.children()?.map(|node| Self { node, owner }))
+        Some(self.node.children()?.map(|node| Self { node, ..*self }))
     }
 
     /// Whether its box may be that of an object which was moved away.
     pub fn may_be_left(&self) -> bool {
-        matches!(self.owner, Owner::Copied(_, [_, ..]))
+        self.instance.is_none() && !self.hierarchy.moved.is_empty()
     }
 
     /// Object and corners of each triangle of a leaf; nothing for other nodes.
     pub fn triangles(&self) -> impl Iterator<Item = (usize, [DVec3; 3])> + use<'a> {
-        let owner = self.owner;
-        self.node
-            .triangles()
-            .filter_map(move |(triangle, corners)| match owner {
-                Owner::Copied(triangles, moved) => {
-                    let (object, _) = triangles[triangle as usize];
-                    (!is_moved(moved, object)).then_some((object as usize, *corners))
-                }
-                Owner::Instance(instance) => Some((instance.object as usize, instance.placed(corners))),
-            })
+        let (hierarchy, instance) = (self.hierarchy, self.instance);
+        self.node.triangles().filter_map(move |(slot, corners)| {
+            let (object, _) = hierarchy.triangle((instance, slot))?;
+            let placed = instance.map_or(*corners, |instance| instance.placed(corners));
+            Some((object as usize, placed))
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
     use std::sync::Arc;
 
     use glam::{DAffine3, DMat3, DVec3};
 
     use super::Hierarchy;
     use crate::geometry::Ray;
+    use crate::geometry::sampling::even_point;
     use crate::scene::builtin::shapes;
     use crate::scene::{Edit, Material, Motion, Object, Scene, SurfaceKind};
     use crate::transport::Tracer;
 
-    /// Even numbers of [0, 1), the same ones every time.
-    struct Numbers(u64);
-
-    impl Numbers {
-        fn next(&mut self) -> f64 {
-            self.0 = self
-                .0
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
-            (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-        }
-
-        /// Of the box from −1 to 1.
-        fn vector(&mut self) -> DVec3 {
-            DVec3::new(self.next(), self.next(), self.next()) * 2.0 - 1.0
-        }
+    /// Of the box from −1 to 1, the same one every time.
+    fn vector(index: usize, seed: u64) -> DVec3 {
+        let [a, b] = [0, 1].map(|pair| even_point(index as u32, pair, seed));
+        DVec3::new(a.x, a.y, b.x) * 2.0 - 1.0
     }
 
     /// Balls of one mesh, turned, stretched, mirrored, and two at the very same place, over a floor.
     fn balls() -> Scene {
-        let mut numbers = Numbers(1);
         let mesh = Arc::new(shapes::sphere(DVec3::new(0.3, -0.2, 0.1), 1.0, 2));
-        let mut objects = Vec::new();
-        for node in 0..24 {
+        let ball = |node: usize| {
             let mut ball = Object::new(format!("ball{node}"), (node, 0), 0, Arc::clone(&mesh));
-            let sign = if node % 3 == 0 { -1.0 } else { 1.0 };
-            let linear = DMat3::from_diagonal(DVec3::new(0.4 * sign, 0.5, 0.3))
-                + DMat3::from_cols(numbers.vector(), numbers.vector(), numbers.vector()) * 0.1;
+            let sign = if node.is_multiple_of(3) { -1.0 } else { 1.0 };
+            let [x, y, z] = [2, 3, 4].map(|seed| vector(node, seed) * 0.1);
             match node {
                 0 => {}
                 1 | 2 => ball.place(DAffine3::from_translation(DVec3::new(2.0, 0.1, 0.7))),
                 _ => ball.place(DAffine3 {
-                    matrix3: linear,
-                    translation: numbers.vector() * DVec3::new(4.0, 1.0, 4.0),
+                    matrix3: DMat3::from_diagonal(DVec3::new(0.4 * sign, 0.5, 0.3))
+                        + DMat3::from_cols(x, y, z),
+                    translation: vector(node, 5) * DVec3::new(4.0, 1.0, 4.0),
                 }),
             }
-            objects.push(ball);
-        }
+            ball
+        };
+        let mut objects: Vec<Object> = (0..24).map(ball).collect();
         let floor = shapes::floor([-6.0, 6.0], [-6.0, 6.0], -2.0);
         objects.insert(5, Object::new("floor", (24, 0), 1, floor));
         let glass = Material {
@@ -463,21 +451,19 @@ mod tests {
     }
 
     /// Rays from anywhere to anywhere, and to vertices and middles of edges.
-    fn rays(scene: &Scene) -> Vec<Ray> {
-        let mut numbers = Numbers(2);
-        let ray = |index: usize| {
-            let origin = numbers.vector() * if index.is_multiple_of(7) { 1e4 } else { 5.0 };
+    fn rays(scene: &Scene) -> impl Iterator<Item = Ray> {
+        (0..20_000).map(|index: usize| {
+            let origin = vector(index, 6) * if index.is_multiple_of(7) { 1e4 } else { 5.0 };
             let mesh = scene.objects[index % scene.objects.len()].copy_in_scene();
-            let [a, b, _] = mesh.corners((numbers.next() * mesh.triangles.len() as f64) as usize);
+            let [a, b, _] = mesh.corners(index % mesh.triangles.len());
             let target = match index % 3 {
                 0 => a,
                 1 => a * 0.5 + b * 0.5,
-                _ => numbers.vector() * DVec3::new(5.0, 2.0, 5.0),
+                _ => vector(index, 7) * DVec3::new(5.0, 2.0, 5.0),
             };
             let direction = (target - origin).normalize();
             Ray { origin, direction }
-        };
-        (0..20_000).map(ray).collect()
+        })
     }
 
     /// Fails unless both find the same, to the last bit.
@@ -524,23 +510,17 @@ mod tests {
     #[test]
     fn a_drag_builds_no_hierarchy_of_triangles() {
         let mut scene = balls();
-        for (most_copied, instances) in [(0, [24, 24, 25, 25, 25]), (usize::MAX, [1, 1, 2, 2, 3])] {
-            let mut before = Hierarchy::new(&scene, most_copied);
+        for (max_copied, instances) in [(0, [24, 24, 25, 25, 25]), (usize::MAX, [1, 1, 2, 2, 3])] {
+            let mut before = Hierarchy::new(&scene, max_copied);
             for (object, instances) in [9, 9, 5, 5, 7].into_iter().zip(instances) {
                 let was = scene.clone();
                 let place = DAffine3::from_translation(DVec3::Y) * *was.objects[object].world_from_object();
                 scene.objects[object].place(place);
                 let after = before.edited(&was, &scene);
                 assert!(Arc::ptr_eq(&before.copied, &after.copied));
-                let meshes = |hierarchy: &Hierarchy| {
-                    let meshes = hierarchy
-                        .instances
-                        .iter()
-                        .map(|instance| Arc::as_ptr(&instance.shared));
-                    meshes.collect::<BTreeSet<_>>()
-                };
-                let (was, is) = (meshes(&before), meshes(&after));
-                assert!(was.is_subset(&is) && is.len() <= 2);
+                let mut was = before.meshes.iter();
+                assert!(was.all(|was| after.meshes.iter().any(|is| Arc::ptr_eq(was, is))));
+                assert!(after.meshes.len() <= 2);
                 assert_eq!(after.instances.len(), instances);
                 before = after;
             }

@@ -111,8 +111,8 @@ impl Tracer {
     }
 
     /// The same, where copies of one mesh have no more than that many triangles.
-    pub(super) fn sharing(scene: Arc<Scene>, most_copied: usize) -> Self {
-        let hierarchy = Arc::new(Hierarchy::new(&scene, most_copied));
+    pub(super) fn sharing(scene: Arc<Scene>, max_copied: usize) -> Self {
+        let hierarchy = Arc::new(Hierarchy::new(&scene, max_copied));
         let specular = (0..scene.objects.len())
             .into_par_iter()
             .map(|object| Self::specular_shape(&scene, &hierarchy, object))
@@ -244,7 +244,7 @@ impl Tracer {
         }
         let shared = hierarchy.shared(object);
         // A copy of what was moved takes no more memory than the one before.
-        let normals = match shared.filter(|_| !hierarchy.is_moved(object as u32)) {
+        let normals = match shared.filter(|_| !hierarchy.is_moved(object)) {
             Some(shared) => NormalField::Found(Arc::clone(&shared.around)),
             None => NormalField::new(scene.objects[object].mesh_in_scene()),
         };
@@ -420,7 +420,9 @@ impl Tracer {
             return true;
         };
         let image = material.base_colour_texture.as_ref();
-        mask.is_there(image.and_then(|image| self.scene.placed_texture(image, (object, triangle), barycentric)))
+        mask.is_there(
+            image.and_then(|image| self.scene.placed_texture(image, (object, triangle), barycentric)),
+        )
     }
 
     /// What the surface is made of at a place of a triangle; by the material's factors alone without `textures`.

@@ -7,28 +7,30 @@ use glam::DVec3;
 
 use super::bindings::Storage;
 use super::bindings::bind_group;
-use super::geometry::{Geometry, Segment, rows};
+use super::geometry::{Geometry, Segment};
 use super::objects::absorption_per_m;
-use super::uniforms::{ChainStart, Instance, LightRecord, Node, SeenWavelengths, Triangle, rgb};
+use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle, rgb};
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
-use crate::geometry::packed;
+use crate::geometry::PackedNode;
 use crate::gpu::Gpu;
 use crate::scene::emitter::{Emitter, EmitterKind};
 use crate::scene::{Object, Scene};
-use crate::transport::{MediumStack, PackedMesh, Tracer, media_at};
+use crate::transport::{MediumStack, PackedInstance, PackedMesh, Tracer, media_at};
 
 /// Nodes that may wait while a ray is traced; `STACK` in the shader.
 const STACK: usize = 64;
 /// Largest number of a body that a chain can remember.
 const MAX_OBJECTS: usize = u16::MAX as usize - 1;
 /// Storage buffers that a fragment of a chain reads.
-const BUFFERS: u32 = 9;
-/// Number of triangles of a leaf that is an instance; the shader's.
+const BUFFERS: u32 = 8;
+/// Count of a node that is an instance; the shader's.
 const INSTANCE: u32 = u32::MAX;
-/// Stands for no object in the shader.
+/// In place of an object; the shader's.
 const NO_OBJECT: u32 = u32::MAX;
+/// Nodes that an instance takes.
+const INSTANCE_NODES: usize = 4;
 /// Surfaces at which both ways on can be followed; `MAX_BRANCHING` in the shader.
 pub(super) const MAX_BRANCHING: u32 = 4;
 
@@ -39,15 +41,15 @@ pub(super) struct ChainScene {
     tracer: Tracer,
     /// Of each object.
     firsts: Vec<First>,
-    /// Of each mesh: the node around it, and its first triangle.
-    roots: Vec<u32>,
-    starts: Vec<usize>,
+    /// Of each mesh its first node and triangle.
+    starts: Vec<(usize, usize)>,
+    /// The node around what is no instance, if anything is.
+    root: Option<Node>,
     /// Largest number of nodes above one in a mesh.
     depth: usize,
-    /// Those over instances first, which are written again when something is moved.
+    /// Those over instances and the instances first, which are written again when something is moved.
     nodes: Storage,
     triangles: Storage,
-    instances: Storage,
     lights: Storage,
     light_count: u32,
     bytes: u64,
@@ -80,45 +82,28 @@ impl ChainScene {
     }
 
     fn with_meshes(gpu: &Gpu, tracer: Tracer, firsts: Vec<First>) -> Result<Self> {
-        // As many as there can be over instances.
-        let (_, instances) = tracer.packed_instances();
-        let mut nodes = vec![Node::default(); 2 * instances.len()];
+        let (above, _) = tracer.packed_instances();
+        let mut nodes = vec![Node::default(); 3 + above.nodes.len() + INSTANCE_NODES * above.triangles.len()];
         let mut triangles: Vec<Triangle> = Vec::new();
-        let (mut roots, mut starts, mut depth) = (Vec::new(), Vec::new(), 0);
-        for mesh in tracer.packed_meshes() {
-            let (first_node, first_triangle) = (nodes.len() as u32, triangles.len() as u32);
-            roots.push(first_node);
-            starts.push(triangles.len());
+        let (mut starts, mut depth) = (Vec::new(), 0);
+        let meshes = tracer.packed_meshes();
+        for mesh in &meshes {
+            let start = (nodes.len(), triangles.len());
+            starts.push(start);
             depth = depth.max(mesh.bvh.depth);
-            nodes.extend(mesh.bvh.nodes.iter().map(|node| Node {
-                low: node.low,
-                first: node.first
-                    + if node.count > 0 {
-                        first_triangle
-                    } else {
-                        first_node
-                    },
-                high: node.high,
-                count: node.count,
-            }));
-            triangles.extend(records(&mesh, &firsts));
+            nodes.extend(mesh.bvh.nodes.iter().map(|node| placed(node, start)));
+            triangles.extend(records(mesh, &firsts));
         }
-        let scene = tracer.scene();
-        for bytes in [
-            size_of_val(nodes.as_slice()),
-            size_of_val(triangles.as_slice()),
-            instances.len() * size_of::<Instance>(),
-        ] {
-            check_bytes(gpu, scene, bytes)?;
+        for bytes in [size_of_val(nodes.as_slice()), size_of_val(triangles.as_slice())] {
+            check_bytes(gpu, tracer.scene(), bytes)?;
         }
         let mut made = Self {
             firsts,
-            roots,
+            root: meshes[0].bvh.nodes.first().map(|root| placed(root, starts[0])),
             starts,
             depth,
             nodes: Storage::new(gpu, "nodes"),
             triangles: Storage::new(gpu, "triangles"),
-            instances: Storage::new(gpu, "instances"),
             lights: Storage::new(gpu, "lights"),
             light_count: 0,
             bytes: 0,
@@ -134,41 +119,69 @@ impl ChainScene {
     /// A hierarchy that is too deep.
     fn place(&mut self, gpu: &Gpu) -> Result<()> {
         let (above, instances) = self.tracer.packed_instances();
-        check_depth(self.tracer.scene(), packed::depth(&above) + self.depth)?;
-        let nodes: Vec<Node> = above
-            .iter()
-            .map(|node| Node {
-                low: node.low,
-                first: node.first,
-                high: node.high,
-                count: if node.count > 0 { INSTANCE } else { 0 },
-            })
-            .collect();
+        check_depth(self.tracer.scene(), 2 + above.depth + self.depth)?;
+        let first = 3 + above.nodes.len();
+        let over_instances = |node: &PackedNode| match node.count {
+            0 => placed(node, (3, 0)),
+            _ => Node {
+                first: (first + INSTANCE_NODES * node.first as usize) as u32,
+                count: INSTANCE,
+                ..placed(node, (0, 0))
+            },
+        };
+        let both = Node {
+            first: 1,
+            ..Node::default()
+        };
+        let mut nodes = match (self.root, above.nodes.first().map(over_instances)) {
+            (Some(root), Some(above)) => vec![both, root, above],
+            (root, above) => vec![root.or(above).unwrap_or_default(); 3],
+        };
+        nodes.extend(above.nodes.iter().map(over_instances));
+        nodes.extend(instances.iter().flat_map(|instance| self.instance(instance)));
         self.nodes.write_at(gpu, 0, &nodes);
         let moved = self.tracer.moved_meshes();
         let starts = &self.starts[self.starts.len() - moved.len()..];
-        for (mesh, &start) in moved.iter().zip(starts) {
+        for (mesh, &(_, start)) in moved.iter().zip(starts) {
             let records: Vec<Triangle> = records(mesh, &self.firsts).collect();
             self.triangles.write_at(gpu, start, &records);
         }
-        let records = instances.iter().map(|instance| {
-            let object = instance.object.map(|object| object as usize);
-            let first = object.map_or(First::default(), |object| self.firsts[object]);
-            Instance {
-                from_mesh: rows(&instance.from_mesh),
-                to_nodes: rows(&instance.to_nodes),
-                root: self.roots[instance.mesh],
-                object: instance.object.unwrap_or(NO_OBJECT),
-                first_index: first.index,
-                first_order: first.order,
-                margin: instance.margin,
-                is_mirrored: u32::from(instance.from_mesh.matrix3.determinant() < 0.0),
-                ..Default::default()
-            }
-        });
-        let records: Vec<Instance> = records.collect();
-        self.instances.write(gpu, &records);
         Ok(())
+    }
+
+    /// An instance as `instance_at` in the shader reads it.
+    fn instance(&self, instance: &PackedInstance) -> [Node; INSTANCE_NODES] {
+        let object = instance.object.map(|object| object as usize);
+        let First { index, order } = object.map_or(First::default(), |object| self.firsts[object]);
+        let root = self.starts[instance.mesh].0 as u32;
+        let is_mirrored = instance.from_mesh.matrix3.determinant() < 0.0;
+        let [to_nodes, from_mesh] = [&instance.to_nodes, &instance.from_mesh].map(|transform| {
+            let columns = [
+                transform.x_axis,
+                transform.y_axis,
+                transform.z_axis,
+                transform.translation,
+            ];
+            columns.map(|column| column.as_vec3().to_array())
+        });
+        let node = |[low, high]: [[f32; 3]; 2], [first, count]: [u32; 2]| Node {
+            low,
+            first,
+            high,
+            count,
+        };
+        [
+            node(
+                [to_nodes[0], to_nodes[1]],
+                [root, instance.object.unwrap_or(NO_OBJECT)],
+            ),
+            node([to_nodes[2], to_nodes[3]], [index, order]),
+            node(
+                [from_mesh[0], from_mesh[1]],
+                [instance.margin.to_bits(), u32::from(is_mirrored)],
+            ),
+            node([from_mesh[2], from_mesh[3]], [0; 2]),
+        ]
     }
 
     /// What it takes on the device [bytes].
@@ -186,11 +199,9 @@ impl ChainScene {
         1.0 / self.tracer.frame().scale
     }
 
-    /// Nodes, triangles and instances, by their number.
-    pub(super) fn bindings(&self) -> [(u32, wgpu::BindingResource<'_>); 3] {
-        let bindings = [&self.nodes, &self.triangles, &self.instances].map(Storage::binding);
-        let [nodes, triangles, instances] = bindings;
-        [(1, nodes), (2, triangles), (8, instances)]
+    /// Nodes and triangles.
+    pub(super) fn bindings(&self) -> [wgpu::BindingResource<'_>; 2] {
+        [self.nodes.binding(), self.triangles.binding()]
     }
 
     /// Group 1 of what traces; `None` without triangles.
@@ -215,7 +226,6 @@ impl ChainScene {
             page.indices.as_entire_binding(),
             self.lights.binding(),
             wavelengths.as_entire_binding(),
-            self.instances.binding(),
         ];
         Some(bind_group(gpu, "chains", layout, resources))
     }
@@ -317,6 +327,21 @@ fn firsts(scene: &Scene, geometry: &Geometry) -> Vec<First> {
         first
     };
     objects.map(first).collect()
+}
+
+/// A node of a mesh with its first node and triangle.
+fn placed(node: &PackedNode, (first_node, first_triangle): (usize, usize)) -> Node {
+    let first = if node.count > 0 {
+        first_triangle
+    } else {
+        first_node
+    };
+    Node {
+        low: node.low,
+        first: first as u32 + node.first,
+        high: node.high,
+        count: node.count,
+    }
 }
 
 /// Triangles of a mesh, slot by slot.

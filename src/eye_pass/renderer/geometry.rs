@@ -6,13 +6,13 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::{DAffine3, DVec2, DVec3};
+use glam::{DAffine3, DVec2};
 
 use super::paging::Uploaded;
 use super::uniforms::ObjectRecord;
 use crate::gpu::Gpu;
 use crate::illumination::Chart;
-use crate::scene::{Material, Mesh, Object, Scene, TextureRef, instances};
+use crate::scene::{Material, Mesh, Object, Scene, TextureRef};
 
 /// A corner of a triangle. Surfaces with a map share none between triangles, since maps may cut them anywhere.
 #[repr(C)]
@@ -87,9 +87,6 @@ const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexForm
 /// Largest buffer [bytes]: one allocation that drivers serve. Chains need all of a scene in one page.
 const PAGE_BYTES: u64 = 1 << 30;
 
-/// Meshes that lie farther from the origin of their coordinates are drawn as copies [diagonals of their boxes].
-const MAX_OFF_CENTRE: f64 = 64.0;
-
 /// Part of an object within one page.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Segment {
@@ -141,9 +138,7 @@ impl Geometry {
             indices: Vec::new(),
             shared: HashMap::new(),
         };
-        let mut boxes = HashMap::new();
-        let objects = scene.objects.iter();
-        let drawn: Vec<Drawn> = objects.map(|object| Drawn::of(object, &mut boxes)).collect();
+        let drawn: Vec<Drawn> = scene.objects.iter().map(Drawn::of).collect();
         let numbered = drawn.iter().enumerate();
         let segments = numbered
             .map(|(object, drawn)| packing.add(scene.material_of(object), drawn))
@@ -161,14 +156,13 @@ impl Geometry {
     /// Takes over an edited scene with as many objects. Where an object shows another mesh or needs other corners than
     /// it has, everything is uploaded anew.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
-        let mut boxes = HashMap::new();
         let mut can_stay = true;
         for (index, object) in scene.objects.iter().enumerate() {
             let is_receiver = scene.material_of(index).surface.is_receiver();
             let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
             can_stay &= !(is_shared && is_receiver);
             if !self.shown[index].stands_as(object) {
-                let drawn = Drawn::of(object, &mut boxes);
+                let drawn = Drawn::of(object);
                 can_stay &= drawn.has_corners_of(&self.drawn[index]);
                 self.drawn[index] = drawn;
             }
@@ -190,7 +184,11 @@ impl Geometry {
 
     /// Rows of the way from an object's corners to the scene.
     pub(super) fn rows(&self, object: usize) -> [[f32; 4]; 3] {
-        rows(&self.drawn[object].world_from_mesh)
+        let transform = &self.drawn[object].world_from_mesh;
+        [0, 1, 2].map(|row| {
+            let row = transform.matrix3.row(row).extend(transform.translation[row]);
+            row.as_vec4().to_array()
+        })
     }
 
     fn bytes(&self) -> usize {
@@ -245,21 +243,12 @@ struct Drawn {
     world_from_mesh: DAffine3,
 }
 
-/// Boxes of meshes that can be drawn in their own coordinates.
-type Boxes = HashMap<*const Mesh, Option<(DVec3, DVec3)>>;
-
 impl Drawn {
-    fn of(object: &Object, boxes: &mut Boxes) -> Self {
-        let (mesh, world_from_mesh) = (object.mesh(), object.world_from_object());
-        let mut suits = || {
-            let bounds = boxes.entry(Arc::as_ptr(mesh));
-            let bounds = *bounds.or_insert_with(|| instances::shared_box(mesh));
-            bounds.is_some_and(|bounds| suits_single(world_from_mesh, bounds))
-        };
-        if object.placement().is_none() || suits() {
+    fn of(object: &Object) -> Self {
+        if object.placement().is_none() || object.can_share() {
             return Self {
-                mesh: Arc::clone(mesh),
-                world_from_mesh: *world_from_mesh,
+                mesh: Arc::clone(object.mesh()),
+                world_from_mesh: *object.world_from_object(),
             };
         }
         Self {
@@ -281,24 +270,6 @@ impl Drawn {
     fn has_corners_of(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.mesh, &other.mesh) && self.is_mirrored() == other.is_mirrored()
     }
-}
-
-/// Whether a mesh within a box loses nothing in single precision on its way into the scene.
-fn suits_single(transform: &DAffine3, (low, high): (DVec3, DVec3)) -> bool {
-    let linear = transform.matrix3;
-    let axes = [linear.x_axis, linear.y_axis, linear.z_axis];
-    let is_moderate = |axis: &DVec3| (1e-6..1e6).contains(&axis.length());
-    low.abs().max(high.abs()).length() <= MAX_OFF_CENTRE * (high - low).length()
-        && axes.iter().all(is_moderate)
-        && instances::is_sound(transform, (low, high))
-}
-
-/// Rows of a transform in single precision.
-pub(super) fn rows(transform: &DAffine3) -> [[f32; 4]; 3] {
-    [0, 1, 2].map(|row| {
-        let row = transform.matrix3.row(row).extend(transform.translation[row]);
-        row.as_vec4().to_array()
-    })
 }
 
 /// Where a mesh is with the texture coordinates of an image.

@@ -287,7 +287,6 @@ impl SurfacePipelines {
             storage(),
             storage(),
             uniform(wgpu::ShaderStages::FRAGMENT),
-            storage(),
         ];
         self.traced_layout
             .get_or_insert_with(|| bind_group_layout(gpu, "chains", &chains));

@@ -79,13 +79,10 @@ fn run(gpu: &Gpu, chains: &ChainScene, rays: &[ProbeRay], groups: u32) -> Result
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
-    let bind = |group: u32, resources: &[(u32, wgpu::BindingResource<'_>)]| {
-        let entries: Vec<_> = resources
-            .iter()
-            .map(|(binding, resource)| wgpu::BindGroupEntry {
-                binding: *binding,
-                resource: resource.clone(),
-            })
+    let bind = |group: u32, first: u32, resources: [wgpu::BindingResource<'_>; 2]| {
+        let entries: Vec<_> = (first..)
+            .zip(resources)
+            .map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource })
             .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
             label: Some("probe"),
@@ -93,11 +90,8 @@ fn run(gpu: &Gpu, chains: &ChainScene, rays: &[ProbeRay], groups: u32) -> Result
             entries: &entries,
         })
     };
-    let own = bind(
-        0,
-        &[(0, given.as_entire_binding()), (1, found.as_entire_binding())],
-    );
-    let scene = bind(1, &chains.bindings());
+    let own = bind(0, 0, [given.as_entire_binding(), found.as_entire_binding()]);
+    let scene = bind(1, 1, chains.bindings());
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let mut pass = encoder.begin_compute_pass(&Default::default());
     pass.set_pipeline(&pipeline);

@@ -4,8 +4,8 @@ use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
 use super::pipelines::{Faces, PipelineFlags, PipelineKey, Writes};
 use super::tone_mapping;
 use super::uniforms::{
-    Accumulation, ChainStart, DisplayWhite, Frame, Instance, LightRecord, Node, ObjectRecord, ProbeHit,
-    ProbeRay, SeenWavelengths, Triangle,
+    Accumulation, ChainStart, DisplayWhite, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay,
+    SeenWavelengths, Triangle,
 };
 use crate::eye_pass::ToneMap;
 use crate::gpu::layout::StructLayout;
@@ -120,7 +120,6 @@ pub fn shared_structs() -> Vec<StructLayout> {
         SeenWavelengths::layout(),
         Node::layout(),
         Triangle::layout(),
-        Instance::layout(),
         DisplayWhite::layout(),
         Accumulation::layout(),
         ProbeRay::layout(),

@@ -163,11 +163,11 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// A node of a hierarchy, of triangles or of instances.
+    /// A node of a hierarchy, of triangles or of instances; or a part of an instance.
     Node {
         /// Minimum corner, local.
         low: [f32; 3],
-        /// Of a leaf its first triangle or its instance, of others the first of two children.
+        /// Of a leaf its first triangle or the first node of its instance, of others the first of two children.
         first: u32,
         /// Maximum corner, local.
         high: [f32; 3],
@@ -191,30 +191,6 @@ shader_struct! {
         c: [f32; 3],
         /// Of triangles at the same distance the one of lowest order is met.
         order: u32,
-    }
-}
-
-shader_struct! {
-    /// A mesh where it stands.
-    Instance {
-        /// Rows of the way from its coordinates to local ones.
-        from_mesh: [[f32; 4]; 3],
-        /// From local ones to those of its nodes.
-        to_nodes: [[f32; 4]; 3],
-        /// Node around its triangles.
-        root: u32,
-        /// Index into the scene's objects; `NO_OBJECT` where its triangles are local and have their own numbers.
-        object: u32,
-        /// Added to those of its triangles.
-        first_index: u32,
-        /// The same.
-        first_order: u32,
-        /// By which boxes are widened, in coordinates of the nodes: what rounding on the way there moves rays.
-        margin: f32,
-        /// Whether its triangles are turned over.
-        is_mirrored: u32,
-        padding0: u32,
-        padding1: u32,
     }
 }
 
