@@ -120,6 +120,8 @@ impl Placement {
     }
 
     /// Corners of a triangle of the mesh, as the placed mesh has them [m].
+    // Out of the way of loops over meshes that nothing places.
+    #[inline(never)]
     pub fn corners(&self, corners: &[DVec3; 3]) -> [DVec3; 3] {
         self.turned(corners.map(|corner| self.position(corner)))
     }
@@ -178,19 +180,13 @@ pub struct InScene<'a> {
 
 impl<'a> From<&'a Mesh> for InScene<'a> {
     fn from(mesh: &'a Mesh) -> Self {
-        Self {
-            mesh,
-            placement: None,
-        }
+        Self::new(mesh, None)
     }
 }
 
 impl<'a> InScene<'a> {
-    pub(super) fn new(mesh: &'a Mesh, placement: &'a Placement) -> Self {
-        Self {
-            mesh,
-            placement: Some(placement),
-        }
+    pub(super) fn new(mesh: &'a Mesh, placement: Option<&'a Placement>) -> Self {
+        Self { mesh, placement }
     }
 
     /// Number of triangles.
@@ -224,6 +220,7 @@ impl<'a> InScene<'a> {
     }
 
     /// Unit normal of a vertex. Where the triangles around it give it, all of the mesh is looked at.
+    #[inline(never)]
     pub fn normal(&self, vertex: usize) -> DVec3 {
         let normal = self.mesh.normals[vertex];
         self.placement.map_or(normal, |placement| {
@@ -237,7 +234,7 @@ impl<'a> InScene<'a> {
     pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
         match self.placement {
             None => self.mesh.corners(triangle),
-            Some(placement) => self.placed_corners(placement, triangle),
+            Some(placement) => placement.corners(&self.mesh.corners(triangle)),
         }
     }
 
@@ -246,19 +243,8 @@ impl<'a> InScene<'a> {
     pub fn corner_normals(&self, triangle: usize) -> [DVec3; 3] {
         match self.placement {
             None => self.mesh.corner_normals(triangle),
-            Some(_) => self.placed_normals(triangle),
+            Some(_) => self.triangle(triangle).map(|vertex| self.normal(vertex as usize)),
         }
-    }
-
-    // Out of the way of the loops over meshes that nothing places.
-    #[inline(never)]
-    fn placed_corners(&self, placement: &Placement, triangle: usize) -> [DVec3; 3] {
-        placement.corners(&self.mesh.corners(triangle))
-    }
-
-    #[inline(never)]
-    fn placed_normals(&self, triangle: usize) -> [DVec3; 3] {
-        self.triangle(triangle).map(|vertex| self.normal(vertex as usize))
     }
 
     /// Unit normal of a triangle by its winding; zero for a degenerate one.

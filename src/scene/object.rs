@@ -140,45 +140,34 @@ impl Object {
         self.shape.placement.as_ref()
     }
 
+    /// The mesh itself where nothing places it, or a copy that is kept.
+    #[inline]
+    fn kept(&self) -> Option<&Arc<Mesh>> {
+        match self.shape.placement {
+            None => Some(&self.shape.mesh),
+            Some(_) => self.shape.found.mesh.get(),
+        }
+    }
+
     /// The mesh in scene coordinates: [`mesh`](Self::mesh) itself where the transform is the identity, else a copy that is
     /// kept. What goes over many objects asks [`in_scene`](Self::in_scene), which copies nothing.
     pub fn mesh_in_scene(&self) -> &Arc<Mesh> {
-        let Shape {
-            mesh,
-            placement,
-            found,
-            ..
-        } = &self.shape;
-        match placement {
-            Some(placement) => found.mesh.get_or_init(|| Arc::new(placement.of_mesh(mesh))),
-            None => mesh,
-        }
+        let copy = || self.shape.found.mesh.get_or_init(|| self.copy_in_scene());
+        self.kept().unwrap_or_else(copy)
     }
 
     /// The same, but a copy is not kept.
     pub fn copy_in_scene(&self) -> Arc<Mesh> {
-        let Shape {
-            mesh,
-            placement,
-            found,
-            ..
-        } = &self.shape;
-        match (placement, found.mesh.get()) {
-            (Some(placement), None) => Arc::new(placement.of_mesh(mesh)),
-            (_, kept) => Arc::clone(kept.unwrap_or(mesh)),
-        }
+        let copy = || Arc::new(self.shape.mesh.placed(&self.shape.world_from_object));
+        self.kept().map_or_else(copy, Arc::clone)
     }
 
     /// The same, triangle by triangle: by the copy where there is one.
     #[inline]
     pub fn in_scene(&self) -> InScene<'_> {
-        let mesh = &*self.shape.mesh;
-        let Some(placement) = &self.shape.placement else {
-            return InScene::from(mesh);
-        };
-        match self.shape.found.mesh.get() {
-            Some(kept) => InScene::from(&**kept),
-            None => InScene::new(mesh, placement),
+        match self.kept() {
+            Some(mesh) => InScene::from(&**mesh),
+            None => InScene::new(&self.shape.mesh, self.placement()),
         }
     }
 

@@ -112,40 +112,30 @@ impl Hierarchy {
 
     /// With other instances; those that were copied are passed over there.
     fn with_instances(&self, scene: &Scene, is_instance: &[bool]) -> Self {
-        let known = self
-            .meshes
-            .iter()
-            .map(|shared| (Arc::as_ptr(&shared.mesh), shared));
-        let known: HashMap<_, _> = known.collect();
+        let known = self.meshes.iter();
+        let known: HashMap<_, _> = known.map(|shared| (Arc::as_ptr(&shared.mesh), shared)).collect();
         let (mut meshes, mut places) = (Vec::new(), HashMap::new());
-        let mut instances = Vec::new();
-        for (object, stands) in scene
-            .objects
-            .iter()
-            .enumerate()
-            .filter(|(object, _)| is_instance[*object])
-        {
+        let mut instance = |object: usize| {
+            let stands = &scene.objects[object];
             let mesh = stands.mesh();
             let place = *places.entry(Arc::as_ptr(mesh)).or_insert_with(|| {
-                let known = known.get(&Arc::as_ptr(mesh));
-                meshes.push(known.map_or_else(|| Arc::new(SharedMesh::new(mesh)), |known| Arc::clone(known)));
+                let known = known.get(&Arc::as_ptr(mesh)).map(|known| Arc::clone(known));
+                meshes.push(known.unwrap_or_else(|| Arc::new(SharedMesh::new(mesh))));
                 meshes.len() - 1
             });
-            instances.push(Instance {
+            Instance {
                 object: object as u32,
                 mesh: place,
                 shared: Arc::clone(&meshes[place]),
                 placement: stands.placement().cloned(),
                 object_from_world: stands.world_from_object().inverse(),
                 bounds: stands.bounds().unwrap_or_default(),
-            });
-        }
-        let copied = &self.copied.objects;
-        let moved: Vec<usize> = copied
-            .iter()
-            .copied()
-            .filter(|object| is_instance[*object])
-            .collect();
+            }
+        };
+        let objects = (0..is_instance.len()).filter(|&object| is_instance[object]);
+        let instances: Vec<Instance> = objects.map(&mut instance).collect();
+        let copied = self.copied.objects.iter().copied();
+        let moved = copied.filter(|&object| is_instance[object]).collect();
         let bounds = scene.objects.iter().filter_map(Object::bounds);
         let corners: Vec<DVec3> = bounds.flat_map(|(low, high)| [low, high]).collect();
         let frame = Frame::around(corners.iter());

@@ -155,33 +155,21 @@ impl ChainScene {
         let First { index, order } = object.map_or(First::default(), |object| self.firsts[object]);
         let root = self.starts[instance.mesh].0 as u32;
         let is_mirrored = instance.from_mesh.matrix3.determinant() < 0.0;
-        let [to_nodes, from_mesh] = [&instance.to_nodes, &instance.from_mesh].map(|transform| {
-            let columns = [
-                transform.x_axis,
-                transform.y_axis,
-                transform.z_axis,
-                transform.translation,
-            ];
-            columns.map(|column| column.as_vec3().to_array())
-        });
-        let node = |[low, high]: [[f32; 3]; 2], [first, count]: [u32; 2]| Node {
-            low,
-            first,
-            high,
-            count,
-        };
-        [
-            node(
-                [to_nodes[0], to_nodes[1]],
-                [root, instance.object.unwrap_or(NO_OBJECT)],
-            ),
-            node([to_nodes[2], to_nodes[3]], [index, order]),
-            node(
-                [from_mesh[0], from_mesh[1]],
-                [instance.margin.to_bits(), u32::from(is_mirrored)],
-            ),
-            node([from_mesh[2], from_mesh[3]], [0; 2]),
-        ]
+        let places = [instance.to_nodes, instance.from_mesh].map(|place| place.to_cols_array_2d());
+        let [a, b] = places.map(|columns| columns.map(|column| column.map(|entry| entry as f32)));
+        let columns = [[a[0], a[1]], [a[2], a[3]], [b[0], b[1]], [b[2], b[3]]];
+        let words = [
+            [root, instance.object.unwrap_or(NO_OBJECT)],
+            [index, order],
+            [instance.margin.to_bits(), u32::from(is_mirrored)],
+            [0, 0],
+        ];
+        std::array::from_fn(|node| Node {
+            low: columns[node][0],
+            first: words[node][0],
+            high: columns[node][1],
+            count: words[node][1],
+        })
     }
 
     /// What it takes on the device [bytes].

@@ -2,6 +2,7 @@
 //! of their meshes; each object's record says where it stands.
 
 use std::collections::HashMap;
+use std::mem::offset_of;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -34,17 +35,9 @@ pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     array_stride: size_of::<Corner>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &[
-        attribute(
-            0,
-            std::mem::offset_of!(Corner, position),
-            wgpu::VertexFormat::Float32x3,
-        ),
-        attribute(
-            1,
-            std::mem::offset_of!(Corner, normal),
-            wgpu::VertexFormat::Float32x3,
-        ),
-        attribute(2, std::mem::offset_of!(Corner, uv), wgpu::VertexFormat::Float32x2),
+        attribute(0, offset_of!(Corner, position), wgpu::VertexFormat::Float32x3),
+        attribute(1, offset_of!(Corner, normal), wgpu::VertexFormat::Float32x3),
+        attribute(2, offset_of!(Corner, uv), wgpu::VertexFormat::Float32x2),
     ],
 };
 pub(super) const MAP_UV_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
@@ -58,21 +51,9 @@ pub(super) const OBJECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     array_stride: size_of::<ObjectRecord>() as u64,
     step_mode: wgpu::VertexStepMode::Instance,
     attributes: &[
-        attribute(
-            4,
-            std::mem::offset_of!(ObjectRecord, row_x),
-            wgpu::VertexFormat::Float32x4,
-        ),
-        attribute(
-            5,
-            std::mem::offset_of!(ObjectRecord, row_y),
-            wgpu::VertexFormat::Float32x4,
-        ),
-        attribute(
-            6,
-            std::mem::offset_of!(ObjectRecord, row_z),
-            wgpu::VertexFormat::Float32x4,
-        ),
+        attribute(4, offset_of!(ObjectRecord, row_x), wgpu::VertexFormat::Float32x4),
+        attribute(5, offset_of!(ObjectRecord, row_y), wgpu::VertexFormat::Float32x4),
+        attribute(6, offset_of!(ObjectRecord, row_z), wgpu::VertexFormat::Float32x4),
     ],
 };
 
@@ -139,10 +120,9 @@ impl Geometry {
             shared: HashMap::new(),
         };
         let drawn: Vec<Drawn> = scene.objects.iter().map(Drawn::of).collect();
-        let numbered = drawn.iter().enumerate();
-        let segments = numbered
-            .map(|(object, drawn)| packing.add(scene.material_of(object), drawn))
-            .collect();
+        let segments = (0..).zip(&drawn);
+        let segments = segments.map(|(object, drawn)| packing.add(scene.material_of(object), drawn));
+        let segments = segments.collect();
         packing.close_page();
         Self {
             pages: packing.pages,

@@ -165,7 +165,7 @@ fn shone_by(image: Option<Texture>) -> f64 {
         vec![],
     );
     if let Some(image) = image {
-        let glow = Glow::new(scene.objects[1].mesh_in_scene(), &texture_reference(), &image);
+        let glow = Glow::new(scene.objects[1].in_scene(), &texture_reference(), &image);
         scene.glows.insert(1, Arc::new(glow.expect("it glows")));
         scene.textures.push(Arc::new(image));
     }
