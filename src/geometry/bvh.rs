@@ -257,11 +257,10 @@ impl<'a> Node<'a> {
         (!node.is_leaf()).then(|| [child(node.first_index), child(node.first_index + 1)])
     }
 
-    /// Slot and corners of each triangle of a leaf; nothing for other nodes.
-    pub fn triangles(&self) -> impl Iterator<Item = (u32, &'a [DVec3; 3])> + use<'a> {
+    /// Slots of the triangles of a leaf; none for other nodes.
+    pub fn slots(&self) -> std::ops::Range<u32> {
         let node = &self.hierarchy.bvh.nodes[self.index];
-        let corners = &self.hierarchy.corners;
-        (node.first_index..node.first_index + node.prim_count).map(|slot| (slot, &corners[slot as usize]))
+        node.first_index..node.first_index + node.prim_count
     }
 }
 

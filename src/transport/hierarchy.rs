@@ -72,10 +72,7 @@ pub(super) struct Instance {
 }
 
 /// A triangle: its slot in the hierarchy of an instance's mesh, or in that of what is copied.
-type Found<'a> = (Option<&'a Instance>, u32);
-
-/// What a ray met, and the corners of that triangle in the scene [m].
-pub(super) type Met = (RayHit, [DVec3; 3]);
+pub(super) type Found<'a> = (Option<&'a Instance>, u32);
 
 impl Hierarchy {
     /// Of a scene. `max_copied`: see [`instances::MAX_COPIED`].
@@ -163,22 +160,24 @@ impl Hierarchy {
         &self,
         ray: &Ray,
         is_there: impl Fn(usize, usize, [f64; 3]) -> bool,
-    ) -> Option<Met> {
+    ) -> Option<(RayHit, Found<'_>)> {
         let sheared = ShearedRay::new(ray);
-        let mut best: Option<Met> = None;
-        self.search(ray, f64::INFINITY, |corners, found| {
-            let nothing = Some(f64::INFINITY);
-            let Some((distance_m, barycentric)) = sheared.intersect(corners) else {
-                return nothing;
+        let mut best: Option<(RayHit, Found)> = None;
+        let mut nearest_m = f64::INFINITY;
+        self.search(ray, nearest_m, |corners, found| {
+            let hit = sheared.intersect(corners);
+            let Some((distance_m, barycentric)) = hit.filter(|(distance_m, _)| *distance_m <= nearest_m)
+            else {
+                return Some(f64::INFINITY);
             };
-            let Some((object, triangle)) = self.triangle(found) else {
-                return nothing;
-            };
-            let is_nearer = best.is_none_or(|(hit, _)| {
+            let (object, triangle) = self.triangle(found);
+            let is_first = |(hit, _): &(RayHit, Found)| {
                 (distance_m, object, triangle) < (hit.distance_m, hit.object, hit.triangle)
-            });
-            if !is_nearer || !is_there(object as usize, triangle as usize, barycentric) {
-                return nothing;
+            };
+            let is_nearer = best.as_ref().is_none_or(is_first);
+            let is_there = || is_there(object as usize, triangle as usize, barycentric);
+            if !is_nearer || self.is_left((object, found)) || !is_there() {
+                return Some(f64::INFINITY);
             }
             let hit = RayHit {
                 object,
@@ -186,7 +185,8 @@ impl Hierarchy {
                 barycentric,
                 distance_m,
             };
-            best = Some((hit, *corners));
+            best = Some((hit, found));
+            nearest_m = distance_m;
             Some(distance_m)
         });
         best
@@ -204,8 +204,10 @@ impl Hierarchy {
         self.search(ray, distance_m, |corners, found| {
             let hit = sheared.intersect(corners);
             is_blocked = hit.is_some_and(|(hit_m, barycentric)| {
-                let is_there = |(object, triangle)| is_there(object as usize, triangle as usize, barycentric);
-                hit_m < distance_m && self.triangle(found).is_some_and(is_there)
+                let (object, triangle) = self.triangle(found);
+                hit_m < distance_m
+                    && !self.is_left((object, found))
+                    && is_there(object as usize, triangle as usize, barycentric)
             });
             (!is_blocked).then_some(f64::INFINITY)
         });
@@ -215,7 +217,12 @@ impl Hierarchy {
     /// Hands out all triangles that a ray may meet before `end_m`, with their corners in the scene, as
     /// [`TriangleBvh::search`] does.
     #[inline(always)]
-    fn search(&self, ray: &Ray, mut end_m: f64, mut meet: impl FnMut(&[DVec3; 3], Found) -> Option<f64>) {
+    fn search<'a>(
+        &'a self,
+        ray: &Ray,
+        mut end_m: f64,
+        mut meet: impl FnMut(&[DVec3; 3], Found<'a>) -> Option<f64>,
+    ) {
         let bvh = &self.copied.bvh;
         bvh.search(ray, end_m, |slot| {
             let met_m = meet(bvh.corners(slot), (None, slot));
@@ -229,11 +236,11 @@ impl Hierarchy {
 
     // Out of the way of scenes without any.
     #[inline(never)]
-    fn search_instances(
-        &self,
+    fn search_instances<'a>(
+        &'a self,
         ray: &Ray,
         mut end_m: f64,
-        meet: &mut dyn FnMut(&[DVec3; 3], Found) -> Option<f64>,
+        meet: &mut dyn FnMut(&[DVec3; 3], Found<'a>) -> Option<f64>,
     ) {
         self.above.search(ray, end_m, |place| {
             let instance = &self.instances[self.above.triangle(place) as usize];
@@ -246,13 +253,25 @@ impl Hierarchy {
         });
     }
 
-    /// Object and triangle within it; `None` where that was moved away.
-    fn triangle(&self, (instance, slot): Found) -> Option<(u32, u32)> {
+    /// Object and triangle within it.
+    fn triangle(&self, (instance, slot): Found) -> (u32, u32) {
         let Copied { bvh, triangles, .. } = &*self.copied;
         match instance {
-            Some(instance) => Some((instance.object, instance.shared.bvh.triangle(slot))),
-            None => Some(triangles[bvh.triangle(slot) as usize])
-                .filter(|(object, _)| !self.is_moved(*object as usize)),
+            Some(instance) => (instance.object, instance.shared.bvh.triangle(slot)),
+            None => triangles[bvh.triangle(slot) as usize],
+        }
+    }
+
+    /// Whether an object's triangle is of a copy that it was moved away from.
+    fn is_left(&self, (object, (instance, _)): (u32, Found)) -> bool {
+        instance.is_none() && self.is_moved(object as usize)
+    }
+
+    /// Its corners in the scene [m].
+    pub(super) fn corners(&self, (instance, slot): Found) -> [DVec3; 3] {
+        match instance {
+            Some(instance) => instance.placed(instance.shared.bvh.corners(slot)),
+            None => *self.copied.bvh.corners(slot),
         }
     }
 
@@ -381,10 +400,10 @@ impl<'a> SceneNode<'a> {
     /// Object and corners of each triangle of a leaf; nothing for other nodes.
     pub fn triangles(&self) -> impl Iterator<Item = (usize, [DVec3; 3])> + use<'a> {
         let (hierarchy, instance) = (self.hierarchy, self.instance);
-        self.node.triangles().filter_map(move |(slot, corners)| {
-            let (object, _) = hierarchy.triangle((instance, slot))?;
-            let placed = instance.map_or(*corners, |instance| instance.placed(corners));
-            Some((object as usize, placed))
+        self.node.slots().filter_map(move |slot| {
+            let found = (instance, slot);
+            let (object, _) = hierarchy.triangle(found);
+            (!hierarchy.is_left((object, found))).then(|| (object as usize, hierarchy.corners(found)))
         })
     }
 }

@@ -308,8 +308,8 @@ impl Tracer {
 
     /// The nearest surface in front of the ray's origin.
     pub fn closest_hit(&self, ray: &Ray) -> Option<SurfaceHit> {
-        let (place, corners) = self.closest(ray)?;
-        Some(self.surface_with(&place, &corners))
+        let (place, found) = self.closest(ray)?;
+        Some(self.surface_with(&place, &self.hierarchy.corners(found)))
     }
 
     /// Where the nearest surface in front of the ray's origin is met.
@@ -317,7 +317,7 @@ impl Tracer {
         Some(self.closest(ray)?.0)
     }
 
-    fn closest(&self, ray: &Ray) -> Option<hierarchy::Met> {
+    fn closest(&self, ray: &Ray) -> Option<(RayHit, hierarchy::Found<'_>)> {
         if self.has_masks {
             self.hierarchy
                 .closest(ray, |object, triangle, at| self.is_there(object, triangle, at))
