@@ -46,13 +46,15 @@ pub enum Effect {
     Direct,
     /// The indirect layer.
     Indirect,
+    /// Waves that run, and what keyframes move.
+    Motion,
     /// What the eye sees in mirrors and through glass.
     Chains,
 }
 
 impl Effect {
     /// All of them, as they are listed.
-    pub const ALL: [Self; 12] = *Self::VARIANTS.as_array().expect("twelve effects");
+    pub const ALL: [Self; 13] = *Self::VARIANTS.as_array().expect("thirteen effects");
 
     /// Its name on the command line and in files.
     pub fn name(self) -> &'static str {
@@ -81,6 +83,7 @@ impl Effect {
             }
             Self::Direct => "Light straight from the lamps, with its shadows.",
             Self::Indirect => "Light that diffuse surfaces send each other.",
+            Self::Motion => "Waves run, and animated objects, lights and cameras move.",
             Self::Chains => "What the eye sees in mirrors and through glass.",
         }
     }

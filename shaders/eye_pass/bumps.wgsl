@@ -1,6 +1,6 @@
 // Normals bent by waves and by an image of normals; twin of transport/bend.rs, transport/normal_texture.rs and
 // scene/waves.rs. A record in the table of images is
-//   record of the image of normals, scale of its normals, number of waves,
+//   look of the image of normals, scale of its normals, number of waves,
 // and for each wave
 //   wave vector x, y, z [rad/m], phase [rad], amplitude [m].
 
@@ -14,8 +14,8 @@ const STEEPEST_TEXEL: f32 = 8.0;
 // A piece of a surface: two steps along it, of any unit, with the changes of texture coordinates along them.
 struct Piece {
     steps: array<vec3f, 2>,
-    changes: array<vec2f, 2>,
-    uv: vec2f,
+    changes: array<vec4f, 2>,
+    uvs: vec4f,
 }
 
 // What a height over a surface does at a place.
@@ -41,9 +41,9 @@ fn texel_slope(texel: vec2i, layer: i32, scale: f32) -> vec2f {
 }
 
 // Gradient of the height that an image of normals stands for, on a piece of a surface with a unit normal.
-fn image_gradient(image: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f {
-    let first = piece.changes[0];
-    let second = piece.changes[1];
+fn image_gradient(look: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f {
+    let first = placed(look, piece.changes[0], true);
+    let second = placed(look, piece.changes[1], true);
     let turn = select(-1.0, 1.0, first.x * second.y - first.y * second.x >= 0.0);
     let by_u = (piece.steps[0] * second.y - piece.steps[1] * first.y) * turn;
     let by_v = (piece.steps[1] * first.x - piece.steps[0] * second.x) * turn;
@@ -55,7 +55,7 @@ fn image_gradient(image: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f 
     let x = along * inverseSqrt(size);
     let across = cross(normal, x);
     let y = select(across, -across, dot(by_v, across) > 0.0);
-    let spot = locate(image, 0u, piece.uv);
+    let spot = locate(image_table[look], 0u, placed(look, piece.uvs, false));
     let top = mix(
         texel_slope(spot.texel, spot.layer, scale),
         texel_slope(spot.texel + vec2i(1, 0), spot.layer, scale),
@@ -73,9 +73,9 @@ fn image_gradient(image: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f 
 // Of all bumps at a place in scene coordinates [m], on a piece of a surface with a unit normal.
 fn bump_at(record: u32, place_m: vec3f, piece: Piece, normal: vec3f) -> Bump {
     var bump = Bump(vec3f(0.0), 0.0);
-    let image = image_table[record];
-    if image != NO_IMAGE {
-        bump.gradient = image_gradient(image, table_float(record + 1u), piece, normal);
+    let look = image_table[record];
+    if look != NO_IMAGE {
+        bump.gradient = image_gradient(look, table_float(record + 1u), piece, normal);
     }
     let count = image_table[record + 2u];
     for (var wave = 0u; wave < count; wave += 1u) {

@@ -38,7 +38,7 @@ fn is_clear(surface: u32) -> bool {
 
 // Whether a gaze goes through a hole of a surface.
 fn is_hole(hit: Hit, object: ObjectRecord) -> bool {
-    return HAS_MASK && object.alpha_cutoff > 0.0 && !is_there(object, surface_point(hit).uv);
+    return HAS_MASK && object.alpha_cutoff > 0.0 && !is_there(object, surface_point(hit).uvs);
 }
 
 // The nearest surface that is drawn: backs of single-sided opaque ones and holes are not.
@@ -71,6 +71,18 @@ fn footprint_level(record: u32, density: f32, width: f32, cos_view: f32) -> f32 
     let extent = level_extent(record, 0u);
     let texels = abs(width) * density * sqrt(extent.x * extent.y / max(cos_view, 1e-3));
     return log2(max(texels, 1e-10));
+}
+
+// The same of what a look finds; densities of both sets of coordinates.
+fn footprint_look_level(look: u32, densities: vec2f, width: f32, cos_view: f32) -> f32 {
+    if look == NO_IMAGE {
+        return 0.0;
+    }
+    let x = placed(look, vec4f(1.0, 0.0, 1.0, 0.0), true);
+    let y = placed(look, vec4f(0.0, 1.0, 0.0, 1.0), true);
+    let density = select(densities.x, densities.y, image_table[look + 1u] != 0u);
+    let scaled_density = density * sqrt(abs(x.x * y.y - x.y * y.x));
+    return footprint_level(image_table[look], scaled_density, width, cos_view);
 }
 
 fn largest(v: vec3f) -> f32 {
@@ -131,8 +143,8 @@ fn has_map(surface: u32) -> bool {
 
 fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
     let object = objects[point.object];
-    let level = footprint_level(object.texture, point.uv_density, gaze.width, cos_view);
-    return object.base_colour * texture_colour(object.texture, point.uv, level);
+    let level = footprint_look_level(object.texture, point.uv_densities, gaze.width, cos_view);
+    return object.base_colour * point.colour * looked_up(object.texture, point.uvs, level).rgb;
 }
 
 // The side of a point that is seen from somewhere.
@@ -174,8 +186,8 @@ fn chain_radiance(first: Gaze) -> vec3f {
             var emitted = object.emitted_radiance;
             if object.glow != NO_IMAGE {
                 let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
-                let level = footprint_level(object.glow, point.uv_density, walk.gaze.width, cos_view);
-                emitted *= texture_colour(object.glow, point.uv, level);
+                let level = footprint_look_level(object.glow, point.uv_densities, walk.gaze.width, cos_view);
+                emitted *= looked_up(object.glow, point.uvs, level).rgb;
             }
             walk.radiance += shown(walk.gaze.weight * emitted, walk.gaze.wavelength);
             if has_map(object.surface) {

@@ -1,7 +1,7 @@
 // What is known of a point of a surface from the corners of its triangle.
 
-// Two per corner: position and normal.x, then normal.yz and texture coordinates.
-@group(1) @binding(3) var<storage, read> corners: array<vec4f>;
+// Six per corner: floats of position, normal and two sets of texture coordinates, and a colour of 16 bits a channel.
+@group(1) @binding(3) var<storage, read> corners: array<vec2u>;
 @group(1) @binding(4) var<storage, read> corner_map_uvs: array<vec2f>;
 // Three for each triangle.
 @group(1) @binding(5) var<storage, read> corner_indices: array<u32>;
@@ -20,18 +20,28 @@ struct SurfacePoint {
     shading_normal: vec3f,
     // How much the normals spread per length, > 0 where the surface is convex.
     curvature: f32,
-    uv: vec2f,
+    uvs: vec4f,
     map_uv: vec2f,
+    // What the base colour is multiplied by.
+    colour: vec3f,
     // Coordinates over area, square root: their change along a line of length one.
-    uv_density: f32,
+    uv_densities: vec2f,
     map_density: f32,
 }
 
 // Unit.
 fn corner_normal(corner: u32, object: ObjectRecord) -> vec3f {
-    let second = corners[2u * corner + 1u];
-    let normal = vec3f(corners[2u * corner].w, second.x, second.y);
+    let normal = bitcast<vec3f>(vec3u(corners[6u * corner + 1u].y, corners[6u * corner + 2u]));
     return normal_in_scene(normal, object.row_x.xyz, object.row_y.xyz, object.row_z.xyz);
+}
+
+fn corner_uvs(corner: u32) -> vec4f {
+    return bitcast<vec4f>(vec4u(corners[6u * corner + 3u], corners[6u * corner + 4u]));
+}
+
+fn corner_colour(corner: u32) -> vec3f {
+    let channels = corners[6u * corner + 5u];
+    return vec3f(unpack2x16unorm(channels.x), unpack2x16unorm(channels.y).x);
 }
 
 fn area_ratio(a: vec2f, b: vec2f, c: vec2f, twice_area: f32) -> f32 {
@@ -72,22 +82,28 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     point.curvature = (bend(triangle.a, triangle.b, normal_a, normal_b)
         + bend(triangle.b, triangle.c, normal_b, normal_c)
         + bend(triangle.c, triangle.a, normal_c, normal_a)) / 3.0;
-    let uv_a = corners[2u * first + 1u].zw;
-    let uv_b = corners[2u * second + 1u].zw;
-    let uv_c = corners[2u * third + 1u].zw;
-    point.uv = uv_a * weight.x + uv_b * weight.y + uv_c * weight.z;
+    let uv_a = corner_uvs(first);
+    let uv_b = corner_uvs(second);
+    let uv_c = corner_uvs(third);
+    point.colour = corner_colour(first) * weight.x
+        + corner_colour(second) * weight.y
+        + corner_colour(third) * weight.z;
+    point.uvs = uv_a * weight.x + uv_b * weight.y + uv_c * weight.z;
     if HAS_BUMPS {
         let record = object.bumps;
         if record != NO_IMAGE {
             let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
             let steps = array(triangle.b - triangle.a, triangle.c - triangle.a);
-            let piece = Piece(steps, array(uv_b - uv_a, uv_c - uv_a), point.uv);
+            let piece = Piece(steps, array(uv_b - uv_a, uv_c - uv_a), point.uvs);
             let bump = bump_at(record, place_m, piece, point.shading_normal);
             point.shading_normal = bent(point.shading_normal, bump.gradient);
             point.curvature -= 0.5 * bump.laplacian * start.unit_m;
         }
     }
-    point.uv_density = area_ratio(uv_a, uv_b, uv_c, twice_area);
+    point.uv_densities = vec2f(
+        area_ratio(uv_a.xy, uv_b.xy, uv_c.xy, twice_area),
+        area_ratio(uv_a.zw, uv_b.zw, uv_c.zw, twice_area),
+    );
     let map_a = corner_map_uvs[first];
     let map_b = corner_map_uvs[second];
     let map_c = corner_map_uvs[third];

@@ -1,9 +1,12 @@
 // Illumination maps and textures, in tiles through a page table.
 
 // All images: a record each, then where their tiles are. A record is
-//   finest level that is held, number of levels, scale, how coordinates wrap (2 bits each way),
+//   finest level that is held, number of levels, scale, how coordinates wrap (2 bits each way) and whether texels are not
+//   blended (1 bit),
 // and for each level
 //   texels across and down, texels of the unit square across and down, index of its first page, pages across.
+// How a material looks up one of them is
+//   its record, set of coordinates, two rows of what transforms those (KHR_texture_transform).
 @group(0) @binding(2) var<storage, read> image_table: array<u32>;
 @group(0) @binding(3) var map_tiles: texture_2d_array<f32>;
 @group(0) @binding(4) var texture_tiles: texture_2d_array<f32>;
@@ -23,6 +26,7 @@ const LEVEL_WORDS: u32 = 6u;
 const WRAP_CLAMP: u32 = 0u;
 const WRAP_REPEAT: u32 = 1u;
 const WRAP_MIRROR: u32 = 2u;
+const IS_NEAREST: u32 = 16u;
 
 // Four texels of a pool, and where between them.
 struct Spot {
@@ -59,7 +63,7 @@ fn locate(record: u32, level: u32, uv: vec2f) -> Spot {
     let at = record + RECORD_WORDS + level * LEVEL_WORDS;
     let size = vec2f(f32(image_table[at]), f32(image_table[at + 1u]));
     let wraps = image_table[record + 3u];
-    let wrap = vec2u(wraps & 3u, wraps >> 2u);
+    let wrap = vec2u(wraps & 3u, wraps >> 2u & 3u);
     let place = vec2f(folded(uv.x, wrap.x), folded(uv.y, wrap.y)) * level_extent(record, level) - 0.5;
     let position = vec2f(wrapped(place.x, size.x, wrap.x), wrapped(place.y, size.y, wrap.y));
     let low = min(floor(position), size - 1.0);
@@ -81,18 +85,20 @@ fn level_value(tiles: texture_2d_array<f32>, record: u32, level: u32, uv: vec2f)
     if spot.is_empty || spot.is_coarser {
         return vec4f(0.0);
     }
+    let is_nearest = (image_table[record + 3u] & IS_NEAREST) != 0u;
     // Weights in full precision: the steps of the 8-bit weights that samplers use show at the edge of a caustic.
+    let weight = select(spot.weight, step(vec2f(0.5), spot.weight), is_nearest);
     let top = mix(
         textureLoad(tiles, spot.texel, spot.layer, 0),
         textureLoad(tiles, spot.texel + vec2i(1, 0), spot.layer, 0),
-        spot.weight.x,
+        weight.x,
     );
     let bottom = mix(
         textureLoad(tiles, spot.texel + vec2i(0, 1), spot.layer, 0),
         textureLoad(tiles, spot.texel + vec2i(1, 1), spot.layer, 0),
-        spot.weight.x,
+        weight.x,
     );
-    return mix(top, bottom, spot.weight.y);
+    return mix(top, bottom, weight.y);
 }
 
 // The two levels to blend, and the share of the coarser one.
@@ -130,12 +136,35 @@ fn irradiance(record: u32, uv: vec2f, level: f32) -> vec4f {
     return vec4f(value.rgb * bitcast<f32>(image_table[record + 2u]), value.a);
 }
 
-// Linear colour at a place of a texture, seen at a level; white without one.
-fn texture_colour(record: u32, uv: vec2f, level: f32) -> vec3f {
-    if record == NO_IMAGE {
-        return vec3f(1.0);
+fn look_number(at: u32) -> f32 {
+    return bitcast<f32>(image_table[at]);
+}
+
+// What a look makes of both sets of coordinates, or of changes of them.
+fn placed(look: u32, uvs: vec4f, is_change: bool) -> vec2f {
+    let uv = select(uvs.xy, uvs.zw, image_table[look + 1u] != 0u);
+    let shift = vec2f(look_number(look + 4u), look_number(look + 7u));
+    let turned = vec2f(
+        look_number(look + 2u) * uv.x + look_number(look + 3u) * uv.y,
+        look_number(look + 5u) * uv.x + look_number(look + 6u) * uv.y,
+    );
+    return turned + select(shift, vec2f(0.0), is_change);
+}
+
+// Linear colour and alpha where a look finds them, seen at a level; white without one.
+fn looked_up(look: u32, uvs: vec4f, level: f32) -> vec4f {
+    if look == NO_IMAGE {
+        return vec4f(1.0);
     }
-    return value_at(texture_tiles, record, uv, level).rgb;
+    return value_at(texture_tiles, image_table[look], placed(look, uvs, false), level);
+}
+
+// The level of a look at which a texel is as large as a parallelogram of coordinates.
+fn look_level(look: u32, across: vec4f, down: vec4f) -> f32 {
+    if look == NO_IMAGE {
+        return 0.0;
+    }
+    return level_of(image_table[look], placed(look, across, true), placed(look, down, true));
 }
 
 // The level at which a texel is as large as a parallelogram of coordinates.

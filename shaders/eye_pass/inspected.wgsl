@@ -48,7 +48,12 @@ fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
         return vec4f(linear_from_srgb(0.5 * normalize(fragment.normal) + 0.5), 1.0);
     }
     if INSPECTED == INSPECTED_UV {
-        return vec4f(linear_from_srgb(vec3f(fract(fragment.uv), 0.0)), 1.0);
+        let look = objects[fragment.object].texture;
+        var uv = fragment.uvs.xy;
+        if look != NO_IMAGE {
+            uv = placed(look, fragment.uvs, false);
+        }
+        return vec4f(linear_from_srgb(vec3f(fract(uv), 0.0)), 1.0);
     }
     if record == NO_IMAGE {
         return vec4f(NO_MAP, 1.0);

@@ -47,19 +47,19 @@ fn lobe_rad(roughness: f32) -> f32 {
 
 // What images multiply transmission, roughness and metallic by, as the gaze sees them.
 fn factors_at(point: SurfacePoint, gaze: Gaze) -> vec3f {
-    let record = objects[point.object].variation;
-    if record == NO_IMAGE {
+    let look = objects[point.object].variation;
+    if look == NO_IMAGE {
         return vec3f(1.0);
     }
     let cos_view = abs(dot(point.geometric_normal, gaze.direction));
-    return texture_colour(record, point.uv, footprint_level(record, point.uv_density, gaze.width, cos_view));
+    return looked_up(look, point.uvs, footprint_look_level(look, point.uv_densities, gaze.width, cos_view)).rgb;
 }
 
 fn mixture_at(point: SurfacePoint, gaze: Gaze, factors: vec3f) -> Mixture {
     let object = objects[point.object];
     let cos_view = abs(dot(point.geometric_normal, gaze.direction));
-    let level = footprint_level(object.texture, point.uv_density, gaze.width, cos_view);
-    return mixture_of(object, factors, alpha_at(object, point.uv, level));
+    let level = footprint_look_level(object.texture, point.uv_densities, gaze.width, cos_view);
+    return mixture_of(object, factors, looked_up(object.texture, point.uvs, level).a);
 }
 
 fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f, lobe: f32) -> Branch {

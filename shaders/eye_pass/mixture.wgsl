@@ -25,14 +25,6 @@ fn mixture_of(object: ObjectRecord, factors: vec3f, alpha: f32) -> Mixture {
     return Mixture(metal, clear, max(there - metal - clear, 0.0), 1.0 - there, polish);
 }
 
-// Alpha of the base colour's image; 1 without one.
-fn alpha_at(object: ObjectRecord, uv: vec2f, level: f32) -> f32 {
-    if object.texture == NO_IMAGE {
-        return 1.0;
-    }
-    return value_at(texture_tiles, object.texture, uv, level).a;
-}
-
 // What the body of a surface takes of light: part of it, and how much of that polish covers.
 struct Taking {
     share: f32,

@@ -13,8 +13,8 @@ fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -
     let margin = 4e-6 * (1.0 + length(offset));
     var mixture: Mixture;
     if SURFACE == SURFACE_VARIED {
-        let factors = texture_colour(object.variation, fragment.uv, 0.0);
-        mixture = mixture_of(object, factors, alpha_at(object, fragment.uv, 0.0));
+        let factors = looked_up(object.variation, fragment.uvs, 0.0).rgb;
+        mixture = mixture_of(object, factors, looked_up(object.texture, fragment.uvs, 0.0).a);
     }
     let taking = taking_of(object, mixture);
     let point = LitPoint(place, margin, towards_eye * normalize(across), shading_normal, taking);

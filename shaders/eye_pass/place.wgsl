@@ -4,12 +4,14 @@ struct Corner {
     // In coordinates of the mesh.
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
+    // Both sets of texture coordinates.
+    @location(2) uvs: vec4f,
     @location(3) map_uv: vec2f,
     // From there to the scene, of the object's record.
     @location(4) row_x: vec4f,
     @location(5) row_y: vec4f,
     @location(6) row_z: vec4f,
+    @location(7) colour: vec4f,
 }
 
 struct Fragment {
@@ -17,9 +19,10 @@ struct Fragment {
     @builtin(position) @invariant clip: vec4f,
     @location(0) from_camera: vec3f,
     @location(1) normal: vec3f,
-    @location(2) uv: vec2f,
+    @location(2) uvs: vec4f,
     @location(3) map_uv: vec2f,
     @location(4) @interpolate(flat) object: u32,
+    @location(5) colour: vec3f,
 }
 
 @vertex
@@ -32,5 +35,5 @@ fn place(corner: Corner, @builtin(instance_index) object: u32) -> Fragment {
     clip.x -= frame.jitter.x * clip.w;
     clip.y -= frame.jitter.y * clip.w;
     let normal = normal_in_scene(corner.normal, corner.row_x.xyz, corner.row_y.xyz, corner.row_z.xyz);
-    return Fragment(clip, from_camera, normal, corner.uv, corner.map_uv, object);
+    return Fragment(clip, from_camera, normal, corner.uvs, corner.map_uv, object, corner.colour.rgb);
 }

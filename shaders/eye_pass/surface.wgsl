@@ -9,18 +9,18 @@ override HAS_TEXTURE: bool;
 
 fn own_base_colour(fragment: Fragment) -> vec3f {
     let object = objects[fragment.object];
-    var colour = object.base_colour;
+    var colour = object.base_colour * fragment.colour;
     if HAS_TEXTURE {
-        let level = level_of(object.texture, dpdx(fragment.uv), dpdy(fragment.uv));
-        colour *= texture_colour(object.texture, fragment.uv, level);
+        let level = look_level(object.texture, dpdx(fragment.uvs), dpdy(fragment.uvs));
+        colour *= looked_up(object.texture, fragment.uvs, level).rgb;
     }
     return colour;
 }
 
 fn own_emission(fragment: Fragment) -> vec3f {
     let object = objects[fragment.object];
-    let level = level_of(object.glow, dpdx(fragment.uv), dpdy(fragment.uv));
-    return object.emitted_radiance * texture_colour(object.glow, fragment.uv, level);
+    let level = look_level(object.glow, dpdx(fragment.uvs), dpdy(fragment.uvs));
+    return object.emitted_radiance * looked_up(object.glow, fragment.uvs, level).rgb;
 }
 
 fn own_irradiance(fragment: Fragment, is_front: bool) -> vec4f {
@@ -35,7 +35,7 @@ fn own_polish(fragment: Fragment) -> f32 {
         var normal = normalize(fragment.normal);
         if HAS_BUMPS {
             let steps = array(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
-            let piece = Piece(steps, array(dpdx(fragment.uv), dpdy(fragment.uv)), fragment.uv);
+            let piece = Piece(steps, array(dpdx(fragment.uvs), dpdy(fragment.uvs)), fragment.uvs);
             let place_m = frame.camera_position + fragment.from_camera;
             normal = bent(normal, bump_at(objects[fragment.object].bumps, place_m, piece, normal).gradient);
         }

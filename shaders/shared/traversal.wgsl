@@ -143,7 +143,7 @@ fn slabs_in(at: Instance, origin: vec3f, direction: vec3f) -> Slabs {
 }
 
 // A triangle as an instance has it.
-fn placed(triangle: Triangle, instance: u32) -> Triangle {
+fn in_instance(triangle: Triangle, instance: u32) -> Triangle {
     if instance == LOCAL {
         return triangle;
     }
@@ -165,7 +165,7 @@ fn placed(triangle: Triangle, instance: u32) -> Triangle {
 
 // The triangle that was met.
 fn met(hit: Hit) -> Triangle {
-    return placed(triangles[hit.triangle], hit.instance);
+    return in_instance(triangles[hit.triangle], hit.instance);
 }
 
 // Woop, Benthin and Wald 2013: watertight. Distance below zero where the triangle is missed.
@@ -281,7 +281,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             }
         }
         for (var slot = first; slot < end; slot += 1u) {
-            let triangle = placed(triangles[slot], search.instance);
+            let triangle = in_instance(triangles[slot], search.instance);
             let found = meet_triangle(ray, slot, triangle, search.instance);
             // Of triangles at the same distance the first given.
             let is_nearer = found.distance < search.best.distance

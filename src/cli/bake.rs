@@ -1,22 +1,25 @@
 //! `bake`: maps and a manifest in a folder, or one shard of them as raw sums.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
-use nephroid::error::Result;
+use nephroid::error::{Error, Result};
 use nephroid::export::manifest::{Manifest, MapEntry};
 use nephroid::export::map_folder::MapFolder;
+use nephroid::export::sequence::{FrameTimes, SequenceFolder};
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest};
 use nephroid::light_pass::ledger::CarriedFlux;
 use nephroid::light_pass::share::Share;
 use nephroid::scene::LoadOptions;
 use nephroid::session::forecast::forecast;
 use nephroid::session::{self, BakeResult, Forecast, ForecastReport, StopReason};
-use nephroid::settings::{BakeSettings, Estimator, LayerKind};
+use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
 use super::bake_options::BakeOptions;
 use super::console::{Console, bytes, in_lines};
 use super::loaded::{LoadedScene, within_reach};
+use super::moments::MomentOptions;
 use super::options::{RunOptions, SceneOptions};
 use super::values;
 
@@ -37,6 +40,8 @@ pub struct BakeArguments {
     #[arg(long, value_name = "I/N", value_parser = values::share_of_bake, allow_hyphen_values = true)]
     shard: Option<Share>,
     #[command(flatten)]
+    moment: MomentOptions,
+    #[command(flatten)]
     scene_options: SceneOptions,
     #[command(flatten)]
     bake: BakeOptions,
@@ -55,7 +60,15 @@ impl BakeArguments {
             session::shards::check(&settings)?;
         }
         let options = self.scene_options.load_options(false);
-        let loaded = LoadedScene::load(&self.scene, &options, true, console)?;
+        let times = self.moment.sequence();
+        if times.is_some() {
+            self.check_sequence(&settings)?;
+        }
+        let moment = (&self.moment, &settings.effects);
+        let loaded = LoadedScene::load_at(&self.scene, &options, true, moment, console)?;
+        if let Some(times) = times {
+            return self.bake_sequence(times, &settings, &loaded, console);
+        }
         if let Some(share) = self.shard {
             return self.bake_shard(share, &settings, &loaded, options, console);
         }
@@ -63,6 +76,71 @@ impl BakeArguments {
         let result = loaded.bake(&settings, console)?;
         let manifest = folder.write(&loaded.scene, &settings, &result)?;
         let text = summary(&manifest, &result, &self.output.display().to_string());
+        console.print_result(&text, &manifest)
+    }
+
+    fn check_sequence(&self, settings: &BakeSettings) -> Result<()> {
+        let refused = |option: &str, what: &str, remedy: &str| Err(Error::usage(option, what, remedy));
+        if self.shard.is_some() {
+            return refused(
+                "--shard",
+                "a shard is a part of one moment",
+                "bake every frame by itself with --time, or leave it out",
+            );
+        }
+        if settings.map_resolution == MapResolution::Auto {
+            return refused(
+                "--frames",
+                "`--map-resolution auto` may choose another size for every frame",
+                "add --map-resolution, such as 256",
+            );
+        }
+        Ok(())
+    }
+
+    fn bake_sequence(
+        &self,
+        times: FrameTimes,
+        settings: &BakeSettings,
+        loaded: &LoadedScene,
+        console: &Console,
+    ) -> Result<()> {
+        let mut folder = SequenceFolder::open(&self.output, self.force, times)?;
+        let affordable = within_reach(settings, console);
+        let (mut worst, mut cpu_s) = (0.0_f64, 0.0);
+        loaded.session(console, |session, bar, control| {
+            for frame in 0..times.frames {
+                let scene = Arc::new(loaded.scene.at(times.time_s(frame)));
+                session.set_scene(scene.clone())?;
+                let result = session.bake(&affordable, bar, control)?;
+                console.check(&loaded.scene.source)?;
+                console.warn(&result.warnings);
+                let entry = folder.write(frame, &scene, settings, &result)?;
+                worst = worst.max(entry.error.estimated_visible.unwrap_or(0.0));
+                cpu_s += entry.cpu_s;
+            }
+            Ok(())
+        })?;
+        let Some(manifest) = folder.finish()? else {
+            return Ok(());
+        };
+        let wall_s = loaded.seconds().0;
+        let text = in_lines(&[
+            ("folder", self.output.display().to_string()),
+            ("frames", format!("{} at {} a second", times.frames, times.fps)),
+            ("maps", format!("{} in each", manifest.maps.len())),
+            (
+                "error",
+                format!("{:.2} % visible at most, estimated", 100.0 * worst),
+            ),
+            (
+                "seconds",
+                format!(
+                    "{wall_s:.2} ({cpu_s:.2} of CPU), {:.3} of CPU a frame",
+                    cpu_s / times.frames as f64
+                ),
+            ),
+        ]);
         console.print_result(&text, &manifest)
     }
 

@@ -349,10 +349,20 @@ impl ExportArguments {
 
     fn write_textures(&self, console: &Console) -> Result<()> {
         let scene = self.load()?;
-        let reader = MapReader::open(&self.maps, &scene)?;
+        let sequence = map_reader::sequence_of(&self.maps)?;
+        let scenes = sequence
+            .as_ref()
+            .map_or(Vec::new(), |sequence| sequence.scenes(&scene));
+        let frames = scenes.iter().enumerate();
+        let mut readers = frames
+            .map(|(frame, scene)| MapReader::open_frame(&self.maps, scene, frame))
+            .collect::<Result<Vec<_>>>()?;
+        if readers.is_empty() {
+            readers.push(MapReader::open(&self.maps, &scene)?);
+        }
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(self.format));
         let folder = TextureFolder::open(&output, self.force)?;
-        let report = textures::write(&reader, self.texture_options(), folder, console.control())?;
+        let report = textures::write(&readers, self.texture_options(), folder, console.control())?;
         console.warn(&report.warnings);
         let folder = &output.display().to_string();
         let written = WrittenFolder {

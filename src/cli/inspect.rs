@@ -46,7 +46,7 @@ impl InspectArguments {
     /// Bad usage; a scene that cannot be read, settings that do not fit it.
     pub fn run(&self, console: &Console) -> Result<()> {
         let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads()?)?;
-        let options = self.scene_options.load_options(false);
+        let options = self.scene_options.load_options(true);
         let scene = &LoadedScene::load(&self.scene, &options, false, console)?.scene;
         let survey = BakeSession::new(scene.clone())?.survey(&settings, console.control())?;
         let camera = scene.cameras.first().map(|camera| (camera, PICTURE_ASPECT));

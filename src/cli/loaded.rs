@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use nephroid::effect::EffectSwitches;
 use nephroid::error::{Error, Result, Warning};
 use nephroid::files;
 use nephroid::progress::Control;
@@ -14,6 +15,7 @@ use nephroid::session::{BakeResult, BakeSession, Timings};
 use nephroid::settings::BakeSettings;
 
 use super::console::{Console, StageBar, bytes};
+use super::moments::MomentOptions;
 
 /// A scene, with clocks from the start of the run on and what they showed when it was loaded.
 pub struct LoadedScene {
@@ -28,8 +30,23 @@ impl LoadedScene {
     /// # Errors
     /// A scene that cannot be read, or has no light where it needs one.
     pub fn load(source: &str, options: &LoadOptions, needs_light: bool, console: &Console) -> Result<Self> {
+        let rest = (&MomentOptions::default(), &EffectSwitches::default());
+        Self::load_at(source, options, needs_light, rest, console)
+    }
+
+    /// Loads a scene as it is at a moment.
+    ///
+    /// # Errors
+    /// As [`Self::load`]; a scene that does not move as it is asked to.
+    pub fn load_at(
+        source: &str,
+        options: &LoadOptions,
+        needs_light: bool,
+        (moment, effects): (&MomentOptions, &EffectSwitches),
+        console: &Console,
+    ) -> Result<Self> {
         let started = (Instant::now(), ProcessTime::now());
-        let scene = Arc::new(scene::load(source, options)?);
+        let scene = Arc::new(moment.apply(scene::load(source, options)?, effects)?);
         if needs_light && scene.lights.is_empty() {
             return Err(Error::failure(
                 source,

@@ -8,6 +8,7 @@ mod export;
 mod inspect;
 mod loaded;
 mod merge;
+mod moments;
 mod options;
 mod picture;
 mod render;

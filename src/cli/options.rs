@@ -22,7 +22,7 @@ enum Switch {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Scene options")]
 pub struct SceneOptions {
-    /// Add a sun to a scene without light
+    /// Add a sun and a clear sky to a scene without light
     #[arg(long)]
     default_light: bool,
     /// Whether closed meshes of a transmissive material without a volume are solid glass, or panes without thickness
@@ -42,7 +42,7 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// How the scene is read; a command may add a sun unasked.
+    /// How the scene is read; a command may light a dark scene unasked.
     pub fn load_options(&self, adds_light: bool) -> LoadOptions {
         LoadOptions {
             solid_glass: self.solid_glass == Switch::On,
@@ -91,7 +91,7 @@ impl RunOptions {
     }
 }
 
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Picture options")]
 pub struct PictureOptions {
     /// Camera of the file, by name or index [default: the first, or one that frames the scene]

@@ -1,11 +1,15 @@
 //! `render`: one picture, or the frames of a camera that moves.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use clap::Args;
 #[cfg(feature = "gpu")]
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::error::{Error, Result};
+use nephroid::export::frame_folder::FrameFolder;
+use nephroid::export::map_reader;
+use nephroid::export::sequence::FrameTimes;
 use nephroid::files;
 #[cfg(feature = "gpu")]
 use nephroid::scene::CameraPath;
@@ -16,21 +20,22 @@ use serde_json::json;
 use super::bake_options::BakeOptions;
 use super::console::Console;
 use super::loaded::LoadedScene;
+use super::moments::MomentOptions;
 use super::options::{MapsOption, PictureOptions, RunOptions, SceneOptions};
 #[cfg(feature = "gpu")]
 use super::picture::Backend;
 use super::picture::{self, EyeOptions};
 #[cfg(feature = "gpu")]
 use super::render_path::Film;
-use super::values;
+use super::values::{self, Exposure};
 
 #[derive(Debug, Args)]
-#[command(group = clap::ArgGroup::new("motion").args(["path", "turntable"]))]
+#[command(group = clap::ArgGroup::new("camera_motion").args(["path", "turntable"]))]
 pub struct RenderArguments {
     /// .glb, .gltf or builtin:NAME
     scene: String,
-    /// Picture: .png for display, .exr for radiance in W/(m² sr); with --path or --turntable a folder for the frames as
-    /// .png
+    /// Picture: .png for display, .exr for radiance in W/(m² sr); with --path, --turntable or --frames a folder for the
+    /// frames as .png
     #[arg(short, long, value_name = "FILE", required_unless_present_any = ["path", "turntable"])]
     output: Option<PathBuf>,
     /// Draw the frames of a camera's path, a JSON file, on the graphics card
@@ -40,8 +45,10 @@ pub struct RenderArguments {
     #[arg(long, value_name = "FRAMES", conflicts_with = "path", value_parser = values::within(1..=MAX_FRAMES, "frames"))]
     turntable: Option<usize>,
     /// With --path or --turntable: time every frame with and without what is seen in mirrors and through glass
-    #[arg(long, requires = "motion")]
+    #[arg(long, requires = "camera_motion")]
     stats: bool,
+    #[command(flatten)]
+    moment: MomentOptions,
     #[command(flatten)]
     maps: MapsOption,
     #[command(flatten)]
@@ -65,10 +72,14 @@ impl RenderArguments {
         let layers = [LayerKind::Caustic, LayerKind::Direct];
         let settings = self.bake.settings(&layers, self.run.threads()?)?;
         let options = self.scene_options.load_options(true);
-        let load = || LoadedScene::load(&self.scene, &options, false, console);
+        let moment = (&self.moment, &settings.effects);
+        let load = || LoadedScene::load_at(&self.scene, &options, false, moment, console);
         let Some(output) = self.output.as_ref().filter(|_| !self.moves()) else {
             return self.film(&settings, load, console);
         };
+        if let Some(times) = self.moment.sequence() {
+            return self.draw_moments(output, times, &settings, &load()?, console);
+        }
         self.refuse_what_radiance_has_not(picture::holds_radiance(output)?)?;
         let loaded = load()?;
         files::check_output_file(output)?;
@@ -98,6 +109,46 @@ impl RenderArguments {
         console.print_result(&text, &report)
     }
 
+    /// Draws the frames of a scene that moves, all at the exposure of the first.
+    fn draw_moments(
+        &self,
+        output: &Path,
+        times: FrameTimes,
+        settings: &BakeSettings,
+        loaded: &LoadedScene,
+        console: &Console,
+    ) -> Result<()> {
+        let folder = FrameFolder::open(output)?;
+        let mut options = self.picture.clone();
+        loaded.session(console, |session, bar, control| {
+            for frame in 0..times.frames {
+                let scene = Arc::new(loaded.scene.at(times.time_s(frame)));
+                let maps = match &self.maps.maps {
+                    Some(maps) => map_reader::read_frame(maps, &scene, frame)?.0,
+                    None => {
+                        session.set_scene(scene.clone())?;
+                        let result = session.bake(settings, bar, control)?;
+                        console.check(&loaded.scene.source)?;
+                        result.maps
+                    }
+                };
+                let (look, path) = ((&options, &self.eye), folder.file(frame));
+                let made = picture::make(&scene, &maps, &settings.effects, look, &path, console)?;
+                options.exposure = Some(Exposure::Stops(made.view.exposure_stops));
+            }
+            Ok(())
+        })?;
+        let seconds = loaded.seconds().0;
+        let text = format!(
+            "frames    {} in {}\nseconds   {seconds:.2}",
+            times.frames,
+            output.display()
+        );
+        let report =
+            json!({"frames": times.frames, "folder": output.display().to_string(), "seconds": seconds});
+        console.print_result(&text, &report)
+    }
+
     fn moves(&self) -> bool {
         self.path.is_some() || self.turntable.is_some()
     }
@@ -110,6 +161,13 @@ impl RenderArguments {
         console: &Console,
     ) -> Result<()> {
         let refused = |option: &str, what: &str, remedy: &str| Err(Error::usage(option, what, remedy));
+        if self.moment.sequence().is_some() {
+            return refused(
+                "--frames",
+                "the camera moves or the scene, not both",
+                "leave --frames, or --path and --turntable, out",
+            );
+        }
         if self.eye.backend == Some(Backend::Cpu) {
             return refused(
                 "--backend cpu",

@@ -75,6 +75,21 @@ where
     PossibleValuesParser::new(possible).try_map(|name| options::named(&name))
 }
 
+/// Latest moment of a scene that moves [s]: a day.
+const MAX_TIME_S: f64 = 86_400.0;
+
+/// A moment [s].
+pub fn time_s(text: &str) -> Result<f64, String> {
+    let time_s = text.parse().ok().filter(|time| (0.0..=MAX_TIME_S).contains(time));
+    time_s.ok_or_else(|| format!("give 0 to {MAX_TIME_S} seconds"))
+}
+
+/// Frames per second.
+pub fn fps(text: &str) -> Result<f64, String> {
+    let fps = text.parse().ok().filter(|fps| (0.01..=1000.0).contains(fps));
+    fps.ok_or_else(|| "give 0.01 to 1000 frames a second".to_string())
+}
+
 /// `auto` (none) or a number of stops, −64 to 64.
 pub fn exposure(text: &str) -> Result<Exposure, String> {
     if text == "auto" {

@@ -1,6 +1,6 @@
 //! Frames of a camera's way as pictures in a folder.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::picture::encode;
 use crate::error::{Error, Result};
@@ -27,12 +27,17 @@ impl FrameFolder {
         ))
     }
 
+    /// Where a frame, counted from 0 on, is written.
+    pub fn file(&self, frame: usize) -> PathBuf {
+        self.0.path().join(file_name(frame))
+    }
+
     /// Writes a frame, counted from 0 on: encoded RGBA, row 0 at the top.
     ///
     /// # Errors
     /// The file cannot be written.
     pub fn write(&self, frame: usize, (width, height): (u32, u32), rgba: Vec<u8>) -> Result<()> {
-        let file = self.0.path().join(file_name(frame));
+        let file = self.file(frame);
         let bytes = encode(width, height, rgba, &file.display().to_string())?;
         files::write_atomically(&file, |writer| writer.write_all(&bytes))
     }

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::sequence::FrameTimes;
 use crate::error::Warning;
 use crate::files::cache::ContentHash;
 use crate::illumination::{IlluminationMap, Side, UvSet};
@@ -59,6 +60,57 @@ pub struct Manifest {
     pub error: ErrorEstimate,
     /// One per surface that received flux.
     pub maps: Vec<MapEntry>,
+    /// The frames of a moving scene. What stands above is of the first of them.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sequence: Option<Sequence>,
+}
+
+/// Maps of a scene at several moments.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Sequence {
+    /// Frames per second.
+    pub fps: f64,
+    /// Whether the first frame follows the last.
+    pub is_loop: bool,
+    /// In the order of time.
+    pub frames: Vec<FrameEntry>,
+}
+
+impl Sequence {
+    /// The scene at the time of each frame.
+    pub fn scenes(&self, rest: &Scene) -> Vec<Scene> {
+        let times = FrameTimes {
+            frames: self.frames.len(),
+            fps: self.fps,
+            is_loop: self.is_loop,
+        };
+        let rest = times.scene(rest);
+        self.frames.iter().map(|frame| rest.at(frame.time_s)).collect()
+    }
+}
+
+/// One moment of a sequence.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FrameEntry {
+    /// Counted from 1.
+    pub frame: usize,
+    /// Since the scene began [s].
+    pub time_s: f64,
+    /// Of the scene at that moment.
+    pub geometry_hash: String,
+    /// Why its bake ended.
+    pub stop_reason: StopReason,
+    /// How exact it is.
+    pub error: ErrorEstimate,
+    /// Light rays of its caustic layer.
+    pub rays: u64,
+    /// Of its caustic layer, over all lights.
+    #[serde(skip_deserializing)]
+    pub energy_w: EnergyLedger,
+    /// CPU seconds of its bake.
+    pub cpu_s: f64,
+    /// One per surface that received flux.
+    pub maps: Vec<MapEntry>,
 }
 
 /// The scene that maps belong to.
@@ -89,7 +141,7 @@ pub struct LedgerEntry {
 }
 
 /// An estimate without a reference.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct ErrorEstimate {
     /// Of the whole bake; `None` where it was not estimated.
     pub estimated_relative_rmse: Option<f64>,
@@ -211,7 +263,15 @@ impl Manifest {
                 estimated_visible: result.estimated_visible,
             },
             maps,
+            sequence: None,
         }
+    }
+
+    /// Paths of all files of the maps, relative to the manifest.
+    pub fn files(&self) -> impl Iterator<Item = &str> {
+        let frames = self.sequence.iter().flat_map(|sequence| &sequence.frames);
+        let of_frames = frames.flat_map(|frame| &frame.maps);
+        self.maps.iter().chain(of_frames).flat_map(MapEntry::files)
     }
 }
 

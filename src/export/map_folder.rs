@@ -1,5 +1,6 @@
 //! A folder of maps: `maps/NNNN_slug.exr`, their generated coordinates, and the manifest, written last.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, BandChannel, LightChannels, Manifest, MapEntry};
@@ -51,23 +52,36 @@ impl MapFolder {
     /// # Errors
     /// A disk that is full, a place that cannot be written any more.
     pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &BakeResult) -> Result<Manifest> {
-        let mut entries = Vec::new();
-        for map in &result.maps {
-            entries.push(self.write_map(scene, settings, map, result)?);
-        }
-        let manifest = Manifest::new(scene, settings, result, entries);
+        let maps = self.write_maps(scene, settings, result, None)?;
+        self.finish(Manifest::new(scene, settings, result, maps))
+    }
+
+    /// Writes maps, those of a frame (counted from 1) into a folder for each map.
+    pub(super) fn write_maps(
+        &self,
+        scene: &Scene,
+        settings: &BakeSettings,
+        result: &BakeResult,
+        frame: Option<usize>,
+    ) -> Result<Vec<MapEntry>> {
+        let maps = result.maps.iter();
+        maps.map(|map| self.write_map(scene, settings, map, result, frame))
+            .collect()
+    }
+
+    /// Writes the manifest and removes what the previous bake had more.
+    pub(super) fn finish(self, manifest: Manifest) -> Result<Manifest> {
         let path = self.path().join(manifest::FILE_NAME);
         let json = files::to_json(&manifest, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;
-        let written: Vec<&str> = manifest.maps.iter().flat_map(MapEntry::files).collect();
-        for outdated in self
-            .previous
-            .iter()
-            .filter(|file| !written.contains(&file.as_str()))
-        {
-            files::remove_file(&self.path().join(outdated))?;
-        }
-        Ok(manifest)
+        let written: HashSet<&str> = manifest.files().collect();
+        let mut previous = self.previous.iter();
+        previous
+            .try_for_each(|file| match written.contains(file.as_str()) {
+                true => Ok(()),
+                false => files::remove_file(&self.path().join(file)),
+            })
+            .map(|()| manifest.clone())
     }
 
     fn write_map(
@@ -76,13 +90,17 @@ impl MapFolder {
         settings: &BakeSettings,
         map: &IlluminationMap,
         result: &BakeResult,
+        frame: Option<usize>,
     ) -> Result<MapEntry> {
-        let name = format!("{}.exr", stem(scene, map));
+        let stem = stem(scene, map);
+        let name = frame.map_or(format!("{stem}.exr"), |frame| format!("{stem}/{frame:04}.exr"));
         let path = self.maps.path().join(&name);
+        let folder = frame.map(|_| OutputFolder::open(&self.maps.path().join(&stem)));
+        let _folder = folder.transpose()?;
         let (parts, uv_path) = write_map(&path, scene, settings, map, result)?;
         let in_maps = |path: &Path| {
-            let name = path.file_name().unwrap_or_default();
-            format!("{MAPS}/{}", name.to_string_lossy())
+            let name = path.strip_prefix(self.path()).unwrap_or(path);
+            name.to_string_lossy().into_owned()
         };
         Ok(MapEntry::new(
             scene,
@@ -174,15 +192,18 @@ fn light_slug(scene: &Scene, light: usize) -> String {
     if is_alone { own } else { format!("{own}-{light}") }
 }
 
-/// Whether a path in a manifest is one that a bake writes: `maps/NAME` with nothing that leads elsewhere.
+/// Whether a path in a manifest is one that a bake writes: `maps/NAME`, or `maps/NAME/NAME` of a frame, with nothing that
+/// leads elsewhere.
 pub(super) fn is_map_file(file: &str) -> bool {
-    file.strip_prefix("maps/").is_some_and(|name| {
-        !name.is_empty()
-            && !name.starts_with('.')
-            && name
-                .bytes()
-                .all(|byte| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte))
-    })
+    let is_name = |name: &str| {
+        let mut bytes = name.bytes();
+        let is_plain = bytes.all(|byte| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte));
+        !name.is_empty() && !name.starts_with('.') && is_plain
+    };
+    let Some(within) = file.strip_prefix("maps/") else {
+        return false;
+    };
+    within.split('/').count() <= 2 && within.split('/').all(is_name)
 }
 
 #[cfg(test)]
@@ -207,7 +228,9 @@ mod tests {
             "maps/",
             "x.exr",
             "maps/.hidden",
-            "maps/a/b",
+            "maps/a/b/c",
+            "maps/a/../b",
+            "maps//b",
             "maps\\a",
         ] {
             assert!(!is_map_file(file), "{file}");

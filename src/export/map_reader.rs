@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use serde::Deserialize;
 
-use super::manifest::{self, LightChannels, MapEntry, SceneSummary};
+use super::manifest::{self, LightChannels, MapEntry, SceneSummary, Sequence};
 use super::map_folder::is_map_file;
 use super::{FloatImage, float_image, uv_file};
 use crate::error::{Error, Result, Warning};
@@ -24,6 +24,7 @@ struct StoredMaps {
     #[serde(default)]
     energy_w: StoredEnergy,
     maps: Vec<MapEntry>,
+    sequence: Option<Sequence>,
 }
 
 /// What the bake's light comes to.
@@ -78,6 +79,8 @@ pub struct MapReader<'a> {
     scene: &'a Scene,
     stored: StoredMaps,
     location: String,
+    /// Of a sequence, counted from 0.
+    frame: Option<usize>,
 }
 
 impl<'a> MapReader<'a> {
@@ -86,7 +89,38 @@ impl<'a> MapReader<'a> {
     /// # Errors
     /// No manifest, one of another format or scene.
     pub fn open(folder: &'a Path, scene: &'a Scene) -> Result<Self> {
-        let (stored, location) = read_manifest(folder)?;
+        Self::of(folder, scene, read_manifest(folder)?, None)
+    }
+
+    /// The maps of a frame of a sequence, counted from 0; `scene` is that at its time.
+    ///
+    /// # Errors
+    /// As [`Self::open`]; a frame that is not there.
+    pub fn open_frame(folder: &'a Path, scene: &'a Scene, frame: usize) -> Result<Self> {
+        let (mut stored, location) = read_manifest(folder)?;
+        let frames = || stored.sequence.iter().flat_map(|sequence| &sequence.frames);
+        let Some(found) = frames().find(|entry| entry.frame == frame + 1).cloned() else {
+            let what = format!(
+                "it has {} frames, and none is number {}",
+                frames().count(),
+                frame + 1
+            );
+            return Err(Error::failure(
+                &location,
+                what,
+                "bake so many frames, or name fewer",
+            ));
+        };
+        (stored.maps, stored.scene.geometry_hash) = (found.maps, found.geometry_hash);
+        Self::of(folder, scene, (stored, location), Some(frame))
+    }
+
+    fn of(
+        folder: &'a Path,
+        scene: &'a Scene,
+        (stored, location): (StoredMaps, String),
+        frame: Option<usize>,
+    ) -> Result<Self> {
         if stored.scene.geometry_hash != SceneSummary::of(scene).geometry_hash {
             return Err(Error::failure(
                 &location,
@@ -102,7 +136,18 @@ impl<'a> MapReader<'a> {
             scene,
             stored,
             location,
+            frame,
         })
+    }
+
+    /// Which frame of a sequence it reads, counted from 0.
+    pub fn frame(&self) -> Option<usize> {
+        self.frame
+    }
+
+    /// Frames per second of the sequence.
+    pub fn fps(&self) -> Option<f64> {
+        self.stored.sequence.as_ref().map(|sequence| sequence.fps)
     }
 
     /// The folder that the maps lie in.
@@ -254,7 +299,22 @@ impl<'a> MapReader<'a> {
 /// # Errors
 /// No manifest, one of another format or scene, files that are missing, damaged or do not fit the manifest.
 pub fn read(folder: &Path, scene: &Scene) -> Result<(Vec<IlluminationMap>, Vec<Warning>)> {
-    let reader = MapReader::open(folder, scene)?;
+    read_all(&MapReader::open(folder, scene)?)
+}
+
+/// Maps of a frame of a sequence, counted from 0, as [`read`].
+///
+/// # Errors
+/// As there; a frame that is not there.
+pub fn read_frame(
+    folder: &Path,
+    scene: &Scene,
+    frame: usize,
+) -> Result<(Vec<IlluminationMap>, Vec<Warning>)> {
+    read_all(&MapReader::open_frame(folder, scene, frame)?)
+}
+
+fn read_all(reader: &MapReader) -> Result<(Vec<IlluminationMap>, Vec<Warning>)> {
     let mut maps: Vec<IlluminationMap> = Vec::new();
     for entry in reader.entries() {
         let map = reader.read_with(entry, &[])?.map;
@@ -278,10 +338,20 @@ pub fn source_of(folder: &Path) -> Result<String> {
     read_manifest(folder).map(|(stored, _)| stored.scene.source)
 }
 
+/// The frames in a folder; `None` where it holds one moment.
+///
+/// # Errors
+/// As [`source_of`].
+pub fn sequence_of(folder: &Path) -> Result<Option<Sequence>> {
+    read_manifest(folder).map(|(stored, _)| stored.sequence)
+}
+
 /// Files of the maps in a folder, relative to it; `None` where none are.
 pub(super) fn files_of(folder: &Path) -> Option<Vec<String>> {
     let (stored, _) = read_manifest(folder).ok()?;
-    let files = stored.maps.iter().flat_map(MapEntry::files);
+    let frames = stored.sequence.iter().flat_map(|sequence| &sequence.frames);
+    let maps = stored.maps.iter().chain(frames.flat_map(|frame| &frame.maps));
+    let files = maps.flat_map(MapEntry::files);
     Some(
         files
             .filter(|file| is_map_file(file))

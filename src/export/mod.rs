@@ -10,6 +10,7 @@ pub mod map_reader;
 pub mod pfm;
 pub mod picture;
 mod quantity;
+pub mod sequence;
 pub mod shards;
 pub mod textures;
 pub mod uv_file;

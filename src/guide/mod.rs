@@ -6,6 +6,7 @@
 //! | [`scenes`] | built-in scenes, and what is read from glTF |
 //! | [`glass_and_lamps`] | materials, glass catalogue, metals, lights and their spectra |
 //! | [`surfaces`] | which surfaces get maps, layers, resolution, texture coordinates |
+//! | [`moving_scenes`] | running water and keyframes: live, baked, rendered |
 //! | [`formats`] | the folder of a bake, exported files, units |
 //! | [`engines`] | maps in three.js, Blender, Godot, Unity, Bevy and Unreal |
 //! | [`many_machines`] | one bake on many machines |
@@ -41,6 +42,9 @@ pub mod how_it_works {}
 
 #[doc = include_str!("many_machines.md")]
 pub mod many_machines {}
+
+#[doc = include_str!("moving_scenes.md")]
+pub mod moving_scenes {}
 
 #[doc = include_str!("scenes.md")]
 pub mod scenes {}

@@ -82,6 +82,7 @@ impl ItemBuffer {
         let builder = Builder {
             launch,
             tracer,
+            bounds: &bounds,
             boxes: boxes(true),
             wanted: &wanted,
             tests: AtomicU64::new(0),

@@ -76,6 +76,7 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> 
         decision.area_lights(pass.on),
         decision.direct(),
         decision.indirect(),
+        decision.motion(),
     ];
     EffectPlan {
         effects: std::iter::once(pass).chain(effects).collect(),
@@ -282,6 +283,16 @@ impl Decision<'_> {
                 None if switch == EffectSwitch::On => line(true, "switched on by the user"),
                 None => line(true, "the indirect layer is asked for"),
             },
+        }
+    }
+
+    fn motion(&self) -> EffectLine {
+        let effect = Effect::Motion;
+        match (self.settings.effects.get(effect), self.scene.why_animated()) {
+            (EffectSwitch::Off, _) => self.line(effect, false, SWITCHED_OFF),
+            (_, Some(why)) => self.line(effect, true, why),
+            (EffectSwitch::On, None) => self.line(effect, true, FORCED_ON),
+            (EffectSwitch::Auto, None) => self.line(effect, false, "nothing in the scene moves by itself"),
         }
     }
 

@@ -1,8 +1,9 @@
 //! Cameras.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::animation::turned;
 use crate::geometry::Frustum;
 
 /// Full vertical angle of view of a camera that frames a scene [rad].
@@ -64,6 +65,15 @@ impl Camera {
         let distance_m = radius_m / half_height.min(half_width).sin();
         let backward = DVec3::new(-0.5, 0.55, 0.67).normalize();
         Self::look_at(name, centre + backward * distance_m, centre, FRAMING_FOV_RAD)
+    }
+
+    /// Moves and turns it; its axes stay perpendicular.
+    pub(super) fn carry(&mut self, carrying: &DAffine3) {
+        self.position = carrying.transform_point3(self.position);
+        let [forward, up] = [self.forward, self.up].map(|axis| turned(axis, carrying));
+        if let Some(right) = forward.cross(up).try_normalize() {
+            (self.forward, self.up) = (forward, right.cross(forward));
+        }
     }
 
     /// Unit, to the right of the picture.

@@ -126,8 +126,17 @@ pub struct Places<'a> {
 impl<'a> Places<'a> {
     /// Of a light of a scene.
     pub fn new(light: &'a Light, scene: &'a Scene) -> Self {
+        Self::chosen_by(light, scene, weight)
+    }
+
+    /// The same, where parts of a surface that an image leaves dark are chosen as often as bright ones.
+    pub fn spread_evenly(light: &'a Light, scene: &'a Scene) -> Self {
+        Self::chosen_by(light, scene, |_, _| 1.0)
+    }
+
+    fn chosen_by(light: &'a Light, scene: &'a Scene, weight: fn(&Glow, usize) -> f64) -> Self {
         let surface = match light.kind {
-            LightKind::Surface { object, .. } => Glowing::new(scene, object),
+            LightKind::Surface { object, .. } => Glowing::new(scene, object, weight),
             _ => None,
         };
         Self {
@@ -154,9 +163,20 @@ impl<'a> Places<'a> {
         }
     }
 
-    /// Area of all glowing sides of an object [m²]; 0 of other lights.
-    pub fn surface_m2(&self) -> f64 {
-        self.surface.as_ref().map_or(0.0, Glowing::area_m2)
+    /// Area of all sides of an object that glow, or of a panel [m²]; 0 of other lights.
+    pub fn area_m2(&self) -> f64 {
+        match self.light.kind {
+            LightKind::Panel {
+                across, down, shape, ..
+            } => {
+                let outline = match shape {
+                    PanelShape::Rectangle => 4.0,
+                    PanelShape::Disc => std::f64::consts::PI,
+                };
+                across.cross(down).length() * outline
+            }
+            _ => self.surface.as_ref().map_or(0.0, Glowing::area_m2),
+        }
     }
 
     fn at(&self, square: Option<DVec2>) -> Option<Emitter> {
@@ -229,12 +249,7 @@ impl<'a> Places<'a> {
                     (PanelShape::Disc, Some(square)) => on_disc(square),
                 };
                 let position = centre + across * place.x + down * place.y;
-                let area_m2 = across.cross(down).length()
-                    * match shape {
-                        PanelShape::Rectangle => 4.0,
-                        PanelShape::Disc => std::f64::consts::PI,
-                    };
-                Some(whole(EmitterKind::Facet { position, normal }, area_m2))
+                Some(whole(EmitterKind::Facet { position, normal }, self.area_m2()))
             }
             (LightKind::Surface { .. }, _, square) => {
                 let surface = self.surface.as_ref()?;
@@ -306,6 +321,8 @@ struct Glowing<'a> {
     upto_m2: Vec<f64>,
     /// Of an image: the scene with its object, and the area of the object [m²].
     image: Option<(&'a Scene, usize, f64)>,
+    /// How often a triangle is chosen for its area.
+    weight: fn(&Glow, usize) -> f64,
 }
 
 /// How often a triangle is chosen for its area: dark ones too, whose image may have been overlooked.
@@ -316,7 +333,7 @@ fn weight(glow: &Glow, triangle: usize) -> f64 {
 
 impl<'a> Glowing<'a> {
     /// `None` where it has no area.
-    fn new(scene: &'a Scene, object: usize) -> Option<Self> {
+    fn new(scene: &'a Scene, object: usize, weight: fn(&Glow, usize) -> f64) -> Option<Self> {
         let mesh = scene.objects.get(object)?.in_scene();
         let glow = scene.glows.get(&object);
         let mut sum_m2 = 0.0;
@@ -332,6 +349,7 @@ impl<'a> Glowing<'a> {
             both_sides: scene.material_of(object).double_sided,
             upto_m2,
             image: glow.map(|_| (scene, object, mesh.area_m2())),
+            weight,
         })
     }
 
@@ -371,7 +389,7 @@ impl<'a> Glowing<'a> {
         let normal = self.mesh.face_normal(triangle) * side;
         let position = ray::offset_origin(point, error, normal, normal);
         let brightness = self.image.map(|(scene, object, area_m2)| {
-            let chosen = weight(&scene.glows[&object], triangle) * area_m2 / self.total_m2();
+            let chosen = (self.weight)(&scene.glows[&object], triangle) * area_m2 / self.total_m2();
             scene.glow_at(object, triangle, barycentric) / chosen
         });
         Some((EmitterKind::Facet { position, normal }, brightness))

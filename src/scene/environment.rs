@@ -1,5 +1,6 @@
 //! Light from all around: an equirectangular image of radiance.
 
+mod clear_sky;
 mod file;
 
 use std::f64::consts::{PI, TAU};
@@ -8,6 +9,7 @@ use glam::{DVec2, DVec3};
 
 use crate::optics::LinearSrgb;
 
+pub use clear_sky::clear_sky;
 pub use file::read;
 
 /// Radiance from infinitely far, over all directions. Column 0 begins at −z and columns go on over +x (the middle of the
@@ -222,6 +224,25 @@ mod tests {
         for (mean, expected) in mean.to_array().into_iter().zip(expected.to_array()) {
             assert!((mean / expected - 1.0).abs() < 2e-3, "{mean} for {expected}");
         }
+    }
+
+    #[test]
+    fn a_clear_sky_sends_what_it_is_asked_to() {
+        let to_sun = DVec3::new(0.3, 0.8, -0.5).normalize();
+        let Some(sky) = clear_sky(to_sun, 6.0, 1.0) else {
+            panic!("it shines");
+        };
+        let count = 1 << 16;
+        let samples = (0..count).filter_map(|index| sky.sample(even_point(index, 0, 3)));
+        let received = samples.map(|sample| sample.irradiance.luminance() * sample.to_light.y.max(0.0));
+        let mean = received.sum::<f64>() / f64::from(count);
+        assert!((mean - 1.0).abs() < 2e-3, "{mean}");
+        let [sun, away] =
+            [to_sun, to_sun * DVec3::new(-1.0, 1.0, -1.0)].map(|at| sky.radiance(at).luminance());
+        assert!(sun > 4.0 * away, "{sun} {away}");
+        let ground = sky.radiance(DVec3::NEG_Y).luminance();
+        let expected = 0.2 / PI * (6.0 * to_sun.y + 1.0);
+        assert!((ground / expected - 1.0).abs() < 1e-6, "{ground} {expected}");
     }
 
     #[test]

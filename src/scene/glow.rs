@@ -1,6 +1,7 @@
 //! What an object that glows by an image sends from each of its triangles.
 
 use glam::DVec2;
+use rayon::prelude::*;
 
 use super::texture::{Texture, TextureRef};
 use super::{InScene, Scene};
@@ -8,6 +9,9 @@ use crate::optics::LinearSrgb;
 
 /// Steps along an edge of a triangle in which its image is looked at.
 const STEPS: (f64, f64) = (4.0, 64.0);
+
+/// Looks that a mesh of many triangles takes, about: they say which triangle is bright, not how a place of it looks.
+const LOOKS: f64 = 1e6;
 
 /// Brightness of an object over the mean of its image.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,20 +25,23 @@ pub struct Glow {
 impl Glow {
     /// Of a mesh with an image; `None` where it is black or has no coordinates.
     pub fn new(mesh: InScene, image: &TextureRef, texture: &Texture) -> Option<Self> {
+        let most_steps = (LOOKS / mesh.triangle_count() as f64)
+            .sqrt()
+            .clamp(STEPS.0, STEPS.1);
+        let triangles = (0..mesh.triangle_count()).into_par_iter();
+        let means = triangles.map(|triangle| triangle_mean(mesh, (image, texture), triangle, most_steps));
+        let means: Vec<LinearSrgb> = means.collect::<Option<_>>()?;
         let (mut sum, mut area_m2) = (LinearSrgb::BLACK, 0.0);
-        let mut luminances = Vec::with_capacity(mesh.triangle_count());
-        for triangle in 0..mesh.triangle_count() {
-            let mean = triangle_mean(mesh, image, texture, triangle)?;
+        for (triangle, mean) in means.iter().enumerate() {
             let triangle_m2 = mesh.triangle_area_m2(triangle);
-            sum += mean * triangle_m2;
+            sum += *mean * triangle_m2;
             area_m2 += triangle_m2;
-            luminances.push(mean.luminance());
         }
         let mean = sum / area_m2;
         let luminance = mean.luminance();
         (luminance > 0.0).then(|| Self {
             mean,
-            by_triangle: luminances.into_iter().map(|of| of / luminance).collect(),
+            by_triangle: means.iter().map(|mean| mean.luminance() / luminance).collect(),
         })
     }
 
@@ -44,18 +51,18 @@ impl Glow {
     }
 }
 
-/// Mean of an image over a triangle, at places as close as its texels.
+/// Mean of an image over a triangle, at places as close as its texels or in so many steps.
 fn triangle_mean(
     mesh: InScene,
-    image: &TextureRef,
-    texture: &Texture,
+    (image, texture): (&TextureRef, &Texture),
     triangle: usize,
+    most_steps: f64,
 ) -> Option<LinearSrgb> {
     let at = |barycentric| image.place(mesh, triangle, barycentric);
     let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
     let [a, b, c] = [at([1.0, 0.0, 0.0])?, at([0.0, 1.0, 0.0])?, at([0.0, 0.0, 1.0])?].map(|uv| uv * size);
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-    let steps = longest.clamp(STEPS.0, STEPS.1) as u32;
+    let steps = longest.clamp(STEPS.0, most_steps) as u32;
     let mut sum = LinearSrgb::BLACK;
     for row in 0..steps {
         for column in 0..steps {

@@ -2,9 +2,10 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::animation::turned;
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::Spectrum;
 use crate::units::{Irradiance, Radiance, RadiantIntensity};
@@ -212,11 +213,28 @@ impl LightKind {
     }
 
     /// The same light moved by `offset` [m].
-    pub fn moved(mut self, offset: DVec3) -> Self {
+    pub fn moved(self, offset: DVec3) -> Self {
+        self.carried(&DAffine3::from_translation(offset))
+    }
+
+    /// The same light, moved and turned; panels are scaled too.
+    pub fn carried(mut self, carrying: &DAffine3) -> Self {
         match &mut self {
-            Self::Point { position, .. } | Self::Spot { position, .. } => *position += offset,
-            Self::Panel { centre, .. } => *centre += offset,
-            Self::Sun { .. } | Self::Surface { .. } | Self::Environment { .. } => {}
+            Self::Point { position, .. } => *position = carrying.transform_point3(*position),
+            Self::Spot {
+                position, direction, ..
+            } => {
+                *position = carrying.transform_point3(*position);
+                *direction = turned(*direction, carrying);
+            }
+            Self::Sun { direction, .. } => *direction = turned(*direction, carrying),
+            Self::Panel {
+                centre, across, down, ..
+            } => {
+                *centre = carrying.transform_point3(*centre);
+                [*across, *down] = [*across, *down].map(|axis| carrying.transform_vector3(axis));
+            }
+            Self::Surface { .. } | Self::Environment { .. } => {}
         }
         self
     }

@@ -14,7 +14,7 @@ use crate::units::Irradiance;
 pub struct LoadOptions {
     /// Reads transmitting surfaces without a volume as solid glass where their mesh encloses space.
     pub solid_glass: bool,
-    /// Adds a sun to a scene that has no light, with a warning.
+    /// Adds a sun and a clear sky to a scene that has no light, with a warning.
     pub default_light: bool,
     /// An equirectangular image of radiance, .hdr or .exr, that lies around the scene and lights it.
     pub environment: Option<PathBuf>,
@@ -137,31 +137,69 @@ fn add_environment(scene: &mut Scene, path: &Path, memory_limit_bytes: u64) -> R
     Ok(())
 }
 
-/// A grey floor then sends a radiance of about 0.5 W/(m² sr): neither dark nor overexposed at exposure 0.
+/// Under both a grey floor sends a radiance of about 0.5 W/(m² sr): neither dark nor overexposed at exposure 0.
 const DEFAULT_SUN: Irradiance = Irradiance(4.0);
+/// From the sky on level ground: a sixth of the sun's, as on a clear day.
+const DEFAULT_SKY: Irradiance = Irradiance(DEFAULT_SUN.0 / 6.0);
 
 /// Name of the sun of scenes without light.
 const DEFAULT_SUN_NAME: &str = "default sun";
+
+/// Images beside a scene that are named to light it.
+const MAX_BESIDE: usize = 3;
 
 /// Whether a scene, as it was loaded, had no light of its own and was given a sun.
 pub fn was_dark(loaded: &Scene) -> bool {
     loaded.lights.iter().any(|light| light.name == DEFAULT_SUN_NAME)
 }
 
+/// A sun and, unless something lies around the scene already, a clear sky.
 fn add_default_light(scene: &mut Scene) {
-    scene.lights.push(Light::new(
-        DEFAULT_SUN_NAME,
-        LightKind::Sun {
-            direction: DVec3::new(0.4, -0.8, -0.45).normalize(),
-            normal_irradiance: DEFAULT_SUN,
-        },
-    ));
+    let direction = DVec3::new(0.4, -0.8, -0.45).normalize();
+    let normal_irradiance = DEFAULT_SUN;
+    let sun = LightKind::Sun {
+        direction,
+        normal_irradiance,
+    };
+    scene.lights.push(Light::new(DEFAULT_SUN_NAME, sun));
+    let mut added = format!(
+        "a sun of {} W/m² was added, called `{DEFAULT_SUN_NAME}`",
+        DEFAULT_SUN.0
+    );
+    if scene.environment.is_none() {
+        let sky = environment::clear_sky(-direction, DEFAULT_SUN.0, DEFAULT_SKY.0);
+        scene.environment = sky.map(Arc::new);
+        let sky = LightKind::Environment { scale: 1.0 };
+        scene.lights.push(Light::new("default sky", sky));
+        added += ", and a clear sky, called `default sky`";
+    }
     scene.warnings.push(Warning::new(
         scene.source.clone(),
-        format!(
-            "the scene has no light, so a sun of {} W/m² was added, called `{DEFAULT_SUN_NAME}`",
-            DEFAULT_SUN.0
-        ),
-        "add a light to the scene to choose your own",
+        format!("the scene has no light, so {added}"),
+        match &skies_beside(&scene.source)[..] {
+            [] => "add a light to the scene, or surround it by an image with --environment".to_owned(),
+            skies => format!("light it by an image that lies beside it: {}", skies.join(" or ")),
+        },
     ));
+}
+
+/// How to surround a scene by the images that lie beside its file.
+pub fn skies_beside(source: &str) -> Vec<String> {
+    let folder = Path::new(source)
+        .parent()
+        .filter(|_| !source.starts_with("builtin:"));
+    let folder = folder.map(|folder| folder.join("."));
+    let entries = folder.and_then(|folder| folder.read_dir().ok());
+    let paths = entries.into_iter().flatten().flatten().map(|entry| entry.path());
+    let is_sky = |path: &PathBuf| {
+        path.extension()
+            .is_some_and(|extension| extension.eq_ignore_ascii_case("hdr"))
+    };
+    let mut skies: Vec<PathBuf> = paths.filter(is_sky).collect();
+    skies.sort();
+    let named = skies.iter().take(MAX_BESIDE).filter_map(|path| {
+        let path = Path::new(source).with_file_name(path.file_name()?);
+        Some(format!("--environment {}", path.display()))
+    });
+    named.collect()
 }

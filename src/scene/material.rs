@@ -15,7 +15,9 @@ use crate::optics::{Glass, LinearSrgb, Metal, Nanometres};
 pub const SPECULAR_ROUGHNESS_LIMIT: f64 = 0.3;
 
 /// Roughness up to which metals send light on in a lobe; above it they are pure Lambert. What lets light through does so
-/// at any roughness.
+/// at any roughness. The lobe is as wide as Lambert's there: of light from 0, 30, 60 and 75° to the normal, 15, 29, 44
+/// and 46 % goes another way than by Lambert's, and for no roughness less than 11, 23, 31 and 32 %. Pictures would err
+/// more, since the eye looks at metals as at mirrors.
 pub const METAL_ROUGHNESS_LIMIT: f64 = 0.6;
 
 /// Up to this roughness a surface is as good as smooth: its lobe is some hundredths of a degree wide.
@@ -130,12 +132,14 @@ impl Material {
         self.normal_map.as_ref().filter(|_| self.surface.is_specular())
     }
 
-    /// The image whose texture coordinates all of its images follow.
-    pub fn coordinates(&self) -> Option<&TextureRef> {
-        let normals = self.bending_map().map(|map| &map.image);
-        let variation = self.variation.as_ref().map(|variation| &variation.image);
-        let surface = self.base_colour_texture.as_ref().or(variation);
-        surface.or(self.emission_texture.as_ref()).or(normals)
+    /// Its images: of base colour, of factors, of what it emits, and of normals where those are bent.
+    pub fn images(&self) -> [Option<&TextureRef>; 4] {
+        [
+            self.base_colour_texture.as_ref(),
+            self.variation.as_ref().map(|variation| &variation.image),
+            self.emission_texture.as_ref(),
+            self.bending_map().map(|map| &map.image),
+        ]
     }
 
     /// Whether anything bends its normals.
@@ -153,11 +157,8 @@ impl Material {
 
     /// Whether it is the surface of a solid in which light goes another way at another wavelength.
     pub fn is_dispersive(&self) -> bool {
-        self.surface == SurfaceKind::Dielectric
-            && self
-                .glass
-                .as_ref()
-                .is_some_and(|glass| glass.dispersion.is_dispersive())
+        let glass = self.glass.as_ref();
+        self.is_solid() && glass.is_some_and(|glass| glass.dispersion.is_dispersive())
     }
 
     /// Makes it of a glass, with that one's index at 587.56 nm; what else it has stays.

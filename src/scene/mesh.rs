@@ -2,6 +2,8 @@
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
 
+use crate::optics::LinearSrgb;
+
 /// A normal of a length that differs from 1 by no more is unit, squared [1].
 const UNIT: f64 = 4.0 * f64::EPSILON;
 
@@ -18,6 +20,8 @@ pub struct Mesh {
     pub uv0: Option<Vec<DVec2>>,
     /// TEXCOORD_1, one per position.
     pub uv1: Option<Vec<DVec2>>,
+    /// COLOR_0 in linear light, one per position, where it varies: multiplies the base colour.
+    pub colours: Option<Vec<[f32; 3]>>,
     /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
 }
@@ -41,6 +45,11 @@ impl Mesh {
             self.normals[b as usize],
             self.normals[c as usize],
         ]
+    }
+
+    /// What the base colour is multiplied by at a place of a triangle: white without colours.
+    pub fn colour(&self, triangle: usize, barycentric: [f64; 3]) -> LinearSrgb {
+        InScene::from(self).colour(triangle, barycentric)
     }
 
     /// Unit normal of a triangle by its winding; zero for a degenerate one.
@@ -154,6 +163,7 @@ impl Placement {
             normals: Vec::new(),
             uv0: mesh.uv0.clone(),
             uv1: mesh.uv1.clone(),
+            colours: mesh.colours.clone(),
             triangles: mesh
                 .triangles
                 .iter()
@@ -277,6 +287,18 @@ impl<'a> InScene<'a> {
     pub fn uvs(&self, set: usize) -> Option<&'a [DVec2]> {
         let uvs = if set == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
         uvs.as_deref()
+    }
+
+    /// What the base colour is multiplied by at a place of a triangle: white without colours.
+    pub fn colour(&self, triangle: usize, barycentric: [f64; 3]) -> LinearSrgb {
+        let Some(colours) = &self.mesh.colours else {
+            return LinearSrgb::WHITE;
+        };
+        let corners = self.triangle(triangle).into_iter().zip(barycentric);
+        let colour = corners.fold(LinearSrgb::BLACK, |sum, (vertex, weight)| {
+            sum + LinearSrgb::from(colours[vertex as usize].map(f64::from)) * weight
+        });
+        colour.map(|channel| channel.clamp(0.0, 1.0))
     }
 }
 

@@ -12,6 +12,7 @@ use crate::files::cache::ContentHash;
 use crate::optics::LinearSrgb;
 
 pub mod adjacency;
+mod animation;
 pub mod builtin;
 pub mod camera;
 pub mod camera_path;
@@ -36,6 +37,7 @@ pub mod turntable;
 pub mod waves;
 
 pub use adjacency::Adjacency;
+pub use animation::{Animated, Clip, ClipNode, Interpolation, Track};
 pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
 pub use edit::{Edit, EditState, LightEdit, MaterialEdit, why_light_stays};
@@ -71,6 +73,10 @@ pub struct Scene {
     pub textures: Vec<Arc<Texture>>,
     /// Of objects whose emission has an image.
     pub glows: BTreeMap<usize, Arc<Glow>>,
+    /// Of objects whose vertices the waves of their material lift: the mesh of the still surface.
+    pub swells: BTreeMap<usize, Arc<Mesh>>,
+    /// What moves objects, lights and cameras.
+    pub clip: Option<Arc<Clip>>,
     /// Lights with some power.
     pub lights: Vec<Light>,
     /// Which of them were there when the scene was loaded.
@@ -189,6 +195,9 @@ impl Scene {
             textures,
             // As materials, images and meshes have it.
             glows: _,
+            // As meshes and waves have it.
+            swells: _,
+            clip: _,
             lights,
             light_list: _,
             environment,

@@ -55,6 +55,14 @@ impl fmt::Debug for Found {
     }
 }
 
+impl Shape {
+    fn settle(&mut self) {
+        let is_moved = self.world_from_object != DAffine3::IDENTITY;
+        self.placement = is_moved.then(|| Placement::new(self.world_from_object));
+        self.found = Arc::default();
+    }
+}
+
 /// How a node was moved since it was loaded: turned about the middle of its box, and then moved.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
@@ -214,9 +222,19 @@ impl Object {
             return;
         }
         shape.world_from_object = world_from_object;
-        let is_moved = world_from_object != DAffine3::IDENTITY;
-        shape.placement = is_moved.then(|| Placement::new(world_from_object));
-        shape.found = Arc::default();
+        shape.settle();
+    }
+
+    /// Moves it on from where it is now.
+    pub(super) fn carry(&mut self, carrying: &DAffine3) {
+        self.shape.world_from_object = *carrying * self.shape.world_from_object;
+        self.shape.settle();
+    }
+
+    /// Gives it another mesh at the same place.
+    pub(super) fn reshape(&mut self, mesh: Arc<Mesh>) {
+        self.shape.mesh = mesh;
+        self.shape.settle();
     }
 
     /// Takes over mesh and place of an object that looks the same, so that who knows that one does nothing anew.

@@ -29,6 +29,8 @@ pub struct Texture {
     pub rgba: Vec<[u8; 4]>,
     /// Across and down.
     pub wrap: [Wrap; 2],
+    /// Whether a place has the colour of its nearest texel, and not one between four; slopes of normals are always between.
+    pub is_nearest: bool,
 }
 
 /// A texture and how a material looks it up.
@@ -43,25 +45,28 @@ pub struct TextureRef {
 }
 
 impl Texture {
-    /// Bilinear look-up in linear light at a texture coordinate.
+    /// Look-up in linear light at a texture coordinate.
     pub fn sample(&self, uv: DVec2) -> LinearSrgb {
-        let x = uv.x * f64::from(self.width) - 0.5;
-        let y = uv.y * f64::from(self.height) - 0.5;
-        let (x0, y0) = (x.floor(), y.floor());
-        let (fx, fy) = (x - x0, y - y0);
-        let row = |dy: f64| self.texel(x0, y0 + dy) * (1.0 - fx) + self.texel(x0 + 1.0, y0 + dy) * fx;
-        row(0.0) * (1.0 - fy) + row(1.0) * fy
+        let (low, share) = self.between(uv);
+        let at = |dx: f64, dy: f64| self.texel(low.x + dx, low.y + dy);
+        let row = |dy: f64| at(0.0, dy) * (1.0 - share.x) + at(1.0, dy) * share.x;
+        row(0.0) * (1.0 - share.y) + row(1.0) * share.y
     }
 
-    /// Bilinear look-up of alpha, [0, 1], at a texture coordinate.
+    /// Look-up of alpha, [0, 1], at a texture coordinate.
     pub fn alpha(&self, uv: DVec2) -> f64 {
-        let x = uv.x * f64::from(self.width) - 0.5;
-        let y = uv.y * f64::from(self.height) - 0.5;
-        let (x0, y0) = (x.floor(), y.floor());
-        let (fx, fy) = (x - x0, y - y0);
-        let at = |dx: f64, dy: f64| f64::from(self.code(x0 + dx, y0 + dy)[3]) / 255.0;
-        let row = |dy: f64| at(0.0, dy) * (1.0 - fx) + at(1.0, dy) * fx;
-        row(0.0) * (1.0 - fy) + row(1.0) * fy
+        let (low, share) = self.between(uv);
+        let at = |dx: f64, dy: f64| f64::from(self.code(low.x + dx, low.y + dy)[3]) / 255.0;
+        let row = |dy: f64| at(0.0, dy) * (1.0 - share.x) + at(1.0, dy) * share.x;
+        row(0.0) * (1.0 - share.y) + row(1.0) * share.y
+    }
+
+    /// The texel below a place on both axes, and how far the place lies towards the next ones, [0, 1].
+    fn between(&self, uv: DVec2) -> (DVec2, DVec2) {
+        let place = uv * DVec2::new(f64::from(self.width), f64::from(self.height)) - 0.5;
+        let low = place.floor();
+        let share = place - low;
+        (low, if self.is_nearest { share.round() } else { share })
     }
 
     /// The texel of a column and a row, whole numbers that may lie anywhere.
@@ -116,6 +121,8 @@ impl Scene {
 fn wrap_index(coordinate: f64, size: u32, wrap: Wrap) -> usize {
     let size_f = f64::from(size);
     let index = match wrap {
+        // As each of them has it, without a division.
+        _ if (0.0..size_f).contains(&coordinate) => coordinate,
         Wrap::ClampToEdge => coordinate.clamp(0.0, size_f - 1.0),
         Wrap::Repeat => coordinate.rem_euclid(size_f),
         Wrap::MirroredRepeat => {

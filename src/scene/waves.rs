@@ -1,9 +1,11 @@
-//! Overlapping waves on a surface, by its normals alone: a height h(P) = Σ A·cos(K·P + φ) that bends the normal as a
-//! surface of that height would, while the surface itself stays where it is.
+//! Overlapping waves on a surface: a height h(P, t) = Σ A·cos(K·P + φ − 2πt/T) that bends the normal as a surface of that
+//! height would. The surface itself stays where it is, unless the scene [lifts](super::Scene::swells) its vertices too.
 //!
 //! Waves are a solid texture in the scene's coordinates: K is a vector in space, and each surface takes the part of
 //! ∇h along itself. They are smooth over any mesh, need no texture coordinates, and go on across its triangles. An
 //! object that is moved moves through them.
+
+use std::f64::consts::TAU;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -14,6 +16,9 @@ pub const MAX_WAVES: usize = 8;
 /// Largest sum of the waves' slopes A·2π/λ [1]: steeper normals would send much of the light through the surface that
 /// is not bent.
 pub const STEEPEST_SLOPE: f64 = 1.0;
+
+/// Acceleration of gravity [m/s²].
+const GRAVITY_M_PER_S2: f64 = 9.80665;
 
 /// One wave.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -26,9 +31,25 @@ pub struct Wave {
     pub direction: DVec3,
     /// φ [rad].
     pub phase_rad: f64,
+    /// T [s]: crests move along the direction by one wavelength in this time; 0 where they stand still.
+    #[serde(default)]
+    pub period_s: f64,
 }
 
 impl Wave {
+    /// A wave of height A·cos(kx·x + kz·z + φ) [m] that gravity moves over water of so many metres.
+    pub fn on_water(amplitude_m: f64, [kx, kz]: [f64; 2], phase_rad: f64, depth_m: f64) -> Self {
+        let vector = DVec3::new(kx, 0.0, kz);
+        let wavelength_m = TAU / vector.length();
+        Self {
+            amplitude_m,
+            wavelength_m,
+            direction: vector.normalize(),
+            phase_rad,
+            period_s: gravity_period_s(wavelength_m, depth_m),
+        }
+    }
+
     /// K = 2π/λ along the direction [rad/m].
     pub fn wave_vector(&self) -> DVec3 {
         self.direction * self.wave_number()
@@ -36,7 +57,7 @@ impl Wave {
 
     /// 2π/λ [rad/m].
     pub fn wave_number(&self) -> f64 {
-        std::f64::consts::TAU / self.wavelength_m
+        TAU / self.wavelength_m
     }
 
     /// Steepest slope A·2π/λ [1].
@@ -51,6 +72,8 @@ impl Wave {
             && self.wavelength_m > 0.0
             && self.wave_number().is_finite()
             && self.phase_rad.is_finite()
+            && self.period_s >= 0.0
+            && self.period_s.is_finite()
             && is_unit
     }
 }
@@ -134,12 +157,39 @@ impl Waves {
         self.waves.iter().map(change).sum()
     }
 
+    /// Whether any of them moves.
+    pub fn is_moving(&self) -> bool {
+        self.waves
+            .iter()
+            .any(|wave| wave.period_s > 0.0 && wave.amplitude_m > 0.0)
+    }
+
+    /// The waves after so much time [s], as if they had begun there.
+    #[must_use]
+    pub fn after(&self, time_s: f64) -> Self {
+        let mut moved = self.clone();
+        for wave in moved.waves.iter_mut().filter(|wave| wave.period_s > 0.0) {
+            wave.phase_rad -= TAU * (time_s / wave.period_s).fract();
+        }
+        moved
+    }
+
+    /// The waves with periods that fit so much time [s] a whole number of times, at least once each.
+    #[must_use]
+    pub fn looped(&self, duration_s: f64) -> Self {
+        let mut fitted = self.clone();
+        for wave in fitted.waves.iter_mut().filter(|wave| wave.period_s > 0.0) {
+            wave.period_s = duration_s / (duration_s / wave.period_s).round().max(1.0);
+        }
+        fitted
+    }
+
     /// The same waves for coordinates whose origin was moved to `origin` [m].
     #[must_use]
     pub fn with_origin(&self, origin: DVec3) -> Self {
         let mut moved = self.clone();
         for wave in &mut moved.waves {
-            wave.phase_rad = wave_phase(wave, origin).rem_euclid(std::f64::consts::TAU);
+            wave.phase_rad = wave_phase(wave, origin).rem_euclid(TAU);
         }
         moved
     }
@@ -148,4 +198,10 @@ impl Waves {
 /// K·P + φ [rad].
 fn wave_phase(wave: &Wave, point: DVec3) -> f64 {
     wave.wave_vector().dot(point) + wave.phase_rad
+}
+
+/// Period [s] of waves under gravity, ω² = g·k·tanh(k·h) (Lamb, *Hydrodynamics*, art. 228), over water of the depth h [m].
+pub fn gravity_period_s(wavelength_m: f64, depth_m: f64) -> f64 {
+    let wave_number = TAU / wavelength_m;
+    TAU / (GRAVITY_M_PER_S2 * wave_number * (wave_number * depth_m).tanh()).sqrt()
 }

@@ -1,17 +1,17 @@
-//! What a bake would take, before it: a short pilot bake of each preset, and what its course says.
+//! What a bake would take, before it: the first moments of one, and what its course says.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::forecast::{Forecast, forecast};
-use super::{BakeEstimate, BakeResult, BakeSession, StopReason, Timings};
+use super::{BakeEstimate, BakeResult, BakeSession};
 use crate::error::Result;
 use crate::plan::Effect;
-use crate::progress::Control;
+use crate::progress::{Control, Progress, Stage};
 use crate::settings::{BakeSettings, Preset};
 
-/// A pilot's light pass ends after so long [s]; the later ones go on where those before ended, where no error is known
-/// by then.
-const PILOTS_S: [f64; 3] = [0.5, 3.0, 9.0];
+/// A pilot ends after so long once something is known of its error, and else [s].
+const PILOT_S: (f64, f64) = (0.6, 1.2);
 
 /// Density of a pilot of splats [rays/sr].
 const PILOT_DENSITY_PER_SR: f64 = 10_000.0;
@@ -42,7 +42,7 @@ pub struct Survey {
 }
 
 impl BakeSession {
-    /// Finds out what a bake would take: draft, preview and final in turn, everything else as the settings say.
+    /// Finds out what a bake would take: draft, preview and final, everything else as the settings say.
     ///
     /// # Errors
     /// As [`Self::bake`].
@@ -50,78 +50,79 @@ impl BakeSession {
         let began = Instant::now();
         let estimate = self.estimate(settings)?;
         let is_on = estimate.plan.is_on(Effect::LightPass);
-        let mut pilots = Vec::new();
-        for preset in Preset::ALL {
-            if pilots.is_empty() || is_on && settings.estimator.refines() {
-                pilots.push(self.pilot(&pilot_settings(settings, preset), control)?);
-            }
-        }
-        let of_preset = |(index, preset): (usize, Preset)| {
-            let pilot = &pilots[index.min(pilots.len() - 1)];
-            PresetForecast {
-                preset,
-                forecast: match settings.estimator {
-                    _ if !is_on => Some(nothing(preset)),
-                    _ if settings.estimator.refines() => {
-                        forecast(&pilot.course, preset.max_error(), settings.estimator)
-                    }
-                    _ => splat_forecast(pilot, preset),
-                },
+        let watch = PilotWatch {
+            began: Instant::now(),
+            is_known: AtomicBool::new(false),
+            control,
+            own: Control::default(),
+        };
+        let pilot = self.bake(&pilot_settings(settings), &watch, &watch.own)?;
+        let within_memory = |forecast: Forecast| {
+            let held = pilot.course.last().map_or(0, |last| last.bytes);
+            Forecast {
+                // What is kept beside the maps is dropped where memory ends.
+                bytes: forecast.bytes.min(settings.memory_bytes.max(held)),
+                ..forecast
             }
         };
-        let presets = Preset::ALL.into_iter().enumerate().map(of_preset).collect();
-        let pilot = pilots.swap_remove(pilots.len() / 2);
+        let of_preset = |preset: Preset| PresetForecast {
+            preset,
+            forecast: match settings.estimator {
+                _ if !is_on => Some(nothing(preset)),
+                estimator if estimator.refines() => {
+                    forecast(&pilot.course, preset.max_error(), estimator).map(within_memory)
+                }
+                _ => splat_forecast(&pilot, preset),
+            },
+        };
+        let presets = Preset::ALL.into_iter().map(of_preset).collect();
         Ok(Survey {
             estimate,
-            pilot,
             presets,
             seconds: began.elapsed().as_secs_f64(),
+            pilot,
         })
     }
+}
 
-    /// The first moments of a bake: until something is known of its error, or the last limit is reached.
-    fn pilot(&mut self, settings: &BakeSettings, control: &Control) -> Result<BakeResult> {
-        let within = |limit_s| BakeSettings {
-            max_time_s: Some(limit_s),
-            ..settings.clone()
-        };
-        let mut pilot = self.bake(&within(PILOTS_S[0]), &(), control)?;
-        for limit_s in &PILOTS_S[1..] {
-            if pilot.course.is_empty() && pilot.stop_reason == StopReason::MaxTime {
-                let longer = self.bake(&within(*limit_s), &(), control)?;
-                pilot = added(pilot, longer);
-            }
+/// Ends a pilot in time. A bake that knows of a limit would choose what fits into it; this one is cut off.
+struct PilotWatch<'a> {
+    began: Instant,
+    /// Whether the error is known.
+    is_known: AtomicBool,
+    /// What the user asks.
+    control: &'a Control,
+    own: Control,
+}
+
+impl Progress for PilotWatch<'_> {
+    fn advance(&self, _: Stage, _: u64, _: u64) {
+        let (known_s, unknown_s) = PILOT_S;
+        let is_known = self.is_known.load(Ordering::Relaxed);
+        let limit_s = if is_known { known_s } else { unknown_s };
+        if self.control.is_cancelled() || self.began.elapsed().as_secs_f64() > limit_s {
+            self.own.cancel();
         }
-        Ok(pilot)
+    }
+
+    fn expect(&self, _: &str) {
+        self.is_known.store(true, Ordering::Relaxed);
     }
 }
 
-/// A bake that went on where another ended, with what that one took.
-fn added(first: BakeResult, mut second: BakeResult) -> BakeResult {
-    let sum_s = |times: &Timings| times.plan + times.trace + times.deposit;
-    for point in &mut second.course {
-        point.rays += first.counts.rays;
-        point.cpu_s += sum_s(&first.cpu_s);
-        point.wall_s += sum_s(&first.timings_s);
-    }
-    second.counts.rays += first.counts.rays;
-    second.item_buffers = first.item_buffers;
-    second
-}
-
-/// The map's size, and with it the noise of each texel, depends on the target.
-fn pilot_settings(settings: &BakeSettings, preset: Preset) -> BakeSettings {
-    if settings.estimator.refines() {
-        BakeSettings {
-            max_error: Some(preset.max_error()),
-            density_per_sr: BakeSettings::starting_density_per_sr(preset.max_error()),
-            ..settings.clone()
-        }
+/// Of the default preset, whose course leads past a draft towards a final bake.
+fn pilot_settings(settings: &BakeSettings) -> BakeSettings {
+    let target = Preset::Preview.max_error();
+    let (max_error, density_per_sr) = if settings.estimator.refines() {
+        (Some(target), BakeSettings::starting_density_per_sr(target))
     } else {
-        BakeSettings {
-            density_per_sr: PILOT_DENSITY_PER_SR,
-            ..settings.clone()
-        }
+        (settings.max_error, PILOT_DENSITY_PER_SR)
+    };
+    BakeSettings {
+        max_error,
+        density_per_sr,
+        max_time_s: None,
+        ..settings.clone()
     }
 }
 

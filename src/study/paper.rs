@@ -420,16 +420,20 @@ pub(super) fn item_buffer(bench: &Bench) -> Result<Sweep> {
 
 pub(super) fn pool_plates(bench: &Bench) -> Result<Sweep> {
     let (mesh, against) = scene_and_truth("pool")?;
+    let waves = mesh.materials.iter().find_map(|material| material.waves.clone());
+    let Some(waves) = waves else {
+        return Ok(Sweep::default());
+    };
     let mut waters = vec![
-        ("mesh of 512 × 512 quads".to_string(), Arc::clone(&mesh)),
+        ("sheet that waves lift and bend".to_string(), Arc::clone(&mesh)),
         ("one polygon with bumps".to_string(), scene("pool-bump")?),
     ];
-    for &quads in bench.some(&[16, 32, 64, 128], 1) {
+    for &quads in bench.some(&[16, 32, 64, 128, 512], 1) {
         let mut coarse = Scene::clone(&mesh);
         coarse
             .objects
             .retain(|object| mesh.materials[object.material].surface.is_receiver());
-        let water = pool::water(DVec3::Y, [1.5; 2], [quads; 2], &pool::waves(pool::AMPLITUDE_M));
+        let water = pool::meshed(DVec3::Y, [1.5; 2], [quads; 2], &waves);
         parts::add(&mut coarse, "water", water, parts::dielectric("water", 1.333));
         waters.push((format!("mesh of {quads} × {quads} quads"), Arc::new(coarse)));
     }

@@ -126,7 +126,7 @@ impl Tracer {
                 Event::Refraction => Turn::Refracted {
                     eta: 1.0 / branch.ior_ratio,
                 },
-                Event::ThinTransmission => Turn::ThroughThinWall,
+                Event::ThinTransmission | Event::Passage => Turn::ThroughThinWall,
                 Event::Reflection | Event::TotalInternalReflection => Turn::Reflected,
             };
             return at_hit.map(|derivative| RayDerivative {
@@ -138,7 +138,7 @@ impl Tracer {
                 ),
             });
         }
-        if branch.event == Event::ThinTransmission {
+        if matches!(branch.event, Event::ThinTransmission | Event::Passage) {
             return *at_hit;
         }
         at_hit.map(|derivative| {

@@ -22,6 +22,8 @@ pub enum Event {
     Refraction,
     /// Straight through a thin wall.
     ThinTransmission,
+    /// Straight on where a surface is there in part: such light is direct light still.
+    Passage,
 }
 
 impl Event {
@@ -288,7 +290,7 @@ impl Meeting<'_> {
             Through::Nothing | Through::Unreachable => return None,
             Through::Hole => {
                 passed = self.facing.turned(self.incident);
-                (&passed, Event::ThinTransmission, self.media, 1.0)
+                (&passed, Event::Passage, self.media, 1.0)
             }
             Through::ThinWall => {
                 passed = self.facing.passed(self.incident);

@@ -1,5 +1,6 @@
 //! Finds the next surface of a scene.
 
+use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
@@ -32,6 +33,8 @@ pub struct Tracer {
     has_bumps: bool,
     /// Whether anything is cut out of a surface.
     has_masks: bool,
+    /// Whether any surface is there in part.
+    has_partial: bool,
     /// The wavelength of all light, where it has but one.
     wavelength: Option<Nanometres>,
 }
@@ -118,7 +121,8 @@ impl Tracer {
             .map(|object| Self::specular_shape(&scene, &hierarchy, object))
             .collect();
         Self {
-            has_masks: has_masks(&scene),
+            has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
+            has_partial: is_any(&scene, |material| material.coverage.is_some()),
             shapes: scene.objects.iter().map(|_| Arc::default()).collect(),
             scene,
             hierarchy,
@@ -159,7 +163,8 @@ impl Tracer {
             })
             .collect();
         Self {
-            has_masks: has_masks(&scene),
+            has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
+            has_partial: is_any(&scene, |material| material.coverage.is_some()),
             shapes: (0..count).map(shape).collect(),
             scene,
             hierarchy,
@@ -179,6 +184,7 @@ impl Tracer {
             specular: self.specular.clone(),
             has_bumps: false,
             has_masks: self.has_masks,
+            has_partial: self.has_partial,
             wavelength: self.wavelength,
         }
     }
@@ -413,6 +419,35 @@ impl Tracer {
         }
     }
 
+    /// Share of the light along a ray that no surface before `distance_m` stops: where one is there in part, the rest goes
+    /// straight on.
+    pub fn passing_share(&self, ray: &Ray, distance_m: f64) -> f64 {
+        if !self.has_partial {
+            return f64::from(u8::from(!self.is_blocked(ray, distance_m)));
+        }
+        let holes = RefCell::new(Vec::new());
+        let is_blocked = self
+            .hierarchy
+            .is_blocked(ray, distance_m, |object, triangle, at| {
+                if !self.is_there(object, triangle, at) {
+                    return false;
+                }
+                if self.scene.material_of(object).coverage.is_none() {
+                    return true;
+                }
+                let hole = self.mixture(object, (triangle, at), true).hole;
+                holes.borrow_mut().push(hole);
+                hole == 0.0
+            });
+        if is_blocked {
+            return 0.0;
+        }
+        // The same product in whichever order the hierarchies have them.
+        let mut holes = holes.into_inner();
+        holes.sort_unstable_by(f64::total_cmp);
+        holes.iter().product()
+    }
+
     /// Whether a surface is there at a place of a triangle, or cut out.
     fn is_there(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> bool {
         let material = self.scene.material_of(object);
@@ -467,16 +502,17 @@ impl Tracer {
         self.scene.material_of(hit.object).base_colour * self.texture_colour(hit)
     }
 
-    /// What the texture at a hit multiplies the base colour by: white where there is none.
+    /// What texture and vertices at a hit multiply the base colour by: white where there is nothing.
     pub(super) fn texture_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
         let image = self.scene.material_of(hit.object).base_colour_texture.as_ref();
         let place = (hit.object, hit.triangle);
         let placed = image.and_then(|image| self.scene.placed_texture(image, place, hit.barycentric));
-        placed.map_or(LinearSrgb::WHITE, |(texture, uv)| texture.sample(uv))
+        let mesh = self.scene.objects[hit.object].in_scene();
+        let of_vertices = mesh.colour(hit.triangle, hit.barycentric);
+        placed.map_or(of_vertices, |(texture, uv)| of_vertices * texture.sample(uv))
     }
 }
 
-fn has_masks(scene: &Scene) -> bool {
-    let mut objects = 0..scene.objects.len();
-    objects.any(|object| scene.material_of(object).alpha_mask.is_some())
+fn is_any(scene: &Scene, is: impl Fn(&Material) -> bool) -> bool {
+    (0..scene.objects.len()).any(|object| is(scene.material_of(object)))
 }

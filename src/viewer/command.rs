@@ -72,6 +72,8 @@ pub enum Command {
     Compare(CompareCommand),
     /// Record, play or film the camera's path.
     Film(FilmCommand),
+    /// Let the scene's time go on, or choose a moment.
+    Play(PlayCommand),
     /// Write maps to files.
     Export(Export),
     /// Forget the point that was asked about.
@@ -101,6 +103,17 @@ pub enum CompareCommand {
     Load(PathBuf),
     /// End it.
     End,
+}
+
+/// What is to become of the scene's time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlayCommand {
+    /// Go on, or stand still.
+    Play(bool),
+    /// Seconds of the scene in one second [1].
+    Speed(f64),
+    /// Stand at this moment [s].
+    GoTo(f64),
 }
 
 /// What is to become of the camera's path.

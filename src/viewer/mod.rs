@@ -23,6 +23,7 @@ pub mod new_light;
 mod overlay;
 pub mod pace;
 pub mod panel;
+pub mod playback;
 pub mod probe;
 pub mod sketching;
 pub mod time_left;

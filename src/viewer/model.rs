@@ -4,6 +4,7 @@ mod filming;
 mod keeping;
 mod opening;
 mod picking;
+mod playing;
 mod seeking;
 mod showing;
 
@@ -22,6 +23,7 @@ use super::files::keeper::Autosaver;
 use super::files::{Files, working_folder};
 use super::filming::Player;
 use super::navigation::{NavigationMode, Navigator};
+use super::playback::Playback;
 use super::probe::{Probed, Prober};
 use super::sketching::PreviewTask;
 use super::timing::{FrameTimes, Latencies};
@@ -53,8 +55,9 @@ const SKETCHED_SHARE: f64 = 0.05;
 /// The state behind the window.
 #[derive(Debug)]
 pub struct Model {
-    /// What is shown, with its history.
+    /// What is shown, with its history: as it is at rest.
     edits: EditedScene,
+    playback: Playback,
     /// What the user has set.
     pub choices: Choices,
     /// From where it is seen.
@@ -176,6 +179,7 @@ impl Model {
             maps_revision: 0,
             picture: PictureReport::default(),
             edits: EditedScene::new(scene),
+            playback: Playback::default(),
         };
         model.choices.display.exposure_stops = options.exposure_stops.unwrap_or(0.0);
         model.begin(options);
@@ -200,6 +204,9 @@ impl Model {
 
     /// Moves the camera by some time [s].
     pub fn advance(&mut self, seconds: f64) {
+        if self.playback.is_playing {
+            self.playback.advance(seconds, self.edits.scene());
+        }
         if self.play_on(seconds) || !self.navigator.is_moving() {
             return;
         }
@@ -215,7 +222,7 @@ impl Model {
 
     /// What is shown, as it is now.
     pub fn scene(&self) -> &Arc<Scene> {
-        self.edits.scene()
+        self.playback.shown(self.edits.scene())
     }
 
     /// The scene with its history.
@@ -315,7 +322,11 @@ impl Model {
         let state = self.worker.state();
         let mut has_maps = false;
         let level = self.worker.take_level();
-        if let Some(level) = level.filter(|level| level.serial >= self.first_request) {
+        let is_wanted = |level: &BakedLevel| {
+            level.serial >= self.first_request && (level.is_final || !self.playback.is_playing)
+        };
+        if let Some(mut level) = level.filter(is_wanted) {
+            self.take_moment(&mut level);
             has_maps = self.improves_on_what_is_shown(&level);
             let mut more = event_log::baked(&level);
             if level.is_final {
@@ -379,7 +390,8 @@ impl Model {
 
     /// What the user asks for now.
     fn wanted(&self) -> BakeRequest {
-        BakeRequest::new(Arc::clone(self.edits.scene()), self.choices.settings.clone())
+        let scene = self.playback.wanted(self.edits.scene());
+        BakeRequest::new(Arc::clone(scene), self.choices.settings.clone())
     }
 
     /// Does what was asked for, and bakes what was changed; returns what the window is to do.
@@ -400,7 +412,7 @@ impl Model {
         if std::mem::replace(&mut self.seen, self.revision) != self.revision {
             self.bake_due = Some(now + QUIET);
         }
-        if !self.choices.automatic {
+        if !self.choices.automatic || self.playback.is_playing {
             self.bake_due = None;
         }
         let is_ripe = self.bake_due.is_some() && self.has_answered();
@@ -408,6 +420,7 @@ impl Model {
         if (has_rested || is_ripe) && self.is_changed() {
             self.rebake();
         }
+        self.play_moment();
         self.keep(now);
         of_window
     }
@@ -425,6 +438,7 @@ impl Model {
             Command::Worth(effect) => self.compare(effect),
             Command::Compare(command) => self.compare_with(&command),
             Command::Film(command) => self.film(&command),
+            Command::Play(command) => self.set_time(command),
             Command::Export(export) => self.export(export),
             Command::ClearProbe => self.probe(None),
             Command::Brightest => self.seek(|sought| sought.brightest = true),
@@ -491,6 +505,7 @@ impl Model {
         let outcome = self.edits.edit(edit);
         self.revision += u64::from(outcome.is_ok());
         self.refusal = outcome.err().map(|error| error.to_string());
+        self.stand_at_moment();
         self.refusal.is_none()
     }
 
@@ -514,7 +529,10 @@ impl Model {
                 self.revision += 1;
             }
             // The scene, which is changed already.
-            _ => self.revision += 1,
+            _ => {
+                self.revision += 1;
+                self.stand_at_moment();
+            }
         }
     }
 
@@ -530,8 +548,9 @@ impl Model {
         self.state = self.worker.state();
     }
 
-    /// Stops the bake and keeps the maps that are shown.
+    /// Stops the bake and keeps the maps that are shown; what plays stands still.
     pub fn cancel(&mut self) {
+        self.playback.stop();
         self.settle();
         self.worker.cancel();
     }

@@ -170,6 +170,7 @@ fn wavy_mirror() -> Material {
         wavelength_m: 0.2,
         direction: DVec3::Y,
         phase_rad: 0.5,
+        period_s: 0.0,
     };
     Material {
         waves: Waves::new(vec![wave]).ok(),
@@ -197,6 +198,7 @@ fn stripes() -> Texture {
         height: 8,
         rgba: rgba.collect(),
         wrap: [Wrap::Repeat; 2],
+        is_nearest: false,
     }
 }
 
@@ -214,6 +216,7 @@ pub fn fitting_waves() -> Waves {
         wavelength_m,
         direction,
         phase_rad,
+        period_s: 0.0,
     };
     Waves::new(vec![
         wave(DVec3::X, WIDTH_M / 4.0, 1.0),
@@ -253,6 +256,7 @@ pub fn by_image(mirrored: bool) -> Scene {
         height: SIDE,
         rgba: (0..SIDE * SIDE).map(texel).collect(),
         wrap: [Wrap::Repeat; 2],
+        is_nearest: false,
     };
     let image = TextureRef {
         texture: 0,

@@ -28,6 +28,7 @@ pub fn floor(name: &str, material: usize, height_m: f64) -> Object {
         normals: vec![DVec3::Y; 4],
         uv0: Some(CORNERS.to_vec()),
         uv1: None,
+        colours: None,
         triangles: TRIANGLES.to_vec(),
     };
     Object::new(name, (0, 0), material, mesh)
@@ -94,6 +95,7 @@ pub fn four_colours() -> Texture {
             [255, 255, 255, 255],
         ],
         wrap: [Wrap::ClampToEdge; 2],
+        is_nearest: false,
     }
 }
 

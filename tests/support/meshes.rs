@@ -12,6 +12,7 @@ pub fn quad(corner: DVec3, side_u: DVec3, side_v: DVec3) -> Mesh {
         normals: vec![normal; 4],
         uv0: Some(vec![DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y]),
         uv1: None,
+        colours: None,
         triangles: vec![[0, 2, 1], [0, 3, 2]],
     }
 }

@@ -8,7 +8,7 @@ use crate::export::quantity::{Quantity, white};
 use crate::files;
 use crate::illumination::{Chart, IlluminationMap};
 use crate::optics::LinearSrgb;
-use crate::scene::{Scene, TextureRef};
+use crate::scene::Scene;
 use crate::settings::LayerKind;
 use crate::units::LUMENS_PER_WATT;
 
@@ -64,31 +64,47 @@ pub fn light_of(
 fn albedo(scene: &Scene, chart: &Chart) -> Vec<LinearSrgb> {
     let object = &scene.objects[chart.object()];
     let material = scene.material_of(chart.object());
-    let plain = vec![material.base_colour; chart.texel_count()];
-    let Some(reference) = &material.base_colour_texture else {
-        return plain;
-    };
-    let sets = [&object.mesh_in_scene().uv0, &object.mesh_in_scene().uv1];
-    let Some(uvs) = sets.get(reference.uv_set).and_then(|set| set.as_deref()) else {
-        return plain;
-    };
-    let texture = &scene.textures[reference.texture];
-    let look = |reference: &TextureRef, uv: DVec2| texture.sample(reference.transform(uv));
-    // How far outside its nearest triangle each texel's centre lies [texels], with what that one has there.
-    let mut nearest: Vec<(f64, DVec2)> = vec![(f64::INFINITY, DVec2::ZERO); chart.texel_count()];
-    for (corners, triangle) in chart.corner_uvs.iter().zip(&object.mesh_in_scene().triangles) {
-        let of_image = triangle.map(|vertex| uvs[vertex as usize]);
-        spread(chart, *corners, of_image, &mut nearest);
+    let (reference, mesh) = (&material.base_colour_texture, object.in_scene());
+    if reference.is_none() && object.mesh().colours.is_none() {
+        return vec![material.base_colour; chart.texel_count()];
     }
-    let of_texel = |(outside, uv): &(f64, DVec2)| match outside.is_finite() {
-        true => material.base_colour * look(reference, *uv),
-        false => material.base_colour,
+    let mut nearest = vec![Nearest::default(); chart.texel_count()];
+    for (triangle, corners) in chart.corner_uvs.iter().enumerate() {
+        spread(chart, *corners, triangle, &mut nearest);
+    }
+    let of_texel = |nearest: &Nearest| {
+        let Some((triangle, shares)) = nearest.place else {
+            return material.base_colour;
+        };
+        let placed = reference
+            .as_ref()
+            .and_then(|image| scene.placed_texture(image, (chart.object(), triangle), shares));
+        let of_image = placed.map_or(LinearSrgb::WHITE, |(texture, uv)| texture.sample(uv));
+        material.base_colour * of_image * mesh.colour(triangle, shares)
     };
     nearest.iter().map(of_texel).collect()
 }
 
-/// Gives the texels in and around a triangle its coordinates, where none is nearer.
-fn spread(chart: &Chart, corners: [DVec2; 3], values: [DVec2; 3], nearest: &mut [(f64, DVec2)]) {
+/// The triangle that is nearest to a texel's centre.
+#[derive(Clone, Copy)]
+struct Nearest {
+    /// How far outside the centre lies [texels].
+    outside: f64,
+    /// Which, and the centre's barycentric coordinates.
+    place: Option<(usize, [f64; 3])>,
+}
+
+impl Default for Nearest {
+    fn default() -> Self {
+        Self {
+            outside: f64::INFINITY,
+            place: None,
+        }
+    }
+}
+
+/// Gives the texels in and around a triangle their places on it, where none is nearer.
+fn spread(chart: &Chart, corners: [DVec2; 3], triangle: usize, nearest: &mut [Nearest]) {
     let size = DVec2::new(chart.width as f64, chart.height as f64);
     let [a, b, c] = corners.map(|corner| corner * size);
     let doubled = (b - a).perp_dot(c - a);
@@ -113,9 +129,9 @@ fn spread(chart: &Chart, corners: [DVec2; 3], values: [DVec2; 3], nearest: &mut 
                 .map(|(share, height)| -share * height);
             let outside = depths.fold(0.0, f64::max);
             let known = &mut nearest[row * chart.width + column];
-            if outside < known.0 && outside <= MARGIN_TEXELS {
-                let [x, y, z] = shares;
-                *known = (outside, values[0] * x + values[1] * y + values[2] * z);
+            if outside < known.outside && outside <= MARGIN_TEXELS {
+                let place = Some((triangle, shares));
+                *known = Nearest { outside, place };
             }
         }
     }
@@ -229,8 +245,8 @@ mod tests {
     }
 
     #[test]
-    fn colours_of_a_triangle_reach_its_texels_and_those_beside_it() {
-        let mut nearest = vec![(f64::INFINITY, DVec2::ZERO); 64];
+    fn a_triangle_reaches_its_texels_and_those_beside_it() {
+        let mut nearest = vec![Nearest::default(); 64];
         let chart = Chart {
             receiver: crate::illumination::Receiver::front(0),
             uv_set: crate::illumination::UvSet::Generated,
@@ -243,10 +259,14 @@ mod tests {
             joints: Vec::new(),
         };
         let corners = [DVec2::ZERO, DVec2::new(0.5, 0.0), DVec2::new(0.0, 0.5)];
-        spread(&chart, corners, corners.map(|corner| corner * 2.0), &mut nearest);
-        assert_eq!(nearest[0].0, 0.0);
-        assert!((nearest[0].1 - DVec2::splat(0.125)).length() < 1e-12);
-        assert!(nearest[4].0 > 0.0 && nearest[4].0 < 1.0, "{:?}", nearest[4]);
-        assert!(nearest[63].0.is_infinite());
+        spread(&chart, corners, 5, &mut nearest);
+        assert_eq!(nearest[0].outside, 0.0);
+        assert_eq!(nearest[0].place, Some((5, [0.75, 0.125, 0.125])));
+        assert!(
+            nearest[4].outside > 0.0 && nearest[4].outside < 1.0,
+            "{}",
+            nearest[4].outside
+        );
+        assert!(nearest[63].place.is_none());
     }
 }

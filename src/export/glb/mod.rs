@@ -297,7 +297,7 @@ const STRENGTH: &str = "KHR_materials_emissive_strength";
 const UNLIT: &str = "KHR_materials_unlit";
 
 /// Gives a primitive a material of its own that carries the light of a texture. Colours and textures of the one that it
-/// had stay. `intensity`: the value of the texture's white, in the export's unit.
+/// had stay, but for those that are part of the texture. `intensity`: the value of the texture's white, in the export's unit.
 fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64, options: GlbOptions) {
     let index = glb.primitive(place)["material"].as_u64();
     let mut material = index.map_or(json!({}), |index| glb.json["materials"][index as usize].clone());
@@ -324,6 +324,10 @@ fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64
             material["pbrMetallicRoughness"] =
                 json!({ "baseColorTexture": texture, "metallicFactor": 0.0, "roughnessFactor": 1.0 });
             material["extensions"] = json!({ UNLIT: {} });
+            // They are in the texture already.
+            if let Some(attributes) = glb.primitive(place)["attributes"].as_object_mut() {
+                attributes.remove("COLOR_0");
+            }
         }
     }
     let material = glb.push("/materials", material);

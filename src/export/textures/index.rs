@@ -41,6 +41,9 @@ pub struct TextureIndex {
     pub row_0: &'static str,
     /// The scene that was baked.
     pub scene: SceneSummary,
+    /// Frames per second of a sequence.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fps: Option<f64>,
     /// One per file.
     pub textures: Vec<TextureEntry>,
 }
@@ -83,6 +86,9 @@ pub struct PlacedMap {
     pub uv_file: Option<String>,
     /// Where its texels are.
     pub rectangle: Rectangle,
+    /// Of a sequence: which frame it is, counted from 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame: Option<usize>,
 }
 
 /// A part of a texture. Coordinates (u, v) of a map are (x + u·width, y + v·height) [texels] there.
@@ -112,7 +118,11 @@ impl Rectangle {
 
 impl PlacedMap {
     /// The map of a folder's entry, whose generated coordinates are in a file here.
-    pub(super) fn new(entry: &MapEntry, uv_file: Option<String>, rectangle: Rectangle) -> Self {
+    pub(super) fn new(
+        (reader, entry): (&MapReader<'_>, &MapEntry),
+        uv_file: Option<String>,
+        rectangle: Rectangle,
+    ) -> Self {
         Self {
             surface: entry.surface.clone(),
             node: entry.node,
@@ -121,6 +131,7 @@ impl PlacedMap {
             uv_set: entry.uv_set,
             uv_file,
             rectangle,
+            frame: reader.frame().map(|frame| frame + 1),
         }
     }
 }
@@ -144,6 +155,7 @@ impl TextureIndex {
             primaries: "BT.709 (linear sRGB)",
             row_0: "v = 0",
             scene: reader.scene_summary().clone(),
+            fps: reader.fps(),
             textures,
         }
     }

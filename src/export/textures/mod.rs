@@ -71,32 +71,39 @@ pub struct TextureReport {
     pub warnings: Vec<Warning>,
 }
 
-/// Writes all maps of a folder as textures: whole, or nothing at all.
+/// Writes all maps of a folder as textures, those of a sequence frame by frame: whole, or nothing at all.
 ///
 /// # Errors
 /// Maps that cannot be read or lack the light that was asked for; light that the format cannot hold; a place that cannot
 /// be written; [`Error::cancelled`].
 pub fn write(
-    reader: &MapReader<'_>,
+    readers: &[MapReader<'_>],
     options: TextureOptions,
     mut folder: TextureFolder,
     control: &Control,
 ) -> Result<TextureReport> {
-    options.content.check(reader)?;
+    let Some(first) = readers.first() else {
+        return Err(Error::failure("maps", "there are none", "bake the scene again"));
+    };
+    options.content.check(first)?;
+    let maps: Vec<MapOf> = readers
+        .iter()
+        .flat_map(|reader| reader.entries().iter().map(move |entry| (reader, entry)))
+        .collect();
     let mut writer = Writer {
         options,
         exposure_stops: 0.0,
         control,
         bytes: 0,
-        warnings: reader.warnings(),
+        warnings: first.warnings(),
         folder: &mut folder,
     };
-    writer.exposure_stops = writer.choose_exposure(reader)?;
+    writer.exposure_stops = writer.choose_exposure(&maps)?;
     let textures = match options.atlas_side {
-        Some(side) => writer.write_atlas(reader, side)?,
-        None => writer.write_each(reader)?,
+        Some(side) => writer.write_atlas(&maps, side)?,
+        None => writer.write_each(&maps)?,
     };
-    let index = TextureIndex::new(reader, options, writer.exposure_stops, textures);
+    let index = TextureIndex::new(first, options, writer.exposure_stops, textures);
     let json = files::to_json(&index, index::FILE_NAME)?;
     writer.put(index::FILE_NAME.into(), &json)?;
     let (bytes, warnings) = (writer.bytes, writer.warnings);
@@ -107,6 +114,9 @@ pub fn write(
         warnings,
     })
 }
+
+/// A map with what reads it.
+type MapOf<'a> = (&'a MapReader<'a>, &'a MapEntry);
 
 /// What the files of one export have in common.
 struct Writer<'a> {
@@ -119,13 +129,13 @@ struct Writer<'a> {
 }
 
 impl Writer<'_> {
-    fn choose_exposure(&self, reader: &MapReader<'_>) -> Result<f64> {
+    fn choose_exposure(&self, maps: &[MapOf]) -> Result<f64> {
         let cut = match self.options.exposure {
             Exposure::Stops(stops) => return Ok(stops),
             Exposure::Cut(cut) => cut,
         };
         let mut white: f64 = 0.0;
-        for entry in reader.entries() {
+        for (reader, entry) in maps {
             let stored = reader.read(entry)?;
             for part in self.options.content.parts(&stored)?.0 {
                 self.check()?;
@@ -142,14 +152,14 @@ impl Writer<'_> {
     }
 
     /// One file for each map.
-    fn write_each(&mut self, reader: &MapReader<'_>) -> Result<Vec<TextureEntry>> {
+    fn write_each(&mut self, maps: &[MapOf]) -> Result<Vec<TextureEntry>> {
         let mut textures = Vec::new();
-        for entry in reader.entries() {
+        for &(reader, entry) in maps {
             let stored = reader.read(entry)?;
             let uv_file = self.put_coordinates(reader, entry)?;
             for part in self.parts(&stored)? {
                 let texels = self.texels(&stored, &part);
-                let map = PlacedMap::new(entry, uv_file.clone(), Rectangle::whole(texels.size()));
+                let map = PlacedMap::new((reader, entry), uv_file.clone(), Rectangle::whole(texels.size()));
                 let name = format!("{}{}", stem(entry), part.suffix());
                 textures.push(self.write_texels(&name, &texels, &part, vec![map])?);
             }
@@ -158,17 +168,19 @@ impl Writer<'_> {
     }
 
     /// As few files as hold all maps.
-    fn write_atlas(&mut self, reader: &MapReader<'_>, most_side: usize) -> Result<Vec<TextureEntry>> {
-        let entries = reader.entries();
-        let sizes: Vec<(usize, usize)> = entries.iter().map(|entry| (entry.width, entry.height)).collect();
+    fn write_atlas(&mut self, maps: &[MapOf], most_side: usize) -> Result<Vec<TextureEntry>> {
+        let sizes: Vec<(usize, usize)> = maps
+            .iter()
+            .map(|(_, entry)| (entry.width, entry.height))
+            .collect();
         let options = self.options.encoding.atlas_options(most_side);
-        let name = |map: usize| format!("the map of {}", entries[map].surface);
+        let name = |map: usize| format!("the map of {}", maps[map].1.surface);
         let mut textures = Vec::new();
         for (number, page) in atlas::pack(&sizes, options, name)?.into_iter().enumerate() {
             // By what they hold.
             let mut sheets: BTreeMap<String, Sheet> = BTreeMap::new();
             for &(map, place) in &page.places {
-                let entry = &entries[map];
+                let (reader, entry) = maps[map];
                 let stored = reader.read(entry)?;
                 let uv_file = self.put_coordinates(reader, entry)?;
                 for part in self.parts(&stored)? {
@@ -181,7 +193,9 @@ impl Writer<'_> {
                     });
                     sheet.texels.place(&texels, place, options.gutter);
                     sheet.part.layers.extend(&part.layers);
-                    sheet.maps.push(PlacedMap::new(entry, uv_file.clone(), place));
+                    sheet
+                        .maps
+                        .push(PlacedMap::new((reader, entry), uv_file.clone(), place));
                 }
             }
             for mut sheet in sheets.into_values() {
@@ -267,10 +281,10 @@ struct Sheet {
     maps: Vec<PlacedMap>,
 }
 
-/// The name of a map's files without what they hold.
-fn stem(entry: &MapEntry) -> &str {
-    let file = entry.file.rsplit('/').next().unwrap_or_default();
-    file.strip_suffix(".exr").unwrap_or(file)
+/// The name of a map's files without what they hold; that of a frame ends with its number.
+fn stem(entry: &MapEntry) -> String {
+    let file = entry.file.strip_prefix("maps/").unwrap_or(&entry.file);
+    file.strip_suffix(".exr").unwrap_or(file).replace('/', "_")
 }
 
 /// Largest index that is read [bytes].

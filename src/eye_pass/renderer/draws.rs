@@ -75,7 +75,7 @@ impl Manner {
         let how = PipelineFlags {
             has_texture: match writes {
                 Writes::Traced => self.has_tinted_glass,
-                _ => look.has_texture(),
+                _ => look.has_texture,
             },
             is_scaled: self.is_scaled,
             traces_lights: self.traces_lights,

@@ -13,7 +13,7 @@ use super::paging::Uploaded;
 use super::uniforms::ObjectRecord;
 use crate::gpu::Gpu;
 use crate::illumination::Chart;
-use crate::scene::{Material, Mesh, Object, Scene, TextureRef};
+use crate::scene::{Material, Mesh, Object, Scene};
 
 /// A corner of a triangle. Surfaces with a map share none between triangles, since maps may cut them anywhere.
 #[repr(C)]
@@ -23,8 +23,10 @@ pub(super) struct Corner {
     position: [f32; 3],
     /// In these too, of any length.
     normal: [f32; 3],
-    /// Of the material's images, KHR_texture_transform applied.
-    uv: [f32; 2],
+    /// TEXCOORD_0 and TEXCOORD_1, 0 where the mesh has none.
+    uvs: [[f32; 2]; 2],
+    /// What the base colour is multiplied by, in steps of 1/65535; the last number is not used.
+    colour: [u16; 4],
 }
 
 /// Map coordinates of a corner: they change with the maps.
@@ -37,7 +39,8 @@ pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     attributes: &[
         attribute(0, offset_of!(Corner, position), wgpu::VertexFormat::Float32x3),
         attribute(1, offset_of!(Corner, normal), wgpu::VertexFormat::Float32x3),
-        attribute(2, offset_of!(Corner, uv), wgpu::VertexFormat::Float32x2),
+        attribute(2, offset_of!(Corner, uvs), wgpu::VertexFormat::Float32x4),
+        attribute(7, offset_of!(Corner, colour), wgpu::VertexFormat::Unorm16x4),
     ],
 };
 pub(super) const MAP_UV_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
@@ -133,23 +136,27 @@ impl Geometry {
         }
     }
 
-    /// Takes over an edited scene with as many objects. Where an object shows another mesh or needs other corners than
-    /// it has, everything is uploaded anew.
+    /// Takes over an edited scene with as many objects. Corners of a mesh that changed its form alone are written again;
+    /// where an object needs others than it has, everything is uploaded anew.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
-        let mut can_stay = true;
+        let (mut can_stay, mut reshaped) = (true, Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
             let is_receiver = scene.material_of(index).surface.is_receiver();
             let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
             can_stay &= !(is_shared && is_receiver);
             if !self.shown[index].stands_as(object) {
                 let drawn = Drawn::of(object);
-                can_stay &= drawn.has_corners_of(&self.drawn[index]);
+                if !drawn.has_corners_of(&self.drawn[index]) {
+                    can_stay &= drawn.fits_corners_of(&self.drawn[index]) && self.is_alone(index);
+                    reshaped.push(index);
+                }
                 self.drawn[index] = drawn;
             }
         }
         if can_stay {
             self.shown.clone_from(&scene.objects);
-            return Uploaded::default();
+            let bytes = reshaped.iter().map(|&index| self.write_corners(gpu, index));
+            return Uploaded::other(bytes.sum());
         }
         let charts = std::mem::take(&mut self.charts);
         *self = Self::new(gpu, scene);
@@ -169,6 +176,25 @@ impl Geometry {
             let row = transform.matrix3.row(row).extend(transform.translation[row]);
             row.as_vec4().to_array()
         })
+    }
+
+    /// Whether no other object is drawn by its corners.
+    fn is_alone(&self, index: usize) -> bool {
+        let own = &self.segments[index];
+        self.segments.iter().filter(|segments| *segments == own).count() == 1
+    }
+
+    fn write_corners(&self, gpu: &Gpu, index: usize) -> usize {
+        let mut bytes = 0;
+        for segment in &self.segments[index] {
+            let corners = segment.corners(&self.drawn[index]);
+            let offset = (segment.first_corner * size_of::<Corner>()) as u64;
+            let page = &self.pages[segment.page];
+            gpu.queue
+                .write_buffer(&page.corners, offset, bytemuck::cast_slice(&corners));
+            bytes += size_of_val(corners.as_slice());
+        }
+        bytes
     }
 
     fn bytes(&self) -> usize {
@@ -198,20 +224,18 @@ impl Geometry {
 }
 
 impl Segment {
-    fn corners(&self, drawn: &Drawn, image: Option<&TextureRef>) -> Vec<Corner> {
+    fn corners(&self, drawn: &Drawn) -> Vec<Corner> {
         let mesh = &drawn.mesh;
         if self.shares_corners {
             return (0..mesh.positions.len())
-                .map(|vertex| corner(mesh, image, vertex))
+                .map(|vertex| corner(mesh, vertex))
                 .collect();
         }
         let vertices = self
             .triangles
             .clone()
             .flat_map(|triangle| drawn.triangle(triangle));
-        vertices
-            .map(|vertex| corner(mesh, image, vertex as usize))
-            .collect()
+        vertices.map(|vertex| corner(mesh, vertex as usize)).collect()
     }
 }
 
@@ -250,10 +274,14 @@ impl Drawn {
     fn has_corners_of(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.mesh, &other.mesh) && self.is_mirrored() == other.is_mirrored()
     }
-}
 
-/// Where a mesh is with the texture coordinates of an image.
-type ForImage = (Option<TextureRef>, Segment);
+    /// Whether its corners have the places of those.
+    fn fits_corners_of(&self, other: &Self) -> bool {
+        self.mesh.positions.len() == other.mesh.positions.len()
+            && self.mesh.triangles == other.mesh.triangles
+            && self.is_mirrored() == other.is_mirrored()
+    }
+}
 
 /// Fills page after page.
 struct Packing<'a> {
@@ -262,30 +290,27 @@ struct Packing<'a> {
     pages: Vec<Page>,
     corners: Vec<Corner>,
     indices: Vec<u32>,
-    /// Where meshes are that need no corners for each object, mirrored ones apart, with the images they are for.
-    shared: HashMap<(*const Mesh, bool), Vec<ForImage>>,
+    /// Where meshes are that need no corners for each object, mirrored ones apart.
+    shared: HashMap<(*const Mesh, bool), Segment>,
 }
 
 impl Packing<'_> {
     /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles, and with all other
     /// instances of their mesh.
     fn add(&mut self, material: &Material, drawn: &Drawn) -> Vec<Segment> {
-        let image = material.coordinates();
         let mesh = &*drawn.mesh;
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
             let key = (Arc::as_ptr(&drawn.mesh), drawn.is_mirrored());
-            let mut known = self.shared.get(&key).into_iter().flatten();
-            if let Some((_, segment)) = known.find(|(of, _)| of.as_ref() == image) {
+            if let Some(segment) = self.shared.get(&key) {
                 return vec![segment.clone()];
             }
             let segment = self.segment(largest, 0..mesh.triangles.len(), true);
             let first = self.corners.len() as u32;
-            self.corners.extend(segment.corners(drawn, image));
+            self.corners.extend(segment.corners(drawn));
             let vertices = (0..mesh.triangles.len()).flat_map(|triangle| drawn.triangle(triangle));
             self.indices.extend(vertices.map(|vertex| first + vertex));
-            let known = self.shared.entry(key).or_default();
-            known.push((image.cloned(), segment.clone()));
+            self.shared.insert(key, segment.clone());
             return vec![segment];
         }
         let mut segments = Vec::new();
@@ -297,7 +322,7 @@ impl Packing<'_> {
             triangle = triangles.end;
             let segment = self.segment(3 * triangles.len(), triangles, false);
             let first = self.corners.len() as u32;
-            self.corners.extend(segment.corners(drawn, image));
+            self.corners.extend(segment.corners(drawn));
             self.indices.extend(first..self.corners.len() as u32);
             segments.push(segment);
         }
@@ -353,18 +378,14 @@ fn single(uv: DVec2) -> [f32; 2] {
     uv.as_vec2().to_array()
 }
 
-fn corner(mesh: &Mesh, image: Option<&TextureRef>, vertex: usize) -> Corner {
-    // Without an image they are looked at, but nothing is looked up by them.
-    let uv = match image {
-        Some(image) => {
-            let set = if image.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-            set.as_ref().map(|uvs| image.transform(uvs[vertex]))
-        }
-        None => mesh.uv0.as_ref().map(|uvs| uvs[vertex]),
-    };
+fn corner(mesh: &Mesh, vertex: usize) -> Corner {
+    let uv = |set: &Option<Vec<DVec2>>| single(set.as_ref().map_or(DVec2::ZERO, |uvs| uvs[vertex]));
+    let colour = mesh.colours.as_ref().map_or([1.0; 3], |colours| colours[vertex]);
+    let [red, green, blue] = colour.map(|channel| (channel * f32::from(u16::MAX)).round() as u16);
     Corner {
         position: mesh.positions[vertex].as_vec3().to_array(),
         normal: mesh.normals[vertex].as_vec3().to_array(),
-        uv: single(uv.unwrap_or_default()),
+        uvs: [uv(&mesh.uv0), uv(&mesh.uv1)],
+        colour: [red, green, blue, u16::MAX],
     }
 }

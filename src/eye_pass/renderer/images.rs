@@ -8,7 +8,7 @@ use super::paging::{Level, PagedImage, TILE, Texels, TilePool, Uploaded, is_halv
 use crate::gpu::Gpu;
 use crate::illumination::Receiver;
 use crate::optics::LinearSrgb;
-use crate::scene::{Material, Scene, Texture};
+use crate::scene::{Material, Scene, Texture, TextureRef};
 
 /// What an object refers to in place of an image that it does not have; `NO_IMAGE` in the shaders.
 pub(super) const NO_IMAGE: u32 = u32::MAX;
@@ -27,13 +27,15 @@ pub(super) struct Images {
     /// As `textures` hold them.
     sources: Vec<Arc<Texture>>,
     textures: Vec<PagedImage<Texel>>,
-    /// What bends normals, by object: the image of normals, if there is one, and the words that follow it.
-    bumps: Vec<Option<(Option<usize>, Vec<u32>)>>,
-    /// Records of images and where their tiles are, and of what bends normals.
+    /// How materials look their images up, in the order of [`Material::images`].
+    looks: Vec<[Option<TextureRef>; 4]>,
+    /// What bends normals, by object: the material, and the words that follow the look of its image.
+    bumps: Vec<Option<(usize, Vec<u32>)>>,
+    /// Records of images and where their tiles are, of looks, and of what bends normals.
     pub(super) table: Storage,
-    /// Where the record of each object's map, and of each texture, starts in the table.
+    /// Where the record of each object's map, and of each material's looks, starts in the table.
     map_records: Vec<u32>,
-    texture_records: Vec<u32>,
+    look_records: Vec<[u32; 4]>,
     bump_records: Vec<u32>,
     /// Most that maps may take [bytes].
     budget_bytes: u64,
@@ -47,10 +49,11 @@ impl Images {
             maps: (0..2 * scene.objects.len()).map(|_| None).collect(),
             sources: Vec::new(),
             textures: Vec::new(),
+            looks: Vec::new(),
             bumps: Vec::new(),
             table: Storage::new(gpu, "image table"),
             map_records: Vec::new(),
-            texture_records: Vec::new(),
+            look_records: Vec::new(),
             bump_records: Vec::new(),
             budget_bytes,
         };
@@ -86,7 +89,12 @@ impl Images {
                 uploaded += bytes;
             }
         }
-        let bumps = |object| bumps(scene.material_of(object));
+        let looks = |material: &Material| material.images().map(Option::<&TextureRef>::cloned);
+        self.looks = scene.materials.iter().map(looks).collect();
+        let bumps = |object: usize| {
+            let material = scene.objects[object].material;
+            Some((material, bumps(&scene.materials[material])?))
+        };
         self.bumps = (0..scene.objects.len()).map(bumps).collect();
         uploaded += self.write_table(gpu);
         uploaded
@@ -196,9 +204,9 @@ impl Images {
         self.map_records[receiver.index()]
     }
 
-    /// Record of a texture.
-    pub(super) fn texture_record(&self, texture: usize) -> u32 {
-        self.texture_records.get(texture).copied().unwrap_or(NO_IMAGE)
+    /// Records of how a material looks its images up.
+    pub(super) fn look_records(&self, material: usize) -> [u32; 4] {
+        self.look_records[material]
     }
 
     /// Record of what bends an object's normals.
@@ -221,17 +229,32 @@ impl Images {
                 record
             }));
         }
-        for texture in &self.textures {
-            texture_records.push(words.len() as u32);
+        for (texture, source) in self.textures.iter().zip(&self.sources) {
+            let record = words.len();
+            texture_records.push(record as u32);
             texture.write_record(&mut words, 1.0);
+            words[record + 3] |= u32::from(source.is_nearest) << 4;
         }
-        (self.map_records, self.texture_records) = (map_records, texture_records);
+        self.map_records = map_records;
+        let mut write_look = |look: &TextureRef| {
+            let record = words.len() as u32;
+            words.extend([texture_records[look.texture], look.uv_set as u32]);
+            // Rows, each with what is added to it.
+            let [u, v, shift] = look.uv_transform.to_cols_array_2d();
+            let rows = [u[0], v[0], shift[0], u[1], v[1], shift[1]];
+            words.extend(rows.map(|number| (number as f32).to_bits()));
+            record
+        };
+        let records = |looks: &[Option<TextureRef>; 4]| {
+            [0, 1, 2, 3].map(|which: usize| looks[which].as_ref().map_or(NO_IMAGE, &mut write_look))
+        };
+        self.look_records = self.looks.iter().map(records).collect();
         self.bump_records.clear();
         for bumps in &self.bumps {
             let record = words.len() as u32;
             self.bump_records.push(match bumps {
-                Some((image, rest)) => {
-                    words.push(image.map_or(NO_IMAGE, |image| self.texture_record(image)));
+                Some((material, rest)) => {
+                    words.push(self.look_records[*material][3]);
                     words.extend(rest);
                     record
                 }
@@ -242,21 +265,20 @@ impl Images {
     }
 }
 
-/// What bends a material's normals, as `bumps.wgsl` reads it: the image of normals, and the words after it.
-fn bumps(material: &Material) -> Option<(Option<usize>, Vec<u32>)> {
+/// What bends a material's normals, as `bumps.wgsl` reads it after the look of its image.
+fn bumps(material: &Material) -> Option<Vec<u32>> {
     if !material.has_bumps() {
         return None;
     }
-    let map = material.bending_map();
     let waves = material.bending_waves().map_or(&[][..], |waves| waves.list());
-    let scale = map.map_or(0.0, |map| map.scale);
+    let scale = material.bending_map().map_or(0.0, |map| map.scale);
     let mut words = vec![(scale as f32).to_bits(), waves.len() as u32];
     for wave in waves {
         let [x, y, z] = wave.wave_vector().to_array();
         let numbers = [x, y, z, wave.phase_rad, wave.amplitude_m];
         words.extend(numbers.map(|number| (number as f32).to_bits()));
     }
-    Some((map.map(|map| map.image.texture), words))
+    Some(words)
 }
 
 /// What a map would take.

@@ -27,9 +27,8 @@ pub(super) struct Look {
     pub(super) bounds: Option<(DVec3, DVec3)>,
     /// Without what refers to images.
     record: ObjectRecord,
-    base_colour_texture: Option<usize>,
-    variation: Option<usize>,
-    emission_texture: Option<usize>,
+    material: usize,
+    pub(super) has_texture: bool,
 }
 
 /// Glasses that can part wavelengths in one scene; as many as the shader's uniform has room for.
@@ -155,7 +154,7 @@ impl Objects {
     /// Whether a mirror, a pane or a body has a texture.
     pub(super) fn has_tinted_glass(&self) -> bool {
         let mut looks = self.list.iter();
-        looks.any(|look| look.surface.is_specular() && !look.surface.is_receiver() && look.has_texture())
+        looks.any(|look| look.surface.is_specular() && !look.surface.is_receiver() && look.has_texture)
     }
 
     /// Whether anything has holes.
@@ -171,20 +170,17 @@ impl Objects {
     fn write_records(&mut self, gpu: &Gpu) -> Uploaded {
         let records: Vec<ObjectRecord> = (0..)
             .zip(&self.list)
-            .map(|(index, look)| ObjectRecord {
-                map: self.images.map_record(Receiver::front(index)),
-                back_map: self.images.map_record(Receiver::back(index)),
-                texture: look
-                    .base_colour_texture
-                    .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
-                variation: look
-                    .variation
-                    .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
-                glow: look
-                    .emission_texture
-                    .map_or(NO_IMAGE, |texture| self.images.texture_record(texture)),
-                bumps: self.images.bump_record(index),
-                ..look.record
+            .map(|(index, look)| {
+                let [texture, variation, glow, _] = self.images.look_records(look.material);
+                ObjectRecord {
+                    map: self.images.map_record(Receiver::front(index)),
+                    back_map: self.images.map_record(Receiver::back(index)),
+                    texture,
+                    variation,
+                    glow,
+                    bumps: self.images.bump_record(index),
+                    ..look.record
+                }
             })
             .collect();
         let peaks = (0..).zip(&self.list).map(|(index, look)| {
@@ -237,22 +233,14 @@ impl Look {
                 row_y,
                 row_z,
             },
-            base_colour_texture: material.base_colour_texture.as_ref().map(|image| image.texture),
-            variation: material
-                .variation
-                .as_ref()
-                .map(|variation| variation.image.texture),
-            emission_texture: material.emission_texture.as_ref().map(|image| image.texture),
+            material: object.material,
+            has_texture: material.base_colour_texture.is_some(),
         }
     }
 
     /// Whether it has holes.
     pub(super) fn has_mask(&self) -> bool {
         self.record.alpha_cutoff > 0.0
-    }
-
-    pub(super) fn has_texture(&self) -> bool {
-        self.base_colour_texture.is_some()
     }
 
     /// Bound on the radiance that leaves it, reflections aside [W/(m² sr)].

@@ -82,6 +82,8 @@ struct Segment {
     signature: PathSignature,
     depth: u32,
     path_m: f64,
+    /// Whether it is direct light still.
+    is_straight: bool,
 }
 
 /// Traces light rays of one light; reused from ray to ray.
@@ -140,6 +142,7 @@ impl<'a> PathTracer<'a> {
             signature: PathSignature::default(),
             depth: 0,
             path_m: 0.0,
+            is_straight: true,
         };
         self.waiting.push(first);
         while let Some(segment) = self.waiting.pop() {
@@ -173,12 +176,17 @@ impl<'a> PathTracer<'a> {
             self.tracer
                 .interact_with(effects, &hit, segment.ray.direction, &segment.media, micro);
         let deposit_w = flux_w * interaction.deposit;
-        if segment.depth == 0 {
+        if segment.is_straight {
             // What a surface takes on the first hit is direct light, and so is what a body around the lamp takes of that.
             let is_specular = self.tracer.scene().material_of(hit.object).surface.is_specular();
             let direct_w = if is_specular { deposit_w } else { segment.flux_w };
             self.book(Account::NotEmitted, direct_w);
-            self.book(Account::Emitted, segment.flux_w - direct_w);
+            let sent_w = if segment.depth == 0 {
+                segment.flux_w
+            } else {
+                LinearSrgb::BLACK
+            };
+            self.book(Account::Emitted, sent_w - direct_w);
             if !is_specular {
                 return;
             }
@@ -229,6 +237,7 @@ impl<'a> PathTracer<'a> {
             signature: from.signature.with(object, branch.event),
             depth: from.depth + 1,
             path_m,
+            is_straight: from.is_straight && branch.event == Event::Passage,
         });
     }
 }

@@ -12,7 +12,7 @@ use crate::light_pass::item_buffer::{Hiding, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::light_pass::photon::spheres::Spheres;
 use crate::plan::{LightReach, Reach};
-use crate::scene::{Light, Scene, SurfaceKind};
+use crate::scene::{Light, LightKind, Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
 use crate::transport::{Tracer, media_at};
 
@@ -366,18 +366,24 @@ impl ItemBufferBuilder<'_> {
         }
     }
 
-    /// Where to look from: some places of a light with a size, else its only one.
+    /// Where to look from: some places of a light with a size, else its only one. All places of what glows by an image
+    /// are as bright as it is in the mean: any of them may stand for its power, and may be black.
     fn places(&self, light: usize) -> impl Iterator<Item = (u32, Emitter)> {
         let scene = self.aimer.tracer.scene();
         let source = scene.lights[light].of_unit_strength();
         let many = self.sizes && source.has_extent();
+        let is_surface = matches!(source.kind, LightKind::Surface { .. });
+        let mean = Emitter::middle(&source, scene).filter(|_| is_surface);
+        let mean = mean.map(|middle| middle.strength);
         (0..if many { MAX_PLACES } else { 1 }).filter_map(move |place| {
             let emitter = if many {
                 Emitter::sample(&source, scene, even_point(place, 0, PLACES_SEED))
             } else {
                 Emitter::middle(&source, scene)
             };
-            Some((place, emitter?))
+            let mut emitter = emitter?;
+            emitter.strength = mean.unwrap_or(emitter.strength);
+            Some((place, emitter))
         })
     }
 }

@@ -58,8 +58,6 @@ pub struct Arriving {
     pub distance_m: f64,
     /// E for a strength of 1, before polish reflects its share.
     pub open: f64,
-    /// And after that, and after what lies on the way.
-    pub strength: LinearSrgb,
 }
 
 impl Arriving {
@@ -82,7 +80,6 @@ impl Arriving {
             to_light: beam.to_light,
             distance_m: beam.distance_m,
             open,
-            strength,
         })
     }
 }

@@ -1,8 +1,8 @@
 //! Light straight from the lamps (LD), as irradiance of every texel.
 //!
 //! E = I cos θ/r² for points and spots, E⊥ cos θ for suns, θ by the interpolated normal, stopped by every surface,
-//! clear glass included: what comes through that is caustic light (LS+D). A body around a lamp takes its share on the
-//! way. Each side of a surface has a
+//! clear glass included: what comes through that is caustic light (LS+D). Surfaces that are there in part let the rest of
+//! it pass. A body around a lamp takes its share on the way. Each side of a surface has a
 //! map of its own. Lights with extent are means over their places.
 
 pub mod border;
@@ -407,9 +407,12 @@ impl<'a> Baker<'a> {
                     let Some(arriving) = arriving else { continue };
                     sample.shadow_rays += 1;
                     let ray = point.spawn(arriving.to_light);
-                    if !self.tracer.is_blocked(&ray, arriving.distance_m) {
-                        sample.irradiance += arriving.irradiance;
+                    let passing = self.tracer.passing_share(&ray, arriving.distance_m);
+                    sample.irradiance += arriving.irradiance * passing;
+                    if passing == 1.0 {
                         sample.mask ^= mark_of(light);
+                    } else if passing > 0.0 {
+                        sample.mask ^= mark_of(light).rotate_left(1);
                     }
                 }
                 Emission::Soft(soft) => {

@@ -82,7 +82,8 @@ enum ManyPlaces {
 
 struct Shape {
     polygons: Vec<Polygon>,
-    radiance: LinearSrgb,
+    /// Of all of its sides that shine [m²].
+    area_m2: f64,
 }
 
 /// What a light with extent gives a point.
@@ -91,7 +92,7 @@ pub struct Gathered {
     /// E [W/m²].
     pub irradiance: LinearSrgb,
     pub shadow_rays: u64,
-    /// Those that met something.
+    /// Those that something stopped, all or part of what they carry.
     pub blocked_rays: u64,
 }
 
@@ -106,11 +107,13 @@ impl Source {
             .map_or(Surroundings::VACUUM, |place| Surroundings::at(tracer, place));
         let emission = if light.has_extent() {
             let shape = shape(light, scene);
+            let has_image =
+                matches!(light.kind, LightKind::Surface { object, .. } if scene.glows.contains_key(&object));
             let is_narrow = |size: LightSize| matches!(size, LightSize::Angle { diameter_rad } if diameter_rad <= NARROW_RAD);
             Emission::Soft(Soft {
-                places: ManyPlaces::new(light, scene, index)?,
+                places: ManyPlaces::new(light, scene, index, shape.is_some())?,
                 light: index as u64,
-                is_even: shape.is_some() || is_narrow(light.size),
+                is_even: (shape.is_some() && !has_image) || is_narrow(light.size),
                 shape,
             })
         } else {
@@ -121,7 +124,8 @@ impl Source {
 }
 
 impl ManyPlaces {
-    fn new(light: &Light, scene: &Scene, index: usize) -> Option<Self> {
+    /// Places of what has a shape are spread over it evenly.
+    fn new(light: &Light, scene: &Scene, index: usize, has_shape: bool) -> Option<Self> {
         let sequence = |count: usize, pair| {
             (0..count as u32).map(move |place| even_point(place, pair, SEED + index as u64))
         };
@@ -146,11 +150,14 @@ impl ManyPlaces {
                 }
             }
             _ => {
-                let places = Places::new(light, scene);
+                let places = match has_shape {
+                    true => Places::spread_evenly(light, scene),
+                    false => Places::new(light, scene),
+                };
                 let all: Option<Vec<Emitter>> = squares().map(|square| places.sample(square)).collect();
                 Self::Emitters {
                     all: all?,
-                    area_m2: places.surface_m2(),
+                    area_m2: places.area_m2(),
                 }
             }
         })
@@ -190,7 +197,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
         }
         LightKind::Surface { object, .. } => {
             let mesh = scene.objects.get(object)?.in_scene();
-            if mesh.triangle_count() > MAX_POLYGONS || scene.glows.contains_key(&object) {
+            if mesh.triangle_count() > MAX_POLYGONS {
                 return None;
             }
             let both_sides = scene.material_of(object).double_sided;
@@ -207,7 +214,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
     };
     Some(Shape {
         polygons,
-        radiance: light.strength(),
+        area_m2: Places::new(light, scene).area_m2(),
     })
 }
 
@@ -244,16 +251,16 @@ impl Soft {
             sum.shadow_rays += 1;
             sum.open += arriving.open;
             let distance_m = arriving.distance_m * (1.0 - BEFORE_LAMP);
-            if tracer.is_blocked(&point.spawn(arriving.to_light), distance_m) {
-                sum.blocked_rays += 1;
-            } else {
-                sum.taken += arriving.strength;
-                sum.irradiance += arriving.irradiance;
-            }
+            let passing = tracer.passing_share(&point.spawn(arriving.to_light), distance_m);
+            sum.blocked_rays += u64::from(passing < 1.0);
+            sum.irradiance += arriving.irradiance * passing;
         }
         let irradiance = match &self.shape {
-            // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018.
-            Some(shape) if sum.open > 0.0 => shape.irradiance(point) * (sum.taken / sum.open),
+            // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018. What
+            // an image leaves of the light is part of the ratio, as shadows are.
+            Some(shape) if sum.open > 0.0 => {
+                sum.irradiance * (shape.seen_sr(point) / (sum.open * shape.area_m2))
+            }
             Some(_) => LinearSrgb::BLACK,
             None => sum.irradiance / count,
         };
@@ -354,25 +361,19 @@ impl Cosines {
 #[derive(Default)]
 struct Sum {
     irradiance: LinearSrgb,
-    /// Σ of what would come without shadows, polish and what lies on the way left aside, and of what is taken, for
-    /// strength 1.
+    /// Σ of what would come for strength 1 without shadows, polish and what lies on the way left aside.
     open: f64,
-    taken: LinearSrgb,
     shadow_rays: u64,
     blocked_rays: u64,
 }
 
 impl Shape {
-    /// E at a point without shadows [W/m²].
-    fn irradiance(&self, point: &SurfacePoint) -> LinearSrgb {
-        let seen_sr: f64 = self
-            .polygons
-            .iter()
-            .map(|polygon| {
-                polygon.projected_solid_angle_sr(point.position, point.geometric_normal, point.shading_normal)
-            })
-            .sum();
-        self.radiance * seen_sr
+    /// E/L [sr] at a point without shadows.
+    fn seen_sr(&self, point: &SurfacePoint) -> f64 {
+        let seen = self.polygons.iter().map(|polygon| {
+            polygon.projected_solid_angle_sr(point.position, point.geometric_normal, point.shading_normal)
+        });
+        seen.sum()
     }
 }
 

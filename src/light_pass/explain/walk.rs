@@ -9,7 +9,7 @@ use crate::illumination::{Receiver, Side};
 use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
-use crate::transport::{MediumStack, Tracer};
+use crate::transport::{Event, MediumStack, Tracer};
 
 /// Segments that one light ray may have waiting.
 const MAX_WAITING: usize = 512;
@@ -51,6 +51,8 @@ struct Segment {
     depth: u32,
     /// What it left last, among all vertices.
     from: Option<usize>,
+    /// Whether it is direct light still.
+    is_straight: bool,
 }
 
 /// A vertex with the one before it.
@@ -111,6 +113,7 @@ impl Walker<'_> {
             way: PathSignature::default(),
             depth: 0,
             from: None,
+            is_straight: true,
         }];
         while let Some(segment) = waiting.pop() {
             let Some(hit) = self.tracer.closest_hit(&segment.ray) else {
@@ -123,7 +126,7 @@ impl Walker<'_> {
             let interaction = self.tracer.interact(&hit, direction, &segment.media);
             let receiver = Receiver::new(hit.object, Side::met(direction, hit.geometric_normal));
             let taken = incident * interaction.deposit;
-            if segment.depth > 0 && receiver == self.target.receiver && taken.max_channel() > 0.0 {
+            if !segment.is_straight && receiver == self.target.receiver && taken.max_channel() > 0.0 {
                 let arrival = Arrival {
                     way: segment.way,
                     place: self.target.landing(&segment.ray, &hit),
@@ -160,6 +163,7 @@ impl Walker<'_> {
                         way: segment.way.at(hit.object, group).event(branch.event),
                         depth: segment.depth + 1,
                         from: Some(steps.len() - 1),
+                        is_straight: segment.is_straight && branch.event == Event::Passage,
                     });
                 }
             }

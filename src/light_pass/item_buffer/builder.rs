@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 
 use super::bits::CellBits;
-use super::hidden::{Facet, Hidden, HiddenCells};
+use super::hidden::{Hidden, HiddenCells};
 use super::search::{Bounds, Search};
 use crate::light_pass::launch::Launch;
 use crate::transport::{SceneNode, Tracer};
@@ -18,6 +18,8 @@ const TRIED_FIRST: usize = 16;
 pub(super) struct Builder<'a> {
     pub(super) launch: &'a Launch,
     pub(super) tracer: &'a Tracer,
+    /// Of every object; `None` of one without corners.
+    pub(super) bounds: &'a [Option<Bounds>],
     /// Of the wanted objects.
     pub(super) boxes: Vec<Bounds>,
     /// Whether an object is a caster.
@@ -77,24 +79,24 @@ impl Builder<'_> {
         }
         let wanted = |object: usize| self.wanted[object];
         let find = |(face, marked): (usize, &CellBits)| {
-            let mut cells = HiddenCells::new(self.launch);
+            let mut cells = HiddenCells::new(self.launch, face);
             let mut tests = 0;
-            let facet = |&(object, triangle): &(usize, usize)| {
-                let corners = self.tracer.scene().objects[object].in_scene().corners(triangle);
-                (object, Facet::new(self.launch, face, &corners))
-            };
-            for (object, facet) in hiders.iter().filter(|_| marked.count() > 0).map(facet) {
-                tests += if self.wanted[object] {
-                    cells.add_opaque_caster(object, &facet)
-                } else {
-                    cells.add_opaque(object, &facet, marked)
-                };
-            }
             let search = Search::new(self.launch, face, &self.boxes, &[], &wanted);
+            let is_any_marked = marked.count() > 0;
+            let is_near = |bounds: Bounds| is_any_marked && search.may_touch(bounds, marked);
+            let are_near: Vec<bool> = self
+                .bounds
+                .iter()
+                .map(|bounds| bounds.is_some_and(is_near))
+                .collect();
+            for &(object, triangle) in hiders.iter().filter(|(object, _)| are_near[*object]) {
+                let mesh = self.tracer.scene().objects[object].in_scene();
+                let marked = (!self.wanted[object]).then_some(marked);
+                tests += cells.add_opaque(object, &mesh.corners(triangle), marked);
+            }
             let doubtful = cells.doubtful().clone();
             search.visit(self.roots(), &doubtful, |object, corners| {
-                let facet = Facet::new(self.launch, face, corners);
-                tests += cells.add_caster(object, &facet);
+                tests += cells.add_caster(object, corners);
             });
             self.count(tests + search.tests());
             let found = cells.find();

@@ -34,7 +34,6 @@ const MAX_PIECES: usize = 256;
 /// A triangle in a face's homogeneous coordinates, with how near to the light it is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facet {
-    corners: [DVec3; 3],
     /// Planes through the light and the edges: positive on directions within, where the light sees the triangle.
     edges: [DVec3; 3],
     /// `nearness·(x, y, 1)` is how near the triangle's plane is in the direction of a point of the face: 1/z or, for a
@@ -61,7 +60,6 @@ impl Facet {
         let all_before = corners.iter().all(|corner| corner.z > 0.0);
         let [u, v, w] = at_corners;
         Self {
-            corners,
             edges,
             nearness: is_sound.then_some(weighted / volume),
             range: all_before.then_some((u.max(v).max(w), u.min(v).min(w))),
@@ -98,7 +96,9 @@ fn extremes(plane: DVec3, (low, high): (DVec2, DVec2)) -> (f64, f64) {
 }
 
 /// What lies in the marked cells of one face.
-pub(super) struct HiddenCells {
+pub(super) struct HiddenCells<'a> {
+    launch: &'a Launch,
+    face: usize,
     grid: &'static Grid,
     /// Opaque faces that may hide a caster, with their object, by cell.
     faces: Vec<Vec<(usize, Facet)>>,
@@ -117,9 +117,11 @@ pub(super) struct Hidden {
     pub(super) seen: BTreeSet<usize>,
 }
 
-impl HiddenCells {
-    pub(super) fn new(launch: &Launch) -> Self {
+impl<'a> HiddenCells<'a> {
+    pub(super) fn new(launch: &'a Launch, face: usize) -> Self {
         Self {
+            launch,
+            face,
             grid: Grid::of(launch.mapping()),
             faces: vec![Vec::new(); CELLS_PER_SIDE * CELLS_PER_SIDE],
             doubtful: CellBits::filled(false),
@@ -127,16 +129,21 @@ impl HiddenCells {
         }
     }
 
-    /// Adds an opaque face of an object that may lie before a caster in some of the `marked` cells, which become doubtful
-    /// by it. Returns the cells looked at.
-    pub(super) fn add_opaque(&mut self, object: usize, facet: &Facet, marked: &CellBits) -> u64 {
-        let Some(polygon) = Polygon::seen(&facet.corners) else {
-            return 1;
-        };
-        let cells = polygon.touched(self.grid, marked);
+    /// Adds an opaque triangle of an object that may lie before a caster in some of the `marked` cells, which become
+    /// doubtful by it. Without any, as for a caster, whose own light leaves from there, cells that are doubtful already
+    /// are meant: alone it drops none. Returns the cells looked at.
+    pub(super) fn add_opaque(
+        &mut self,
+        object: usize,
+        corners: &[DVec3; 3],
+        marked: Option<&CellBits>,
+    ) -> u64 {
+        let cells = self.touched(corners, marked.unwrap_or(&self.doubtful));
+        let mut facet = None;
         for &(column, row) in &cells {
             let faces = &mut self.faces[row * CELLS_PER_SIDE + column];
             if faces.len() < MAX_FACES {
+                let facet = facet.get_or_insert_with(|| Facet::new(self.launch, self.face, corners));
                 faces.push((object, *facet));
             }
             self.doubtful.set(column, row);
@@ -144,11 +151,10 @@ impl HiddenCells {
         1 + cells.len() as u64
     }
 
-    /// Adds a face of an opaque caster to cells that are doubtful already: alone it drops no cell, since its own light
-    /// leaves from there. Returns the cells looked at.
-    pub(super) fn add_opaque_caster(&mut self, object: usize, facet: &Facet) -> u64 {
-        let doubtful = self.doubtful.clone();
-        self.add_opaque(object, facet, &doubtful)
+    /// Cells of a set that a triangle touches.
+    fn touched(&self, corners: &[DVec3; 3], set: &CellBits) -> Vec<(usize, usize)> {
+        let seen = corners.map(|corner| self.launch.to_face(self.face, corner));
+        Polygon::seen(&seen).map_or(Vec::new(), |polygon| polygon.touched(self.grid, set))
     }
 
     /// Cells that opaque faces may cover.
@@ -157,11 +163,12 @@ impl HiddenCells {
     }
 
     /// Adds a triangle of a caster. Returns the cells looked at.
-    pub(super) fn add_caster(&mut self, object: usize, facet: &Facet) -> u64 {
-        let Some(polygon) = Polygon::seen(&facet.corners) else {
+    pub(super) fn add_caster(&mut self, object: usize, corners: &[DVec3; 3]) -> u64 {
+        let cells = self.touched(corners, &self.doubtful);
+        if cells.is_empty() {
             return 1;
-        };
-        let cells = polygon.touched(self.grid, &self.doubtful);
+        }
+        let facet = Facet::new(self.launch, self.face, corners);
         for &cell in &cells {
             let nearest = self.casters.entry((cell, object)).or_insert(f64::NEG_INFINITY);
             *nearest = nearest.max(facet.nearest_in(self.grid.cell(cell.0, cell.1)));

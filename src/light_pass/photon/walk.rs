@@ -11,8 +11,7 @@ use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
-use crate::scene::SurfaceKind;
-use crate::transport::{Branch, EffectSet, MediumStack, Meeting, Tracer};
+use crate::transport::{Branch, EffectSet, Event, MediumStack, Meeting, Tracer};
 
 /// A photon whose flux (largest channel) has become less than this part of what it started with goes on by chance, with
 /// this part of it or not at all.
@@ -88,6 +87,8 @@ struct Photon<'a> {
     followed: u32,
     /// Probability of having been drawn to go this way.
     probability: f64,
+    /// Whether it is direct light still.
+    is_straight: bool,
 }
 
 impl<'a> PhotonWalk<'a> {
@@ -150,6 +151,7 @@ impl<'a> PhotonWalk<'a> {
             carried,
             followed: (1 << carried.bundles.len()) - 1,
             probability: 1.0,
+            is_straight: true,
         };
         let brightest_w = photon.flux_w.max_channel();
         let Some(start) = start.filter(|_| brightest_w > 0.0 && photon.flux_w.is_finite()) else {
@@ -195,9 +197,12 @@ impl<'a> PhotonWalk<'a> {
         };
         let scene = photon.hue.tracer.scene();
         let material = scene.material_of(hit.object);
-        if depth == 0 && !material.surface.is_specular() {
+        if photon.is_straight && !material.surface.is_specular() {
             photon.leave_all(arrive);
             self.book(Account::NotEmitted, &photon.hue.channels, photon.flux_w);
+            if depth > 0 {
+                self.book(Account::Emitted, &photon.hue.channels, photon.flux_w * -1.0);
+            }
             return None;
         }
         let effects = self.rules.effects;
@@ -205,7 +210,7 @@ impl<'a> PhotonWalk<'a> {
         if effects.absorption && media.absorbs(scene) {
             photon.flux_w = photon.flux_w * media.transmittance(scene, hit.distance_m);
         }
-        if material.surface == SurfaceKind::Dielectric && material.is_dispersive() {
+        if material.is_dispersive() {
             self.part(photon);
         }
         let micro = (effects.lobes && material.is_rough())
@@ -216,9 +221,10 @@ impl<'a> PhotonWalk<'a> {
         if photon.followed != 0 {
             photon.part_at(depth as usize, hit.object, &meeting, arrive);
         }
-        if depth == 0 {
+        if photon.is_straight {
             // What a surface takes on the first hit is direct light.
             self.book(Account::NotEmitted, &sent_hue.channels, deposit_w);
+            let sent_w = if depth == 0 { sent_w } else { LinearSrgb::BLACK };
             self.book(Account::Emitted, &sent_hue.channels, sent_w - deposit_w);
         } else if deposit_w.max_channel() > 0.0 {
             arrive(Hit {
@@ -291,6 +297,7 @@ impl<'a> PhotonWalk<'a> {
             reflected_w + transmitted_w - flux_w,
         );
         photon.flux_w = flux_w;
+        photon.is_straight &= branch.event == Event::Passage;
         Some(branch)
     }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::pool::{Wave, water};
+use super::pool::{self, Ripple};
 use super::{parts, shapes};
 use crate::scene::Scene;
 
@@ -19,9 +19,8 @@ pub struct Basin<'a> {
     pub rim_m: f64,
     pub bottom_m: f64,
     pub water_m: f64,
-    /// Quads of the water along x and z.
-    pub quads: [u32; 2],
-    pub waves: &'a [Wave],
+    /// Amplitude [m], wave vector [rad/m] and phase [rad] of each wave.
+    pub waves: &'a [Ripple],
 }
 
 impl Basin<'_> {
@@ -57,7 +56,8 @@ impl Basin<'_> {
             }
         }
         let half = self.half_m.map(|half| half + 0.5 * wall_m);
-        let surface = water(centre + DVec3::Y * self.water_m, half, self.quads, self.waves);
-        parts::add(scene, "water", surface, parts::dielectric("water", 1.333));
+        let depth_m = self.water_m - self.bottom_m;
+        let place = centre + DVec3::Y * self.water_m;
+        pool::add_rippled(scene, place, half, self.waves, depth_m);
     }
 }

@@ -1,4 +1,4 @@
-//! Procedural scenes. All but `gallery`, `showroom`, `pool-bump`, `spectrum` and `bowl` have a reference solution and are
+//! Procedural scenes. All but `gallery`, `showroom`, `pool-bump`, `water-room`, `spectrum` and `bowl` have a reference solution and are
 //! meshes of the exact surfaces that it was computed on: in `assets/reference/`, or for `prism` by wavelength in closed
 //! form.
 
@@ -17,17 +17,19 @@ pub mod shapes;
 mod showroom;
 mod slab;
 mod spectrum;
+mod water_room;
 
 use super::Scene;
 
 /// Names of all built-in scenes, the program's default first.
-pub const NAMES: [&str; 13] = [
+pub const NAMES: [&str; 14] = [
     "gallery",
     "showroom",
     "ring",
     "ball",
     "pool",
     "pool-bump",
+    "water-room",
     "mirror",
     "slab",
     "paraboloid",
@@ -46,6 +48,7 @@ pub fn build(name: &str) -> Option<Scene> {
         "ball" => ball::build(),
         "pool" => pool::build(),
         "pool-bump" => pool::bumped(pool::AMPLITUDE_M),
+        "water-room" => water_room::build(),
         "mirror" => mirror::build(),
         "slab" => slab::build(),
         "paraboloid" => paraboloid::build(),

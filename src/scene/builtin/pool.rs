@@ -1,50 +1,55 @@
-//! `pool`: the sun through a wavy water surface, as a mesh of its height and (`pool-bump`) as one quad whose normals
-//! alone have the waves.
+//! `pool`: the sun through a wavy water surface that waves lift and bend, and (`pool-bump`) as one quad whose normals alone
+//! have the waves.
+
+use std::sync::Arc;
 
 use glam::DVec3;
 
 use super::{parts, shapes};
-use crate::scene::{self, Material, Mesh, Scene, Waves};
+use crate::scene::{Material, Mesh, Scene, Wave, Waves};
 use crate::units::Irradiance;
 
-/// One wave: height A·cos(kx·x + kz·z + phase).
-#[derive(Clone, Copy, Debug)]
-pub struct Wave {
-    /// A [m].
-    pub amplitude_m: f64,
-    /// kx, kz [rad/m].
-    pub wave_vector: [f64; 2],
-    /// [rad].
-    pub phase_rad: f64,
-}
-
-impl Wave {
-    /// A·cos(k·x + φ).
-    pub const fn new(amplitude_m: f64, wave_vector: [f64; 2], phase_rad: f64) -> Self {
-        Self {
-            amplitude_m,
-            wave_vector,
-            phase_rad,
-        }
-    }
-}
-
-/// Open water sheet, normals up: `quads` across and down over `half` [m] in x and z around `centre`.
-pub fn water(centre: DVec3, half: [f64; 2], quads: [u32; 2], waves: &[Wave]) -> Mesh {
+/// Open sheet of still water, normals up: `quads` across and down over `half` [m] in x and z around `centre`.
+fn still(centre: DVec3, half: [f64; 2], quads: [u32; 2]) -> Mesh {
     shapes::sheet(quads[0], quads[1], |u, v| {
         let x = centre.x + half[0] * (2.0 * u - 1.0);
         let z = centre.z + half[1] * (2.0 * v - 1.0);
-        let (mut height, mut slope_x, mut slope_z) = (centre.y, 0.0, 0.0);
-        for wave in waves {
-            let [kx, kz] = wave.wave_vector;
-            let (sine, cosine) = (kx * x + kz * z + wave.phase_rad).sin_cos();
-            height += wave.amplitude_m * cosine;
-            slope_x -= wave.amplitude_m * kx * sine;
-            slope_z -= wave.amplitude_m * kz * sine;
-        }
-        let normal = DVec3::new(-slope_x, 1.0, -slope_z).normalize();
-        (DVec3::new(x, height, z), normal)
+        (DVec3::new(x, centre.y, z), DVec3::Y)
     })
+}
+
+/// Amplitude [m], wave vector along x and z [rad/m] and phase [rad] of a wave.
+pub type Ripple = (f64, [f64; 2], f64);
+
+/// Those waves as they run over water of the depth [m]; `None` for none.
+fn running(ripples: &[Ripple], depth_m: f64) -> Option<Waves> {
+    let waves = ripples.iter();
+    let waves =
+        waves.map(|&(amplitude_m, vector, phase)| Wave::on_water(amplitude_m, vector, phase, depth_m));
+    Waves::new(waves.collect()).ok()
+}
+
+fn rippled(waves: Option<Waves>) -> Material {
+    Material {
+        waves,
+        ..parts::dielectric("water", 1.333)
+    }
+}
+
+/// Adds a flat sheet of water that waves bend but do not lift.
+pub fn add_rippled(scene: &mut Scene, centre: DVec3, half: [f64; 2], ripples: &[Ripple], depth_m: f64) {
+    let material = rippled(running(ripples, depth_m));
+    parts::add(scene, "water", still(centre, half, [1, 1]), material);
+}
+
+/// A sheet whose mesh alone has the waves: the vertices at their height, with the normals of the surface there.
+pub fn meshed(centre: DVec3, half: [f64; 2], quads: [u32; 2], waves: &Waves) -> Mesh {
+    let mut mesh = still(centre, half, quads);
+    for (position, normal) in mesh.positions.iter_mut().zip(&mut mesh.normals) {
+        *normal = (DVec3::Y - waves.gradient(*position)).normalize();
+        *position += DVec3::Y * waves.height_m(*position);
+    }
+    mesh
 }
 
 /// Amplitude of each wave [m].
@@ -53,10 +58,18 @@ pub const AMPLITUDE_M: f64 = 0.02;
 /// Half width of the water [m].
 const HALF_M: f64 = 1.5;
 
-/// The waves of the pool, each of the given amplitude [m].
-pub fn waves(amplitude_m: f64) -> [Wave; 3] {
-    [([9.0, 0.0], 1.0), ([0.0, 7.0], 2.0), ([6.0, 5.0], 0.0)]
-        .map(|(vector, phase_rad)| Wave::new(amplitude_m, vector, phase_rad))
+/// Depth of the water [m].
+const DEPTH_M: f64 = 1.0;
+
+/// Quads across and down the sheet: straight ones miss the water by 0.2 mm at most.
+const QUADS: u32 = 149;
+
+fn waves(amplitude_m: f64) -> Option<Waves> {
+    let ripples = [([9.0, 0.0], 1.0), ([0.0, 7.0], 2.0), ([6.0, 5.0], 0.0)];
+    running(
+        &ripples.map(|(vector, phase_rad)| (amplitude_m, vector, phase_rad)),
+        DEPTH_M,
+    )
 }
 
 /// A sheet of 3 m × 3 m, n = 1.333, 1 m above a floor of 2 m × 2 m; the sun shines with 1 W/m².
@@ -64,42 +77,26 @@ pub fn build() -> Scene {
     displaced(AMPLITUDE_M)
 }
 
-/// The pool with waves of the given amplitude [m] as a mesh of 512² quads.
+/// The pool with waves of the given amplitude [m] that lift its surface.
 pub fn displaced(amplitude_m: f64) -> Scene {
-    let surface = water(DVec3::Y, [HALF_M; 2], [512, 512], &waves(amplitude_m));
-    with_water(surface, parts::dielectric("water", 1.333))
+    let flat = still(DVec3::Y * DEPTH_M, [HALF_M; 2], [QUADS; 2]);
+    let mut scene = with_water(flat.clone(), rippled(waves(amplitude_m)));
+    scene.swells.insert(scene.objects.len() - 1, Arc::new(flat));
+    scene.lift();
+    scene
 }
 
 /// The same waves on one flat quad, by its normals alone.
 pub fn bumped(amplitude_m: f64) -> Scene {
-    let surface = water(DVec3::Y, [HALF_M; 2], [1, 1], &[]);
-    let material = Material {
-        waves: as_bumps(&waves(amplitude_m)),
-        ..parts::dielectric("water", 1.333)
-    };
-    with_water(surface, material)
+    let flat = still(DVec3::Y * DEPTH_M, [HALF_M; 2], [1, 1]);
+    with_water(flat, rippled(waves(amplitude_m)))
 }
 
-/// Waves of a sheet as a material has them.
-fn as_bumps(waves: &[Wave]) -> Option<Waves> {
-    let bump = |wave: &Wave| {
-        let [x, z] = wave.wave_vector;
-        let vector = DVec3::new(x, 0.0, z);
-        scene::Wave {
-            amplitude_m: wave.amplitude_m,
-            wavelength_m: std::f64::consts::TAU / vector.length(),
-            direction: vector.normalize(),
-            phase_rad: wave.phase_rad,
-        }
-    };
-    Waves::new(waves.iter().map(bump).collect()).ok()
-}
-
+/// The pool with another sheet of water.
 fn with_water(surface: Mesh, material: Material) -> Scene {
     let mut scene = parts::reference_scene(1.0);
     parts::add(&mut scene, "water", surface, material);
-    scene
-        .lights
-        .push(parts::sun("light", DVec3::new(0.3, -1.0, 0.2), Irradiance(1.0)));
+    let sun = parts::sun("light", DVec3::new(0.3, -1.0, 0.2), Irradiance(1.0));
+    scene.lights.push(sun);
     scene
 }

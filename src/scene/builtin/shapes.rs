@@ -15,6 +15,7 @@ pub fn rectangle(centre: DVec3, half_u: DVec3, half_v: DVec3) -> Mesh {
         normals: vec![half_u.cross(half_v).normalize(); 4],
         uv0: Some(corners.map(|(s, t)| DVec2::new(s + 1.0, t + 1.0) * 0.5).to_vec()),
         uv1: None,
+        colours: None,
         triangles: vec![[0, 1, 2], [0, 2, 3]],
     }
 }
@@ -123,6 +124,7 @@ pub fn sphere(centre: DVec3, radius: f64, levels: u32) -> Mesh {
         normals: directions,
         uv0: None,
         uv1: None,
+        colours: None,
         triangles,
     }
 }

@@ -3,7 +3,6 @@
 use glam::DVec3;
 
 use super::basin::Basin;
-use super::pool::Wave;
 use super::ring::cylinder;
 use super::{parts, shapes};
 use crate::optics::LinearSrgb;
@@ -60,12 +59,11 @@ fn add_basin(scene: &mut Scene) {
         rim_m: 0.38,
         bottom_m: 0.01,
         water_m: 0.34,
-        quads: [256, 216],
         waves: &[
-            Wave::new(0.004, [31.0, 6.0], 1.0),
-            Wave::new(0.004, [-9.0, 27.0], 2.0),
-            Wave::new(0.003, [22.0, 24.0], 0.0),
-            Wave::new(0.002, [36.0, -25.0], 4.0),
+            (0.004, [31.0, 6.0], 1.0),
+            (0.004, [-9.0, 27.0], 2.0),
+            (0.003, [22.0, 24.0], 0.0),
+            (0.002, [36.0, -25.0], 4.0),
         ],
     };
     basin.add(scene, material, material);

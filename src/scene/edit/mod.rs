@@ -45,6 +45,7 @@ impl Edit {
             }
             Self::Place(object, motion) => place(&mut edited, *object, motion)?,
         }
+        edited.lift();
         Ok(edited)
     }
 
@@ -102,6 +103,7 @@ impl EditState {
                 object.set_motion(*motion, scene.pivot(index));
             }
         }
+        edited.lift();
         edited
     }
 }

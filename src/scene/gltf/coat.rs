@@ -2,9 +2,11 @@
 
 use gltf::json::Value;
 use gltf::json::extensions::material as extension;
+use gltf::json::texture::Info;
 use serde::Deserialize;
 
 use super::material::Reading;
+use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
 use crate::scene::{Material, SurfaceKind};
@@ -20,34 +22,57 @@ const F0: f64 = 0.04;
 
 impl Reading<'_, '_> {
     /// A lacquer over the surface, where the file has one.
-    pub(super) fn coat(&mut self, material: &mut Material, extensions: &extension::Material) {
+    ///
+    /// # Errors
+    /// Images that do not fit the memory budget.
+    pub(super) fn coat(&mut self, material: &mut Material, extensions: &extension::Material) -> Result<()> {
         let Some(stated) = extensions.others.get(NAME) else {
-            return;
+            return Ok(());
         };
         let Ok(stated) = Coat::deserialize(stated) else {
-            return self.warn(
+            self.warn(
                 "its clearcoat cannot be read and was left out",
                 "export the file again",
             );
+            return Ok(());
         };
-        let factor = self.share(stated.clearcoat_factor, "clearcoat factor");
-        let roughness = self.share(stated.clearcoat_roughness_factor, "clearcoat roughness");
+        let mut factor = self.share(stated.clearcoat_factor, "clearcoat factor");
+        let mut roughness = self.share(stated.clearcoat_roughness_factor, "clearcoat roughness");
         if factor == 0.0 || extensions.unlit.is_some() {
-            return;
+            return Ok(());
         }
-        if stated.has_texture() {
+        let of = |code: u8| LinearSrgb::grey(f64::from(code) / 255.0);
+        let textures = [&stated.clearcoat_texture, &stated.clearcoat_roughness_texture];
+        factor *= self.mean_of(textures[0].as_ref(), |[red, ..]| of(red))?.r;
+        roughness *= self.mean_of(textures[1].as_ref(), |[_, green, ..]| of(green))?.r;
+        if textures.iter().any(|texture| texture.is_some()) {
             self.warn(
-                "its clearcoat is read by its factors alone, without textures",
+                "its clearcoat's textures were read as their means",
                 "split the mesh where the lacquer changes",
+            );
+        }
+        if stated.clearcoat_normal_texture.is_some() {
+            self.warn(
+                "its clearcoat's normal texture was ignored",
+                "expect it to look and bake as if it were not there",
             );
         }
         if let Err(why) = put_on(material, factor, roughness) {
             self.warn(why, "expect it to look and bake as if it were not there");
+        } else if (material.roughness - roughness).abs() > UNLIKE {
+            self.warn(
+                "its clearcoat was read as rough as what it covers",
+                "give both the same roughness",
+            );
         }
+        Ok(())
     }
 }
 
-/// The lacquer as the file states it; textures are named and not read.
+/// Roughnesses that differ by more look different.
+const UNLIKE: f64 = 0.1;
+
+/// The lacquer as the file states it.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 struct Coat {
@@ -55,28 +80,16 @@ struct Coat {
     clearcoat_factor: f32,
     /// Of its surface.
     clearcoat_roughness_factor: f32,
-    clearcoat_texture: Option<Value>,
-    clearcoat_roughness_texture: Option<Value>,
+    clearcoat_texture: Option<Info>,
+    clearcoat_roughness_texture: Option<Info>,
     clearcoat_normal_texture: Option<Value>,
-}
-
-impl Coat {
-    /// Whether an image changes it from place to place.
-    fn has_texture(&self) -> bool {
-        let textures = [
-            &self.clearcoat_texture,
-            &self.clearcoat_roughness_texture,
-            &self.clearcoat_normal_texture,
-        ];
-        textures.iter().any(|texture| texture.is_some())
-    }
 }
 
 /// Puts a lacquer of a factor and a roughness, both in [0, 1], over a material whose class is known.
 ///
 /// # Errors
 /// Why it has to be left out, to go after the name of the material.
-fn put_on(material: &mut Material, factor: f64, roughness: f64) -> Result<(), String> {
+fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
     match material.surface {
         SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => Err(format!(
             "its clearcoat of roughness {roughness:.2} was left out, as it hardly shines"

@@ -4,6 +4,7 @@ use gltf::json::{Root, Value};
 use serde::Deserialize;
 use serde_json::Map;
 
+use super::animation::Animations;
 use super::extras::Extras;
 use super::pose::Poses;
 use super::report::Report;
@@ -21,6 +22,8 @@ pub struct Document {
     pub extras: Extras,
     /// What bends meshes.
     pub poses: Poses,
+    /// What moves nodes.
+    pub animations: Animations,
 }
 
 /// A node's own transform as the file states it, unchecked.
@@ -50,6 +53,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let required = strings(file, "extensionsRequired")?;
     extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
     let poses = Poses::of(file);
+    let animations = Animations::of(file);
     prepare(file, report);
     make_glass_clear(file, report);
     let extras = Extras::of(&value);
@@ -66,6 +70,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
         transforms,
         extras,
         poses,
+        animations,
     })
 }
 
@@ -132,15 +137,14 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Takes out animations, skins and morph targets, so that faults in them cannot stop a scene at rest, brings old materials
-/// up to date, and fills in what the typed reader wants although glTF does not.
+/// Takes out animations, skins and morph targets, so that faults in them cannot stop a scene, brings old materials up to date, and fills in what the typed reader wants although glTF does not.
 fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
         let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
         let owner = format!("material `{}`", names::name(name.as_ref(), "material", index));
         glossiness::convert(material, &owner, report);
     }
-    let has_animations = file.remove("animations").is_some();
+    file.remove("animations");
     let mut is_bent = file.remove("skins").is_some();
     for node in objects(file.get_mut("nodes")) {
         is_bent |= node.remove("skin").is_some();
@@ -151,9 +155,6 @@ fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
         for primitive in objects(mesh.get_mut("primitives")) {
             is_bent |= primitive.remove("targets").is_some();
         }
-    }
-    if has_animations {
-        report.warn("animations", "are not played", "the scene is read at rest");
     }
     if is_bent {
         report.warn(

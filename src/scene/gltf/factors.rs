@@ -20,6 +20,7 @@ const EVEN: f64 = 2.0 / 255.0;
 pub struct FactorImage {
     pub pixels: Rc<RgbaImage>,
     pub wrap: [Wrap; 2],
+    pub is_nearest: bool,
     /// Set and transform of its coordinates; `None` for a set that is not read.
     pub place: Option<(usize, DMat3)>,
 }
@@ -62,9 +63,9 @@ impl Factors<'_> {
         )
     }
 
-    /// Set and transform of the coordinates of all images, and of another one if there is one; `None` where they differ.
-    pub fn place(&self, other: Option<(usize, DMat3)>) -> Option<(usize, DMat3)> {
-        let mut places = self.images().map(|image| image.place).chain(other.map(Some));
+    /// Set and transform of the coordinates of all images; `None` where they differ.
+    pub fn place(&self) -> Option<(usize, DMat3)> {
+        let mut places = self.images().map(|image| image.place);
         let first = places.next()??;
         places.all(|place| place == Some(first)).then_some(first)
     }
@@ -136,6 +137,7 @@ impl Factors<'_> {
                 })
                 .collect(),
             wrap: self.images().next().map_or([Wrap::Repeat; 2], |image| image.wrap),
+            is_nearest: self.images().all(|image| image.is_nearest),
         }
     }
 }

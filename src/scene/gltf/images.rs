@@ -6,7 +6,7 @@ use std::path::Path;
 use std::rc::Rc;
 
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
-use gltf::json::texture::{Sampler, WrappingMode};
+use gltf::json::texture::{MagFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use image::{ImageFormat, ImageReader, Limits, RgbaImage};
@@ -25,6 +25,9 @@ const LARGEST_SIDE: u32 = 16_384;
 /// sRGB code of linear 0.5: stands in for an image that cannot be read.
 const GREY: u8 = 188;
 
+/// Texels, how they repeat along u and v, and whether the nearest one counts.
+type Pixels = (Rc<RgbaImage>, [Wrap; 2], bool);
+
 /// Reads the images that materials ask for, each once.
 #[derive(Debug)]
 pub struct Images<'a> {
@@ -32,7 +35,7 @@ pub struct Images<'a> {
     buffers: &'a Buffers<'a>,
     folder: &'a Path,
     decoded: HashMap<usize, Rc<RgbaImage>>,
-    by_source: HashMap<(usize, [u8; 2]), usize>,
+    by_source: HashMap<(usize, [u8; 2], bool), usize>,
     textures: Vec<Texture>,
 }
 
@@ -69,7 +72,8 @@ impl<'a> Images<'a> {
             return Ok(None);
         };
         let wrap = self.wrap(texture);
-        let key = (image, wrap.map(|wrap| wrap as u8));
+        let is_nearest = self.is_nearest(texture);
+        let key = (image, wrap.map(|wrap| wrap as u8), is_nearest);
         if let Some(known) = self.by_source.get(&key) {
             return Ok(Some(*known));
         }
@@ -81,12 +85,13 @@ impl<'a> Images<'a> {
             height: pixels.height(),
             rgba: pixels.pixels().map(|pixel| pixel.0).collect(),
             wrap,
+            is_nearest,
         });
         self.by_source.insert(key, self.textures.len() - 1);
         Ok(Some(self.textures.len() - 1))
     }
 
-    /// The texels of a glTF texture, and how it repeats; `None` where it has no image.
+    /// The texels of a glTF texture; `None` where it has no image.
     ///
     /// # Errors
     /// More memory than the budget has.
@@ -96,12 +101,12 @@ impl<'a> Images<'a> {
         owner: &str,
         budget: &mut Budget,
         report: &mut Report,
-    ) -> Result<Option<(Rc<RgbaImage>, [Wrap; 2])>> {
+    ) -> Result<Option<Pixels>> {
         let Some(image) = self.image_index(texture, owner, report) else {
             return Ok(None);
         };
         let pixels = self.decode(image, budget, report)?;
-        Ok(Some((pixels, self.wrap(texture))))
+        Ok(Some((pixels, self.wrap(texture), self.is_nearest(texture))))
     }
 
     /// Adds a texture that is no image of the file; gives its index among the scene's textures.
@@ -168,13 +173,20 @@ impl<'a> Images<'a> {
         found
     }
 
+    fn sampler(&self, texture: Index<gltf::json::Texture>) -> Option<&Sampler> {
+        let sampler = self.root.textures.get(texture.value())?.sampler?;
+        self.root.samplers.get(sampler.value())
+    }
+
+    fn is_nearest(&self, texture: Index<gltf::json::Texture>) -> bool {
+        let filter = self
+            .sampler(texture)
+            .and_then(|sampler| sampler.mag_filter.as_ref());
+        filter.is_some_and(|filter| *filter == Checked::Valid(MagFilter::Nearest))
+    }
+
     fn wrap(&self, texture: Index<gltf::json::Texture>) -> [Wrap; 2] {
-        let sampler = self
-            .root
-            .textures
-            .get(texture.value())
-            .and_then(|texture| texture.sampler);
-        let sampler: Option<&Sampler> = sampler.and_then(|sampler| self.root.samplers.get(sampler.value()));
+        let sampler = self.sampler(texture);
         let mode = |mode: &Checked<WrappingMode>| match mode {
             Checked::Valid(WrappingMode::ClampToEdge) => Wrap::ClampToEdge,
             Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::MirroredRepeat,

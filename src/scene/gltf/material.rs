@@ -6,6 +6,7 @@ use std::sync::Arc;
 use gltf::json::Value;
 use gltf::json::extensions::material as extension;
 use gltf::json::material::Material as Source;
+use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 
 use super::document::Document;
@@ -105,6 +106,11 @@ pub fn read_all(
         .collect()
 }
 
+/// The colour of a texel, in linear light.
+pub(super) fn linear([r, g, b, _]: [u8; 4]) -> LinearSrgb {
+    [r, g, b].map(LinearSrgb::decode_channel).into()
+}
+
 /// A material while it is read.
 pub struct Reading<'a, 'b> {
     pub owner: String,
@@ -176,9 +182,9 @@ impl Reading<'_, '_> {
         }
         let is_polish = matches!(material.surface, SurfaceKind::Mixed | SurfaceKind::Varied);
         if let (true, Some(specular)) = (is_polish, &extensions.specular) {
-            material.polish = self.share(specular.specular_factor.0, "specular factor");
+            material.polish = self.polish(specular)?;
         }
-        self.coat(&mut material, extensions);
+        self.coat(&mut material, extensions)?;
         material.normal_map = self.normal_map(&material)?;
         self.name_what_is_ignored(extensions, &material, is_polish);
         Ok(material)
@@ -202,6 +208,40 @@ impl Reading<'_, '_> {
             );
         }
         read
+    }
+
+    /// What part of a polish reflects, by KHR_materials_specular.
+    fn polish(&mut self, stated: &extension::Specular) -> Result<f64> {
+        let factor = self.share(stated.specular_factor.0, "specular factor");
+        let colour = LinearSrgb::from(stated.specular_color_factor.0.map(widen));
+        let alpha = |[.., alpha]: [u8; 4]| LinearSrgb::grey(f64::from(alpha) / 255.0);
+        let mean = self.mean_of(stated.specular_texture.as_ref(), alpha)?.r;
+        let tint = colour * self.mean_of(stated.specular_color_texture.as_ref(), linear)?;
+        let is_grey = tint.r == tint.g && tint.g == tint.b;
+        if !is_grey || stated.specular_texture.is_some() || stated.specular_color_texture.is_some() {
+            self.warn(
+                "its specular colour was read as its brightness, and specular textures as their means",
+                "expect highlights of the light's own colour, the same everywhere",
+            );
+        }
+        let brightness = if is_grey { tint.r } else { tint.luminance() };
+        let brightness = if brightness.is_nan() { 1.0 } else { brightness };
+        Ok((factor * mean * brightness).clamp(0.0, 1.0))
+    }
+
+    /// Mean over a texture of what `value` makes of each texel; white without one.
+    pub(super) fn mean_of(
+        &mut self,
+        texture: Option<&Info>,
+        value: impl Fn([u8; 4]) -> LinearSrgb,
+    ) -> Result<LinearSrgb> {
+        let Some(info) = texture else {
+            return Ok(LinearSrgb::WHITE);
+        };
+        let mean = self
+            .images
+            .mean(info.index, value, &self.owner, self.budget, self.report)?;
+        Ok(mean.unwrap_or(LinearSrgb::WHITE))
     }
 
     fn colour(&mut self, channels: [f32; 3], what: &str) -> LinearSrgb {
@@ -353,10 +393,6 @@ impl Reading<'_, '_> {
                     "give it transmission and a volume",
                 )
             }
-            SurfaceKind::Varied if material.glass.is_some() => self.warn(
-                "changes from place to place, so that its glass disperses nothing",
-                "split the mesh where the material changes",
-            ),
             _ => {}
         }
         surface
@@ -376,8 +412,9 @@ impl Reading<'_, '_> {
                 "export the file again",
             ),
         }
-        let changed_specular = extensions.specular.as_ref().is_some_and(|specular| {
-            (specular.specular_factor.0 != 1.0 && !is_polish)
+        let changed_specular = extensions.specular.as_ref().filter(|_| !is_polish);
+        let changed_specular = changed_specular.is_some_and(|specular| {
+            specular.specular_factor.0 != 1.0
                 || specular.specular_color_factor.0 != [1.0; 3]
                 || specular.specular_texture.is_some()
                 || specular.specular_color_texture.is_some()
@@ -385,6 +422,10 @@ impl Reading<'_, '_> {
         let mut ignored = Vec::new();
         if changed_specular {
             ignored.push("KHR_materials_specular".to_owned());
+        }
+        let volume = extensions.volume.as_ref().filter(|_| material.volume.is_some());
+        if volume.is_some_and(|volume| volume.thickness_texture.is_some()) {
+            ignored.push("thickness texture, as its mesh says how thick it is,".to_owned());
         }
         if is_matte && self.source.normal_texture.is_some() {
             ignored.push("normal texture, as it is matte,".to_owned());

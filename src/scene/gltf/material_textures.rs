@@ -12,7 +12,7 @@ use gltf::json::validation::Checked;
 use serde::Deserialize;
 
 use super::factors::{FactorImage, Factors};
-use super::material::Reading;
+use super::material::{Reading, linear};
 use super::numbers::widen;
 use crate::error::Result;
 use crate::optics::LinearSrgb;
@@ -28,7 +28,7 @@ const MAX_BETWEEN: f64 = 0.02;
 const OPAQUE: u8 = 254;
 
 impl Reading<'_, '_> {
-    /// The image of what it emits, or its mean where the graphics card could not place it.
+    /// The image of what it emits, or its mean where that has a spectrum.
     pub(super) fn glow(&mut self, material: &mut Material) -> Result<()> {
         let source = self.source;
         let Some(info) = source.emissive_texture.as_ref() else {
@@ -38,22 +38,14 @@ impl Reading<'_, '_> {
             return Ok(());
         }
         let place = self.place_of("emissive texture", info);
-        let others = material.coordinates();
-        let is_coloured = self.spectrum.is_none();
-        let fits =
-            is_coloured && others.is_none_or(|other| place == Some((other.uv_set, other.uv_transform)));
-        if let Some(place) = place.filter(|_| fits) {
+        if let Some(place) = place.filter(|_| self.spectrum.is_none()) {
             material.emission_texture = self.texture_at(info.index, place)?;
             return Ok(());
         }
-        let linear = |[r, g, b, _]: [u8; 4]| [r, g, b].map(LinearSrgb::decode_channel).into();
-        let mean = self
-            .images
-            .mean(info.index, linear, &self.owner, self.budget, self.report)?;
-        material.emitted_radiance = material.emitted_radiance * mean.unwrap_or(LinearSrgb::WHITE);
+        material.emitted_radiance = material.emitted_radiance * self.mean_of(Some(info), linear)?;
         self.warn(
-            "its emissive texture was read as its mean, since it has other coordinates than its others or a spectrum",
-            "give all of its textures the same set and transform",
+            "its emissive texture was read as its mean, since it has a spectrum or coordinates that are not read",
+            "use TEXCOORD_0 or TEXCOORD_1, and no spectrum",
         );
         Ok(())
     }
@@ -66,12 +58,13 @@ impl Reading<'_, '_> {
         let found = self
             .images
             .pixels(info.index, &self.owner, self.budget, self.report)?;
-        let Some((pixels, wrap)) = found else {
+        let Some((pixels, wrap, is_nearest)) = found else {
             return Ok(None);
         };
         Ok(Some(FactorImage {
             pixels,
             wrap,
+            is_nearest,
             place: self.place_of(what, info),
         }))
     }
@@ -97,9 +90,7 @@ impl Reading<'_, '_> {
         }
         let mean = factors.mean();
         let class = factors.class(material);
-        let colour = material.base_colour_texture.as_ref();
-        let place = factors.place(colour.map(|colour| (colour.uv_set, colour.uv_transform)));
-        if let (Some(surface), Some((uv_set, uv_transform))) = (class, place)
+        if let (Some(surface), Some((uv_set, uv_transform))) = (class, factors.place())
             && surface != SurfaceKind::Diffuse
         {
             let texture = factors.texture(format!("factors of {}", self.owner));
@@ -131,7 +122,7 @@ impl Reading<'_, '_> {
                      roughness {:.2} and transmission {:.2}",
                     material.metallic, material.roughness, material.transmission
                 ),
-                "give all of its textures the same set and transform",
+                "give both the same set and transform",
             );
         }
         Ok(())
@@ -230,15 +221,6 @@ impl Reading<'_, '_> {
             return Ok(None);
         };
         let scale = widen(stated.scale);
-        let colour = material.coordinates();
-        // The graphics card has one set of coordinates for each surface.
-        if colour.is_some_and(|colour| (colour.uv_set, colour.uv_transform) != place) {
-            self.warn(
-                "its normal texture follows other coordinates than its base colour and was left out",
-                "give both the same set and transform",
-            );
-            return Ok(None);
-        }
         if !scale.is_finite() {
             self.warn(
                 "its normal texture has a scale that is not finite and was left out",

@@ -14,10 +14,11 @@ use report::{Budget, Report};
 use super::{LoadOptions, Scene};
 use crate::error::{Error, Result, Warning};
 use crate::files;
-use crate::scene::{Glow, Light, LightKind, LightSize};
+use crate::scene::{Clip, Glow, Light, LightKind, LightSize};
 use crate::units::Radiance;
 
 mod accessor;
+mod animation;
 mod area_light;
 mod buffers;
 mod coat;
@@ -142,13 +143,14 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         .collect();
 
     let mut scene = Scene::default();
+    let reader = accessor::Reader {
+        root: &document.root,
+        buffers: &buffers,
+    };
     surface::add_objects(
         &mut scene,
         primitive::Source {
-            reader: accessor::Reader {
-                root: &document.root,
-                buffers: &buffers,
-            },
+            reader,
             poses: &document.poses,
             stands: &stands,
         },
@@ -162,9 +164,20 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
     let lights = light::all(&document, &placed, folder, &mut report)?;
+    let light_nodes = lights.iter().map(|(_, origin)| origin.node).collect();
     scene.lights = lights.into_iter().map(|(light, _)| light).collect();
     add_lights(&mut scene);
-    scene.cameras = nodes::read_all(&document.root, &placed, &mut report);
+    let (cameras, camera_nodes) = nodes::read_all(&document.root, &placed, &mut report);
+    scene.cameras = cameras;
+    let animations = &document.animations;
+    let clip = animations.read(&document, &placed, reader, &mut budget, &mut report);
+    scene.clip = clip.map(|clip| {
+        Arc::new(Clip {
+            light_nodes,
+            camera_nodes,
+            ..clip
+        })
+    });
     substance::warn_of_ranges(&scene, &mut report);
     rebase(&mut scene);
     scene.warnings = report.into_warnings();

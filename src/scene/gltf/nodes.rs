@@ -158,9 +158,7 @@ fn local(transform: &NodeTransform, name: &str, report: &mut Report) -> Result<D
             translation: matrix.w_axis.truncate(),
         });
     }
-    let scale = DVec3::from(transform.scale.unwrap_or([1.0; 3]));
-    let translation = DVec3::from(transform.translation.unwrap_or_default());
-    let rotation = DQuat::from_array(transform.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0]));
+    let (scale, rotation, translation) = stated(transform);
     if !scale.is_finite() || !translation.is_finite() || !rotation.is_finite() {
         return Err(not_finite(name));
     }
@@ -172,16 +170,36 @@ fn local(transform: &NodeTransform, name: &str, report: &mut Report) -> Result<D
             "export the file again",
         );
     }
-    let rotation = if length > 0.0 {
-        rotation / length
-    } else {
-        DQuat::IDENTITY
-    };
     Ok(DAffine3::from_scale_rotation_translation(
         scale,
-        rotation,
+        unit(rotation),
         translation,
     ))
+}
+
+fn stated(transform: &NodeTransform) -> (DVec3, DQuat, DVec3) {
+    (
+        DVec3::from(transform.scale.unwrap_or([1.0; 3])),
+        DQuat::from_array(transform.rotation.unwrap_or([0.0, 0.0, 0.0, 1.0])),
+        DVec3::from(transform.translation.unwrap_or_default()),
+    )
+}
+
+fn unit(rotation: DQuat) -> DQuat {
+    if rotation.length() > 0.0 {
+        rotation / rotation.length()
+    } else {
+        DQuat::IDENTITY
+    }
+}
+
+/// From a placed node to its parent, and the same as scale, rotation and translation [m] where it has no matrix.
+pub fn at_rest(document: &Document, node: usize) -> (DAffine3, (DVec3, DQuat, DVec3)) {
+    let transform = &document.transforms[node];
+    // Placed nodes have a transform that can be read.
+    let at_rest = local(transform, "", &mut Report::default()).unwrap_or(DAffine3::IDENTITY);
+    let (scale, rotation, translation) = stated(transform);
+    (at_rest, (scale, unit(rotation), translation))
 }
 
 fn not_finite(name: &str) -> Error {
@@ -192,8 +210,10 @@ fn not_finite(name: &str) -> Error {
     )
 }
 
-/// All perspective cameras of the placed nodes. What cannot be read is left out with a warning.
-pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> Vec<Camera> {
+/// All perspective cameras of the placed nodes, with the glTF indices of these. What cannot be read is left out with a
+/// warning.
+pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> (Vec<Camera>, Vec<usize>) {
+    let mut nodes = Vec::new();
     let mut cameras = Vec::new();
     for placed in placed {
         let Some(index) = root.nodes[placed.node].camera else {
@@ -210,6 +230,7 @@ pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> Vec<Came
                     placed.name.clone()
                 };
                 cameras.push(Camera { name, ..camera });
+                nodes.push(placed.node);
             }
             Err(why) => report.warn(
                 format!("camera `{}`", placed.name),
@@ -218,7 +239,7 @@ pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> Vec<Came
             ),
         }
     }
-    cameras
+    (cameras, nodes)
 }
 
 fn read_one(source: &Source, placed: &Placed) -> std::result::Result<Camera, String> {

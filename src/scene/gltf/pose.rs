@@ -22,15 +22,16 @@ pub struct Poses {
     skins: Vec<Maybe<Skin>>,
 }
 
+/// A part of a file that faults in it cost alone.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged)]
-enum Maybe<T> {
+pub enum Maybe<T> {
     Read(T),
     Broken(serde::de::IgnoredAny),
 }
 
 impl<T> Maybe<T> {
-    fn get(&self) -> Option<&T> {
+    pub fn get(&self) -> Option<&T> {
         match self {
             Self::Read(read) => Some(read),
             Self::Broken(_) => None,

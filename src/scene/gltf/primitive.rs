@@ -27,6 +27,7 @@ const LARGEST_ROUNDING: f64 = 1e-5;
 /// Bytes of a vertex and a triangle while they are read.
 const VERTEX_BYTES: u64 = 2 * 80;
 const TRIANGLE_BYTES: u64 = 2 * 12;
+const COLOUR_BYTES: u64 = 2 * 12;
 
 /// Takes the memory of one more copy of a mesh.
 ///
@@ -62,7 +63,7 @@ struct Local {
     has_normals: bool,
     /// Whether its positions were rounded to single precision.
     is_rounded: bool,
-    /// Mean of its vertices' colours, over the area.
+    /// Of all its vertices, or their mean over the area; `None` where the mesh has their colours.
     colour: Option<LinearSrgb>,
 }
 
@@ -104,15 +105,16 @@ impl Variant {
 }
 
 impl Primitives {
-    /// The triangles of a primitive, in coordinates from which `world_from_node` brings them into the world, and the mean
-    /// colour of its vertices, if they have any; `None`, with a warning, where it has none there.
+    /// The triangles of a primitive, in coordinates from which `world_from_node` brings them into the world, and the
+    /// colour of its vertices, if they have one; their mean unless it `has_colours`. `None`, with a warning, where it has
+    /// none there.
     ///
     /// # Errors
     /// Positions that are not finite or too far, indices of vertices that do not exist, broken accessors.
     pub fn read(
         &mut self,
         source: Source,
-        (place, primitive): (Place, &Primitive),
+        (place, primitive, has_colours): (Place, &Primitive, bool),
         world_from_node: &DAffine3,
         owner: &str,
         budget: &mut Budget,
@@ -122,7 +124,7 @@ impl Primitives {
         let known = match self.known.entry((place.mesh, place.primitive, bent_by)) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(entry) => {
-                let local = read_local(source, (place, primitive), owner, budget, report)?;
+                let local = read_local(source, (place, primitive, has_colours), owner, budget, report)?;
                 entry.insert(Known {
                     source: local,
                     made: Vec::new(),
@@ -268,11 +270,12 @@ impl Vertices<'_> {
         }
     }
 
-    /// Mean of the colours over the area of the triangles.
-    fn colour(&self, mesh: &Mesh, budget: &mut Budget, report: &mut Report) -> Result<Option<LinearSrgb>> {
+    /// Mean of the colours over the area of the triangles, and the colours themselves where they vary.
+    fn colours(&self, mesh: &Mesh, budget: &mut Budget, report: &mut Report) -> Result<Option<Colours>> {
         let Some(index) = self.index(Semantic::Colors(0)) else {
             return Ok(None);
         };
+        budget.take(mesh.positions.len() as u64 * COLOUR_BYTES, self.owner)?;
         let has_alpha = self.reader.root.accessors.get(index.value()).is_some_and(
             |accessor| matches!(accessor.type_, Checked::Valid(shape) if shape.multiplicity() == 4),
         );
@@ -304,15 +307,20 @@ impl Vertices<'_> {
         let mean = mean.clamp(DVec3::ZERO, DVec3::ONE);
         // One colour is the same wherever it is averaged, and white is white.
         let mean = (mean / COLOUR_STEP).round() * COLOUR_STEP;
-        if colours.iter().any(|colour| colour.distance(mean) > SAME_COLOUR) {
-            report.warn(
-                self.owner,
-                "its vertex colours were read as their mean",
-                "use a base colour texture",
-            );
-        }
-        Ok(Some(mean.to_array().into()))
+        let varies = colours.iter().any(|colour| colour.distance(mean) > SAME_COLOUR);
+        let linear = |colour: &DVec3| colour.clamp(DVec3::ZERO, DVec3::ONE).as_vec3().to_array();
+        Ok(Some(Colours {
+            mean: mean.to_array().into(),
+            of_vertices: varies.then(|| colours.iter().map(linear).collect()),
+        }))
     }
+}
+
+/// Colours of vertices.
+struct Colours {
+    mean: LinearSrgb,
+    /// Where they vary.
+    of_vertices: Option<Vec<[f32; 3]>>,
 }
 
 /// Colours of vertices differ by no more where they are one colour.
@@ -324,7 +332,7 @@ const COLOUR_STEP: f64 = 1.0 / 1_048_576.0;
 /// The primitive in its node's coordinates.
 fn read_local(
     source: Source,
-    (place, primitive): (Place, &Primitive),
+    (place, primitive, has_colours): (Place, &Primitive, bool),
     owner: &str,
     budget: &mut Budget,
     report: &mut Report,
@@ -381,9 +389,10 @@ fn read_local(
         positions,
         uv0,
         uv1,
+        colours: None,
         triangles,
     };
-    let colour = vertices.colour(&mesh, budget, report).unwrap_or_else(|error| {
+    let colours = vertices.colours(&mesh, budget, report).unwrap_or_else(|error| {
         report.warn(
             error.location,
             format!("{}; its colours were left out", error.what),
@@ -391,6 +400,18 @@ fn read_local(
         );
         None
     });
+    let mut colour = colours.as_ref().map(|colours| colours.mean);
+    if let Some(of_vertices) = colours.and_then(|colours| colours.of_vertices) {
+        if has_colours {
+            (colour, mesh.colours) = (None, Some(of_vertices));
+        } else {
+            report.warn(
+                owner,
+                "its vertex colours were read as their mean, as it is not diffuse",
+                "use a base colour texture",
+            );
+        }
+    }
     if source.poses.bend(place) {
         match vertices.bent(source, place, &mesh, budget) {
             Ok(bent) => mesh = bent,
@@ -541,6 +562,9 @@ fn drop_unused_vertices(mesh: &mut Mesh) {
     for uvs in [&mut mesh.uv0, &mut mesh.uv1].into_iter().flatten() {
         *uvs = kept.iter().map(|vertex| uvs[*vertex]).collect();
     }
+    if let Some(colours) = &mut mesh.colours {
+        *colours = kept.iter().map(|vertex| colours[*vertex]).collect();
+    }
     for vertex in mesh.triangles.iter_mut().flatten() {
         *vertex = renamed[*vertex as usize];
     }
@@ -557,18 +581,19 @@ fn split_corners(mesh: &mut Mesh, is_mirrored: bool) {
         .iter()
         .flat_map(|corners| [corners[0], corners[second], corners[third]])
         .collect();
-    let split = |values: &Option<Vec<_>>| {
-        let values = values.as_ref()?;
+    fn split<T: Copy>(values: Option<&Vec<T>>, order: &[u32]) -> Option<Vec<T>> {
+        let values = values?;
         Some(order.iter().map(|vertex| values[*vertex as usize]).collect())
-    };
+    }
     *mesh = Mesh {
         positions: order
             .iter()
             .map(|vertex| mesh.positions[*vertex as usize])
             .collect(),
         normals: vec![DVec3::ZERO; order.len()],
-        uv0: split(&mesh.uv0),
-        uv1: split(&mesh.uv1),
+        uv0: split(mesh.uv0.as_ref(), &order),
+        uv1: split(mesh.uv1.as_ref(), &order),
+        colours: split(mesh.colours.as_ref(), &order),
         triangles: (0..mesh.triangles.len() as u32)
             .map(|t| [3 * t, 3 * t + second as u32, 3 * t + third as u32])
             .collect(),

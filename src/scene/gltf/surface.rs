@@ -63,13 +63,14 @@ pub fn add_objects(
                 mesh: mesh_index.value(),
                 primitive: index,
             };
-            let read = primitives.read(source, (place, part), &world_from_node, &owner, budget, report)?;
+            let material = materials.of_primitive(part, &owner, report);
+            let part = (place, part, materials.is_opaque_body(material));
+            let read = primitives.read(source, part, &world_from_node, &owner, budget, report)?;
             let Some((mesh, colour)) = read else {
                 continue;
             };
             let mut object = Object::new(placed.name.as_str(), (placed.node, index), 0, mesh);
             object.place(world_from_node);
-            let material = materials.of_primitive(part, &owner, report);
             let is_solid = || {
                 let mesh = object.mesh();
                 let mut is_closed = || *closed.entry(Arc::as_ptr(mesh)).or_insert_with(|| is_closed(mesh));
@@ -170,6 +171,12 @@ impl Materials {
         })
     }
 
+    /// Whether a material is diffuse, or diffuse under polish.
+    fn is_opaque_body(&self, material: usize) -> bool {
+        let surface = self.all[material].surface;
+        surface.is_receiver() && surface.is_opaque()
+    }
+
     /// The material of a thin wall for a mesh that is solid or not; any other stays. The first mesh decides what the
     /// material itself becomes, and meshes of the other kind have a twin of it.
     fn thin_or_solid(&mut self, material: usize, is_solid: impl FnOnce() -> bool) -> usize {
@@ -233,16 +240,15 @@ impl Materials {
     }
 
     fn check_coordinates(&self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) {
-        let Some(texture) = self.all[material].coordinates() else {
-            return;
-        };
-        let uvs = if texture.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-        if uvs.is_none() {
-            report.warn(
-                format!("node `{name}`"),
-                format!("has a texture but no TEXCOORD_{} to place it by", texture.uv_set),
-                "give it texture coordinates",
-            );
+        for (set, uvs) in [&mesh.uv0, &mesh.uv1].into_iter().enumerate() {
+            let mut images = self.all[material].images().into_iter().flatten();
+            if uvs.is_none() && images.any(|image| image.uv_set == set) {
+                report.warn(
+                    format!("node `{name}`"),
+                    format!("has a texture but no TEXCOORD_{set} to place it by"),
+                    "give it texture coordinates",
+                );
+            }
         }
     }
 }

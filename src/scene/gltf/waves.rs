@@ -1,5 +1,6 @@
 //! Waves of materials: `nephroid_waves` in a material's `extras`, a list of
-//! `{ "amplitude_m", "wavelength_m", "direction": [x, y, z] or [x, z], "phase_rad" }` in the file's world coordinates.
+//! `{ "amplitude_m", "wavelength_m", "direction": [x, y, z] or [x, z], "phase_rad", "period_s" or "depth_m" }` in the
+//! file's world coordinates.
 
 use glam::DVec3;
 use gltf::json::Value;
@@ -7,6 +8,7 @@ use serde::Deserialize;
 use serde_json::json;
 
 use super::report::Report;
+use crate::scene::waves::gravity_period_s;
 use crate::scene::{Wave, Waves};
 
 /// Where waves stand in a material's extras.
@@ -21,6 +23,10 @@ struct Stated {
     direction: Vec<f64>,
     #[serde(default)]
     phase_rad: f64,
+    /// 0 stands still; without it gravity moves the wave.
+    period_s: Option<f64>,
+    /// Of the water [m]; deep without it.
+    depth_m: Option<f64>,
 }
 
 /// The waves that a material states; those that cannot be are left out with a warning.
@@ -34,8 +40,8 @@ pub fn read(stated: &Value, owner: &str, report: &mut Report) -> Option<Waves> {
             report.warn(
                 owner,
                 format!("{why}: it has none"),
-                "give up to 8 waves of amplitude_m, wavelength_m, direction [x, z] or [x, y, z], phase_rad, with \
-                 slopes amplitude_m·2π/wavelength_m of at most 1 altogether",
+                "give up to 8 waves of amplitude_m, wavelength_m, direction [x, z] or [x, y, z], phase_rad, \
+                 period_s or depth_m, with slopes amplitude_m·2π/wavelength_m of at most 1 altogether",
             );
         })
         .ok()
@@ -50,11 +56,18 @@ fn wave(stated: &Stated) -> Result<Wave, String> {
     let direction = direction
         .try_normalize()
         .ok_or_else(|| format!("of its `{KEY}`, a direction is none"))?;
+    let depth_m = stated.depth_m.unwrap_or(f64::INFINITY);
+    if depth_m.is_nan() || depth_m <= 0.0 {
+        return Err(format!("of its `{KEY}`, a depth of {depth_m} m is none"));
+    }
     Ok(Wave {
         amplitude_m: stated.amplitude_m,
         wavelength_m: stated.wavelength_m,
         direction,
         phase_rad: stated.phase_rad,
+        period_s: stated
+            .period_s
+            .unwrap_or_else(|| gravity_period_s(stated.wavelength_m, depth_m)),
     })
 }
 
@@ -63,7 +76,7 @@ pub fn written(waves: &Waves, shift: DVec3) -> Value {
     let stated = Vec::<Wave>::from(waves.with_origin(-shift));
     let wave = |wave: &Wave| {
         json!({ "amplitude_m": wave.amplitude_m, "wavelength_m": wave.wavelength_m,
-            "direction": wave.direction.to_array(), "phase_rad": wave.phase_rad })
+            "direction": wave.direction.to_array(), "phase_rad": wave.phase_rad, "period_s": wave.period_s })
     };
     stated.iter().map(wave).collect()
 }

@@ -15,33 +15,10 @@ use crate::optics::LinearSrgb;
 use crate::optics::spectrum::xyz::Matrix3;
 use crate::plan;
 use crate::scene::Scene;
-use crate::scene::load::was_dark;
 use crate::viewer::background::{Background, Wake};
 use crate::viewer::graphics::{FORMAT, RenderOptions, SAMPLES, texture};
-use crate::viewer::model::Model;
 use crate::viewer::panel::{Display, Quantity};
 use crate::viewer::timing::Made;
-
-/// What is seen behind scenes that came without light, before tone mapping [1]: their glass and metal would be as black as
-/// what they show. It lights nothing.
-const BACKDROP: f64 = 0.03;
-
-/// Radiance behind the scene [W/(m² sr)]: the same in the picture at every exposure.
-fn backdrop(model: &Model, exposure_stops: f64) -> LinearSrgb {
-    if model.quantity() == Quantity::Light && was_dark(model.edits().loaded()) {
-        LinearSrgb::WHITE * (BACKDROP * (-exposure_stops).exp2())
-    } else {
-        LinearSrgb::BLACK
-    }
-}
-
-/// The view with light alone in it.
-pub(super) fn without_backdrop(view: View) -> View {
-    View {
-        background: LinearSrgb::BLACK,
-        ..view
-    }
-}
 
 impl App {
     /// Draws what changed of the picture: maps, exposure, view.
@@ -169,7 +146,7 @@ impl App {
         if self.exposure.wants(has_new_maps && is_first, shown)
             && let Some(graphics) = &mut self.graphics
         {
-            let stops = graphics.measure_exposure(&without_backdrop(view.clone()))?;
+            let stops = graphics.measure_exposure(view)?;
             shown = self.exposure.take(stops, shown);
             let goal = self.exposure.goal();
             model
@@ -177,7 +154,6 @@ impl App {
                 .write("exposure", json!({"stops": stops, "exposure_stops": goal}));
         }
         view.exposure_stops = self.exposure.next(shown, since);
-        view.background = backdrop(model, view.exposure_stops);
         model.choices.display.exposure_stops = view.exposure_stops;
         Ok(())
     }
@@ -209,7 +185,7 @@ impl App {
             height: height as u32,
             exposure_stops: display.exposure_stops,
             tone_map: display.tone_map,
-            background: backdrop(&self.model, display.exposure_stops),
+            background: LinearSrgb::BLACK,
         })
     }
 

@@ -5,9 +5,8 @@ use std::path::{Path, PathBuf};
 use serde_json::json;
 
 use super::App;
-use super::drawing::without_backdrop;
 use crate::error::{Error, Result};
-use crate::scene::load::was_dark;
+use crate::scene::load::{skies_beside, was_dark};
 use crate::viewer::exporting;
 use crate::viewer::exposure::AutoExposure;
 use crate::viewer::files::{Choice, NO_DIALOG, Purpose, free_names, working_folder};
@@ -16,8 +15,15 @@ use crate::viewer::panel::Quantity;
 
 /// What who opens a file without light is told first.
 pub(super) fn dark_notice(model: &Model) -> Option<String> {
-    was_dark(model.edits().loaded()).then(|| {
-        "The scene has no light: a sun of 4 W/m² was added. Section Scene adds lamps, and removes or turns it.".to_owned()
+    let loaded = model.edits().loaded();
+    was_dark(loaded).then(|| {
+        let mut notice =
+            "The scene has no light: a sun and a clear sky were added. Section Scene adds lamps and changes these."
+                .to_owned();
+        if let Some(option) = skies_beside(&loaded.source).first() {
+            notice += &format!(" The sky beside the file lights it with {option}.");
+        }
+        notice
     })
 }
 
@@ -120,7 +126,6 @@ impl App {
                 "make the window larger",
             ));
         };
-        let view = without_backdrop(view);
         let picture = graphics.radiance(&view)?;
         let folder = working_folder();
         // False colours are no radiance.

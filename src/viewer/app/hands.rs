@@ -9,7 +9,7 @@ use winit::window::CursorGrabMode;
 use super::{App, PIXELS_PER_NOTCH};
 use crate::geometry::Ray;
 use crate::scene::Camera;
-use crate::viewer::command::{Command, FilmCommand};
+use crate::viewer::command::{Command, FilmCommand, PlayCommand};
 use crate::viewer::gizmo::{self, GizmoTarget};
 use crate::viewer::lens::Viewport;
 use crate::viewer::navigation::{BOOKMARKS, HeldKeys, NavigationMode};
@@ -86,6 +86,10 @@ impl App {
             "c" => drop(self.model.navigator.next_camera().map(str::to_owned)),
             "f" => self.model.frame(f64::from(self.picture_rect.aspect_ratio())),
             "r" => self.pressed.push(Command::Rebake),
+            "t" => {
+                let plays = !self.model.playback().is_playing;
+                self.pressed.push(Command::Play(PlayCommand::Play(plays)));
+            }
             "h" | "?" => self.panel.help_open ^= true,
             "v" => {
                 let next = self.model.navigator.travel().next();

@@ -18,6 +18,7 @@ use crate::viewer::files::keeper::Stamps;
 use crate::viewer::filming::Film;
 use crate::viewer::navigation::Navigator;
 use crate::viewer::panel::Selection;
+use crate::viewer::playback::Playback;
 use crate::viewer::worker::BakedLevel;
 use serde_json::json;
 
@@ -118,6 +119,7 @@ impl Model {
         self.sought = PendingSearch::default();
         self.choices.watches = false;
         self.edits = EditedScene::new(scene);
+        self.playback = Playback::default();
         self.exposure_is_kept = self.find_again(Some(Restored::ALL));
         self.forget_maps();
         self.bake_first();
@@ -131,6 +133,7 @@ impl Model {
         self.edits = EditedScene::new(Arc::new(scene));
         self.files.warning = None;
         self.edit_again(&changes);
+        self.stand_at_moment();
         self.navigator.stay_in(self.edits.scene());
         if !is_same_shape {
             self.forget_maps();

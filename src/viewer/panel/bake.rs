@@ -44,10 +44,8 @@ fn show(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Co
 
 fn state_line(ui: &mut Ui, choices: &Choices, model: &Model) {
     let wanted = BakeRequest::new(Arc::clone(model.scene()), choices.settings.clone());
-    let is_stale = model
-        .last
-        .as_deref()
-        .is_some_and(|last| !last.request.is_same(&wanted));
+    let is_other = |last: &BakedLevel| !last.request.is_same(&wanted);
+    let is_stale = !model.playback().is_playing && model.last.as_deref().is_some_and(is_other);
     match &model.state {
         BakeState::Baking {
             stage,
@@ -91,6 +89,7 @@ fn state_line(ui: &mut Ui, choices: &Choices, model: &Model) {
         BakeState::Done | BakeState::Idle if is_stale => {
             ui.colored_label(ATTENTION, "Settings changed since the last bake.");
         }
+        _ if model.playback().is_playing => drop(ui.label("Maps follow what moves.")),
         BakeState::Idle => drop(ui.label("Showing maps that were baked before.")),
         BakeState::Done if has_converged(model.last.as_deref()) => {
             drop(ui.label("Converged: the maps belong to these settings."))

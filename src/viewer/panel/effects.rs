@@ -77,7 +77,7 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, model: &Model) 
     let known = known(effect, model);
     let is_on = known.as_ref().map(|line| line.on);
     let name = effect.name().replace('_', " ");
-    let has_worth = is_on == Some(true) && effect != Effect::Chains;
+    let has_worth = is_on == Some(true) && !matches!(effect, Effect::Chains | Effect::Motion);
     let mut is_asked = false;
     ui.horizontal(|ui| {
         title(ui, &name, is_on).on_hover_text(effect.description());

@@ -15,6 +15,7 @@ mod light_colour;
 mod light_pass;
 mod light_size;
 mod maps;
+mod motion;
 mod probe;
 mod scene;
 mod waves;
@@ -152,6 +153,9 @@ impl Panel {
 
     fn sections(&mut self, ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
         self.scene(ui, choices, model, commands);
+        if model.can_play() {
+            section(ui, "Motion", true, |ui| motion::show(ui, model, commands));
+        }
         let (settings, last) = (&mut choices.settings, model.last.as_deref());
         section(ui, "Light pass", true, |ui| {
             light_pass::show(ui, settings);
@@ -296,6 +300,7 @@ fn keys(ui: &mut Ui, travel: NavigationMode, speed_m_per_s: f64) {
         ("C", "next camera of the file"),
         ("F", "frame what has handles, or the whole scene"),
         ("R", "re-bake"),
+        ("T", "let water and objects move, or stand still"),
         ("Ctrl+Z", "take the last change back"),
         ("Ctrl+Y", "do it again; Ctrl+Shift+Z too"),
         ("P", "probe: click on a surface to see what lights it"),

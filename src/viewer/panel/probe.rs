@@ -146,7 +146,7 @@ fn chain(path: &LightPath, model: &Model) -> String {
     let mut text = light.to_owned();
     for vertex in &path.vertices {
         let verb = match vertex.event {
-            Event::Refraction | Event::ThinTransmission => "through",
+            Event::Refraction | Event::ThinTransmission | Event::Passage => "through",
             Event::Reflection => "off",
             Event::TotalInternalReflection => "totally off",
         };

@@ -64,7 +64,7 @@ fn fault(scene: &Scene, target: &Target, path: &LightPath) -> Option<String> {
                 way_out.distance(way_in - 2.0 * normal * normal.dot(way_in))
             }
             Event::Refraction => (along(way_in) * vertex.ior_ratio).distance(along(way_out)),
-            Event::ThinTransmission => way_in.distance(way_out),
+            Event::ThinTransmission | Event::Passage => way_in.distance(way_out),
         };
         let ior = scene.material_of(vertex.object).ior;
         let ratios = match vertex.event {
@@ -72,7 +72,10 @@ fn fault(scene: &Scene, target: &Target, path: &LightPath) -> Option<String> {
             _ => [1.0, 1.0],
         };
         let off_ratio = ratios.map(|ratio| (vertex.ior_ratio - ratio).abs());
-        let passes = matches!(vertex.event, Event::Refraction | Event::ThinTransmission);
+        let passes = matches!(
+            vertex.event,
+            Event::Refraction | Event::ThinTransmission | Event::Passage
+        );
         let is_on_side = normal.dot(way_in) < 0.0 && passes == (way_out.dot(normal) < 0.0);
         let lengths = (way_out.length() - 1.0).abs() + (normal.length() - 1.0).abs();
         laws.extend([

@@ -376,6 +376,7 @@ fn scene_under_a(sheet: Sheet) -> Scene {
         height: 1,
         rgba: vec![[255, 255, 255, 0], [255; 4]],
         wrap: [Wrap::ClampToEdge; 2],
+        is_nearest: false,
     }));
     let material = Material {
         base_colour_texture: Some(TextureRef {
@@ -489,6 +490,40 @@ fn bumps_differ_from_a_shape_by_its_height() {
     }
 }
 
+/// Under a crest that bends the sun's rays by H·(1 − 1/n)·A·k² = 1, they meet in a line: light runs as the crest does.
+#[test]
+fn focal_lines_run_with_the_crests() {
+    const SIDE: usize = 256;
+    let mut scene = bumped(AMPLITUDE_M);
+    if let LightKind::Sun { direction, .. } = &mut scene.lights[0].kind {
+        *direction = DVec3::NEG_Y;
+    }
+    let (wavelength_m, period_s) = (0.8, 0.72);
+    let wave_number: f64 = TAU / wavelength_m;
+    let water = scene.objects[1].material;
+    let wave = Wave {
+        amplitude_m: (wave_number * wave_number * (1.0 - 1.0 / 1.333)).recip(),
+        wavelength_m,
+        direction: DVec3::X,
+        phase_rad: 0.0,
+        period_s,
+    };
+    scene.materials[water].waves = Waves::new(vec![wave]).ok();
+    for moment in 0..5 {
+        let time_s = 0.13 * f64::from(moment);
+        let light = floor_of(scene.at(time_s), &at(4e4, SIDE));
+        let brightest = (0..SIDE).max_by(|a, b| {
+            let column = |column: usize| light.iter().skip(column).step_by(SIDE).sum::<f64>();
+            column(*a).total_cmp(&column(*b))
+        });
+        // The floor reaches from −1 m to 1 m.
+        let x_m = (brightest.unwrap_or_default() as f64 + 0.5) * 2.0 / SIDE as f64 - 1.0;
+        let from_crest = (x_m - wavelength_m * time_s / period_s).rem_euclid(wavelength_m);
+        let off_m = from_crest.min(wavelength_m - from_crest);
+        assert!(off_m < 2.0 / SIDE as f64, "{time_s} s: {off_m} m from the crest");
+    }
+}
+
 /// One quad with a wave of a length and a slope.
 fn rippled(wavelength_m: f64, slope: f64) -> Scene {
     let mut scene = bumped(AMPLITUDE_M);
@@ -497,6 +532,7 @@ fn rippled(wavelength_m: f64, slope: f64) -> Scene {
         wavelength_m: wavelength_m * part,
         direction: direction.normalize(),
         phase_rad: part,
+        period_s: 0.0,
     };
     let waves = vec![
         wave(DVec3::new(1.0, 0.0, 0.3), 1.0),

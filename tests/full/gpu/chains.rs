@@ -176,6 +176,7 @@ fn wavy_mirror_and_polish_look_as_on_the_cpu() {
             wavelength_m,
             direction: direction.normalize(),
             phase_rad: 0.4,
+            period_s: 0.0,
         };
         let across = direction.cross(DVec3::ONE);
         Waves::new(vec![wave(0.3, direction), wave(0.23, across)]).ok()

@@ -22,6 +22,55 @@ fn assert_keys(object: &Value, expected: &str) {
     assert_eq!(keys, expected);
 }
 
+/// A frame of a sequence is what is baked at its time alone, and the moment behind the last is the first.
+#[test]
+fn frames_are_the_moments_of_their_times() {
+    let sandbox = Sandbox::new();
+    let loops = format!("--frames 3 --fps 4 --loop {QUICK}");
+    sandbox.succeed(&format!("bake builtin:pool -o all {loops}"));
+    let manifest = sandbox.manifest("all");
+    let frames = manifest["sequence"]["frames"].as_array().expect("frames");
+    let times: Vec<f64> = frames.iter().map(|frame| number(&frame["time_s"])).collect();
+    assert_eq!(times, [0.0, 0.25, 0.5]);
+    assert!(frames[1]["geometry_hash"] != frames[0]["geometry_hash"]);
+    let bytes = |file: &str| std::fs::read(sandbox.path(file)).expect("it was written");
+    for (time_s, frame) in [(0.25, 2), (0.5, 3), (0.75, 1)] {
+        sandbox.succeed(&format!("bake builtin:pool -o one --time {time_s} {loops}"));
+        let file = format!("all/maps/0000_floor/{frame:04}.exr");
+        assert!(bytes("one/maps/0000_floor.exr") == bytes(&file), "{time_s} s");
+    }
+    assert!(bytes("all/maps/0000_floor/0001.exr") != bytes("all/maps/0000_floor/0002.exr"));
+    // A shorter one takes its place whole, and a still one that of both.
+    sandbox.succeed(&format!("bake builtin:pool -o all --frames 2 {QUICK}"));
+    assert!(!sandbox.path("all/maps/0000_floor/0003.exr").exists());
+    sandbox.succeed(&format!("bake builtin:pool -o all {QUICK}"));
+    assert!(!sandbox.path("all/maps/0000_floor/0001.exr").exists());
+    let picture = "--size 32x24 --backend cpu";
+    sandbox.succeed(&format!(
+        "render builtin:pool -o pictures --frames 2 {QUICK} {picture}"
+    ));
+    assert!(sandbox.path("pictures/frame-00002.png").exists());
+    for (refused, code, why) in [
+        (
+            format!("bake builtin:ring -o ring --time 1 {QUICK}"),
+            1,
+            "nothing in it moves",
+        ),
+        (
+            "bake builtin:pool -o auto --frames 2".to_string(),
+            2,
+            "--map-resolution",
+        ),
+        (
+            format!("bake builtin:pool -o off --time 1 --effects motion=off {QUICK}"),
+            2,
+            "motion=off",
+        ),
+    ] {
+        sandbox.run(&refused).failed_in_one_sentence(code, &[why]);
+    }
+}
+
 #[test]
 fn bake_prints_the_manifest_that_it_writes() {
     let sandbox = Sandbox::new();

@@ -67,7 +67,7 @@ impl Baked {
         let maps = self.path("out");
         let reader = MapReader::open(&maps, &self.scene)?;
         let folder = TextureFolder::open(&self.path(folder), false)?;
-        nephroid::export::textures::write(&reader, options, folder, &Control::default())
+        nephroid::export::textures::write(&[reader], options, folder, &Control::default())
     }
 }
 

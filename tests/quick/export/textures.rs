@@ -331,7 +331,7 @@ fn an_export_replaces_its_own_files_alone() {
     let folder = TextureFolder::open(&baked.path("c"), false).expect("it can be written");
     let control = Control::default();
     control.cancel();
-    let error = textures::write(&reader, float, folder, &control).expect_err("it was cancelled");
+    let error = textures::write(&[reader], float, folder, &control).expect_err("it was cancelled");
     assert_eq!(error.kind, ErrorKind::Cancelled);
     assert_eq!(names(&baked.path(".")), ["out", "t"]);
 }

@@ -354,6 +354,7 @@ fn texture(width: u32, rgba: Vec<[u8; 4]>, wrap: Wrap) -> Texture {
         height: rgba.len() as u32 / width,
         rgba,
         wrap: [wrap; 2],
+        is_nearest: false,
     }
 }
 
@@ -405,6 +406,27 @@ fn images_go_on_beyond_their_borders() {
         let strip = strip(wrap);
         let found = (-4..8).map(|column| strip.code(f64::from(column), 0.0)[0]);
         assert!(found.eq(expected), "{wrap:?}");
+    }
+    // Between its middles the nearest texel, or one between two.
+    for (is_nearest, expected) in [(true, 2), (false, 1)] {
+        let red = [0, 2].map(LinearSrgb::decode_channel);
+        let pair = Texture {
+            is_nearest,
+            ..texture(2, vec![[0, 0, 0, 255], [2, 0, 0, 0]], Wrap::ClampToEdge)
+        };
+        let place = dvec2(0.5, 0.5);
+        near(
+            pair.sample(place).r,
+            red[1] * 0.5 * f64::from(expected),
+            1e-12,
+            is_nearest,
+        );
+        near(
+            pair.alpha(place),
+            1.0 - 0.5 * f64::from(expected),
+            1e-12,
+            is_nearest,
+        );
     }
     // Textures follow the set that they name.
     let mut mesh = floor(1.0, 0.0);

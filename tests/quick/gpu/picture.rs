@@ -4,7 +4,7 @@ use glam::DAffine3;
 use nephroid::eye_pass::Picture;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::illumination::IlluminationMap;
-use nephroid::scene::{Environment, Object};
+use nephroid::scene::{Environment, Glow, Object, TextureRef};
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip, unlike};
 use crate::prelude::*;
@@ -12,23 +12,40 @@ use support::flip::mean_flip;
 use support::floors::{diffuse, floor_map, floor_scene, four_colours, lambert, texture_reference};
 use support::scenes::{light, seen, view};
 
-/// A textured floor with a lit corner of known radiance, a glowing wall, a mirror ball and a glass ball under a sky;
+/// A textured floor with a lit corner of known radiance, which glows elsewhere by an image of other coordinates, a
+/// glowing wall with colours at its corners, a mirror ball and a glass ball under a sky;
 /// whatever has a colour has three distinct channels.
 fn exhibit() -> (Scene, Vec<IlluminationMap>) {
+    let mut pattern = four_colours();
+    (pattern.wrap, pattern.is_nearest) = ([Wrap::MirroredRepeat, Wrap::Repeat], true);
+    pattern.rgba.reverse();
+    let glow = TextureRef {
+        texture: 1,
+        uv_set: 1,
+        uv_transform: DMat3::from_scale_angle_translation(dvec2(1.5, 1.5), 0.0, dvec2(0.0, -0.6)),
+    };
     let mut scene = floor_scene(Material {
         base_colour_texture: Some(texture_reference()),
+        emitted_radiance: rgb(0.0, 0.4, 0.2),
+        emission_texture: Some(glow.clone()),
         ..diffuse(rgb(0.8, 0.6, 0.3))
     });
-    scene.textures.push(four_colours().into());
+    let mesh = scene.objects[0].mesh_in_scene_mut();
+    let swapped = |uv: &DVec2| dvec2(uv.y, uv.x);
+    mesh.uv1 = mesh.uv0.as_ref().map(|uvs| uvs.iter().map(swapped).collect());
+    let of_floor = Glow::new((&*mesh).into(), &glow, &pattern).expect("it glows");
+    scene.glows.insert(0, of_floor.into());
+    scene.textures.extend([four_colours(), pattern].map(Arc::new));
     let mirror = with(parts::mirror(), |it| it.base_colour = rgb(0.9, 0.7, 0.5));
     let mut glass = parts::dielectric("glass", 1.5);
     glass.base_colour = rgb(1.0, 0.8, 0.6);
     let glowing = Material {
         emitted_radiance: rgb(0.3, 0.9, 0.6),
-        ..diffuse(LinearSrgb::BLACK)
+        ..diffuse(LinearSrgb::WHITE)
     };
     let ball = |x: f64| shapes::sphere(dvec3(x, 0.2, 0.35), 0.18, 4);
-    let wall = shapes::rectangle(dvec3(0.5, 0.3, -0.1), DVec3::X * 0.4, DVec3::Y * 0.2);
+    let mut wall = shapes::rectangle(dvec3(0.5, 0.3, -0.1), DVec3::X * 0.4, DVec3::Y * 0.2);
+    wall.colours = Some(vec![[1.0, 0.0, 0.3], [0.2, 1.0, 0.1], [0.0, 0.4, 1.0], [0.6; 3]]);
     parts::add(&mut scene, "mirror", ball(0.25), mirror);
     parts::add(&mut scene, "glass", ball(0.75), glass);
     parts::add(&mut scene, "wall", wall, glowing);
@@ -43,7 +60,8 @@ fn exhibit() -> (Scene, Vec<IlluminationMap>) {
     for corner in [54, 55, 62, 63] {
         texels[corner] = [3.0, 2.0, 1.0];
     }
-    (scene, vec![floor_map(0, 8, 8, texels)])
+    let of_wall = floor_map(3, 1, 1, vec![[2.0, 3.0, 4.0]]);
+    (scene, vec![floor_map(0, 8, 8, texels), of_wall])
 }
 
 #[test]
@@ -126,6 +144,31 @@ fn what_shares_a_mesh_is_drawn_where_it_is_moved() {
         let copied = or_skip!(Rig::at(AS_CPU, &copies, &maps)).picture(&view);
         assert!(unlike(&moved, &copied) < 2e-3, "{}", unlike(&moved, &copied));
     }
+
+    // Of what waves lift, the corners are sent again.
+    let mirror = scene.objects[1].material;
+    scene.materials[mirror].waves = Some(ripples());
+    scene.swells.insert(1, Arc::clone(&mesh));
+    rig.set_scene(&scene);
+    for time_s in [0.3, 0.5] {
+        let lifted = scene.at(time_s);
+        let bytes = rig.set_scene(&lifted).other_bytes as usize;
+        let corners = 48 * mesh.positions.len();
+        assert!((corners..2 * corners).contains(&bytes), "{bytes}");
+        let afresh = or_skip!(Rig::at(AS_CPU, &lifted, &maps)).picture(&view);
+        assert!(rig.picture(&view).radiance == afresh.radiance);
+    }
+}
+
+fn ripples() -> Waves {
+    let wave = Wave {
+        amplitude_m: 0.01,
+        wavelength_m: 0.2,
+        direction: DVec3::X,
+        phase_rad: 0.4,
+        period_s: 1.0,
+    };
+    Waves::new(vec![wave]).expect("a gentle wave")
 }
 
 /// Stripes, a disc and a gradient, changed by `change`.

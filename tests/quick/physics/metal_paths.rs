@@ -168,6 +168,7 @@ fn textures_dim_a_metal_at_a_wavelength() {
         height: 1,
         rgba: vec![[230, 150, 60, 255]],
         wrap: [Wrap::Repeat; 2],
+        is_nearest: false,
     }));
     scene.materials[0].base_colour_texture = Some(texture_reference());
     let tracer = Tracer::new(Arc::new(scene));

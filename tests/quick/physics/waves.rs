@@ -1,5 +1,6 @@
 //! Waves on normals: the gradient of a height, its change, and the normal of the surface of that height.
 
+use nephroid::scene::builtin::pool;
 use nephroid::transport::bend;
 
 use crate::prelude::*;
@@ -10,6 +11,7 @@ fn waves() -> Waves {
         wavelength_m,
         direction: direction.normalize(),
         phase_rad,
+        period_s: 0.0,
     };
     Waves::new(vec![
         wave(0.02, 0.7, DVec3::X, 1.0),
@@ -37,9 +39,9 @@ fn gradients_are_derivatives_of_the_height() {
 
 #[test]
 fn bent_normals_are_of_the_displaced_surface() {
-    let (displaced, bumped) = (built_in("pool"), built_in("pool-bump"));
+    let bumped = built_in("pool-bump");
     let waves = bumped.materials[1].waves.as_ref().expect("it has waves");
-    let mesh = displaced.objects[1].mesh_in_scene();
+    let mesh = pool::meshed(DVec3::Y, [1.5; 2], [512; 2], waves);
     for (position, normal) in mesh.positions.iter().zip(&mesh.normals).step_by(97) {
         near(waves.height_m(*position), position.y - 1.0, 1e-12, position);
         near(

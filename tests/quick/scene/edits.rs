@@ -49,6 +49,7 @@ fn ripples() -> Waves {
         wavelength_m: 0.1,
         direction: DVec3::X,
         phase_rad: 0.3,
+        period_s: 0.0,
     };
     Waves::new(vec![wave]).expect("a gentle wave")
 }

@@ -269,6 +269,27 @@ fn environments_are_read_and_light_the_scene() {
 }
 
 #[test]
+fn skies_beside_a_dark_scene_are_named() {
+    let folder = folder();
+    let path = folder.path().join("t.glb");
+    std::fs::write(&path, Glb::triangle().bytes()).expect("it can be written");
+    for name in ["b.HDR", "a.hdr", "c.exr"] {
+        std::fs::write(folder.path().join(name), "").expect("it can be written");
+    }
+    let scene = load_path(&path, &options(|options| options.default_light = true)).expect("it is read");
+    let [a, b] = ["a.hdr", "b.HDR"].map(|name| folder.path().join(name).display().to_string());
+    let [warning] = &scene.warnings[..] else {
+        panic!("{:?}", scene.warnings);
+    };
+    assert!(
+        warning
+            .remedy
+            .ends_with(&format!("--environment {a} or --environment {b}")),
+        "{warning:?}"
+    );
+}
+
+#[test]
 fn environments_that_are_none_get_one_sentence() {
     let white = exr(2, 1, |_, _| (1.0, 1.0, 1.0));
     let red = |value: f32| exr(2, 1, move |_, _| (value, 1.0, 1.0));

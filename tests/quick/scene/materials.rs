@@ -281,16 +281,17 @@ fn bad_lights_are_repaired_or_left_out() {
 }
 
 #[test]
-fn default_sun_comes_only_to_a_dark_scene() {
+fn default_light_comes_only_to_a_dark_scene() {
     let with_sun = options(|options| options.default_light = true);
     let dark = Glb::triangle();
     assert!(dark.scene().lights.is_empty());
     let lit = dark.load_with(&with_sun).expect("loads");
-    assert_eq!(
-        (lit.lights.len(), lit.lights[0].name.as_str()),
-        (1, "default sun")
+    let names: Vec<&str> = lit.lights.iter().map(|light| light.name.as_str()).collect();
+    assert_eq!(names, ["default sun", "default sky"]);
+    warns(
+        &lit,
+        "has no light | `default sun` | `default sky` | --environment",
     );
-    warns(&lit, "has no light | `default sun`");
     let own = dark.with_light("lamp", json!({ "type": "point" }));
     let own = own.load_with(&with_sun).expect("loads");
     assert_eq!((own.lights.len(), own.lights[0].name.as_str()), (1, "lamp"));
@@ -420,8 +421,6 @@ fn normal_textures_of_what_is_specular_are_read() {
     let [x, y, z] = [200.0, 128.0, 220.0].map(|code| code / 127.5 - 1.0);
     near(slope.value, dvec2(-0.5 * x / z, -0.5 * y / z), 1e-12, "slope");
 
-    let mut coloured = polish.clone();
-    coloured["baseColorTexture"] = json!({ "index": 0, "texCoord": 1 });
     let (plain, fourth) = (json!({ "index": 0 }), json!({ "index": 0, "texCoord": 3 }));
     for (normals, factors, image, why) in [
         (
@@ -431,13 +430,21 @@ fn normal_textures_of_what_is_specular_are_read() {
             "normal texture, as it is matte,",
         ),
         (&plain, polish.clone(), b"no image", "the same everywhere"),
-        (&fourth, polish, &image, "TEXCOORD_3"),
-        (&plain, coloured, &image, "other coordinates"),
+        (&fourth, polish.clone(), &image, "TEXCOORD_3"),
     ] {
         let scene = embossed(image, normals.clone(), factors);
         assert!(scene.material_of(0).normal_map.is_none());
         warns(&scene, &format!("material `m` | {why}"));
     }
+    // Each image has coordinates of its own.
+    let mut coloured = polish;
+    coloured["baseColorTexture"] = json!({ "index": 0, "texCoord": 1 });
+    let scene = embossed(&image, plain, coloured);
+    let sets = scene
+        .material_of(0)
+        .images()
+        .map(|image| image.map(|image| image.uv_set));
+    assert_eq!(sets, [Some(1), None, None, Some(0)]);
 }
 
 #[test]
@@ -476,11 +483,30 @@ fn lacquer_is_polish_over_matte_and_adds_to_metal() {
         {"clearcoatFactor": 2.0} => clearcoat factor of 2
         {"clearcoatFactor": 1.0, "clearcoatRoughnessFactor": 0.9} => hardly shines
         {"clearcoatFactor": "all"} => cannot be read
-        {"clearcoatFactor": 1.0, "clearcoatTexture": {"index": 0}} => by its factors alone
+        {"clearcoatFactor": 1.0, "clearcoatTexture": {"index": 0}} => read as their means
+        {"clearcoatFactor": 1.0, "clearcoatNormalTexture": {"index": 0}} => normal texture was ignored
         "#,
     ) {
         let (_, scene) = lacquered(0.0, 1.0, parsed(coat));
         warns(&scene, &format!("material `m` | {why}"));
+    }
+    // The means of images of a half and a whole.
+    let image = json!({ "index": 0 });
+    let pixels = [[255, 0, 255, 255], [0, 51, 255, 0]];
+    let coat = json!({ "clearcoatFactor": 1.0, "clearcoatTexture": image,
+        "clearcoatRoughnessFactor": 1.0, "clearcoatRoughnessTexture": image });
+    let dull =
+        json!({ "specularFactor": 0.5, "specularTexture": image, "specularColorFactor": [1.0, 0.0, 0.0] });
+    for (roughness, extension, stated, expected) in [
+        (1.0, "KHR_materials_clearcoat", coat, (0.5, 0.1)),
+        (0.0, "KHR_materials_specular", dull, (0.25 * 0.2126, 0.0)),
+    ] {
+        let mut json = json!({ "name": "m", "pbrMetallicRoughness": factors(0.0, roughness) });
+        json["extensions"] = json!({ extension: stated });
+        let (read, scene) = with_image(pixels, json);
+        near(read.polish, expected.0, 1e-6, extension);
+        near(read.roughness, expected.1, 1e-6, extension);
+        warns(&scene, "material `m` | as their means");
     }
     let (bare, _) = lacquered(0.0, 1.0, json!({}));
     assert_eq!(bare.surface, SurfaceKind::Diffuse);
@@ -571,9 +597,15 @@ fn textures_of_factors_make_surfaces_vary() {
     }
     let other = json!({ "index": 0, "texCoord": 1 });
     let factors = json!({ "metallicRoughnessTexture": other, "baseColorTexture": image });
-    let (read, scene) = with_image([[0, 0, 255, 255], [0, 255, 0, 255]], stated(factors, json!({})));
-    assert!(read.variation.is_none());
-    warns(&scene, "material `m` | follow different coordinates");
+    let by_image = json!({ "transmissionFactor": 1.0, "transmissionTexture": image });
+    for (transmission, is_image) in [(json!({}), true), (by_image, false)] {
+        let pixels = [[0, 0, 255, 255], [0, 255, 0, 255]];
+        let (read, scene) = with_image(pixels, stated(factors.clone(), transmission));
+        assert_eq!(read.variation.is_some(), is_image);
+        if !is_image {
+            warns(&scene, "material `m` | follow different coordinates");
+        }
+    }
 }
 
 #[test]
@@ -615,6 +647,7 @@ fn masks_keep_what_reaches_their_cutoff() {
         height: 1,
         rgba: vec![[255, 255, 255, 51]],
         wrap: [Wrap::Repeat; 2],
+        is_nearest: false,
     };
     let dim = Some((&dim, DVec2::splat(0.5)));
     for (cutoff, factor, image, there) in [

@@ -215,6 +215,37 @@ fn sparse_values_and_short_texture_coordinates_are_read() {
     file.assert_refused("sparse value for element 9");
 }
 
+/// On diffuse surfaces from corner to corner, elsewhere by the mean of a triangle.
+#[test]
+fn vertex_colours_multiply_the_base_colour() {
+    let corners = [[1.0, 0.0, 0.5], [0.0, 1.0, 0.5], [0.5, 0.5, 0.5]];
+    for (metallic, is_each) in [(0.0, true), (1.0, false)] {
+        let mut file = Glb::triangle();
+        let colours = file.push_floats(corners.as_flattened(), 3);
+        attributes(&mut file)["COLOR_0"] = json!(colours);
+        let factors = json!({ "baseColorFactor": [0.5, 1.0, 1.0, 1.0], "metallicFactor": metallic,
+            "roughnessFactor": 1.0 - metallic });
+        let scene = file
+            .with_material(json!({ "pbrMetallicRoughness": factors }))
+            .scene();
+        let mesh = only_mesh(&scene);
+        assert_eq!(mesh.colours.is_some(), is_each);
+        let at = |barycentric: [f64; 3]| {
+            let colour = mesh.colour(0, barycentric) * scene.material_of(0).base_colour;
+            dvec3(colour.r, colour.g, colour.b)
+        };
+        let mean = dvec3(0.25, 0.5, 0.5);
+        let first = if is_each { dvec3(0.5, 0.0, 0.5) } else { mean };
+        near(at([1.0, 0.0, 0.0]), first, 1e-6, "first corner");
+        near(at([1.0 / 3.0; 3]), mean, 1e-6, "middle");
+        if is_each {
+            warns_not(&scene);
+        } else {
+            warns(&scene, "vertex colours were read as their mean");
+        }
+    }
+}
+
 #[test]
 fn flat_triangles_and_unused_vertices_are_dropped() {
     let mut file = Glb::tetrahedron();

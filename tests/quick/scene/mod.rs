@@ -9,6 +9,7 @@ mod files;
 mod lights;
 mod materials;
 mod meshes;
+mod motion;
 mod oracle;
 mod refusals;
 mod spectral;

@@ -149,6 +149,7 @@ fn edits() -> Vec<Edit> {
         wavelength_m: 0.25,
         direction: DVec3::X,
         phase_rad: 0.5,
+        period_s: 0.0,
     };
     let moved = |object, yaw_rad, way| Edit::Place(object, Motion::turned(yaw_rad, way));
     let light = |edit| Edit::Light(0, edit);

@@ -6,7 +6,6 @@ use super::picture::Block;
 use super::{patterns, room};
 use crate::optics::LinearSrgb;
 use crate::scene::builtin::basin::Basin;
-use crate::scene::builtin::pool::Wave;
 use crate::scene::builtin::prism::Prism;
 use crate::scene::builtin::{parts, shapes};
 use crate::scene::{Light, Scene};
@@ -69,18 +68,18 @@ fn add_basin(scene: &mut Scene, stone: usize) {
         rim_m: 0.8,
         bottom_m: 0.46,
         water_m: WATER_M,
-        quads: [232, 160],
         waves: &[
-            Wave::new(0.0022, [31.0, 6.0], 1.0),
-            Wave::new(0.002, [-12.0, 34.0], 2.0),
-            Wave::new(0.0016, [24.0, 31.0], 0.0),
-            Wave::new(0.0013, [40.0, -23.0], 4.0),
-            Wave::new(0.0009, [-9.0, -58.0], 5.0),
+            (0.0022, [31.0, 6.0], 1.0),
+            (0.002, [-12.0, 34.0], 2.0),
+            (0.0016, [24.0, 31.0], 0.0),
+            (0.0013, [40.0, -23.0], 4.0),
+            (0.0009, [-9.0, -58.0], 5.0),
         ],
     };
     let first = scene.objects.len();
     basin.add(scene, mosaic, stone);
-    for object in &mut scene.objects[first..] {
+    let water = scene.objects.len() - 1;
+    for object in &mut scene.objects[first..water] {
         let mesh = object.mesh_in_scene_mut();
         *mesh = room::in_metres(std::mem::take(mesh));
     }

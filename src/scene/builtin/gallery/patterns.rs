@@ -31,6 +31,7 @@ pub fn add(scene: &mut Scene, name: &str, size_m: f64, colour: impl Fn(DVec2) ->
         height: SIDE,
         rgba: (0..SIDE * SIDE).into_par_iter().map(texel).collect(),
         wrap: [Wrap::Repeat; 2],
+        is_nearest: false,
     }));
     let mut material = parts::matte(name, LinearSrgb::WHITE);
     material.base_colour_texture = Some(TextureRef {

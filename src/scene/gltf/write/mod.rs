@@ -54,7 +54,9 @@ fn add_texture(texture: &Texture, glb: &mut Glb) -> Result<()> {
         Wrap::MirroredRepeat => 33648,
         Wrap::ClampToEdge => 33071,
     });
-    let sampler = glb.push("/samplers", json!({ "wrapS": across, "wrapT": down }));
+    let filter = if texture.is_nearest { 9728 } else { 9729 };
+    let sampler = json!({ "magFilter": filter, "wrapS": across, "wrapT": down });
+    let sampler = glb.push("/samplers", sampler);
     glb.push("/textures", json!({ "source": image, "sampler": sampler }));
     Ok(())
 }
@@ -72,6 +74,8 @@ fn add_object(object: &Object, shift: DVec3, glb: &mut Glb) {
         normals,
         uv0,
         uv1,
+        // Built-in scenes have none.
+        colours: _,
         triangles,
     } = &**object.mesh_in_scene();
     let vectors = |list: &[DVec3], shift: DVec3| -> Vec<[f32; 3]> {

@@ -1,0 +1,71 @@
+//! Options of moving scenes: which moment, or which frames.
+
+use clap::Args;
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
+use nephroid::error::{Error, Result};
+use nephroid::export::sequence::FrameTimes;
+use nephroid::scene::Scene;
+use nephroid::scene::camera_path::MAX_FRAMES;
+
+use super::values;
+
+#[derive(Debug, Default, Args)]
+#[command(next_help_heading = "Options of moving scenes")]
+pub struct MomentOptions {
+    /// Moment of a scene whose water or objects move [default: as the file has it]
+    #[arg(long, value_name = "SECONDS", value_parser = values::time_s)]
+    time: Option<f64>,
+    /// So many moments one after the other
+    #[arg(long, value_name = "N", value_parser = values::within(1..=MAX_FRAMES, "frames"))]
+    frames: Option<usize>,
+    /// Frames per second
+    #[arg(long, value_name = "F", requires = "frames", default_value = "24", value_parser = values::fps)]
+    fps: f64,
+    /// Round the periods of waves so that the last frame meets the first
+    #[arg(long = "loop", requires = "frames")]
+    is_loop: bool,
+}
+
+impl MomentOptions {
+    /// The frames that are asked for, unless one moment of them is.
+    pub fn sequence(&self) -> Option<FrameTimes> {
+        self.times().filter(|_| self.time.is_none())
+    }
+
+    fn times(&self) -> Option<FrameTimes> {
+        self.frames.map(|frames| FrameTimes {
+            frames,
+            fps: self.fps,
+            is_loop: self.is_loop,
+        })
+    }
+
+    /// The scene at the moment that is asked for, or with the waves of a loop.
+    ///
+    /// # Errors
+    /// A scene in which nothing moves, or nothing is to.
+    pub fn apply(&self, scene: Scene, effects: &EffectSwitches) -> Result<Scene> {
+        if self.time.is_none() && self.frames.is_none() {
+            return Ok(scene);
+        }
+        if effects.get(Effect::Motion) == EffectSwitch::Off {
+            return Err(Error::usage(
+                "--effects motion=off",
+                "--time and --frames move the scene",
+                "leave one of the two out",
+            ));
+        }
+        if !scene.is_animated() {
+            return Err(Error::failure(
+                &scene.source,
+                "nothing in it moves",
+                "leave --time and --frames out, or give it waves or an animation",
+            ));
+        }
+        let scene = self.times().map_or(scene.clone(), |times| times.scene(&scene));
+        Ok(match self.time {
+            None => scene,
+            Some(time_s) => scene.at(self.times().map_or(time_s, |times| times.within(time_s))),
+        })
+    }
+}

@@ -1,0 +1,242 @@
+//! Keyframes of nodes: translation, rotation and scale of every animation of the file together.
+
+use std::collections::HashMap;
+
+use glam::{DQuat, DVec3, DVec4};
+use gltf::json::{Index, Value};
+use serde::Deserialize;
+use serde_json::Map;
+
+use super::accessor::{Formats, Reader};
+use super::document::Document;
+use super::names;
+use super::nodes::{self, Placed};
+use super::pose::Maybe;
+use super::report::{Budget, Report};
+use crate::error::Error;
+use crate::scene::{Animated, Clip, ClipNode, Interpolation, Track};
+
+/// The animations of a file as it states them. Faults in them cost the motion and not the scene.
+#[derive(Clone, Debug, Default, Deserialize)]
+#[serde(default)]
+pub struct Animations {
+    animations: Vec<Maybe<Animation>>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Animation {
+    name: Option<String>,
+    channels: Vec<Channel>,
+    samplers: Vec<Sampler>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Channel {
+    sampler: usize,
+    target: Target,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Target {
+    node: Option<usize>,
+    path: String,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+struct Sampler {
+    input: u32,
+    output: u32,
+    #[serde(default)]
+    interpolation: Option<String>,
+}
+
+impl Animations {
+    /// Those of a file.
+    pub fn of(file: &Map<String, Value>) -> Self {
+        Self::deserialize(file).unwrap_or_default()
+    }
+
+    /// The clip of all that move a node of the scene; `None` where nothing does.
+    pub fn read(
+        &self,
+        document: &Document,
+        placed: &[Placed],
+        reader: Reader,
+        budget: &mut Budget,
+        report: &mut Report,
+    ) -> Option<Clip> {
+        let mut tracks: HashMap<usize, Vec<Track>> = HashMap::new();
+        for (index, animation) in self.animations.iter().enumerate() {
+            let Some(animation) = animation.get() else {
+                report.warn(
+                    format!("animation {index}"),
+                    "is not as glTF has it and is left out",
+                    "export the file again",
+                );
+                continue;
+            };
+            let name = names::name(animation.name.as_ref(), "animation", index);
+            let owner = format!("animation `{name}`");
+            for channel in &animation.channels {
+                let read = node_of(channel, document)
+                    .and_then(|node| Ok((node, track(animation, channel, reader, &owner, budget)?)));
+                match read {
+                    Ok((node, track)) => {
+                        let of_node = tracks.entry(node).or_default();
+                        if of_node.iter().all(|other| other.animated != track.animated) {
+                            of_node.push(track);
+                        } else {
+                            report.warn(
+                                &owner,
+                                format!("moves node {node} as another animation does, which is played"),
+                                "leave one of them in the file",
+                            );
+                        }
+                    }
+                    Err(why) => report.warn(&owner, why, "export the file again"),
+                }
+            }
+        }
+        clip(tracks, document, placed)
+    }
+}
+
+/// The node that a channel moves.
+fn node_of(channel: &Channel, document: &Document) -> Result<usize, String> {
+    // Without a node an extension says what it moves.
+    let node = channel.target.node.filter(|_| channel.target.path != "pointer");
+    let node = node.ok_or("moves something that is no node, which stays")?;
+    match document.transforms.get(node) {
+        None => Err(format!("moves node {node}, which does not exist")),
+        Some(transform) if transform.matrix.is_some() => {
+            Err(format!("moves node {node}, which stands by a matrix"))
+        }
+        Some(_) => Ok(node),
+    }
+}
+
+/// What a channel does, or why it is left out.
+fn track(
+    animation: &Animation,
+    channel: &Channel,
+    reader: Reader,
+    owner: &str,
+    budget: &mut Budget,
+) -> Result<Track, String> {
+    let animated = match channel.target.path.as_str() {
+        "translation" => Animated::Translation,
+        "rotation" => Animated::Rotation,
+        "scale" => Animated::Scale,
+        "weights" => return Err("moves weights of morph targets, which stay at rest".into()),
+        path => return Err(format!("moves `{path}`, which no node has")),
+    };
+    let sampler = animation.samplers.get(channel.sampler);
+    let sampler = sampler.ok_or("has a channel without a sampler")?;
+    let interpolation = match sampler.interpolation.as_deref() {
+        None | Some("LINEAR") => Interpolation::Linear,
+        Some("STEP") => Interpolation::Step,
+        Some("CUBICSPLINE") => Interpolation::CubicSpline,
+        Some(_) => return Err("has an interpolation that glTF does not know".into()),
+    };
+    let (input, output) = (Index::new(sampler.input), Index::new(sampler.output));
+    let what = |error: Error| error.what;
+    let times = reader.vectors::<1>(input, Formats::Float, owner, budget);
+    let values = match animated {
+        Animated::Rotation => reader
+            .vectors::<4>(output, Formats::FloatOrSigned, owner, budget)
+            .map(|values| values.into_iter().map(DVec4::from).collect()),
+        Animated::Translation | Animated::Scale => reader
+            .vectors::<3>(output, Formats::Float, owner, budget)
+            .map(|values| {
+                values
+                    .into_iter()
+                    .map(|value| DVec3::from(value).extend(0.0))
+                    .collect()
+            }),
+    };
+    let (times, values): (_, Vec<DVec4>) = (times.map_err(what)?, values.map_err(what)?);
+    let mut track = Track {
+        animated,
+        times_s: times.into_iter().map(|[time]| time).collect(),
+        values,
+        interpolation,
+    };
+    check(&mut track)?;
+    Ok(track)
+}
+
+/// Checks the numbers of a track, and brings its rotations to the length 1.
+fn check(track: &mut Track) -> Result<(), &'static str> {
+    let per_keyframe = match track.interpolation {
+        Interpolation::CubicSpline => 3,
+        Interpolation::Step | Interpolation::Linear => 1,
+    };
+    if track.times_s.is_empty() || track.values.len() != per_keyframe * track.times_s.len() {
+        return Err("has another number of values than of times");
+    }
+    if per_keyframe > 1 && track.times_s.len() < 2 {
+        return Err("has a cubic through a single keyframe");
+    }
+    let is_ascending = track.times_s.windows(2).all(|pair| pair[0] < pair[1]);
+    if !is_ascending || track.times_s[0] < 0.0 || !track.times_s.iter().all(|time| time.is_finite()) {
+        return Err("has times that do not ascend");
+    }
+    if !track.values.iter().all(|value| value.is_finite()) {
+        return Err("has a value that is infinite or not a number");
+    }
+    if track.animated == Animated::Rotation {
+        for value in track
+            .values
+            .iter_mut()
+            .skip(per_keyframe / 2)
+            .step_by(per_keyframe)
+        {
+            *value = value.normalize_or(DVec4::from(DQuat::IDENTITY));
+        }
+    }
+    Ok(())
+}
+
+fn clip(mut tracks: HashMap<usize, Vec<Track>>, document: &Document, placed: &[Placed]) -> Option<Clip> {
+    let parents: HashMap<usize, usize> = document
+        .root
+        .nodes
+        .iter()
+        .enumerate()
+        .flat_map(|(parent, node)| {
+            let children = node.children.as_deref().unwrap_or_default();
+            children.iter().map(move |child| (child.value(), parent))
+        })
+        .collect();
+    let places: HashMap<usize, usize> = placed
+        .iter()
+        .enumerate()
+        .map(|(place, of)| (of.node, place))
+        .collect();
+    let nodes: Vec<ClipNode> = placed
+        .iter()
+        .enumerate()
+        .map(|(place, of)| {
+            // Parents stand before their children; a node that is its own ancestor was placed once.
+            let parent = parents.get(&of.node).and_then(|parent| places.get(parent));
+            let (at_rest, pose) = nodes::at_rest(document, of.node);
+            ClipNode {
+                node: of.node,
+                parent: parent.copied().filter(|parent| *parent < place),
+                at_rest,
+                pose,
+                // Joints place what a skin bends, and they stay at rest.
+                is_carried: !document.poses.has_skin(of.node),
+                tracks: tracks.remove(&of.node).unwrap_or_default(),
+            }
+        })
+        .collect();
+    let all = nodes.iter().flat_map(|node| &node.tracks);
+    let ends = all.filter_map(|track| track.times_s.last().copied());
+    let duration_s = ends.reduce(f64::max)?;
+    Some(Clip {
+        nodes,
+        duration_s,
+        ..Clip::default()
+    })
+}
