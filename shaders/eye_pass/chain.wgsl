@@ -50,7 +50,7 @@ fn nearest(gaze: Gaze) -> Seen {
         if hit.triangle == NO_TRIANGLE {
             return Seen(hit, 0.0);
         }
-        let triangle = triangles[hit.triangle];
+        let triangle = met(hit);
         let object = objects[triangle.object];
         passed += hit.distance;
         let normal = cross(triangle.b - triangle.a, triangle.c - triangle.a);
@@ -60,7 +60,7 @@ fn nearest(gaze: Gaze) -> Seen {
         }
         origin = leave(surface_point(hit), gaze.direction);
     }
-    return Seen(Hit(NO_TRIANGLE, 0.0, vec3f(0.0)), 0.0);
+    return Seen(Hit(NO_TRIANGLE, 0.0, vec3f(0.0), 0u), 0.0);
 }
 
 // The level of an image at which a texel is as large as the footprint, seen at an angle.

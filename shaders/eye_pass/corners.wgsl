@@ -29,8 +29,10 @@ struct SurfacePoint {
     map_density: f32,
 }
 
-fn corner_normal(corner: u32) -> vec3f {
-    return bitcast<vec3f>(vec3u(corners[6u * corner + 1u].y, corners[6u * corner + 2u]));
+// Unit.
+fn corner_normal(corner: u32, object: ObjectRecord) -> vec3f {
+    let normal = bitcast<vec3f>(vec3u(corners[6u * corner + 1u].y, corners[6u * corner + 2u]));
+    return normal_in_scene(normal, object.row_x.xyz, object.row_y.xyz, object.row_z.xyz);
 }
 
 fn corner_uvs(corner: u32) -> vec4f {
@@ -55,7 +57,7 @@ fn bend(from_place: vec3f, to_place: vec3f, from_normal: vec3f, to_normal: vec3f
 }
 
 fn surface_point(hit: Hit) -> SurfacePoint {
-    let triangle = triangles[hit.triangle];
+    let triangle = met(hit);
     let weight = hit.barycentric;
     let first = corner_indices[triangle.first_index];
     let second = corner_indices[triangle.first_index + 1u];
@@ -65,9 +67,10 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     let terms_c = triangle.c * weight.z;
     let across = cross(triangle.b - triangle.a, triangle.c - triangle.a);
     let twice_area = length(across);
-    let normal_a = corner_normal(first);
-    let normal_b = corner_normal(second);
-    let normal_c = corner_normal(third);
+    let object = objects[triangle.object];
+    let normal_a = corner_normal(first, object);
+    let normal_b = corner_normal(second, object);
+    let normal_c = corner_normal(third, object);
     let mixed = normal_a * weight.x + normal_b * weight.y + normal_c * weight.z;
     var point: SurfacePoint;
     point.place = terms_a + terms_b + terms_c;
@@ -87,7 +90,7 @@ fn surface_point(hit: Hit) -> SurfacePoint {
         + corner_colour(third) * weight.z;
     point.uvs = uv_a * weight.x + uv_b * weight.y + uv_c * weight.z;
     if HAS_BUMPS {
-        let record = objects[triangle.object].bumps;
+        let record = object.bumps;
         if record != NO_IMAGE {
             let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
             let steps = array(triangle.b - triangle.a, triangle.c - triangle.a);

@@ -29,6 +29,10 @@ struct ObjectRecord {
     glow: u32,
     padding0: u32,
     padding1: u32,
+    // Rows of the way from its mesh's coordinates to the scene.
+    row_x: vec4f,
+    row_y: vec4f,
+    row_z: vec4f,
 }
 
 const SURFACE_DIFFUSE: u32 = 0u;
@@ -41,6 +45,16 @@ const SURFACE_VARIED: u32 = 5u;
 const PI: f32 = 3.14159265358979;
 
 @group(0) @binding(1) var<storage, read> objects: array<ObjectRecord>;
+
+// The unit normal that a normal of a mesh becomes, by the rows of its way into the scene. Outside stays outside where that
+// mirrors.
+fn normal_in_scene(normal: vec3f, x: vec3f, y: vec3f, z: vec3f) -> vec3f {
+    let across = cross(y, z);
+    let turned = vec3f(dot(across, normal), dot(cross(z, x), normal), dot(cross(x, y), normal));
+    let outwards = select(turned, -turned, dot(across, x) < 0.0);
+    let squared = dot(outwards, outwards);
+    return select(vec3f(0.0), outwards * inverseSqrt(squared), squared > 0.0);
+}
 
 // Record of the map of the side that is seen.
 fn map_of(object: ObjectRecord, is_front: bool) -> u32 {

@@ -1,11 +1,16 @@
 // Corners of triangles in the picture.
 
 struct Corner {
+    // In coordinates of the mesh.
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
     // Both sets of texture coordinates.
     @location(2) uvs: vec4f,
     @location(3) map_uv: vec2f,
+    // From there to the scene, of the object's record.
+    @location(4) row_x: vec4f,
+    @location(5) row_y: vec4f,
+    @location(6) row_z: vec4f,
     @location(7) colour: vec4f,
 }
 
@@ -22,10 +27,13 @@ struct Fragment {
 
 @vertex
 fn place(corner: Corner, @builtin(instance_index) object: u32) -> Fragment {
+    let position = vec4f(corner.position, 1.0);
+    let in_scene = vec3f(dot(corner.row_x, position), dot(corner.row_y, position), dot(corner.row_z, position));
     // Relative to the camera first: differences of nearby numbers lose nothing.
-    let from_camera = corner.position - frame.camera_position;
+    let from_camera = in_scene - frame.camera_position;
     var clip = frame.clip_from_camera * vec4f(from_camera, 1.0);
     clip.x -= frame.jitter.x * clip.w;
     clip.y -= frame.jitter.y * clip.w;
-    return Fragment(clip, from_camera, corner.normal, corner.uvs, corner.map_uv, object, corner.colour.rgb);
+    let normal = normal_in_scene(corner.normal, corner.row_x.xyz, corner.row_y.xyz, corner.row_z.xyz);
+    return Fragment(clip, from_camera, normal, corner.uvs, corner.map_uv, object, corner.colour.rgb);
 }

@@ -25,7 +25,7 @@ fn probe(@builtin(global_invocation_id) id: vec3u) {
     let hit = closest_hit(ray.origin, ray.direction, FAR_AWAY);
     var order = NO_TRIANGLE;
     if hit.triangle != NO_TRIANGLE {
-        order = triangles[hit.triangle].order;
+        order = met(hit).order;
     }
     probe_hits[id.x] = ProbeHit(order, hit.distance, vec2u(0u));
 }

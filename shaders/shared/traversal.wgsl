@@ -1,5 +1,5 @@
-// The nearest triangle on a ray, in local coordinates: the scene's radius is at most one. Twin of geometry/bvh.rs and
-// geometry/triangle.rs in single precision.
+// The nearest triangle on a ray, in local coordinates: the scene's radius is at most one. Twin of transport/hierarchy.rs,
+// geometry/bvh.rs and geometry/triangle.rs in single precision.
 
 struct Node {
     low: vec3f,
@@ -20,6 +20,47 @@ struct Triangle {
 @group(1) @binding(1) var<storage, read> nodes: array<Node>;
 @group(1) @binding(2) var<storage, read> triangles: array<Triangle>;
 
+// Count of a node that is an instance.
+const INSTANCE: u32 = 0xffffffffu;
+// In place of an object; of triangles that were moved away.
+const NO_OBJECT: u32 = 0xffffffffu;
+// In place of an instance: triangles and nodes are local.
+const LOCAL: u32 = 0xffffffffu;
+
+// A mesh where it stands.
+struct Instance {
+    // From local coordinates to those of its nodes, and from those of the mesh to local ones.
+    to_nodes: mat4x3f,
+    from_mesh: mat4x3f,
+    root: u32,
+    // None where its triangles are local and have their own numbers.
+    object: u32,
+    // Added to those of its triangles.
+    first_index: u32,
+    first_order: u32,
+    // By which boxes are widened, in coordinates of the nodes: what rounding on the way there moves rays.
+    margin: f32,
+    is_mirrored: bool,
+}
+
+// It takes four nodes.
+fn instance_at(index: u32) -> Instance {
+    let a = nodes[index];
+    let b = nodes[index + 1u];
+    let c = nodes[index + 2u];
+    let d = nodes[index + 3u];
+    return Instance(
+        mat4x3f(a.low, a.high, b.low, b.high),
+        mat4x3f(c.low, c.high, d.low, d.high),
+        a.first,
+        a.count,
+        b.first,
+        b.count,
+        bitcast<f32>(c.first),
+        c.count != 0u,
+    );
+}
+
 // In place of a triangle where nothing is met.
 const NO_TRIANGLE: u32 = 0xffffffffu;
 // Farther than anything [local].
@@ -33,12 +74,12 @@ struct Hit {
     triangle: u32,
     distance: f32,
     barycentric: vec3f,
+    instance: u32,
 }
 
-// A ray as all triangles and boxes need it.
+// A ray as all triangles need it.
 struct Sheared {
     origin: vec3f,
-    inverse: vec3f,
     shear: vec3f,
     // Which axis is the largest of the direction, and whether it points down it.
     axis: u32,
@@ -59,10 +100,8 @@ fn sheared(origin: vec3f, direction: vec3f) -> Sheared {
     } else if size.x <= size.y && size.y > size.z {
         axis = 1u;
     }
-    // No division by zero; signs do not matter where the other side of a box is as far.
-    let safe = select(direction, vec3f(1e-20), size < vec3f(1e-20));
     let is_down = direction[axis] < 0.0;
-    var ray = Sheared(origin, 1.0 / safe, vec3f(0.0), axis, is_down);
+    var ray = Sheared(origin, vec3f(0.0), axis, is_down);
     let d = turned(direction, ray);
     ray.shear = vec3f(d.x / d.z, d.y / d.z, 1.0 / d.z);
     return ray;
@@ -82,9 +121,55 @@ fn gamma(n: f32) -> f32 {
     return n * 5.9604645e-8 / (1.0 - n * 5.9604645e-8);
 }
 
+// A ray as boxes need it.
+struct Slabs {
+    // Of the lower and the upper planes: boxes are widened by what lies between.
+    low_origin: vec3f,
+    high_origin: vec3f,
+    inverse: vec3f,
+}
+
+fn slabs(origin: vec3f, direction: vec3f, margin: f32) -> Slabs {
+    // No division by zero; signs do not matter where the other side of a box is as far.
+    let safe = select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
+    return Slabs(origin + margin, origin - margin, 1.0 / safe);
+}
+
+// Distances along a ray are the same in the coordinates of an instance's nodes.
+fn slabs_in(at: Instance, origin: vec3f, direction: vec3f) -> Slabs {
+    let far = max(abs(origin.x), max(abs(origin.y), abs(origin.z)));
+    let begin = at.to_nodes * vec4f(origin, 1.0);
+    return slabs(begin, at.to_nodes * vec4f(direction, 0.0), at.margin * max(far, 1.0));
+}
+
+// A triangle as an instance has it.
+fn in_instance(triangle: Triangle, instance: u32) -> Triangle {
+    if instance == LOCAL {
+        return triangle;
+    }
+    let at = instance_at(instance);
+    if at.object == NO_OBJECT {
+        return triangle;
+    }
+    let b = at.from_mesh * vec4f(triangle.b, 1.0);
+    let c = at.from_mesh * vec4f(triangle.c, 1.0);
+    return Triangle(
+        at.from_mesh * vec4f(triangle.a, 1.0),
+        at.object,
+        select(b, c, at.is_mirrored),
+        at.first_index + triangle.first_index,
+        select(c, b, at.is_mirrored),
+        at.first_order + triangle.order,
+    );
+}
+
+// The triangle that was met.
+fn met(hit: Hit) -> Triangle {
+    return in_instance(triangles[hit.triangle], hit.instance);
+}
+
 // Woop, Benthin and Wald 2013: watertight. Distance below zero where the triangle is missed.
-fn meet_triangle(ray: Sheared, index: u32) -> Hit {
-    let triangle = triangles[index];
+fn meet_triangle(ray: Sheared, index: u32, triangle: Triangle, instance: u32) -> Hit {
     let a = turned(triangle.a - ray.origin, ray);
     let b = turned(triangle.b - ray.origin, ray);
     let c = turned(triangle.c - ray.origin, ray);
@@ -94,7 +179,7 @@ fn meet_triangle(ray: Sheared, index: u32) -> Hit {
     let u = edge_function(pc, pb);
     let v = edge_function(pa, pc);
     let w = edge_function(pb, pa);
-    let missed = Hit(NO_TRIANGLE, -1.0, vec3f(0.0));
+    let missed = Hit(NO_TRIANGLE, -1.0, vec3f(0.0), 0u);
     if min(u, min(v, w)) < 0.0 && max(u, max(v, w)) > 0.0 {
         return missed;
     }
@@ -115,16 +200,16 @@ fn meet_triangle(ray: Sheared, index: u32) -> Hit {
     // Ahead with all corners it is a distance however narrow the triangle looks: a mean of theirs.
     let ahead = min(a.z * ray.shear.z, min(b.z * ray.shear.z, c.z * ray.shear.z));
     if (distance > bound || ahead > gamma(8.0) * z) && distance < FAR_AWAY {
-        return Hit(index, distance, vec3f(u, v, w) / determinant);
+        return Hit(index, distance, vec3f(u, v, w) / determinant, instance);
     }
     return missed;
 }
 
 // Distance at which a ray enters a box before a limit; FAR_AWAY where it does not.
-fn enter(ray: Sheared, index: u32, limit: f32) -> f32 {
+fn enter(ray: Slabs, index: u32, limit: f32) -> f32 {
     let node = nodes[index];
-    let low = (node.low - ray.origin) * ray.inverse;
-    let high = (node.high - ray.origin) * ray.inverse;
+    let low = (node.low - ray.low_origin) * ray.inverse;
+    let high = (node.high - ray.high_origin) * ray.inverse;
     let near = min(low, high);
     let far = max(low, high);
     let begin = max(max(near.x, near.y), max(near.z, 0.0));
@@ -140,26 +225,40 @@ struct Search {
     index: u32,
     is_over: bool,
     count: u32,
+    // Whose triangles are searched.
+    instance: u32,
+    // How many nodes wait that lie over instances: those after them are of the one that is searched.
+    outside: u32,
 }
 
 // The nearest triangle before a limit, from either side. First down to a leaf, then through its triangles: neighbouring
 // rays then do the same at the same time.
 fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
     let ray = sheared(origin, direction);
+    let outside = slabs(origin, direction, 0.0);
+    var boxes = outside;
     var waiting: array<vec2f, STACK>;
-    var search = Search(Hit(NO_TRIANGLE, limit, vec3f(0.0)), 0u, 0u, false, 0u);
+    var search = Search(Hit(NO_TRIANGLE, limit, vec3f(0.0), LOCAL), 0u, 0u, false, 0u, LOCAL, 0u);
     loop {
         var first = 0u;
         var end = 0u;
         loop {
             let node = nodes[search.index];
+            if node.count == INSTANCE {
+                search.instance = node.first;
+                search.outside = search.count;
+                let at = instance_at(node.first);
+                search.index = at.root;
+                boxes = slabs_in(at, origin, direction);
+                continue;
+            }
             if node.count > 0u {
                 first = node.first;
                 end = node.first + node.count;
                 break;
             }
-            let left = enter(ray, node.first, search.best.distance);
-            let right = enter(ray, node.first + 1u, search.best.distance);
+            let left = enter(boxes, node.first, search.best.distance);
+            let right = enter(boxes, node.first + 1u, search.best.distance);
             let is_left = left <= right;
             if max(left, right) < FAR_AWAY && search.count < STACK {
                 let later = select(node.first, node.first + 1u, is_left);
@@ -170,6 +269,10 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
                 search.index = select(node.first + 1u, node.first, is_left);
             } else if search.count > 0u {
                 // It may be farther than what was found since: then its children are.
+                if search.count == search.outside {
+                    search.instance = LOCAL;
+                    boxes = outside;
+                }
                 search.count -= 1u;
                 search.index = bitcast<u32>(waiting[search.count].x);
             } else {
@@ -178,14 +281,14 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             }
         }
         for (var slot = first; slot < end; slot += 1u) {
-            let found = meet_triangle(ray, slot);
-            let order = triangles[slot].order;
+            let triangle = in_instance(triangles[slot], search.instance);
+            let found = meet_triangle(ray, slot, triangle, search.instance);
             // Of triangles at the same distance the first given.
             let is_nearer = found.distance < search.best.distance
-                || (found.distance == search.best.distance && order < search.best_order);
-            if found.triangle != NO_TRIANGLE && is_nearer {
+                || (found.distance == search.best.distance && triangle.order < search.best_order);
+            if found.triangle != NO_TRIANGLE && is_nearer && triangle.object != NO_OBJECT {
                 search.best = found;
-                search.best_order = order;
+                search.best_order = triangle.order;
             }
         }
         if search.is_over {
@@ -193,6 +296,10 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
         }
         var has_next = false;
         while search.count > 0u && !has_next {
+            if search.count == search.outside {
+                search.instance = LOCAL;
+                boxes = outside;
+            }
             search.count -= 1u;
             search.index = bitcast<u32>(waiting[search.count].x);
             has_next = waiting[search.count].y <= search.best.distance + BOX_MARGIN;

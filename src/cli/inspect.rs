@@ -161,10 +161,7 @@ fn told(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
 
 fn object_report(scene: &Scene, index: usize, lines: &mut Lines) -> Value {
     let (object, material) = (&scene.objects[index], scene.material_of(index));
-    let (triangles, area_m2) = (
-        object.mesh_in_scene().triangles.len(),
-        object.mesh_in_scene().area_m2(),
-    );
+    let (triangles, area_m2) = (object.mesh().triangles.len(), object.in_scene().area_m2());
     let (name, surface) = (&object.name, surface_name(material.surface));
     lines.push((
         "object",

@@ -348,19 +348,14 @@ fn geometry_hash(scene: &Scene) -> u64 {
     for object in &scene.objects {
         take(object.node as u64);
         take(object.primitive as u64);
-        for position in &object.mesh_in_scene().positions {
+        let mesh = object.in_scene();
+        for position in mesh.positions() {
             position.to_array().iter().for_each(|value| take(value.to_bits()));
         }
-        for uv in object
-            .mesh_in_scene()
-            .uv0
-            .iter()
-            .chain(&object.mesh_in_scene().uv1)
-            .flatten()
-        {
+        for uv in [0, 1].into_iter().filter_map(|set| mesh.uvs(set)).flatten() {
             uv.to_array().iter().for_each(|value| take(value.to_bits()));
         }
-        for triangle in &object.mesh_in_scene().triangles {
+        for triangle in mesh.triangles() {
             triangle.iter().for_each(|vertex| take(u64::from(*vertex)));
         }
     }

@@ -282,7 +282,7 @@ impl<'a> MapSet<'a> {
         let Some(file) = &entry.uv_file else {
             return Ok(None);
         };
-        let triangles = self.object_of(entry)?.1.mesh_in_scene().triangles.len();
+        let triangles = self.object_of(entry)?.1.mesh().triangles.len();
         files::read_file(&self.inside(file)?, uv_file::size_bytes(triangles)).map(Some)
     }
 

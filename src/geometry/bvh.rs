@@ -1,5 +1,4 @@
-//! Closest and any hits among many triangles: obvhs finds the candidates in single precision, the decision is made in
-//! double precision.
+//! What rays may meet among many triangles: obvhs builds the hierarchy in single precision.
 
 use glam::{DVec3, Vec3A};
 use obvhs::{
@@ -8,13 +7,13 @@ use obvhs::{
     bvh2::{Bvh2, builder::build_bvh2},
 };
 
+use super::Ray;
 use super::packed::{self, PackedBvh, PackedNode};
 use super::wide::{WideBvh, WideRay};
-use super::{Ray, triangle::ShearedRay};
 
 /// Boxes are widened by this share of the scene's size, so that no rounding of the single-precision box test can lose
 /// a hit: origin, direction and slab distances err by at most some 2⁻²⁰ of the size.
-const BOX_MARGIN: f32 = 1.0 / (1 << 19) as f32;
+pub const BOX_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 
 /// Leaves hold what is tested at once.
 const BUILD: BvhBuildParams = BvhBuildParams {
@@ -26,20 +25,7 @@ const BUILD: BvhBuildParams = BvhBuildParams {
 /// lose their precision out there.
 const FAR_RADII: f64 = 4.0;
 
-/// Where a ray met a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct TriangleHit {
-    /// Index in the order that the triangles were given to [`TriangleBvh::build`].
-    pub triangle: u32,
-    /// Its place among the hierarchy's leaves, for [`TriangleBvh::corners`].
-    pub slot: u32,
-    /// Distance from the ray's origin [m].
-    pub distance_m: f64,
-    /// Of the three corners; they add up to 1.
-    pub barycentric: [f64; 3],
-}
-
-/// A bounding volume hierarchy over triangles.
+/// A bounding volume hierarchy over triangles, or over boxes.
 ///
 /// Single-precision coordinates are relative to the triangles' centre and scaled by a power of two to a radius of
 /// about one, so that neither a far nor a tiny nor a huge scene loses precision.
@@ -49,10 +35,16 @@ pub struct TriangleBvh {
     corners: Vec<[DVec3; 3]>,
     /// Finds what a ray may meet.
     wide: WideBvh,
-    centre: DVec3,
-    /// Single-precision units per metre.
-    scale: f64,
-    /// Of the scene [m].
+    frame: Frame,
+}
+
+/// Single-precision coordinates for what lies within a sphere: (place − `centre`) · `scale`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Frame {
+    /// [m]
+    pub centre: DVec3,
+    /// Single-precision units per metre, a power of two: the sphere's radius is between 1/2 and 1.
+    pub scale: f64,
     radius_m: f64,
 }
 
@@ -67,111 +59,55 @@ impl std::fmt::Debug for TriangleBvh {
 impl TriangleBvh {
     /// Builds the hierarchy. Corners must be finite; triangles without area are allowed and never hit.
     pub fn build(triangles: &[[DVec3; 3]]) -> Self {
-        let (low, high) = triangles
-            .iter()
-            .flatten()
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| {
-                (low.min(*corner), high.max(*corner))
-            });
-        let centre = if triangles.is_empty() {
-            DVec3::ZERO
-        } else {
-            low * 0.5 + high * 0.5
+        let frame = Frame::around(triangles.iter().flatten());
+        Self::over(triangles, frame, BUILD, |corner| frame.local(corner))
+    }
+
+    /// Over boxes by their minimum and maximum corner [m], in the coordinates of something around them.
+    pub fn over_boxes(boxes: &[(DVec3, DVec3)], frame: Frame) -> Self {
+        let build = BvhBuildParams {
+            max_prims_per_leaf: 1,
+            ..BUILD
         };
-        let radius_m = if triangles.is_empty() {
-            1.0
-        } else {
-            (high - centre).length().max(f64::MIN_POSITIVE)
-        };
-        let scale = (-radius_m.log2().ceil()).exp2();
-        let aabbs: Vec<Aabb> = triangles
-            .iter()
-            .map(|corners| {
-                let local = corners.map(|corner| to_single((corner - centre) * scale));
-                let aabb = Aabb::from_points(&local);
-                Aabb::new(aabb.min - BOX_MARGIN, aabb.max + BOX_MARGIN)
-            })
-            .collect();
+        let corners: Vec<[DVec3; 3]> = boxes.iter().map(|&(low, high)| [low, high, high]).collect();
+        // A triangle in one point is never clearly missed: its box decides.
+        Self::over(&corners, frame, build, |_| DVec3::ZERO)
+    }
+
+    fn over(
+        triangles: &[[DVec3; 3]],
+        frame: Frame,
+        build: BvhBuildParams,
+        tested: impl Fn(DVec3) -> DVec3,
+    ) -> Self {
+        let aabbs: Vec<Aabb> = triangles.iter().map(|corners| frame.aabb(corners)).collect();
         let mut build_time = std::time::Duration::ZERO;
-        let bvh = build_bvh2(&aabbs, BUILD, &mut build_time);
+        let bvh = build_bvh2(&aabbs, build, &mut build_time);
         let corners: Vec<[DVec3; 3]> = bvh
             .primitive_indices
             .iter()
             .map(|&triangle| triangles[triangle as usize])
             .collect();
-        let local = |corner: DVec3| (corner - centre) * scale;
-        let singles: Vec<[DVec3; 3]> = corners.iter().map(|corners| corners.map(local)).collect();
+        let singles: Vec<[DVec3; 3]> = corners.iter().map(|corners| corners.map(&tested)).collect();
         Self {
             wide: WideBvh::new(&bvh, &singles),
             bvh,
             corners,
-            centre,
-            scale,
-            radius_m,
+            frame,
         }
     }
 
-    /// The nearest triangle in front of the ray's origin, from either side.
-    pub fn closest_hit(&self, ray: &Ray) -> Option<TriangleHit> {
-        self.closest_hit_where(ray, |_, _| true)
-    }
-
-    /// The same among those places of triangles, by their barycentric coordinates, where something is there.
-    pub fn closest_hit_where(
-        &self,
-        ray: &Ray,
-        is_there: impl Fn(u32, [f64; 3]) -> bool,
-    ) -> Option<TriangleHit> {
-        let mut best: Option<TriangleHit> = None;
-        let sheared = ShearedRay::new(ray);
-        let (local, advanced_m) = self.local_ray(ray, f64::INFINITY);
-        self.wide.search(local, |slot| {
-            let Some((distance_m, barycentric)) = sheared.intersect(&self.corners[slot]) else {
-                return f32::INFINITY;
-            };
-            let triangle = self.bvh.primitive_indices[slot];
-            // Of surfaces at the same distance the first given, whatever the hierarchy looks like.
-            if best.is_some_and(|hit| (hit.distance_m, hit.triangle) <= (distance_m, triangle)) {
-                return f32::INFINITY;
-            }
-            if !is_there(triangle, barycentric) {
-                return f32::INFINITY;
-            }
-            best = Some(TriangleHit {
-                triangle,
-                slot: slot as u32,
-                distance_m,
-                barycentric,
-            });
-            self.local_distance(distance_m, advanced_m)
+    /// Hands out the slots of all triangles or boxes that a ray may meet before `end_m`, near ones first as a rule. `meet`
+    /// gives a distance [m] beyond which nothing is looked for any more, infinite where it knows of none; `None` ends the
+    /// search.
+    #[inline(always)]
+    pub fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
+        let (local, advanced_m) = self.frame.local_ray(ray, end_m);
+        self.wide.search(local, |slot| match meet(slot as u32) {
+            Some(end_m) if end_m.is_finite() => self.frame.local_distance(end_m, advanced_m),
+            Some(_) => f32::INFINITY,
+            None => -1.0,
         });
-        best
-    }
-
-    /// Whether any triangle lies on the ray before `distance_m` (exclusive).
-    pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
-        self.is_blocked_where(ray, distance_m, |_, _| true)
-    }
-
-    /// The same by those places of triangles where something is there.
-    pub fn is_blocked_where(
-        &self,
-        ray: &Ray,
-        distance_m: f64,
-        is_there: impl Fn(u32, [f64; 3]) -> bool,
-    ) -> bool {
-        let sheared = ShearedRay::new(ray);
-        let (local, _) = self.local_ray(ray, distance_m);
-        let mut is_blocked = false;
-        self.wide.search(local, |slot| {
-            is_blocked = sheared
-                .intersect(&self.corners[slot])
-                .is_some_and(|(hit_m, barycentric)| {
-                    hit_m < distance_m && is_there(self.bvh.primitive_indices[slot], barycentric)
-                });
-            if is_blocked { -1.0 } else { f32::INFINITY }
-        });
-        is_blocked
     }
 
     /// The node around all triangles; `None` without any.
@@ -182,49 +118,99 @@ impl TriangleBvh {
         })
     }
 
-    /// The hierarchy for devices.
-    pub fn packed(&self) -> PackedBvh {
-        let has_triangles = !self.corners.is_empty();
-        let nodes: Vec<PackedNode> = self.bvh.nodes[..if has_triangles { self.bvh.nodes.len() } else { 0 }]
-            .iter()
-            .map(|node| PackedNode {
-                low: node.aabb().min.to_array(),
-                first: node.first_index,
-                high: node.aabb().max.to_array(),
-                count: node.prim_count,
-            })
-            .collect();
-        let local = |corner: DVec3| to_single((corner - self.centre) * self.scale).to_array();
+    /// The hierarchy for devices, in its own coordinates or in those of something larger around it.
+    pub fn packed(&self, frame: &Frame) -> PackedBvh {
+        let local = |place: DVec3| to_single(frame.local(place));
+        let placed = |corner: Vec3A, margin: f32| {
+            let is_same = *frame == self.frame;
+            let placed = if is_same {
+                corner
+            } else {
+                local(self.frame.place(corner)) + margin
+            };
+            placed.to_array()
+        };
+        let count = if self.corners.is_empty() {
+            0
+        } else {
+            self.bvh.nodes.len()
+        };
+        let nodes = self.bvh.nodes[..count].iter().map(|node| PackedNode {
+            low: placed(node.aabb().min, -BOX_MARGIN),
+            first: node.first_index,
+            high: placed(node.aabb().max, BOX_MARGIN),
+            count: node.prim_count,
+        });
+        let nodes: Vec<PackedNode> = nodes.collect();
+        let corners = self.corners.iter();
         PackedBvh {
-            corners: self.corners.iter().map(|corners| corners.map(local)).collect(),
+            corners: corners
+                .map(|corners| corners.map(|corner| local(corner).to_array()))
+                .collect(),
             triangles: self.bvh.primitive_indices.clone(),
-            centre: self.centre,
-            scale: self.scale,
             depth: packed::depth(&nodes),
             nodes,
         }
+    }
+
+    /// Its own single-precision coordinates.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+
+    /// The triangle or box in a slot, by its index in the order that they were given.
+    pub fn triangle(&self, slot: u32) -> u32 {
+        self.bvh.primitive_indices[slot as usize]
     }
 
     /// Corners of the triangle in a slot [m].
     pub fn corners(&self, slot: u32) -> &[DVec3; 3] {
         &self.corners[slot as usize]
     }
+}
 
-    /// Number of triangles.
-    pub fn triangle_count(&self) -> usize {
-        self.corners.len()
+impl Frame {
+    /// Around points; of some size where there are none.
+    pub fn around<'a>(points: impl Iterator<Item = &'a DVec3>) -> Self {
+        let mut points = points.peekable();
+        let is_empty = points.peek().is_none();
+        let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), point| {
+            (low.min(*point), high.max(*point))
+        });
+        let (centre, radius_m) = if is_empty {
+            (DVec3::ZERO, 1.0)
+        } else {
+            let centre = low * 0.5 + high * 0.5;
+            (centre, (high - centre).length().max(f64::MIN_POSITIVE))
+        };
+        Self {
+            centre,
+            scale: (-radius_m.log2().ceil()).exp2(),
+            radius_m,
+        }
     }
 
-    /// Centre [m] and radius [m] of a sphere around all triangles.
-    pub fn bounding_sphere(&self) -> (DVec3, f64) {
-        (self.centre, self.radius_m)
+    /// A place [m] in its coordinates.
+    pub fn local(&self, point: DVec3) -> DVec3 {
+        (point - self.centre) * self.scale
+    }
+
+    /// And back [m].
+    fn place(&self, local: Vec3A) -> DVec3 {
+        // Exact but for the sum: the scale is a power of two.
+        self.centre + local.as_dvec3() * (1.0 / self.scale)
+    }
+
+    fn aabb(&self, points: &[DVec3; 3]) -> Aabb {
+        let aabb = Aabb::from_points(&points.map(|point| to_single(self.local(point))));
+        Aabb::new(aabb.min - BOX_MARGIN, aabb.max + BOX_MARGIN)
     }
 
     /// The ray in single-precision coordinates, with the distance [m] by which its origin was advanced.
     fn local_ray(&self, ray: &Ray, limit_m: f64) -> (WideRay, f64) {
         let towards_centre = (self.centre - ray.origin).dot(ray.direction);
         let advanced_m = (towards_centre - FAR_RADII * self.radius_m).max(0.0);
-        let origin = to_single((ray.at(advanced_m) - self.centre) * self.scale);
+        let origin = to_single(self.local(ray.at(advanced_m)));
         // A negative zero would turn the slab test inside out.
         let direction = to_single(ray.direction) + Vec3A::ZERO;
         let limit = if limit_m.is_finite() {
@@ -257,10 +243,8 @@ impl<'a> Node<'a> {
     /// A box around all triangles of the node, a little too large, as minimum and maximum corner [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let aabb = self.hierarchy.bvh.nodes[self.index].aabb();
-        // Exact: the scale is a power of two.
-        let unit_m = 1.0 / self.hierarchy.scale;
-        let metres = |local: Vec3A| self.hierarchy.centre + local.as_dvec3() * unit_m;
-        (metres(aabb.min), metres(aabb.max))
+        let frame = &self.hierarchy.frame;
+        (frame.place(aabb.min), frame.place(aabb.max))
     }
 
     /// The two nodes that share out its triangles; `None` for a leaf.
@@ -273,12 +257,10 @@ impl<'a> Node<'a> {
         (!node.is_leaf()).then(|| [child(node.first_index), child(node.first_index + 1)])
     }
 
-    /// Index and corners of each triangle of a leaf; nothing for other nodes.
-    pub fn triangles(&self) -> impl Iterator<Item = (u32, &'a [DVec3; 3])> {
-        let TriangleBvh { bvh, corners, .. } = self.hierarchy;
-        let node = &bvh.nodes[self.index];
-        let first = node.first_index as usize;
-        (first..first + node.prim_count as usize).map(|slot| (bvh.primitive_indices[slot], &corners[slot]))
+    /// Slots of the triangles of a leaf; none for other nodes.
+    pub fn slots(&self) -> std::ops::Range<u32> {
+        let node = &self.hierarchy.bvh.nodes[self.index];
+        node.first_index..node.first_index + node.prim_count
     }
 }
 

@@ -10,7 +10,7 @@ pub mod sampling;
 pub mod triangle;
 mod wide;
 
-pub use bvh::{TriangleBvh, TriangleHit};
+pub use bvh::TriangleBvh;
 pub use frustum::Frustum;
 pub use packed::{PackedBvh, PackedNode};
 pub use ray::Ray;

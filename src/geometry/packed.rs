@@ -1,9 +1,5 @@
 //! The triangle hierarchy in single precision, for the device.
 
-use glam::DVec3;
-
-use super::TriangleBvh;
-
 /// A node: its box and what is in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PackedNode {
@@ -17,29 +13,19 @@ pub struct PackedNode {
     pub count: u32,
 }
 
-/// Nodes and triangles in local coordinates: relative to a centre and scaled to a radius of at most one, where the
-/// boxes' margin covers all rounding of single precision.
+/// Nodes and triangles in the coordinates of a [`Frame`](super::bvh::Frame), where the boxes' margin covers all rounding
+/// of single precision.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackedBvh {
     /// The root comes first; none without triangles.
     pub nodes: Vec<PackedNode>,
     /// Corners of the triangle in each slot, local.
     pub corners: Vec<[[f32; 3]; 3]>,
-    /// Which triangle lies in each slot: its place in the order that they were given to [`TriangleBvh::build`].
+    /// Which triangle lies in each slot: its place in the order that they were given to
+    /// [`TriangleBvh::build`](super::TriangleBvh::build).
     pub triangles: Vec<u32>,
-    /// Local coordinates are (place − `centre`) · `scale` [m].
-    pub centre: DVec3,
-    /// Local units per metre, a power of two.
-    pub scale: f64,
     /// Largest number of nodes above a node.
     pub depth: usize,
-}
-
-impl PackedBvh {
-    /// The hierarchy over triangles with these corners [m], which must be finite.
-    pub fn build(triangles: &[[DVec3; 3]]) -> Self {
-        TriangleBvh::build(triangles).packed()
-    }
 }
 
 /// Nodes above the deepest node.

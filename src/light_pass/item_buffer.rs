@@ -19,7 +19,7 @@ use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use self::bits::CellBits;
-use self::builder::{Builder, Owners};
+use self::builder::Builder;
 use self::search::{Bounds, Search};
 use super::launch::Launch;
 use crate::transport::Tracer;
@@ -72,10 +72,7 @@ impl ItemBuffer {
             .map(|face| lit::lit_cells(launch, face))
             .collect();
         let objects = &tracer.scene().objects;
-        let bounds: Vec<Option<Bounds>> = objects
-            .par_iter()
-            .map(|object| object.mesh_in_scene().bounds())
-            .collect();
+        let bounds: Vec<Option<Bounds>> = objects.par_iter().map(|object| object.bounds()).collect();
         let mut wanted = vec![false; objects.len()];
         casters.iter().for_each(|&object| wanted[object] = true);
         let boxes = |of_wanted: bool| {
@@ -85,7 +82,6 @@ impl ItemBuffer {
         let builder = Builder {
             launch,
             tracer,
-            owners: Owners::new(tracer),
             bounds: &bounds,
             boxes: boxes(true),
             wanted: &wanted,
@@ -131,7 +127,7 @@ impl ItemBuffer {
 
     /// Whether any cell that a box [m] may lie in is marked.
     pub fn is_marked_towards(&self, launch: &Launch, bounds: (DVec3, DVec3)) -> bool {
-        let none = |_: u32| false;
+        let none = |_: usize| false;
         self.faces.iter().enumerate().any(|(face, marked)| {
             let search = Search::new(launch, face, &[], &[], &none);
             search.may_touch(bounds, marked)
@@ -140,7 +136,7 @@ impl ItemBuffer {
 
     /// Whether an object may bend light, or stand in its way to a caster.
     pub fn may_concern(&self, launch: &Launch, tracer: &Tracer, object: usize) -> bool {
-        let Some(bounds) = tracer.scene().objects[object].mesh_in_scene().bounds() else {
+        let Some(bounds) = tracer.scene().objects[object].bounds() else {
             return false;
         };
         if self.casters.contains(&object) {
@@ -151,11 +147,10 @@ impl ItemBuffer {
         }
         let mut wanted = vec![false; tracer.scene().objects.len()];
         self.casters.iter().for_each(|&caster| wanted[caster] = true);
-        let owners = Owners::new(tracer);
-        let wanted = |triangle: u32| wanted[owners.of(triangle)];
+        let wanted = |object: usize| wanted[object];
         self.faces.iter().enumerate().any(|(face, marked)| {
             let search = Search::new(launch, face, &EVERYWHERE, &[], &wanted);
-            search.may_hide(bounds, marked, tracer.bvh().root())
+            search.may_hide(bounds, marked, tracer.roots())
         })
     }
 

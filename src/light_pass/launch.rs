@@ -291,8 +291,8 @@ fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Doma
     let mut low = DVec3::INFINITY;
     let mut high = DVec3::NEG_INFINITY;
     for &object in casters {
-        for position in &scene.objects[object].mesh_in_scene().positions {
-            let local = frame_from_scene * *position;
+        for position in scene.objects[object].in_scene().positions() {
+            let local = frame_from_scene * position;
             (low, high) = (low.min(local), high.max(local));
         }
     }
@@ -300,8 +300,8 @@ fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Doma
     let before = scene
         .objects
         .iter()
-        .flat_map(|object| &object.mesh_in_scene().positions)
-        .map(|position| (frame_from_scene * *position).z)
+        .flat_map(|object| object.in_scene().positions())
+        .map(|position| (frame_from_scene * position).z)
         .fold(f64::INFINITY, f64::min);
     let size = high - low;
     // Also false where there is no caster, or none with an area across the light.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::geometry::enclosure::{Bounds, is_closed, triangle_meets_box, winding_number};
-use crate::scene::{Light, LightKind, LightSize, Mesh, Scene};
+use crate::scene::{InScene, Light, LightKind, LightSize, Mesh, Scene};
 
 /// Larger meshes are not looked at: they seal nothing.
 const MAX_TRIANGLES: usize = 200_000;
@@ -25,11 +25,7 @@ pub(super) struct Compartments {
 
 impl Compartments {
     pub(super) fn of(scene: &Scene) -> Self {
-        let bounds: Vec<Option<Bounds>> = scene
-            .objects
-            .iter()
-            .map(|object| object.mesh_in_scene().bounds())
-            .collect();
+        let bounds: Vec<Option<Bounds>> = scene.objects.iter().map(|object| object.bounds()).collect();
         let mut compartments = Self {
             objects: vec![Some(Vec::new()); scene.objects.len()],
             lights: vec![Some(Vec::new()); scene.lights.len()],
@@ -53,17 +49,18 @@ impl Compartments {
                 .filter_map(|(light, source)| Some((light, extent(source, &bounds)?)))
                 .filter(|(_, place)| overlap(around, *place))
                 .collect();
-            let mesh = object.mesh_in_scene();
-            if (near.is_empty() && lamps.is_empty())
-                || mesh.triangles.len() > MAX_TRIANGLES
-                || !is_closed(&mesh.positions, &mesh.triangles)
-            {
+            let mesh = object.mesh();
+            if (near.is_empty() && lamps.is_empty()) || mesh.triangles.len() > MAX_TRIANGLES {
+                continue;
+            }
+            let mesh = &*object.copy_in_scene();
+            if !is_closed(&mesh.positions, &mesh.triangles) {
                 continue;
             }
             compartments.encloses[container] = true;
             for (other, bounds) in near {
                 // Boxes overlap easily where surfaces do not.
-                if enters(scene.objects[other].mesh_in_scene(), around) {
+                if enters(scene.objects[other].in_scene(), around) {
                     book(
                         &mut compartments.objects[other],
                         container,
@@ -127,9 +124,9 @@ fn overlap((low, high): Bounds, (from, to): Bounds) -> bool {
 }
 
 /// Whether any part of a mesh lies in a box.
-fn enters(mesh: &Mesh, bounds: Bounds) -> bool {
-    mesh.triangles.len() > MAX_TRIANGLES
-        || (0..mesh.triangles.len()).any(|triangle| triangle_meets_box(mesh.corners(triangle), bounds))
+fn enters(mesh: InScene, bounds: Bounds) -> bool {
+    mesh.triangle_count() > MAX_TRIANGLES
+        || (0..mesh.triangle_count()).any(|triangle| triangle_meets_box(mesh.corners(triangle), bounds))
 }
 
 /// Whether a box lies wholly inside a closed mesh; `None` where the mesh goes through it, or hardly passes it.

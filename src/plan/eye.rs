@@ -61,7 +61,7 @@ fn first_seen(
 ) -> Option<usize> {
     let frustum = camera.map(|(camera, aspect)| camera.frustum(aspect));
     let is_seen = |object: &usize| {
-        let bounds = scene.objects[*object].mesh_in_scene().bounds();
+        let bounds = scene.objects[*object].bounds();
         bounds.is_some_and(|bounds| frustum.is_none_or(|frustum| frustum.may_see(bounds)))
     };
     (0..scene.objects.len())

@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::compartments::Compartments;
 use crate::geometry::enclosure::Bounds;
-use crate::scene::{Light, LightKind, Mesh, Scene, SurfaceKind};
+use crate::scene::{InScene, Light, LightKind, Scene, SurfaceKind};
 
 /// With more specular objects than this, all that share a compartment are taken to send light to each other.
 const MAX_RELAYS: usize = 512;
@@ -43,11 +43,7 @@ impl<'a> Reach<'a> {
         let mut reach = Self {
             scene,
             compartments: Compartments::of(scene),
-            bounds: scene
-                .objects
-                .iter()
-                .map(|object| object.mesh_in_scene().bounds())
-                .collect(),
+            bounds: scene.objects.iter().map(|object| object.bounds()).collect(),
             specular: of_kind(SurfaceKind::is_specular),
             receivers: of_kind(SurfaceKind::is_receiver),
             tolerance_m: TOLERANCE * size_m,
@@ -144,7 +140,7 @@ impl<'a> Reach<'a> {
 
     fn sends_to_any(&self, from: usize, lit_by: Option<&Light>, to: &[usize]) -> bool {
         let tests = self.scene.objects[from]
-            .mesh_in_scene()
+            .mesh()
             .triangles
             .len()
             .saturating_mul(to.len());
@@ -168,15 +164,15 @@ impl<'a> Reach<'a> {
             SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Varied => true,
             SurfaceKind::Diffuse => false,
             SurfaceKind::Mirror | SurfaceKind::Mixed => {
-                let mesh = self.scene.objects[from].mesh_in_scene();
+                let mesh = self.scene.objects[from].in_scene();
                 self.specular.len() > MAX_RELAYS || self.reflects_into(mesh, lit_by, bounds)
             }
         }
     }
 
     /// Whether any triangle of a mirror has part of a box before it, on the side that its light comes from.
-    fn reflects_into(&self, mesh: &Mesh, lit_by: Option<&Light>, bounds: Bounds) -> bool {
-        (0..mesh.triangles.len()).any(|triangle| {
+    fn reflects_into(&self, mesh: InScene, lit_by: Option<&Light>, bounds: Bounds) -> bool {
+        (0..mesh.triangle_count()).any(|triangle| {
             let corner = mesh.corners(triangle)[0];
             let normal = mesh.face_normal(triangle);
             let lit = lit_by.map_or([true, true], |light| self.lit_sides(light, corner, normal));

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 
-use super::Mesh;
+use super::InScene;
 
 /// Beyond this edge is nothing, or more than one thing.
 const BORDER: u32 = u32::MAX;
@@ -24,10 +24,11 @@ impl Adjacency {
     /// Of a mesh. Vertices at the same position are one, since normals and texture coordinates split them. An edge of
     /// more than two triangles, or of two that are wound against each other, is a border: there is no telling which side
     /// goes on into which.
-    pub fn of(mesh: &Mesh) -> Self {
-        let vertices = weld(&mesh.positions);
-        let mut edges: Vec<HalfEdge> = Vec::with_capacity(3 * mesh.triangles.len());
-        for (index, triangle) in mesh.triangles.iter().enumerate() {
+    pub fn of<'a>(mesh: impl Into<InScene<'a>>) -> Self {
+        let mesh = mesh.into();
+        let vertices = weld(mesh.positions());
+        let mut edges: Vec<HalfEdge> = Vec::with_capacity(3 * mesh.triangle_count());
+        for (index, triangle) in mesh.triangles().enumerate() {
             let welded = triangle.map(|vertex| vertices[vertex as usize]);
             for corner in 0..3u8 {
                 let (a, b) = (welded[usize::from(corner)], welded[usize::from(corner + 1) % 3]);
@@ -35,7 +36,7 @@ impl Adjacency {
             }
         }
         edges.par_sort_unstable();
-        let mut across = vec![[BORDER; 3]; mesh.triangles.len()];
+        let mut across = vec![[BORDER; 3]; mesh.triangle_count()];
         for edge in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
             if let [a, b] = edge
                 && a.2 != b.2
@@ -61,14 +62,13 @@ impl Adjacency {
 }
 
 /// For every vertex the first one at the same position.
-fn weld(positions: &[DVec3]) -> Vec<u32> {
-    let mut first_at: HashMap<[u32; 3], u32> = HashMap::with_capacity(positions.len());
+fn weld(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
+    let mut first_at: HashMap<[u32; 3], u32> = HashMap::new();
     positions
-        .iter()
         .enumerate()
         .map(|(index, position)| {
             // Computed positions may differ by rounding; files hold single precision. Adding zero makes −0 and +0 alike.
-            let key = (*position + DVec3::ZERO).as_vec3().to_array().map(f32::to_bits);
+            let key = (position + DVec3::ZERO).as_vec3().to_array().map(f32::to_bits);
             *first_at.entry(key).or_insert(index as u32)
         })
         .collect()

@@ -4,21 +4,21 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::scene::Mesh;
+use crate::scene::{InScene, Mesh};
 
 /// Least volume of a solid over that of a cube of its area: what is flatter is a sheet with two sides.
 const MIN_FILLED: f64 = 1e-6;
 
-/// Whether a mesh encloses space, with its triangles wound so that they face outwards.
-pub fn is_solid(mesh: &Mesh) -> bool {
-    let middle = mesh.positions.first().copied().unwrap_or_default();
-    let volume_m3: f64 = (0..mesh.triangles.len())
+/// Whether a closed mesh encloses space where it stands, with its triangles wound so that they face outwards.
+pub fn has_volume(mesh: InScene) -> bool {
+    let middle = mesh.positions().next().unwrap_or_default();
+    let volume_m3: f64 = (0..mesh.triangle_count())
         .map(|triangle| {
             let [a, b, c] = mesh.corners(triangle).map(|corner| corner - middle);
             a.dot(b.cross(c)) / 6.0
         })
         .sum();
-    volume_m3 > MIN_FILLED * (mesh.area_m2() / 6.0).powf(1.5) && is_closed(mesh)
+    volume_m3 > MIN_FILLED * (mesh.area_m2() / 6.0).powf(1.5)
 }
 
 /// Whether every edge is passed as often in one direction as in the other; vertices are one where their positions are

@@ -83,20 +83,35 @@ fn planes(scene: &Scene) -> BTreeMap<Plane, Vec<Face>> {
         return planes;
     };
     let size_m = low.abs().max(high.abs()).max_element();
-    for object in bodies {
-        let mesh = scene.objects[object].mesh_in_scene();
-        for triangle in 0..mesh.triangles.len() {
+    let bounds = |object: usize| scene.objects[object].bounds();
+    for &object in &bodies {
+        // Wider than what counts as touching.
+        let margin = DVec3::splat(1e-6 * size_m);
+        let others = bodies.iter().filter(|other| **other != object);
+        let boxes =
+            others.filter_map(|&other| bounds(other).map(|(low, high)| (low - margin, high + margin)));
+        let is_near = |(low, high): (DVec3, DVec3), (from, to): &(DVec3, DVec3)| {
+            low.cmple(*to).all() && high.cmpge(*from).all()
+        };
+        let near = boxes.filter(|other| bounds(object).is_some_and(|own| is_near(own, other)));
+        let near: Vec<(DVec3, DVec3)> = near.collect();
+        if near.is_empty() {
+            continue;
+        }
+        let mesh = scene.objects[object].in_scene();
+        for triangle in 0..mesh.triangle_count() {
             let [a, b, c] = mesh.corners(triangle);
             let normal = mesh.face_normal(triangle);
-            if normal == DVec3::ZERO {
+            let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+            if normal == DVec3::ZERO || !near.iter().any(|other| is_near((low, high), other)) {
                 continue;
             }
             let (plane, is_front) = plane(normal, a / size_m);
             let face = Face {
                 object,
                 is_front,
-                low: a.min(b).min(c),
-                high: a.max(b).max(c),
+                low,
+                high,
             };
             planes.entry(plane).or_default().push(face);
         }

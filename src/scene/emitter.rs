@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{Glow, Light, LightKind, LightSize, Mesh, PanelShape, Scene};
+use super::{Glow, InScene, Light, LightKind, LightSize, PanelShape, Scene};
 use crate::geometry::ray;
 use crate::optics::LinearSrgb;
 
@@ -315,7 +315,7 @@ pub fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
 /// An object that glows.
 #[derive(Debug)]
 struct Glowing<'a> {
-    mesh: &'a Mesh,
+    mesh: InScene<'a>,
     both_sides: bool,
     /// Area of all triangles up to each, itself included, by how bright they are [m²].
     upto_m2: Vec<f64>,
@@ -334,10 +334,10 @@ fn weight(glow: &Glow, triangle: usize) -> f64 {
 impl<'a> Glowing<'a> {
     /// `None` where it has no area.
     fn new(scene: &'a Scene, object: usize, weight: fn(&Glow, usize) -> f64) -> Option<Self> {
-        let mesh = scene.objects.get(object)?.mesh_in_scene();
+        let mesh = scene.objects.get(object)?.in_scene();
         let glow = scene.glows.get(&object);
         let mut sum_m2 = 0.0;
-        let upto_m2: Vec<f64> = (0..mesh.triangles.len())
+        let upto_m2: Vec<f64> = (0..mesh.triangle_count())
             .map(|triangle| {
                 let bright = glow.map_or(1.0, |glow| weight(glow, triangle));
                 sum_m2 += mesh.triangle_area_m2(triangle) * bright;

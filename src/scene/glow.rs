@@ -4,7 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::texture::{Texture, TextureRef};
-use super::{Mesh, Scene};
+use super::{InScene, Scene};
 use crate::optics::LinearSrgb;
 
 /// Steps along an edge of a triangle in which its image is looked at.
@@ -24,11 +24,11 @@ pub struct Glow {
 
 impl Glow {
     /// Of a mesh with an image; `None` where it is black or has no coordinates.
-    pub fn new(mesh: &Mesh, image: &TextureRef, texture: &Texture) -> Option<Self> {
-        let most_steps = (LOOKS / mesh.triangles.len() as f64)
+    pub fn new(mesh: InScene, image: &TextureRef, texture: &Texture) -> Option<Self> {
+        let most_steps = (LOOKS / mesh.triangle_count() as f64)
             .sqrt()
             .clamp(STEPS.0, STEPS.1);
-        let triangles = (0..mesh.triangles.len()).into_par_iter();
+        let triangles = (0..mesh.triangle_count()).into_par_iter();
         let means = triangles.map(|triangle| triangle_mean(mesh, (image, texture), triangle, most_steps));
         let means: Vec<LinearSrgb> = means.collect::<Option<_>>()?;
         let (mut sum, mut area_m2) = (LinearSrgb::BLACK, 0.0);
@@ -53,7 +53,7 @@ impl Glow {
 
 /// Mean of an image over a triangle, at places as close as its texels or in so many steps.
 fn triangle_mean(
-    mesh: &Mesh,
+    mesh: InScene,
     (image, texture): (&TextureRef, &Texture),
     triangle: usize,
     most_steps: f64,

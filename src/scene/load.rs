@@ -100,7 +100,8 @@ pub fn files_of(source: &str, options: &LoadOptions) -> Vec<PathBuf> {
 pub fn share(before: &Scene, now: &mut Scene) -> bool {
     let mut is_same = before.objects.len() == now.objects.len();
     for (was, is) in before.objects.iter().zip(&mut now.objects) {
-        if was.mesh_in_scene() == is.mesh_in_scene() {
+        let stands_alike = was.world_from_object() == is.world_from_object() && was.mesh() == is.mesh();
+        if stands_alike || was.copy_in_scene() == is.copy_in_scene() {
             is.share(was);
         } else {
             is_same = false;

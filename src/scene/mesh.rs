@@ -49,14 +49,7 @@ impl Mesh {
 
     /// What the base colour is multiplied by at a place of a triangle: white without colours.
     pub fn colour(&self, triangle: usize, barycentric: [f64; 3]) -> LinearSrgb {
-        let Some(colours) = &self.colours else {
-            return LinearSrgb::WHITE;
-        };
-        let corners = self.triangles[triangle].iter().zip(barycentric);
-        let colour = corners.fold(LinearSrgb::BLACK, |sum, (&vertex, weight)| {
-            sum + LinearSrgb::from(colours[vertex as usize].map(f64::from)) * weight
-        });
-        colour.map(|channel| channel.clamp(0.0, 1.0))
+        InScene::from(self).colour(triangle, barycentric)
     }
 
     /// Unit normal of a triangle by its winding; zero for a degenerate one.
@@ -67,12 +60,7 @@ impl Mesh {
 
     /// Smallest box, as minimum and maximum corner [m]; `None` without vertices.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        let first = *self.positions.first()?;
-        Some(
-            self.positions
-                .iter()
-                .fold((first, first), |(low, high), p| (low.min(*p), high.max(*p))),
-        )
+        InScene::from(self).bounds()
     }
 
     /// Area of a triangle [m²].
@@ -83,42 +71,14 @@ impl Mesh {
 
     /// Total area [m²].
     pub fn area_m2(&self) -> f64 {
-        (0..self.triangles.len())
-            .map(|triangle| self.triangle_area_m2(triangle))
-            .sum()
+        InScene::from(self).area_m2()
     }
 
     /// The same mesh where a transform puts it, with unit normals. A mirroring transform turns the triangles, so that
     /// they stay wound counter-clockwise about the outside.
     #[must_use]
     pub fn placed(&self, world_from_object: &DAffine3) -> Self {
-        let linear = world_from_object.matrix3;
-        let is_mirrored = linear.determinant() < 0.0;
-        let turn = |&[a, b, c]: &[u32; 3]| if is_mirrored { [a, c, b] } else { [a, b, c] };
-        let place = |position: &DVec3| world_from_object.transform_point3(*position);
-        let mut placed = Self {
-            positions: self.positions.iter().map(place).collect(),
-            normals: Vec::new(),
-            uv0: self.uv0.clone(),
-            uv1: self.uv1.clone(),
-            colours: self.colours.clone(),
-            triangles: self.triangles.iter().map(turn).collect(),
-        };
-        let cofactors = cofactors(linear);
-        let sign = if is_mirrored { -1.0 } else { 1.0 };
-        let is_shifted = linear == DMat3::IDENTITY;
-        let mut around: Option<Vec<DVec3>> = None;
-        let normal = |(vertex, normal): (usize, &DVec3)| {
-            let normal = cofactors * *normal * sign;
-            if is_shifted && (normal.length_squared() - 1.0).abs() <= UNIT {
-                return normal;
-            }
-            normal
-                .try_normalize()
-                .unwrap_or_else(|| around.get_or_insert_with(|| placed.normals_around())[vertex])
-        };
-        placed.normals = self.normals.iter().enumerate().map(normal).collect();
-        placed
+        Placement::new(*world_from_object).of_mesh(self)
     }
 
     /// Normals of the triangles around each vertex, weighted by area; every vertex is part of a triangle with an area.
@@ -138,6 +98,207 @@ impl Mesh {
             .zip(any)
             .map(|(sum, any)| sum.try_normalize().unwrap_or(any))
             .collect()
+    }
+}
+
+/// Where a transform puts a mesh: all that is asked of a placed mesh goes through here, so that a copy of it and single
+/// triangles agree to the last bit.
+#[derive(Clone, Debug)]
+pub struct Placement {
+    world_from_object: DAffine3,
+    cofactors: DMat3,
+    is_mirrored: bool,
+    is_shifted: bool,
+}
+
+impl Placement {
+    /// By a transform.
+    pub fn new(world_from_object: DAffine3) -> Self {
+        let linear = world_from_object.matrix3;
+        Self {
+            cofactors: cofactors(linear),
+            is_mirrored: linear.determinant() < 0.0,
+            is_shifted: linear == DMat3::IDENTITY,
+            world_from_object,
+        }
+    }
+
+    /// From the coordinates of the mesh to those of the scene.
+    pub fn world_from_object(&self) -> &DAffine3 {
+        &self.world_from_object
+    }
+
+    /// Corners of a triangle of the mesh, as the placed mesh has them [m].
+    // Out of the way of loops over meshes that nothing places.
+    #[inline(never)]
+    pub fn corners(&self, corners: &[DVec3; 3]) -> [DVec3; 3] {
+        self.turned(corners.map(|corner| self.position(corner)))
+    }
+
+    fn position(&self, position: DVec3) -> DVec3 {
+        self.world_from_object.transform_point3(position)
+    }
+
+    fn turned<T>(&self, [a, b, c]: [T; 3]) -> [T; 3] {
+        if self.is_mirrored { [a, c, b] } else { [a, b, c] }
+    }
+
+    /// `None` where the triangles around a vertex have to give it.
+    fn normal(&self, normal: DVec3) -> Option<DVec3> {
+        let normal = self.cofactors * normal * if self.is_mirrored { -1.0 } else { 1.0 };
+        if self.is_shifted && (normal.length_squared() - 1.0).abs() <= UNIT {
+            return Some(normal);
+        }
+        normal.try_normalize()
+    }
+
+    /// A copy of a mesh, placed.
+    pub(super) fn of_mesh(&self, mesh: &Mesh) -> Mesh {
+        let mut placed = Mesh {
+            positions: mesh
+                .positions
+                .iter()
+                .map(|&position| self.position(position))
+                .collect(),
+            normals: Vec::new(),
+            uv0: mesh.uv0.clone(),
+            uv1: mesh.uv1.clone(),
+            colours: mesh.colours.clone(),
+            triangles: mesh
+                .triangles
+                .iter()
+                .map(|&triangle| self.turned(triangle))
+                .collect(),
+        };
+        let mut around: Option<Vec<DVec3>> = None;
+        let normal = |(vertex, normal): (usize, &DVec3)| {
+            self.normal(*normal)
+                .unwrap_or_else(|| around.get_or_insert_with(|| placed.normals_around())[vertex])
+        };
+        placed.normals = mesh.normals.iter().enumerate().map(normal).collect();
+        placed
+    }
+}
+
+/// A mesh as it stands in the scene: a copy that is kept, or the mesh with what places it.
+#[derive(Clone, Copy, Debug)]
+pub struct InScene<'a> {
+    mesh: &'a Mesh,
+    /// `None` where the mesh stands where its coordinates say.
+    placement: Option<&'a Placement>,
+}
+
+impl<'a> From<&'a Mesh> for InScene<'a> {
+    fn from(mesh: &'a Mesh) -> Self {
+        Self::new(mesh, None)
+    }
+}
+
+impl<'a> InScene<'a> {
+    pub(super) fn new(mesh: &'a Mesh, placement: Option<&'a Placement>) -> Self {
+        Self { mesh, placement }
+    }
+
+    /// Number of triangles.
+    pub fn triangle_count(&self) -> usize {
+        self.mesh.triangles.len()
+    }
+
+    /// Vertex indices of a triangle.
+    #[inline]
+    pub fn triangle(&self, triangle: usize) -> [u32; 3] {
+        let vertices = self.mesh.triangles[triangle];
+        self.placement
+            .map_or(vertices, |placement| placement.turned(vertices))
+    }
+
+    /// Vertex indices of all triangles.
+    pub fn triangles(self) -> impl Iterator<Item = [u32; 3]> + 'a {
+        (0..self.triangle_count()).map(move |triangle| self.triangle(triangle))
+    }
+
+    /// Position of a vertex [m].
+    pub fn position(&self, vertex: usize) -> DVec3 {
+        let position = self.mesh.positions[vertex];
+        self.placement
+            .map_or(position, |placement| placement.position(position))
+    }
+
+    /// Positions of all vertices [m].
+    pub fn positions(self) -> impl Iterator<Item = DVec3> + 'a {
+        (0..self.mesh.positions.len()).map(move |vertex| self.position(vertex))
+    }
+
+    /// Unit normal of a vertex. Where the triangles around it give it, all of the mesh is looked at.
+    #[inline(never)]
+    pub fn normal(&self, vertex: usize) -> DVec3 {
+        let normal = self.mesh.normals[vertex];
+        self.placement.map_or(normal, |placement| {
+            let placed = placement.normal(normal);
+            placed.unwrap_or_else(|| placement.of_mesh(self.mesh).normals[vertex])
+        })
+    }
+
+    /// Corner positions of a triangle [m].
+    #[inline]
+    pub fn corners(&self, triangle: usize) -> [DVec3; 3] {
+        match self.placement {
+            None => self.mesh.corners(triangle),
+            Some(placement) => placement.corners(&self.mesh.corners(triangle)),
+        }
+    }
+
+    /// Unit normals of a triangle's vertices.
+    #[inline]
+    pub fn corner_normals(&self, triangle: usize) -> [DVec3; 3] {
+        match self.placement {
+            None => self.mesh.corner_normals(triangle),
+            Some(_) => self.triangle(triangle).map(|vertex| self.normal(vertex as usize)),
+        }
+    }
+
+    /// Unit normal of a triangle by its winding; zero for a degenerate one.
+    pub fn face_normal(&self, triangle: usize) -> DVec3 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
+    /// Smallest box, as minimum and maximum corner [m]; `None` without vertices.
+    pub fn bounds(self) -> Option<(DVec3, DVec3)> {
+        let mut positions = self.positions();
+        let first = positions.next()?;
+        Some(positions.fold((first, first), |(low, high), p| (low.min(p), high.max(p))))
+    }
+
+    /// Area of a triangle [m²].
+    pub fn triangle_area_m2(&self, triangle: usize) -> f64 {
+        let [a, b, c] = self.corners(triangle);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    /// Total area [m²].
+    pub fn area_m2(&self) -> f64 {
+        (0..self.triangle_count())
+            .map(|triangle| self.triangle_area_m2(triangle))
+            .sum()
+    }
+
+    /// TEXCOORD_0 or TEXCOORD_1, one per vertex.
+    pub fn uvs(&self, set: usize) -> Option<&'a [DVec2]> {
+        let uvs = if set == 0 { &self.mesh.uv0 } else { &self.mesh.uv1 };
+        uvs.as_deref()
+    }
+
+    /// What the base colour is multiplied by at a place of a triangle: white without colours.
+    pub fn colour(&self, triangle: usize, barycentric: [f64; 3]) -> LinearSrgb {
+        let Some(colours) = &self.mesh.colours else {
+            return LinearSrgb::WHITE;
+        };
+        let corners = self.triangle(triangle).into_iter().zip(barycentric);
+        let colour = corners.fold(LinearSrgb::BLACK, |sum, (vertex, weight)| {
+            sum + LinearSrgb::from(colours[vertex as usize].map(f64::from)) * weight
+        });
+        colour.map(|channel| channel.clamp(0.0, 1.0))
     }
 }
 

@@ -24,6 +24,7 @@ pub mod emitter;
 pub mod environment;
 mod glow;
 mod gltf;
+pub mod instances;
 pub mod light;
 pub mod load;
 pub mod material;
@@ -48,7 +49,7 @@ pub use light::{Light, LightKind, LightList, LightSize, PanelShape};
 pub use load::{LoadOptions, open_document};
 pub use material::AlphaMask;
 pub use material::{Material, SurfaceKind, Volume};
-pub use mesh::Mesh;
+pub use mesh::{InScene, Mesh};
 pub use mixture::{Mixture, Variation};
 pub use normal_map::NormalMap;
 pub use object::{Motion, Object};
@@ -145,7 +146,7 @@ impl Scene {
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         self.objects
             .iter()
-            .filter_map(|object| object.mesh_in_scene().bounds())
+            .filter_map(|object| object.bounds())
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
@@ -153,7 +154,7 @@ impl Scene {
     pub fn triangle_count(&self) -> usize {
         self.objects
             .iter()
-            .map(|object| object.mesh_in_scene().triangles.len())
+            .map(|object| object.mesh().triangles.len())
             .sum()
     }
 }
@@ -213,7 +214,7 @@ impl Scene {
                 material,
                 ..
             } = object;
-            let mesh = object.mesh_in_scene();
+            let mesh = object.copy_in_scene();
             let _ = writeln!(text, "{name:?} {node} {primitive} {material} {mesh:?}");
         }
         let _ = write!(

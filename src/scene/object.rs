@@ -1,11 +1,13 @@
 //! What stands in a scene: a mesh and where it is.
 
-use std::sync::Arc;
+use std::fmt;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Mesh, Scene};
+use super::mesh::{InScene, Placement};
+use super::{Mesh, Scene, instances};
 
 /// One mesh primitive of one node: the unit that has a material and, when light reaches it, an illumination map.
 #[derive(Clone, Debug)]
@@ -32,14 +34,32 @@ struct Shape {
     /// What the motion turns about [m].
     pivot: DVec3,
     world_from_object: DAffine3,
-    /// `None` where that is the mesh itself.
-    in_scene: Option<Arc<Mesh>>,
+    /// `None` where that changes nothing.
+    placement: Option<Placement>,
+    found: Arc<Found>,
+}
+
+/// What was found out about a mesh where it stands, when it was first asked for.
+#[derive(Default)]
+struct Found {
+    /// A copy in scene coordinates.
+    mesh: OnceLock<Arc<Mesh>>,
+    bounds: OnceLock<Option<(DVec3, DVec3)>>,
+    can_share: OnceLock<bool>,
+}
+
+impl fmt::Debug for Found {
+    /// Objects are the same whether anybody has asked or not.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Found").finish_non_exhaustive()
+    }
 }
 
 impl Shape {
     fn settle(&mut self) {
         let is_moved = self.world_from_object != DAffine3::IDENTITY;
-        self.in_scene = is_moved.then(|| Arc::new(self.mesh.placed(&self.world_from_object)));
+        self.placement = is_moved.then(|| Placement::new(self.world_from_object));
+        self.found = Arc::default();
     }
 }
 
@@ -107,7 +127,8 @@ impl Object {
                 motion: Motion::default(),
                 pivot: DVec3::ZERO,
                 world_from_object: DAffine3::IDENTITY,
-                in_scene: None,
+                placement: None,
+                found: Arc::default(),
             },
         }
     }
@@ -122,9 +143,51 @@ impl Object {
         &self.shape.world_from_object
     }
 
-    /// The mesh in scene coordinates: [`mesh`](Self::mesh) itself where the transform is the identity.
+    /// What places the mesh in the scene; `None` where it stands where its coordinates say.
+    pub fn placement(&self) -> Option<&Placement> {
+        self.shape.placement.as_ref()
+    }
+
+    /// The mesh itself where nothing places it, or a copy that is kept.
+    #[inline]
+    fn kept(&self) -> Option<&Arc<Mesh>> {
+        match self.shape.placement {
+            None => Some(&self.shape.mesh),
+            Some(_) => self.shape.found.mesh.get(),
+        }
+    }
+
+    /// The mesh in scene coordinates: [`mesh`](Self::mesh) itself where the transform is the identity, else a copy that is
+    /// kept. What goes over many objects asks [`in_scene`](Self::in_scene), which copies nothing.
     pub fn mesh_in_scene(&self) -> &Arc<Mesh> {
-        self.shape.in_scene.as_ref().unwrap_or(&self.shape.mesh)
+        let copy = || self.shape.found.mesh.get_or_init(|| self.copy_in_scene());
+        self.kept().unwrap_or_else(copy)
+    }
+
+    /// The same, but a copy is not kept.
+    pub fn copy_in_scene(&self) -> Arc<Mesh> {
+        let copy = || Arc::new(self.shape.mesh.placed(&self.shape.world_from_object));
+        self.kept().map_or_else(copy, Arc::clone)
+    }
+
+    /// The same, triangle by triangle: by the copy where there is one.
+    #[inline]
+    pub fn in_scene(&self) -> InScene<'_> {
+        match self.kept() {
+            Some(mesh) => InScene::from(&**mesh),
+            None => InScene::new(&self.shape.mesh, self.placement()),
+        }
+    }
+
+    /// Smallest box around the mesh in the scene, as minimum and maximum corner [m]; `None` without vertices.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        *self.shape.found.bounds.get_or_init(|| self.in_scene().bounds())
+    }
+
+    /// Whether its mesh can be met and drawn in its own coordinates, together with other objects that have it.
+    pub fn can_share(&self) -> bool {
+        let is_sound = || instances::is_sound(&self.shape.mesh, &self.shape.world_from_object);
+        *self.shape.found.can_share.get_or_init(is_sound)
     }
 
     /// The mesh in scene coordinates, to be changed: from then on those are its own.
@@ -195,7 +258,7 @@ impl Scene {
         }
         let parts = self.objects.iter().filter(|part| part.node == found.node);
         let bounds = parts
-            .filter_map(|part| part.mesh_in_scene().bounds())
+            .filter_map(Object::bounds)
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         bounds.map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high))
     }

@@ -2,7 +2,7 @@
 
 use glam::{DMat3, DVec2};
 
-use super::{Mesh, Scene};
+use super::{InScene, Scene};
 use crate::optics::LinearSrgb;
 
 /// How a coordinate outside [0, 1] is brought back.
@@ -88,10 +88,10 @@ impl Texture {
 
 impl TextureRef {
     /// Where it is looked up at a place of a triangle; `None` where the mesh lacks its coordinates.
-    pub fn place(&self, mesh: &Mesh, triangle: usize, barycentric: [f64; 3]) -> Option<DVec2> {
-        let uvs = if self.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 }.as_ref()?;
-        let corners = mesh.triangles[triangle].iter().zip(barycentric);
-        let uv = corners.fold(DVec2::ZERO, |sum, (&vertex, weight)| {
+    pub fn place(&self, mesh: InScene, triangle: usize, barycentric: [f64; 3]) -> Option<DVec2> {
+        let uvs = mesh.uvs(self.uv_set)?;
+        let corners = mesh.triangle(triangle).into_iter().zip(barycentric);
+        let uv = corners.fold(DVec2::ZERO, |sum, (vertex, weight)| {
             sum + uvs[vertex as usize] * weight
         });
         Some(self.transform(uv))
@@ -112,7 +112,7 @@ impl Scene {
         (object, triangle): (usize, usize),
         barycentric: [f64; 3],
     ) -> Option<(&Texture, DVec2)> {
-        let uv = reference.place(self.objects[object].mesh_in_scene(), triangle, barycentric)?;
+        let uv = reference.place(self.objects[object].in_scene(), triangle, barycentric)?;
         Some((&self.textures[reference.texture], uv))
     }
 }

@@ -180,7 +180,7 @@ impl Baker {
             }
             for &object in &change.shapes {
                 let nowhere = (glam::DVec3::INFINITY, glam::DVec3::NEG_INFINITY);
-                let bounds = scene.objects[object].mesh_in_scene().bounds().unwrap_or(nowhere);
+                let bounds = scene.objects[object].bounds().unwrap_or(nowhere);
                 state.rays.shape_changed(object, bounds);
             }
             for &object in &change.directions {

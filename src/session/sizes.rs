@@ -197,13 +197,13 @@ impl ChartCache {
     }
 
     fn may_enclose_a_light(&self, object: usize) -> bool {
-        let Some((low, high)) = self.scene.objects[object].mesh_in_scene().bounds() else {
+        let Some((low, high)) = self.scene.objects[object].bounds() else {
             return false;
         };
         let overlaps = |(a, b): (DVec3, DVec3)| a.cmple(high).all() && b.cmpge(low).all();
         self.scene.lights.iter().any(|light| {
             let mesh_bounds = match light.kind {
-                LightKind::Surface { object, .. } => self.scene.objects[object].mesh_in_scene().bounds(),
+                LightKind::Surface { object, .. } => self.scene.objects[object].bounds(),
                 _ => None,
             };
             let place = light.kind.position().map(|position| (position, position));

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
-use crate::scene::Mesh;
+use crate::scene::InScene;
 
 /// A border that turns by less is smooth [cosine of the angle].
 const SMOOTH_TURN: f64 = 0.97;
@@ -48,26 +48,25 @@ struct JoinedEdge {
 
 impl Joined {
     /// `None` for larger meshes.
-    fn new(mesh: &Mesh) -> Option<Self> {
-        if mesh.triangles.len() > MAX_TRIANGLES {
+    fn new(mesh: InScene) -> Option<Self> {
+        if mesh.triangle_count() > MAX_TRIANGLES {
             return None;
         }
         let bits = |v: DVec3| (v + DVec3::ZERO).to_array().map(f64::to_bits);
         let mut places: HashMap<[u64; 3], usize> = HashMap::new();
         let mut points: Vec<DVec3> = Vec::new();
         let point_of: Vec<usize> = mesh
-            .positions
-            .iter()
+            .positions()
             .map(|position| {
-                *places.entry(bits(*position)).or_insert_with(|| {
-                    points.push(*position);
+                *places.entry(bits(position)).or_insert_with(|| {
+                    points.push(position);
                     points.len() - 1
                 })
             })
             .collect();
         let mut sides: Vec<Vec<DVec3>> = vec![Vec::new(); points.len()];
         let mut edges: BTreeMap<(usize, usize), JoinedEdge> = BTreeMap::new();
-        for (triangle, vertices) in mesh.triangles.iter().enumerate() {
+        for (triangle, vertices) in mesh.triangles().enumerate() {
             let normal = mesh.face_normal(triangle);
             let corners = vertices.map(|vertex| point_of[vertex as usize]);
             for (i, &corner) in corners.iter().enumerate() {
@@ -88,7 +87,7 @@ impl Joined {
 }
 
 /// Sharp corners [m]; none where there are very many, or in a very fine mesh.
-pub fn sharp_corners(mesh: &Mesh) -> Vec<DVec3> {
+pub fn sharp_corners(mesh: InScene) -> Vec<DVec3> {
     let Some(Joined { points, sides, edges }) = Joined::new(mesh) else {
         return Vec::new();
     };
@@ -116,7 +115,7 @@ pub fn sharp_corners(mesh: &Mesh) -> Vec<DVec3> {
 }
 
 /// Both ends [m] of each sharp edge; none where there are very many, or in a very fine mesh.
-pub fn sharp_edges(mesh: &Mesh) -> Vec<[DVec3; 2]> {
+pub fn sharp_edges(mesh: InScene) -> Vec<[DVec3; 2]> {
     let Some(joined) = Joined::new(mesh) else {
         return Vec::new();
     };

@@ -4,55 +4,83 @@
 //! that the mesh stands for; averaged over the triangles around a vertex it is right to second order on regular
 //! meshes.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DVec3};
 
-use crate::scene::Mesh;
+use crate::scene::{InScene, Mesh};
 
 /// Derivative of the unit normal by position [1/m], symmetric 3×3: `dn = S·dp` for a step dp along the surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct ShapeOperator {
+pub struct ShapeOperator {
     /// xx, xy, xz, yy, yz, zz: single precision is far below the error of any mesh.
     entries: [f32; 6],
 }
 
-/// Shape operators at the vertices of a mesh.
+/// How the normals of a mesh turn, by the shape operators at its vertices.
 #[derive(Clone, Debug)]
-pub struct NormalField {
-    vertices: Vec<ShapeOperator>,
+pub enum NormalField {
+    /// They are known.
+    Known(Vec<ShapeOperator>),
+    /// They are found from the triangles around a vertex whenever they are needed: of a mesh with many instances, the
+    /// operators would take more memory than all else.
+    Found(Arc<TrianglesAround>),
+}
+
+/// Triangles around each vertex of a mesh, ascending.
+#[derive(Debug)]
+pub struct TrianglesAround(Vec<Vec<u32>>);
+
+impl TrianglesAround {
+    /// Of a mesh.
+    pub fn of(mesh: &Mesh) -> Self {
+        let mut around = vec![Vec::new(); mesh.positions.len()];
+        for (triangle, vertices) in (0..).zip(&mesh.triangles) {
+            vertices
+                .iter()
+                .for_each(|&vertex| around[vertex as usize].push(triangle));
+        }
+        Self(around)
+    }
+
+    /// Average of the triangles around a vertex, by area.
+    fn operator(&self, mesh: InScene, vertex: usize) -> ShapeOperator {
+        let (mut sum, mut sum_m2) = (DMat3::ZERO, 0.0);
+        let triangles = self.0[vertex].iter();
+        for (operator, area_m2) in triangles.filter_map(|&triangle| of_triangle(mesh, triangle as usize)) {
+            sum += operator * area_m2;
+            sum_m2 += area_m2;
+        }
+        if sum_m2 > 0.0 {
+            ShapeOperator::from_matrix(sum * sum_m2.recip())
+        } else {
+            ShapeOperator::default()
+        }
+    }
 }
 
 impl NormalField {
-    /// Averages each vertex's triangles by area.
+    /// Of a mesh in scene coordinates, known.
     pub fn new(mesh: &Mesh) -> Self {
-        let mut sums = vec![(DMat3::ZERO, 0.0_f64); mesh.positions.len()];
-        for (triangle, vertices) in mesh.triangles.iter().enumerate() {
-            let Some((operator, area_m2)) = of_triangle(mesh, triangle) else {
-                continue;
-            };
-            for &vertex in vertices {
-                let sum = &mut sums[vertex as usize];
-                *sum = (sum.0 + operator * area_m2, sum.1 + area_m2);
-            }
-        }
-        let vertices = sums
-            .into_iter()
-            .map(|(sum, area_m2)| {
-                if area_m2 > 0.0 {
-                    ShapeOperator::from_matrix(sum * area_m2.recip())
-                } else {
-                    ShapeOperator::default()
-                }
-            })
-            .collect();
-        Self { vertices }
+        let around = TrianglesAround::of(mesh);
+        let vertices = 0..mesh.positions.len();
+        Self::Known(
+            vertices
+                .map(|vertex| around.operator(mesh.into(), vertex))
+                .collect(),
+        )
     }
 
     /// The normal's change [1] for a step along the surface [m] at a point of a triangle.
-    pub fn turn(&self, mesh: &Mesh, triangle: usize, barycentric: [f64; 3], step: DVec3) -> DVec3 {
-        mesh.triangles[triangle]
-            .iter()
-            .zip(barycentric)
-            .map(|(&vertex, weight)| self.vertices[vertex as usize].apply(step) * weight)
+    pub fn turn(&self, mesh: InScene, triangle: usize, barycentric: [f64; 3], step: DVec3) -> DVec3 {
+        let corners = mesh.triangle(triangle).map(|vertex| vertex as usize);
+        let operators = match self {
+            Self::Known(vertices) => corners.map(|vertex| vertices[vertex]),
+            Self::Found(around) => corners.map(|vertex| around.operator(mesh, vertex)),
+        };
+        let weighted = operators.iter().zip(barycentric);
+        weighted
+            .map(|(operator, weight)| operator.apply(step) * weight)
             .sum()
     }
 }
@@ -85,7 +113,7 @@ impl ShapeOperator {
 
 /// The linear map that takes a triangle's edges to the differences of its corner normals and its normal to zero, with
 /// the triangle's area [m²]; `None` without area.
-fn of_triangle(mesh: &Mesh, triangle: usize) -> Option<(DMat3, f64)> {
+fn of_triangle(mesh: InScene, triangle: usize) -> Option<(DMat3, f64)> {
     let [a, b, c] = mesh.corners(triangle);
     let [na, nb, nc] = mesh.corner_normals(triangle);
     let (dual_b, dual_c) = dual_edges(b - a, c - a)?;
@@ -104,7 +132,7 @@ pub(super) fn dual_edges(e1: DVec3, e2: DVec3) -> Option<(DVec3, DVec3)> {
 }
 
 /// The change of the interpolated, normalised normal [1] for a step [m] within one triangle.
-pub fn turn_within(mesh: &Mesh, triangle: usize, barycentric: [f64; 3], step: DVec3) -> DVec3 {
+pub fn turn_within(mesh: InScene, triangle: usize, barycentric: [f64; 3], step: DVec3) -> DVec3 {
     let [a, b, c] = mesh.corners(triangle);
     let Some((dual_b, dual_c)) = dual_edges(b - a, c - a) else {
         return DVec3::ZERO;

@@ -68,9 +68,7 @@ impl Tracer {
     /// Whether steps of a ray's differential [m, at the hit] leave the triangle that was hit: then the surface's
     /// derivatives are those of the smooth surface around it. `steps` are in units of the differential's coordinates.
     pub fn surface_scale(&self, hit: &SurfaceHit, moved: &RayDifferential, steps: [f64; 2]) -> SurfaceScale {
-        let [a, b, c] = self.scene().objects[hit.object]
-            .mesh_in_scene()
-            .corners(hit.triangle);
+        let [a, b, c] = self.scene().objects[hit.object].in_scene().corners(hit.triangle);
         let shortest = a
             .distance_squared(b)
             .min(b.distance_squared(c))
@@ -177,7 +175,7 @@ impl Tracer {
         step: DVec3,
         (scale, detail): (SurfaceScale, SurfaceDetail),
     ) -> DVec3 {
-        let mesh = self.scene().objects[hit.object].mesh_in_scene();
+        let mesh = self.scene().objects[hit.object].in_scene();
         let change = match (scale, self.normal_field(hit.object)) {
             (SurfaceScale::Smooth, Some(field)) => {
                 let change = field.turn(mesh, hit.triangle, hit.barycentric, step);

@@ -5,7 +5,7 @@
 use glam::{DVec2, DVec3};
 
 use super::curvature::dual_edges;
-use crate::scene::{Mesh, NormalMap, Scene, TextureRef, normal_map::Slope};
+use crate::scene::{InScene, NormalMap, Scene, TextureRef, normal_map::Slope};
 
 /// A triangle with its texture coordinates.
 struct Place {
@@ -25,7 +25,7 @@ pub struct TextureBump {
 impl TextureBump {
     /// At a point of a triangle, over a unit normal; `None` where texture coordinates are missing or degenerate.
     pub fn at(
-        (scene, mesh): (&Scene, &Mesh),
+        (scene, mesh): (&Scene, InScene),
         map: &NormalMap,
         (triangle, barycentric): (usize, [f64; 3]),
         normal: DVec3,
@@ -53,7 +53,7 @@ impl TextureBump {
 
 impl Place {
     fn of(
-        mesh: &Mesh,
+        mesh: InScene,
         image: &TextureRef,
         triangle: usize,
         barycentric: [f64; 3],
@@ -82,17 +82,19 @@ impl Place {
 }
 
 /// Coordinates of a triangle's corners in an image.
-fn corner_uvs(mesh: &Mesh, image: &TextureRef, triangle: usize) -> Option<[DVec2; 3]> {
-    let set = if image.uv_set == 0 { &mesh.uv0 } else { &mesh.uv1 };
-    let uvs = set.as_ref()?;
-    Some(mesh.triangles[triangle].map(|vertex| image.transform(uvs[vertex as usize])))
+fn corner_uvs(mesh: InScene, image: &TextureRef, triangle: usize) -> Option<[DVec2; 3]> {
+    let uvs = mesh.uvs(image.uv_set)?;
+    Some(
+        mesh.triangle(triangle)
+            .map(|vertex| image.transform(uvs[vertex as usize])),
+    )
 }
 
 /// Mean side of a texel of an image on a mesh [m]; `None` without coordinates or area.
-pub fn texel_m(scene: &Scene, mesh: &Mesh, image: &TextureRef) -> Option<f64> {
+pub fn texel_m(scene: &Scene, mesh: InScene, image: &TextureRef) -> Option<f64> {
     let texture = &scene.textures[image.texture];
     let mut texels = 0.0;
-    for triangle in 0..mesh.triangles.len() {
+    for triangle in 0..mesh.triangle_count() {
         let [a, b, c] = corner_uvs(mesh, image, triangle)?;
         texels += 0.5 * (b - a).perp_dot(c - a).abs();
     }

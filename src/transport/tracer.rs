@@ -1,6 +1,6 @@
 //! Finds the next surface of a scene.
 
-use std::cell::Cell;
+use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
 use glam::DVec3;
@@ -9,19 +9,24 @@ use rayon::prelude::*;
 use super::bend;
 use super::corners::{sharp_corners, sharp_edges};
 use super::curvature::NormalField;
+use super::hierarchy::{self, Hierarchy, SceneNode};
 use super::interaction::Taking;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
-use crate::geometry::{Ray, TriangleBvh, TriangleHit, ray};
+use crate::geometry::{Ray, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
-use crate::scene::{Adjacency, AlphaMask, Material, Mixture, Scene, SurfaceKind, TextureRef, Waves};
+use crate::scene::{
+    Adjacency, AlphaMask, Material, Mixture, Scene, SurfaceKind, TextureRef, Waves, instances,
+};
 
 /// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
 #[derive(Debug)]
 pub struct Tracer {
     scene: Arc<Scene>,
     hierarchy: Arc<Hierarchy>,
+    /// Of each object.
+    shapes: Vec<Arc<Shape>>,
     /// Of specular objects; `None` for the others.
     specular: Vec<Option<Arc<SpecularShape>>>,
     /// Whether waves and textures bend normals.
@@ -34,16 +39,13 @@ pub struct Tracer {
     wavelength: Option<Nanometres>,
 }
 
-/// The hierarchy over all triangles of a scene.
-#[derive(Debug)]
-struct Hierarchy {
-    bvh: TriangleBvh,
-    /// Object and triangle within it, by the hierarchy's triangle index.
-    triangles: Vec<(u32, u32)>,
-    /// How the triangles of each object hang together, found when it is asked for.
-    adjacencies: Vec<OnceLock<Adjacency>>,
-    /// Sharp edges of each object, found when they are asked for.
-    edges: Vec<OnceLock<Vec<[DVec3; 2]>>>,
+/// What is found of the shape of an object when it is asked for.
+#[derive(Debug, Default)]
+struct Shape {
+    /// How its triangles hang together.
+    adjacency: OnceLock<Adjacency>,
+    /// Its sharp edges.
+    edges: OnceLock<Vec<[DVec3; 2]>>,
 }
 
 /// What is known of the shape of a specular object.
@@ -52,30 +54,11 @@ struct SpecularShape {
     /// How its normals turn.
     normals: NormalField,
     /// Smoothing group of each triangle.
-    groups: Vec<u32>,
+    groups: Arc<Vec<u32>>,
     /// Its sharp corners [m].
     corners: Vec<DVec3>,
     /// Side of a texel of its normal texture [m].
     texel_m: Option<f64>,
-}
-
-impl Hierarchy {
-    fn new(scene: &Scene) -> Self {
-        let mut corners = Vec::with_capacity(scene.triangle_count());
-        let mut triangles = Vec::with_capacity(scene.triangle_count());
-        for (object, item) in scene.objects.iter().enumerate() {
-            for triangle in 0..item.mesh_in_scene().triangles.len() {
-                corners.push(item.mesh_in_scene().corners(triangle));
-                triangles.push((object as u32, triangle as u32));
-            }
-        }
-        Self {
-            bvh: TriangleBvh::build(&corners),
-            triangles,
-            adjacencies: scene.objects.iter().map(|_| OnceLock::new()).collect(),
-            edges: scene.objects.iter().map(|_| OnceLock::new()).collect(),
-        }
-    }
 }
 
 /// The place where a ray met a surface, and nothing that follows from it: what is worth keeping of a hit.
@@ -125,16 +108,22 @@ impl SurfaceHit {
 }
 
 impl Tracer {
-    /// Builds the hierarchy over all triangles of a scene.
+    /// Builds the hierarchies over all triangles of a scene.
     pub fn new(scene: Arc<Scene>) -> Self {
-        let hierarchy = Arc::new(Hierarchy::new(&scene));
+        Self::sharing(scene, instances::MAX_COPIED)
+    }
+
+    /// The same, where copies of one mesh have no more than that many triangles.
+    pub(super) fn sharing(scene: Arc<Scene>, max_copied: usize) -> Self {
+        let hierarchy = Arc::new(Hierarchy::new(&scene, max_copied));
         let specular = (0..scene.objects.len())
             .into_par_iter()
-            .map(|object| Self::specular_shape(&scene, object))
+            .map(|object| Self::specular_shape(&scene, &hierarchy, object))
             .collect();
         Self {
             has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
             has_partial: is_any(&scene, |material| material.coverage.is_some()),
+            shapes: scene.objects.iter().map(|_| Arc::default()).collect(),
             scene,
             hierarchy,
             specular,
@@ -158,7 +147,11 @@ impl Tracer {
         let hierarchy = if (0..count).all(is_same) {
             Arc::clone(&self.hierarchy)
         } else {
-            Arc::new(Hierarchy::new(&scene))
+            Arc::new(self.hierarchy.edited(&self.scene, &scene))
+        };
+        let shape = |object: usize| match is_same(object) {
+            true => Arc::clone(&self.shapes[object]),
+            false => Arc::default(),
         };
         let specular = (0..count)
             .into_par_iter()
@@ -166,12 +159,13 @@ impl Tracer {
                 Some(shape) if is_same(object) && scene.material_of(object).surface.is_specular() => {
                     Some(Arc::clone(shape))
                 }
-                _ => Self::specular_shape(&scene, object),
+                _ => Self::specular_shape(&scene, &hierarchy, object),
             })
             .collect();
         Self {
             has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
             has_partial: is_any(&scene, |material| material.coverage.is_some()),
+            shapes: (0..count).map(shape).collect(),
             scene,
             hierarchy,
             specular,
@@ -186,6 +180,7 @@ impl Tracer {
         Self {
             scene: Arc::clone(&self.scene),
             hierarchy: Arc::clone(&self.hierarchy),
+            shapes: self.shapes.clone(),
             specular: self.specular.clone(),
             has_bumps: false,
             has_masks: self.has_masks,
@@ -249,17 +244,28 @@ impl Tracer {
         self.has_bumps && self.scene.material_of(object).has_bumps()
     }
 
-    fn specular_shape(scene: &Scene, object: usize) -> Option<Arc<SpecularShape>> {
-        let mesh = scene.objects[object].mesh_in_scene();
+    fn specular_shape(scene: &Scene, hierarchy: &Hierarchy, object: usize) -> Option<Arc<SpecularShape>> {
+        if !scene.material_of(object).surface.is_specular() {
+            return None;
+        }
+        let shared = hierarchy.shared(object);
+        // A copy of what was moved takes no more memory than the one before.
+        let normals = match shared.filter(|_| !hierarchy.is_moved(object)) {
+            Some(shared) => NormalField::Found(Arc::clone(&shared.around)),
+            None => NormalField::new(scene.objects[object].mesh_in_scene()),
+        };
+        let groups = match shared {
+            Some(shared) => Arc::clone(&shared.groups),
+            None => Arc::new(smoothing_groups(scene.objects[object].mesh_in_scene())),
+        };
+        let mesh = scene.objects[object].in_scene();
         let bending_map = scene.material_of(object).bending_map();
-        scene.material_of(object).surface.is_specular().then(|| {
-            Arc::new(SpecularShape {
-                normals: NormalField::new(mesh),
-                groups: smoothing_groups(mesh),
-                corners: sharp_corners(mesh),
-                texel_m: bending_map.and_then(|map| texel_m(scene, mesh, &map.image)),
-            })
-        })
+        Some(Arc::new(SpecularShape {
+            normals,
+            groups,
+            corners: sharp_corners(mesh),
+            texel_m: bending_map.and_then(|map| texel_m(scene, mesh, &map.image)),
+        }))
     }
 
     /// How the normals of an object turn; `None` where it is not specular.
@@ -274,7 +280,8 @@ impl Tracer {
 
     /// Sharp edges of an object, both ends of each [m]; none where there are very many.
     pub fn sharp_edges(&self, object: usize) -> &[[DVec3; 2]] {
-        self.hierarchy.edges[object].get_or_init(|| sharp_edges(self.scene.objects[object].mesh_in_scene()))
+        let edges = &self.shapes[object].edges;
+        edges.get_or_init(|| sharp_edges(self.scene.objects[object].in_scene()))
     }
 
     /// Smoothing group of a triangle within its object; 0 where the object is not specular.
@@ -287,8 +294,8 @@ impl Tracer {
 
     /// How the triangles of an object hang together.
     pub fn adjacency(&self, object: usize) -> &Adjacency {
-        self.hierarchy.adjacencies[object]
-            .get_or_init(|| Adjacency::of(self.scene.objects[object].mesh_in_scene()))
+        let adjacency = &self.shapes[object].adjacency;
+        adjacency.get_or_init(|| Adjacency::of(self.scene.objects[object].in_scene()))
     }
 
     /// The scene.
@@ -296,52 +303,44 @@ impl Tracer {
         &self.scene
     }
 
-    /// The hierarchy.
-    pub fn bvh(&self) -> &TriangleBvh {
-        &self.hierarchy.bvh
+    /// The nodes of its hierarchies that lie around all triangles.
+    pub fn roots(&self) -> Vec<SceneNode<'_>> {
+        self.hierarchy.roots()
+    }
+
+    pub(super) fn hierarchy(&self) -> &Hierarchy {
+        &self.hierarchy
     }
 
     /// The nearest surface in front of the ray's origin.
     pub fn closest_hit(&self, ray: &Ray) -> Option<SurfaceHit> {
-        let hit = self.closest_triangle(ray)?;
-        // They lie where the search just was, those of the mesh do not.
-        let corners = self.hierarchy.bvh.corners(hit.slot);
-        Some(self.surface_with(&self.place_of(&hit), corners))
+        let (place, found) = self.closest(ray)?;
+        Some(self.surface_with(&place, &self.hierarchy.corners(found)))
     }
 
     /// Where the nearest surface in front of the ray's origin is met.
     pub fn closest_place(&self, ray: &Ray) -> Option<RayHit> {
-        Some(self.place_of(&self.closest_triangle(ray)?))
+        Some(self.closest(ray)?.0)
     }
 
-    fn closest_triangle(&self, ray: &Ray) -> Option<TriangleHit> {
-        let bvh = &self.hierarchy.bvh;
+    fn closest(&self, ray: &Ray) -> Option<(RayHit, hierarchy::Found<'_>)> {
         if self.has_masks {
-            bvh.closest_hit_where(ray, |triangle, barycentric| self.is_there(triangle, barycentric))
+            self.hierarchy
+                .closest(ray, |object, triangle, at| self.is_there(object, triangle, at))
         } else {
-            bvh.closest_hit(ray)
-        }
-    }
-
-    fn place_of(&self, hit: &TriangleHit) -> RayHit {
-        let (object, triangle) = self.hierarchy.triangles[hit.triangle as usize];
-        RayHit {
-            object,
-            triangle,
-            barycentric: hit.barycentric,
-            distance_m: hit.distance_m,
+            self.hierarchy.closest(ray, |_, _, _| true)
         }
     }
 
     /// The surface at a place that a ray met.
     pub fn surface_at(&self, hit: &RayHit) -> SurfaceHit {
-        let mesh = self.scene.objects[hit.object as usize].mesh_in_scene();
+        let mesh = self.scene.objects[hit.object as usize].in_scene();
         self.surface_with(hit, &mesh.corners(hit.triangle as usize))
     }
 
     fn surface_with(&self, hit: &RayHit, corners: &[DVec3; 3]) -> SurfaceHit {
         let (object, triangle) = (hit.object as usize, hit.triangle as usize);
-        let mesh = self.scene.objects[object].mesh_in_scene();
+        let mesh = self.scene.objects[object].in_scene();
         let (point, point_error) = ray::point_with_error(corners, hit.barycentric);
         let [a, b, c] = *corners;
         let geometric_normal = (b - a).cross(c - a).normalize_or_zero();
@@ -388,7 +387,7 @@ impl Tracer {
 
     fn texture_bump(&self, hit: &SurfaceHit) -> Option<TextureBump> {
         let map = self.scene.material_of(hit.object).bending_map()?;
-        let mesh = self.scene.objects[hit.object].mesh_in_scene();
+        let mesh = self.scene.objects[hit.object].in_scene();
         let place = (hit.triangle, hit.barycentric);
         TextureBump::at((&self.scene, mesh), map, place, hit.interpolated_normal)
     }
@@ -412,11 +411,11 @@ impl Tracer {
 
     /// Whether any surface lies on the ray before `distance_m`.
     pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
-        let bvh = &self.hierarchy.bvh;
         if self.has_masks {
-            bvh.is_blocked_where(ray, distance_m, |triangle, at| self.is_there(triangle, at))
+            let is_there = |object: usize, triangle: usize, at| self.is_there(object, triangle, at);
+            self.hierarchy.is_blocked(ray, distance_m, is_there)
         } else {
-            bvh.is_blocked(ray, distance_m)
+            self.hierarchy.is_blocked(ray, distance_m, |_, _, _| true)
         }
     }
 
@@ -426,32 +425,39 @@ impl Tracer {
         if !self.has_partial {
             return f64::from(u8::from(!self.is_blocked(ray, distance_m)));
         }
-        let left = Cell::new(1.0);
-        let is_blocked = self.hierarchy.bvh.is_blocked_where(ray, distance_m, |index, at| {
-            if !self.is_there(index, at) {
-                return false;
-            }
-            let (object, triangle) = self.hierarchy.triangles[index as usize];
-            let object = object as usize;
-            if self.scene.material_of(object).coverage.is_none() {
-                return true;
-            }
-            left.set(left.get() * self.mixture(object, (triangle as usize, at), true).hole);
-            left.get() == 0.0
-        });
-        if is_blocked { 0.0 } else { left.get() }
+        let holes = RefCell::new(Vec::new());
+        let is_blocked = self
+            .hierarchy
+            .is_blocked(ray, distance_m, |object, triangle, at| {
+                if !self.is_there(object, triangle, at) {
+                    return false;
+                }
+                if self.scene.material_of(object).coverage.is_none() {
+                    return true;
+                }
+                let hole = self.mixture(object, (triangle, at), true).hole;
+                holes.borrow_mut().push(hole);
+                hole == 0.0
+            });
+        if is_blocked {
+            return 0.0;
+        }
+        // The same product in whichever order the hierarchies have them.
+        let mut holes = holes.into_inner();
+        holes.sort_unstable_by(f64::total_cmp);
+        holes.iter().product()
     }
 
-    /// Whether a surface is there at a place of the hierarchy's triangle, or cut out.
-    fn is_there(&self, triangle: u32, barycentric: [f64; 3]) -> bool {
-        let (object, triangle) = self.hierarchy.triangles[triangle as usize];
-        let place = (object as usize, triangle as usize);
-        let material = self.scene.material_of(place.0);
+    /// Whether a surface is there at a place of a triangle, or cut out.
+    fn is_there(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> bool {
+        let material = self.scene.material_of(object);
         let Some(mask) = &material.alpha_mask else {
             return true;
         };
         let image = material.base_colour_texture.as_ref();
-        mask.is_there(image.and_then(|image| self.scene.placed_texture(image, place, barycentric)))
+        mask.is_there(
+            image.and_then(|image| self.scene.placed_texture(image, (object, triangle), barycentric)),
+        )
     }
 
     /// What the surface is made of at a place of a triangle; by the material's factors alone without `textures`.
@@ -501,7 +507,7 @@ impl Tracer {
         let image = self.scene.material_of(hit.object).base_colour_texture.as_ref();
         let place = (hit.object, hit.triangle);
         let placed = image.and_then(|image| self.scene.placed_texture(image, place, hit.barycentric));
-        let mesh = self.scene.objects[hit.object].mesh_in_scene();
+        let mesh = self.scene.objects[hit.object].in_scene();
         let of_vertices = mesh.colour(hit.triangle, hit.barycentric);
         placed.map_or(of_vertices, |(texture, uv)| of_vertices * texture.sample(uv))
     }

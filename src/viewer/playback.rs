@@ -184,7 +184,7 @@ impl Playback {
             self.side *= 2;
         }
         // Noise falls with the square root of the time that it is given.
-        if share > 1.0 || share < SPARE {
+        if !(SPARE..=1.0).contains(&share) {
             let step = share.sqrt().clamp(ERROR_STEPS.0, ERROR_STEPS.1);
             self.error = (self.error * step).min(LARGEST_ERROR);
         }

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings, render};
-use nephroid::geometry::{Ray, TriangleBvh};
-use nephroid::scene::Scene;
+use nephroid::geometry::Ray;
 use nephroid::scene::builtin::shapes;
+use nephroid::scene::{Material, Mesh, Object, Scene};
 use nephroid::transport::{MediumStack, Tracer, media_at};
 
 use support::chain_laws;
@@ -74,6 +74,22 @@ fn sphere(levels: u32) -> Vec<[DVec3; 3]> {
     triangles
 }
 
+fn tracer(triangles: &[[DVec3; 3]]) -> Tracer {
+    let mesh = Mesh {
+        positions: triangles.concat(),
+        normals: vec![DVec3::Y; 3 * triangles.len()],
+        triangles: (0..triangles.len() as u32)
+            .map(|t| [3 * t, 3 * t + 1, 3 * t + 2])
+            .collect(),
+        ..Mesh::default()
+    };
+    Tracer::new(Arc::new(Scene {
+        objects: vec![Object::new("triangles", (0, 0), 0, mesh)],
+        materials: vec![Material::default()],
+        ..Scene::default()
+    }))
+}
+
 fn towards(origin: DVec3, target: DVec3) -> Ray {
     Ray {
         origin,
@@ -93,17 +109,17 @@ fn no_ray_slips_through() {
     ] {
         let place = |p: DVec3| rotation * p * scale + offset;
         let triangles: Vec<_> = sphere(5).into_iter().map(|corners| corners.map(place)).collect();
-        let bvh = TriangleBvh::build(&triangles);
+        let tracer = tracer(&triangles);
         let origin = place(DVec3::new(0.21, -0.13, 0.34));
         for [a, b, c] in &triangles {
             for target in [*a, *b, (*a + *b) * 0.5, *b * 0.7 + *c * 0.3] {
                 let ray = towards(origin, target);
                 assert!(
-                    bvh.closest_hit(&ray).is_some(),
+                    tracer.closest_place(&ray).is_some(),
                     "scale {scale}: a ray to {target}"
                 );
                 assert!(
-                    bvh.is_blocked(&ray, 10.0 * scale),
+                    tracer.is_blocked(&ray, 10.0 * scale),
                     "scale {scale}: a shadow ray to {target}"
                 );
             }
@@ -113,7 +129,7 @@ fn no_ray_slips_through() {
 }
 
 fn signed_zeros() {
-    let bvh = TriangleBvh::build(&sphere(4));
+    let tracer = tracer(&sphere(4));
     for (axis, (sign, zero)) in
         (0..12).map(|i| (i % 3, [(1.0, 0.0), (1.0, -0.0), (-1.0, 0.0), (-1.0, -0.0)][i / 3]))
     {
@@ -123,7 +139,7 @@ fn signed_zeros() {
             origin: DVec3::ZERO,
             direction,
         };
-        let hit = bvh.closest_hit(&ray).expect("a wall of the sphere");
+        let hit = tracer.closest_place(&ray).expect("a wall of the sphere");
         assert!((hit.distance_m - 1.0).abs() < 0.01, "{direction}: {hit:?}");
     }
 }
@@ -135,12 +151,12 @@ fn close_hits() {
         [[a, b, c], [a, c, d]]
     };
     for gap in [1e-3, 1e-6, 1e-9, 1e-12] {
-        let bvh = TriangleBvh::build(&[square(0.0), square(gap)].concat());
+        let tracer = tracer(&[square(0.0), square(gap)].concat());
         let ray = Ray {
             origin: DVec3::new(0.3, 0.5 * gap, 0.2),
             direction: DVec3::Y,
         };
-        let hit = bvh.closest_hit(&ray).expect("the upper square");
+        let hit = tracer.closest_place(&ray).expect("the upper square");
         assert!(
             (hit.distance_m - 0.5 * gap).abs() <= 1e-6 * gap,
             "gap {gap}: {hit:?}"

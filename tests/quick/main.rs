@@ -5,6 +5,7 @@
 mod bake {
     //! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
 
+    mod instances;
     mod mixture;
     mod photon;
     mod reference;

@@ -64,8 +64,8 @@ pub fn light_of(
 fn albedo(scene: &Scene, chart: &Chart) -> Vec<LinearSrgb> {
     let object = &scene.objects[chart.object()];
     let material = scene.material_of(chart.object());
-    let (reference, mesh) = (&material.base_colour_texture, object.mesh_in_scene());
-    if reference.is_none() && mesh.colours.is_none() {
+    let (reference, mesh) = (&material.base_colour_texture, object.in_scene());
+    if reference.is_none() && object.mesh().colours.is_none() {
         return vec![material.base_colour; chart.texel_count()];
     }
     let mut nearest = vec![Nearest::default(); chart.texel_count()];

@@ -151,6 +151,22 @@ impl Storage {
         bytes.len()
     }
 
+    /// Replaces as many items from one on that it holds.
+    pub(super) fn write_at<T: Pod>(&mut self, gpu: &Gpu, first: usize, items: &[T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(items);
+        let offset = first * size_of::<T>();
+        let written = &mut self.written[offset..offset + bytes.len()];
+        if bytes != written {
+            written.copy_from_slice(bytes);
+            gpu.queue.write_buffer(&self.buffer, offset as u64, bytes);
+        }
+    }
+
+    /// Holds what vertices are read from, too.
+    pub(super) fn buffer(&self) -> &wgpu::Buffer {
+        &self.buffer
+    }
+
     pub(super) fn binding(&self) -> wgpu::BindingResource<'_> {
         self.buffer.as_entire_binding()
     }
@@ -160,7 +176,7 @@ fn buffer(gpu: &Gpu, label: &str, size: u64) -> wgpu::Buffer {
     gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some(label),
         size,
-        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+        usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
         mapped_at_creation: false,
     })
 }

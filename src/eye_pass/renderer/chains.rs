@@ -1,5 +1,5 @@
-//! What chains are traced through: the scene's triangles in their hierarchy, made when something specular first comes
-//! into view.
+//! What chains are traced through: the scene's triangles in hierarchies of their meshes, and where these stand; made when
+//! something specular first comes into view.
 
 use std::sync::Arc;
 
@@ -7,17 +7,17 @@ use glam::DVec3;
 
 use super::bindings::Storage;
 use super::bindings::bind_group;
-use super::geometry::Geometry;
+use super::geometry::{Geometry, Segment};
 use super::objects::absorption_per_m;
 use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle, rgb};
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
-use crate::geometry::PackedBvh;
+use crate::geometry::PackedNode;
 use crate::gpu::Gpu;
-use crate::scene::Scene;
 use crate::scene::emitter::{Emitter, EmitterKind};
-use crate::transport::{MediumStack, Tracer, media_at};
+use crate::scene::{Object, Scene};
+use crate::transport::{MediumStack, PackedInstance, PackedMesh, Tracer, media_at};
 
 /// Nodes that may wait while a ray is traced; `STACK` in the shader.
 const STACK: usize = 64;
@@ -25,6 +25,12 @@ const STACK: usize = 64;
 const MAX_OBJECTS: usize = u16::MAX as usize - 1;
 /// Storage buffers that a fragment of a chain reads.
 const BUFFERS: u32 = 8;
+/// Count of a node that is an instance; the shader's.
+const INSTANCE: u32 = u32::MAX;
+/// In place of an object; the shader's.
+const NO_OBJECT: u32 = u32::MAX;
+/// Nodes that an instance takes.
+const INSTANCE_NODES: usize = 4;
 /// Surfaces at which both ways on can be followed; `MAX_BRANCHING` in the shader.
 pub(super) const MAX_BRANCHING: u32 = 4;
 
@@ -33,9 +39,15 @@ pub(super) const MAX_BRANCHING: u32 = 4;
 pub(super) struct ChainScene {
     /// In double precision: it tells which bodies the eye is in.
     tracer: Tracer,
-    centre: DVec3,
-    /// Local units per metre.
-    scale: f64,
+    /// Of each object.
+    firsts: Vec<First>,
+    /// Of each mesh its first node and triangle.
+    starts: Vec<(usize, usize)>,
+    /// The node around what is no instance, if anything is.
+    root: Option<Node>,
+    /// Largest number of nodes above one in a mesh.
+    depth: usize,
+    /// Those over instances and the instances first, which are written again when something is moved.
     nodes: Storage,
     triangles: Storage,
     lights: Storage,
@@ -44,7 +56,7 @@ pub(super) struct ChainScene {
 }
 
 impl ChainScene {
-    /// Builds and uploads the hierarchy; what `before` has of it is not built again.
+    /// Builds and uploads the hierarchies; of what `before` has of them, only what stands elsewhere is uploaded again.
     ///
     /// # Errors
     /// A scene that is larger than what the device lets a shader read.
@@ -54,46 +66,110 @@ impl ChainScene {
         geometry: &Geometry,
         before: Option<Self>,
     ) -> Result<Self> {
-        let tracer = match before {
+        let tracer = match &before {
             Some(before) => before.tracer.edited(Arc::clone(scene)),
             None => Tracer::new(Arc::clone(scene)),
         };
-        let packed = tracer.bvh().packed();
-        check(gpu, scene, geometry, &packed)?;
-        let corners = places_of_corners(scene, geometry);
-        let records = packed.triangles.iter().zip(&packed.corners);
-        let records: Vec<Triangle> = records
-            .map(|(&order, &[a, b, c])| {
-                let (object, first_index) = corners[order as usize];
-                Triangle {
-                    a,
-                    object,
-                    b,
-                    first_index,
-                    c,
-                    order,
-                }
-            })
-            .collect();
-        let nodes = packed.nodes.iter().map(|node| Node {
-            low: node.low,
-            first: node.first,
-            high: node.high,
-            count: node.count,
-        });
-        let nodes: Vec<Node> = nodes.collect();
+        check(gpu, scene, geometry)?;
+        let firsts = firsts(scene, geometry);
+        let known = before.filter(|before| before.firsts == firsts && tracer.has_meshes_of(&before.tracer));
+        let mut made = match known {
+            Some(before) => Self { tracer, ..before },
+            None => Self::with_meshes(gpu, tracer, firsts)?,
+        };
+        made.place(gpu)?;
+        Ok(made)
+    }
+
+    fn with_meshes(gpu: &Gpu, tracer: Tracer, firsts: Vec<First>) -> Result<Self> {
+        let (above, _) = tracer.packed_instances();
+        let mut nodes = vec![Node::default(); 3 + above.nodes.len() + INSTANCE_NODES * above.triangles.len()];
+        let mut triangles: Vec<Triangle> = Vec::new();
+        let (mut starts, mut depth) = (Vec::new(), 0);
+        let meshes = tracer.packed_meshes();
+        for mesh in &meshes {
+            let start = (nodes.len(), triangles.len());
+            starts.push(start);
+            depth = depth.max(mesh.bvh.depth);
+            nodes.extend(mesh.bvh.nodes.iter().map(|node| placed(node, start)));
+            triangles.extend(records(mesh, &firsts));
+        }
+        for bytes in [size_of_val(nodes.as_slice()), size_of_val(triangles.as_slice())] {
+            check_bytes(gpu, tracer.scene(), bytes)?;
+        }
         let mut made = Self {
-            tracer,
-            centre: packed.centre,
-            scale: packed.scale,
+            firsts,
+            root: meshes[0].bvh.nodes.first().map(|root| placed(root, starts[0])),
+            starts,
+            depth,
             nodes: Storage::new(gpu, "nodes"),
             triangles: Storage::new(gpu, "triangles"),
             lights: Storage::new(gpu, "lights"),
             light_count: 0,
             bytes: 0,
+            tracer,
         };
-        made.bytes = (made.nodes.write(gpu, &nodes) + made.triangles.write(gpu, &records)) as u64;
+        made.bytes = (made.nodes.write(gpu, &nodes) + made.triangles.write(gpu, &triangles)) as u64;
         Ok(made)
+    }
+
+    /// Says where the meshes stand.
+    ///
+    /// # Errors
+    /// A hierarchy that is too deep.
+    fn place(&mut self, gpu: &Gpu) -> Result<()> {
+        let (above, instances) = self.tracer.packed_instances();
+        check_depth(self.tracer.scene(), 2 + above.depth + self.depth)?;
+        let first = 3 + above.nodes.len();
+        let over_instances = |node: &PackedNode| match node.count {
+            0 => placed(node, (3, 0)),
+            _ => Node {
+                first: (first + INSTANCE_NODES * node.first as usize) as u32,
+                count: INSTANCE,
+                ..placed(node, (0, 0))
+            },
+        };
+        let both = Node {
+            first: 1,
+            ..Node::default()
+        };
+        let mut nodes = match (self.root, above.nodes.first().map(over_instances)) {
+            (Some(root), Some(above)) => vec![both, root, above],
+            (root, above) => vec![root.or(above).unwrap_or_default(); 3],
+        };
+        nodes.extend(above.nodes.iter().map(over_instances));
+        nodes.extend(instances.iter().flat_map(|instance| self.instance(instance)));
+        self.nodes.write_at(gpu, 0, &nodes);
+        let moved = self.tracer.moved_meshes();
+        let starts = &self.starts[self.starts.len() - moved.len()..];
+        for (mesh, &(_, start)) in moved.iter().zip(starts) {
+            let records: Vec<Triangle> = records(mesh, &self.firsts).collect();
+            self.triangles.write_at(gpu, start, &records);
+        }
+        Ok(())
+    }
+
+    /// An instance as `instance_at` in the shader reads it.
+    fn instance(&self, instance: &PackedInstance) -> [Node; INSTANCE_NODES] {
+        let object = instance.object.map(|object| object as usize);
+        let First { index, order } = object.map_or(First::default(), |object| self.firsts[object]);
+        let root = self.starts[instance.mesh].0 as u32;
+        let is_mirrored = instance.from_mesh.matrix3.determinant() < 0.0;
+        let places = [instance.to_nodes, instance.from_mesh].map(|place| place.to_cols_array_2d());
+        let [a, b] = places.map(|columns| columns.map(|column| column.map(|entry| entry as f32)));
+        let columns = [[a[0], a[1]], [a[2], a[3]], [b[0], b[1]], [b[2], b[3]]];
+        let words = [
+            [root, instance.object.unwrap_or(NO_OBJECT)],
+            [index, order],
+            [instance.margin.to_bits(), u32::from(is_mirrored)],
+            [0, 0],
+        ];
+        std::array::from_fn(|node| Node {
+            low: columns[node][0],
+            first: words[node][0],
+            high: columns[node][1],
+            count: words[node][1],
+        })
     }
 
     /// What it takes on the device [bytes].
@@ -103,12 +179,12 @@ impl ChainScene {
 
     /// A place [m] in local coordinates.
     pub(super) fn local(&self, place: DVec3) -> [f32; 3] {
-        ((place - self.centre) * self.scale).as_vec3().to_array()
+        self.tracer.frame().local(place).as_vec3().to_array()
     }
 
     /// Length of a local unit [m].
     pub(super) fn unit_m(&self) -> f64 {
-        1.0 / self.scale
+        1.0 / self.tracer.frame().scale
     }
 
     /// Nodes and triangles.
@@ -207,7 +283,7 @@ impl ChainScene {
             eye: self.local(eye),
             unit_m: self.unit_m() as f32,
             media: numbers(&media_at(&self.tracer, eye)),
-            near: (view.camera.near_m * self.scale) as f32,
+            near: (view.camera.near_m / self.unit_m()) as f32,
             branch_threshold: limits.branch_threshold as f32,
             max_depth: limits.max_depth,
             branching_depth: limits.branching_depth.min(MAX_BRANCHING),
@@ -217,16 +293,59 @@ impl ChainScene {
     }
 }
 
-/// Object and place of the three corner indices of each triangle, object by object.
-fn places_of_corners(scene: &Scene, geometry: &Geometry) -> Vec<(u32, u32)> {
-    let mut places = Vec::with_capacity(scene.triangle_count());
-    for (object, segments) in (0..).zip(&geometry.segments) {
-        for segment in segments {
-            let firsts = segment.indices.clone().step_by(3);
-            places.extend(firsts.map(|first| (object, first)));
-        }
+/// What the numbers of an object's first triangle are.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct First {
+    /// Place of the indices of its corners.
+    index: u32,
+    /// Among all triangles of the scene.
+    order: u32,
+}
+
+/// Of each object, all of whose triangles are in one page.
+fn firsts(scene: &Scene, geometry: &Geometry) -> Vec<First> {
+    let mut order = 0;
+    let objects = scene.objects.iter().zip(&geometry.segments);
+    let first = |(object, segments): (&Object, &Vec<Segment>)| {
+        let first = First {
+            index: segments.first().map_or(0, |segment| segment.indices.start),
+            order,
+        };
+        order += object.mesh().triangles.len() as u32;
+        first
+    };
+    objects.map(first).collect()
+}
+
+/// A node of a mesh with its first node and triangle.
+fn placed(node: &PackedNode, (first_node, first_triangle): (usize, usize)) -> Node {
+    let first = if node.count > 0 {
+        first_triangle
+    } else {
+        first_node
+    };
+    Node {
+        low: node.low,
+        first: first as u32 + node.first,
+        high: node.high,
+        count: node.count,
     }
-    places
+}
+
+/// Triangles of a mesh, slot by slot.
+fn records(mesh: &PackedMesh, firsts: &[First]) -> impl Iterator<Item = Triangle> {
+    let slots = mesh.owners.iter().zip(&mesh.bvh.corners);
+    slots.map(move |(&(object, triangle), &[a, b, c])| {
+        let first = object.map_or(First::default(), |object| firsts[object as usize]);
+        Triangle {
+            a,
+            object: object.unwrap_or(NO_OBJECT),
+            b,
+            first_index: first.index + 3 * triangle,
+            c,
+            order: first.order + triangle,
+        }
+    })
 }
 
 /// Bodies as `medium.wgsl` has them: innermost first, 16 bits each, object index + 1.
@@ -239,42 +358,78 @@ fn numbers(media: &MediumStack) -> [u32; 4] {
 }
 
 /// # Errors
-/// A scene that chains cannot be traced through on this device.
-fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry, packed: &PackedBvh) -> Result<()> {
+/// A scene that chains cannot be traced through on this device, by what is known of it at once.
+fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
     let limits = gpu.limits();
-    let largest = (packed.nodes.len() * size_of::<Node>()).max(packed.corners.len() * size_of::<Triangle>());
-    let refused = |what: String| {
-        Err(Error::failure(
-            format!("mirrors and glass of {}", scene.name),
-            format!("{what}: they are drawn without reflections and refractions"),
-            "use a larger graphics device, or `render --backend cpu`",
-        ))
-    };
     if limits.max_storage_buffers_per_shader_stage < BUFFERS {
-        return refused(format!(
-            "the device allows a shader {} buffers, and {BUFFERS} are needed",
-            limits.max_storage_buffers_per_shader_stage
+        return Err(refused(
+            scene,
+            format!(
+                "the device allows a shader {} buffers, and {BUFFERS} are needed",
+                limits.max_storage_buffers_per_shader_stage
+            ),
         ));
     }
-    let readable = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    if geometry.pages.len() > 1 || largest as u64 > readable {
-        return refused(format!(
-            "a buffer of the device holds at most {} KiB, and {} triangles take more",
-            readable >> 10,
-            packed.corners.len()
-        ));
+    if geometry.pages.len() > 1 {
+        return Err(too_many_triangles(gpu, scene));
+    }
+    if u32::try_from(scene.triangle_count()).is_err() {
+        return Err(too_many_triangles(gpu, scene));
     }
     if scene.objects.len() > MAX_OBJECTS {
-        return refused(format!(
-            "{} objects are more than the {MAX_OBJECTS} that it can tell apart",
-            scene.objects.len()
-        ));
-    }
-    if packed.depth >= STACK {
-        return refused(format!(
-            "the hierarchy of its triangles is {} levels deep, and at most {STACK} can be traversed",
-            packed.depth
+        return Err(refused(
+            scene,
+            format!(
+                "{} objects are more than the {MAX_OBJECTS} that it can tell apart",
+                scene.objects.len()
+            ),
         ));
     }
     Ok(())
+}
+
+/// # Errors
+/// A hierarchy that chains cannot be traced through.
+fn check_depth(scene: &Scene, depth: usize) -> Result<()> {
+    if depth >= STACK {
+        return Err(refused(
+            scene,
+            format!(
+                "the hierarchy of its triangles is {depth} levels deep, and at most {STACK} can be traversed"
+            ),
+        ));
+    }
+    Ok(())
+}
+
+fn check_bytes(gpu: &Gpu, scene: &Scene, bytes: usize) -> Result<()> {
+    if bytes as u64 > readable(gpu) {
+        return Err(too_many_triangles(gpu, scene));
+    }
+    Ok(())
+}
+
+/// Bytes that a shader can read of one buffer.
+fn readable(gpu: &Gpu) -> u64 {
+    let limits = gpu.limits();
+    limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)
+}
+
+fn too_many_triangles(gpu: &Gpu, scene: &Scene) -> Error {
+    refused(
+        scene,
+        format!(
+            "a buffer of the device holds at most {} KiB, and {} triangles take more",
+            readable(gpu) >> 10,
+            scene.triangle_count()
+        ),
+    )
+}
+
+fn refused(scene: &Scene, what: String) -> Error {
+    Error::failure(
+        format!("mirrors and glass of {}", scene.name),
+        format!("{what}: they are drawn without reflections and refractions"),
+        "use a larger graphics device, or `render --backend cpu`",
+    )
 }

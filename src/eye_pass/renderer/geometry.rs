@@ -1,23 +1,27 @@
-//! The scene's triangles on the device: few large vertex buffers, each below the device's limit.
+//! The scene's triangles on the device: few large vertex buffers, each below the device's limit. They have the coordinates
+//! of their meshes; each object's record says where it stands.
 
+use std::collections::HashMap;
+use std::mem::offset_of;
 use std::ops::Range;
 use std::sync::Arc;
 
 use bytemuck::{Pod, Zeroable};
-use glam::DVec2;
+use glam::{DAffine3, DVec2};
 
 use super::paging::Uploaded;
+use super::uniforms::ObjectRecord;
 use crate::gpu::Gpu;
 use crate::illumination::Chart;
-use crate::scene::{Mesh, Object, Scene};
+use crate::scene::{Material, Mesh, Object, Scene};
 
 /// A corner of a triangle. Surfaces with a map share none between triangles, since maps may cut them anywhere.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Corner {
-    /// Scene coordinates [m].
+    /// In coordinates of the mesh [m].
     position: [f32; 3],
-    /// Unit.
+    /// In these too, of any length.
     normal: [f32; 3],
     /// TEXCOORD_0 and TEXCOORD_1, 0 where the mesh has none.
     uvs: [[f32; 2]; 2],
@@ -28,37 +32,32 @@ pub(super) struct Corner {
 /// Map coordinates of a corner: they change with the maps.
 type MapUv = [f32; 2];
 
-/// The two vertex buffers of the surface pipelines.
+/// The vertex buffers of the surface pipelines.
 pub(super) const CORNER_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: size_of::<Corner>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &[
-        attribute(
-            0,
-            std::mem::offset_of!(Corner, position),
-            wgpu::VertexFormat::Float32x3,
-        ),
-        attribute(
-            1,
-            std::mem::offset_of!(Corner, normal),
-            wgpu::VertexFormat::Float32x3,
-        ),
-        attribute(
-            2,
-            std::mem::offset_of!(Corner, uvs),
-            wgpu::VertexFormat::Float32x4,
-        ),
-        attribute(
-            7,
-            std::mem::offset_of!(Corner, colour),
-            wgpu::VertexFormat::Unorm16x4,
-        ),
+        attribute(0, offset_of!(Corner, position), wgpu::VertexFormat::Float32x3),
+        attribute(1, offset_of!(Corner, normal), wgpu::VertexFormat::Float32x3),
+        attribute(2, offset_of!(Corner, uvs), wgpu::VertexFormat::Float32x4),
+        attribute(7, offset_of!(Corner, colour), wgpu::VertexFormat::Unorm16x4),
     ],
 };
 pub(super) const MAP_UV_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: size_of::<MapUv>() as u64,
     step_mode: wgpu::VertexStepMode::Vertex,
     attributes: &[attribute(3, 0, wgpu::VertexFormat::Float32x2)],
+};
+
+/// The objects' records: where each stands.
+pub(super) const OBJECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
+    array_stride: size_of::<ObjectRecord>() as u64,
+    step_mode: wgpu::VertexStepMode::Instance,
+    attributes: &[
+        attribute(4, offset_of!(ObjectRecord, row_x), wgpu::VertexFormat::Float32x4),
+        attribute(5, offset_of!(ObjectRecord, row_y), wgpu::VertexFormat::Float32x4),
+        attribute(6, offset_of!(ObjectRecord, row_z), wgpu::VertexFormat::Float32x4),
+    ],
 };
 
 const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexFormat) -> wgpu::VertexAttribute {
@@ -73,7 +72,7 @@ const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexForm
 const PAGE_BYTES: u64 = 1 << 30;
 
 /// Part of an object within one page.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Segment {
     /// Which page.
     pub(super) page: usize,
@@ -101,8 +100,9 @@ pub(super) struct Geometry {
     pub(super) pages: Vec<Page>,
     /// One list per object of the scene.
     pub(super) segments: Vec<Vec<Segment>>,
-    /// What the corners show, object by object.
-    meshes: Vec<Arc<Mesh>>,
+    /// The objects, and what is drawn of them.
+    shown: Vec<Object>,
+    drawn: Vec<Drawn>,
     /// Where the map coordinates come from, object by object.
     pub(super) charts: Vec<Option<Arc<Chart>>>,
 }
@@ -120,62 +120,74 @@ impl Geometry {
             pages: Vec::new(),
             corners: Vec::new(),
             indices: Vec::new(),
+            shared: HashMap::new(),
         };
-        let segments = scene
-            .objects
-            .iter()
-            .map(|object| packing.add(scene, object))
-            .collect();
+        let drawn: Vec<Drawn> = scene.objects.iter().map(Drawn::of).collect();
+        let segments = (0..).zip(&drawn);
+        let segments = segments.map(|(object, drawn)| packing.add(scene.material_of(object), drawn));
+        let segments = segments.collect();
         packing.close_page();
         Self {
             pages: packing.pages,
             segments,
-            meshes: meshes(scene),
+            shown: scene.objects.clone(),
+            drawn,
             charts: vec![None; scene.objects.len()],
         }
     }
 
-    /// Takes over an edited scene with as many objects. Corners of moved objects are written again; where an object
-    /// needs others than it has, everything is uploaded anew.
+    /// Takes over an edited scene with as many objects. Corners of a mesh that changed its form alone are written again;
+    /// where an object needs others than it has, everything is uploaded anew.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
-        let changed = (0..scene.objects.len()).filter(|index| self.is_changed(scene, *index));
-        let changed: Vec<usize> = changed.collect();
-        if changed.iter().all(|index| self.can_hold(scene, *index)) {
-            let bytes = changed.iter().map(|index| self.write_corners(gpu, scene, *index));
-            let bytes = bytes.sum();
-            self.meshes = meshes(scene);
-            return Uploaded::other(bytes);
+        let (mut can_stay, mut reshaped) = (true, Vec::new());
+        for (index, object) in scene.objects.iter().enumerate() {
+            let is_receiver = scene.material_of(index).surface.is_receiver();
+            let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
+            can_stay &= !(is_shared && is_receiver);
+            if !self.shown[index].stands_as(object) {
+                let drawn = Drawn::of(object);
+                if !drawn.has_corners_of(&self.drawn[index]) {
+                    can_stay &= drawn.fits_corners_of(&self.drawn[index]) && self.is_alone(index);
+                    reshaped.push(index);
+                }
+                self.drawn[index] = drawn;
+            }
+        }
+        if can_stay {
+            self.shown.clone_from(&scene.objects);
+            let bytes = reshaped.iter().map(|&index| self.write_corners(gpu, index));
+            return Uploaded::other(bytes.sum());
         }
         let charts = std::mem::take(&mut self.charts);
         *self = Self::new(gpu, scene);
         let mut uploaded = Uploaded::other(self.bytes());
         for chart in charts.iter().flatten() {
-            if chart.corner_uvs.len() == self.meshes[chart.object()].triangles.len() {
+            if chart.corner_uvs.len() == self.shown[chart.object()].mesh().triangles.len() {
                 uploaded += self.set_chart(gpu, chart);
             }
         }
         uploaded
     }
 
-    fn is_changed(&self, scene: &Scene, index: usize) -> bool {
-        !Arc::ptr_eq(&self.meshes[index], scene.objects[index].mesh_in_scene())
-            || !self.can_hold(scene, index)
+    /// Rows of the way from an object's corners to the scene.
+    pub(super) fn rows(&self, object: usize) -> [[f32; 4]; 3] {
+        let transform = &self.drawn[object].world_from_mesh;
+        [0, 1, 2].map(|row| {
+            let row = transform.matrix3.row(row).extend(transform.translation[row]);
+            row.as_vec4().to_array()
+        })
     }
 
-    /// Whether an object's corners have the places that it needs: maps may cut a receiver anywhere.
-    fn can_hold(&self, scene: &Scene, index: usize) -> bool {
-        let (old, new) = (&self.meshes[index], scene.objects[index].mesh_in_scene());
-        let has_same_shape = Arc::ptr_eq(old, new)
-            || (old.positions.len() == new.positions.len() && old.triangles == new.triangles);
-        let is_shared = self.segments[index].iter().any(|segment| segment.shares_corners);
-        has_same_shape && !(is_shared && scene.material_of(index).surface.is_receiver())
+    /// Whether no other object is drawn by its corners.
+    fn is_alone(&self, index: usize) -> bool {
+        let own = &self.segments[index];
+        self.segments.iter().filter(|segments| *segments == own).count() == 1
     }
 
-    fn write_corners(&self, gpu: &Gpu, scene: &Scene, index: usize) -> usize {
-        let object = &scene.objects[index];
+    fn write_corners(&self, gpu: &Gpu, index: usize) -> usize {
         let mut bytes = 0;
         for segment in &self.segments[index] {
-            let corners = segment.corners(object.mesh_in_scene());
+            let corners = segment.corners(&self.drawn[index]);
             let offset = (segment.first_corner * size_of::<Corner>()) as u64;
             let page = &self.pages[segment.page];
             gpu.queue
@@ -211,23 +223,63 @@ impl Geometry {
     }
 }
 
-fn meshes(scene: &Scene) -> Vec<Arc<Mesh>> {
-    scene
-        .objects
-        .iter()
-        .map(|object| Arc::clone(object.mesh_in_scene()))
-        .collect()
-}
-
 impl Segment {
-    fn corners(&self, mesh: &Mesh) -> Vec<Corner> {
+    fn corners(&self, drawn: &Drawn) -> Vec<Corner> {
+        let mesh = &drawn.mesh;
         if self.shares_corners {
             return (0..mesh.positions.len())
                 .map(|vertex| corner(mesh, vertex))
                 .collect();
         }
-        let vertices = mesh.triangles[self.triangles.clone()].iter().flatten();
-        vertices.map(|vertex| corner(mesh, *vertex as usize)).collect()
+        let vertices = self
+            .triangles
+            .clone()
+            .flat_map(|triangle| drawn.triangle(triangle));
+        vertices.map(|vertex| corner(mesh, vertex as usize)).collect()
+    }
+}
+
+/// What is drawn of an object: a mesh in its own coordinates, or a copy in those of the scene where the former do not do
+/// in single precision.
+#[derive(Clone, Debug)]
+struct Drawn {
+    mesh: Arc<Mesh>,
+    world_from_mesh: DAffine3,
+}
+
+impl Drawn {
+    fn of(object: &Object) -> Self {
+        if object.placement().is_none() || object.can_share() {
+            return Self {
+                mesh: Arc::clone(object.mesh()),
+                world_from_mesh: *object.world_from_object(),
+            };
+        }
+        Self {
+            mesh: object.copy_in_scene(),
+            world_from_mesh: DAffine3::IDENTITY,
+        }
+    }
+
+    fn is_mirrored(&self) -> bool {
+        self.world_from_mesh.matrix3.determinant() < 0.0
+    }
+
+    /// Vertices of a triangle, counter-clockwise in the scene.
+    fn triangle(&self, triangle: usize) -> [u32; 3] {
+        let [a, b, c] = self.mesh.triangles[triangle];
+        if self.is_mirrored() { [a, c, b] } else { [a, b, c] }
+    }
+
+    fn has_corners_of(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.mesh, &other.mesh) && self.is_mirrored() == other.is_mirrored()
+    }
+
+    /// Whether its corners have the places of those.
+    fn fits_corners_of(&self, other: &Self) -> bool {
+        self.mesh.positions.len() == other.mesh.positions.len()
+            && self.mesh.triangles == other.mesh.triangles
+            && self.is_mirrored() == other.is_mirrored()
     }
 }
 
@@ -238,20 +290,27 @@ struct Packing<'a> {
     pages: Vec<Page>,
     corners: Vec<Corner>,
     indices: Vec<u32>,
+    /// Where meshes are that need no corners for each object, mirrored ones apart.
+    shared: HashMap<(*const Mesh, bool), Segment>,
 }
 
 impl Packing<'_> {
-    /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles.
-    fn add(&mut self, scene: &Scene, object: &Object) -> Vec<Segment> {
-        let material = &scene.materials[object.material];
-        let mesh = object.mesh_in_scene();
+    /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles, and with all other
+    /// instances of their mesh.
+    fn add(&mut self, material: &Material, drawn: &Drawn) -> Vec<Segment> {
+        let mesh = &*drawn.mesh;
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
+            let key = (Arc::as_ptr(&drawn.mesh), drawn.is_mirrored());
+            if let Some(segment) = self.shared.get(&key) {
+                return vec![segment.clone()];
+            }
             let segment = self.segment(largest, 0..mesh.triangles.len(), true);
             let first = self.corners.len() as u32;
-            self.corners.extend(segment.corners(mesh));
-            self.indices
-                .extend(mesh.triangles.iter().flatten().map(|vertex| first + vertex));
+            self.corners.extend(segment.corners(drawn));
+            let vertices = (0..mesh.triangles.len()).flat_map(|triangle| drawn.triangle(triangle));
+            self.indices.extend(vertices.map(|vertex| first + vertex));
+            self.shared.insert(key, segment.clone());
             return vec![segment];
         }
         let mut segments = Vec::new();
@@ -263,7 +322,7 @@ impl Packing<'_> {
             triangle = triangles.end;
             let segment = self.segment(3 * triangles.len(), triangles, false);
             let first = self.corners.len() as u32;
-            self.corners.extend(segment.corners(mesh));
+            self.corners.extend(segment.corners(drawn));
             self.indices.extend(first..self.corners.len() as u32);
             segments.push(segment);
         }

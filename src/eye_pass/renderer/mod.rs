@@ -127,12 +127,13 @@ impl Renderer {
                 "update its driver, or use --backend cpu",
             ));
         }
+        let geometry = Geometry::new(gpu, scene);
         let renderer = Self {
             sample_count,
             scene: Arc::new(scene.clone()),
             tone_mapping: ToneMappingPipelines::new(gpu, colour_format),
-            geometry: Geometry::new(gpu, scene),
-            objects: Objects::new(gpu, scene, MAP_BUDGET_BYTES),
+            objects: Objects::new(gpu, scene, &geometry, MAP_BUDGET_BYTES),
+            geometry,
             surfaces: SurfacePipelines::new(gpu, sample_count),
             chain_scene: None,
             chain_scene_is_stale: false,
@@ -166,13 +167,15 @@ impl Renderer {
         }
         if self.objects.list.len() == scene.objects.len() {
             let triangles = self.geometry.set_scene(gpu, scene);
-            self.chain_scene_is_stale |= triangles != Uploaded::default();
+            let mut objects = self.scene.objects.iter().zip(&scene.objects);
+            let is_moved = objects.any(|(was, is)| !was.stands_as(is));
+            self.chain_scene_is_stale |= is_moved || triangles != Uploaded::default();
             uploaded += triangles;
         } else {
             self.geometry = Geometry::new(gpu, scene);
             self.chain_scene = None;
         }
-        uploaded += self.objects.set_scene(gpu, scene);
+        uploaded += self.objects.set_scene(gpu, scene, &self.geometry);
         self.scene = Arc::new(scene.clone());
         self.drawn_view = None;
         gpu.take_error().map_or(Ok(uploaded), Err)

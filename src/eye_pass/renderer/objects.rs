@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::bindings::Storage;
+use super::geometry::Geometry;
 use super::images::{Images, NO_IMAGE};
 use super::maps::ShownMap;
 use super::paging::Uploaded;
@@ -12,7 +13,7 @@ use crate::gpu::Gpu;
 use crate::illumination::false_colours::ColourScale;
 use crate::illumination::{Chart, Receiver};
 use crate::optics::glass::Dispersion;
-use crate::scene::{Material, Mesh, Scene, SurfaceKind};
+use crate::scene::{InScene, Material, Scene, SurfaceKind};
 
 /// What an object looks like but for its map.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,7 +49,7 @@ pub(super) struct Objects {
 }
 
 impl Objects {
-    pub(super) fn new(gpu: &Gpu, scene: &Scene, map_budget_bytes: u64) -> Self {
+    pub(super) fn new(gpu: &Gpu, scene: &Scene, geometry: &Geometry, map_budget_bytes: u64) -> Self {
         let mut objects = Self {
             list: Vec::new(),
             images: Images::new(gpu, scene, map_budget_bytes),
@@ -57,16 +58,16 @@ impl Objects {
             texels_per_m: vec![None; 2 * scene.objects.len()],
             peak_radiance: 0.0,
         };
-        objects.set_scene(gpu, scene);
+        objects.set_scene(gpu, scene, geometry);
         objects
     }
 
     /// Takes over an edited scene; the maps stay where it has as many objects.
-    pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
+    pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Uploaded {
         let mut uploaded = self.images.set_scene(gpu, scene);
         self.texels_per_m.resize(2 * scene.objects.len(), None);
         self.list = (0..scene.objects.len())
-            .map(|object| Look::of(scene, object))
+            .map(|object| Look::of(scene, object, geometry.rows(object)))
             .collect();
         self.number_glasses(scene);
         uploaded += self.write_records(gpu);
@@ -111,7 +112,7 @@ impl Objects {
         for (density, map) in self.texels_per_m.iter_mut().zip(&map_of) {
             *density = map.map(|shown| {
                 let chart = &shown.chart;
-                texels_per_m(chart, scene.objects[chart.object()].mesh_in_scene())
+                texels_per_m(chart, scene.objects[chart.object()].in_scene())
             });
         }
         uploaded += self.write_records(gpu);
@@ -192,7 +193,7 @@ impl Objects {
 }
 
 impl Look {
-    fn of(scene: &Scene, index: usize) -> Self {
+    fn of(scene: &Scene, index: usize, [row_x, row_y, row_z]: [[f32; 4]; 3]) -> Self {
         let object = &scene.objects[index];
         let material = &scene.materials[object.material];
         let emitted = match scene.glows.get(&index) {
@@ -204,7 +205,7 @@ impl Look {
             surface: material.surface,
             double_sided: material.has_back(),
             has_bumps: material.has_bumps(),
-            bounds: object.mesh_in_scene().bounds(),
+            bounds: object.bounds(),
             record: ObjectRecord {
                 base_colour: rgb(material.base_colour),
                 ior: material.ior as f32,
@@ -228,6 +229,9 @@ impl Look {
                 glow: NO_IMAGE,
                 padding0: 0,
                 padding1: 0,
+                row_x,
+                row_y,
+                row_z,
             },
             material: object.material,
             has_texture: material.base_colour_texture.is_some(),
@@ -282,7 +286,7 @@ pub(super) fn absorption_per_m(material: &Material) -> [f32; 3] {
 }
 
 /// Mean density of a map's texels along a line on its surface; 0 where the surface has no area.
-fn texels_per_m(chart: &Chart, mesh: &Mesh) -> f64 {
+fn texels_per_m(chart: &Chart, mesh: InScene) -> f64 {
     let in_map: f64 = chart
         .corner_uvs
         .iter()
@@ -300,7 +304,7 @@ fn texels_per_m(chart: &Chart, mesh: &Mesh) -> f64 {
 fn check_chart(scene: &Scene, chart: &Chart) -> Result<()> {
     let belongs = scene.objects.get(chart.object()).is_some_and(|object| {
         scene.materials[object.material].surface.is_receiver()
-            && object.mesh_in_scene().triangles.len() == chart.corner_uvs.len()
+            && object.mesh().triangles.len() == chart.corner_uvs.len()
     });
     if belongs {
         return Ok(());

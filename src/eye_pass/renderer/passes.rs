@@ -1,12 +1,15 @@
 //! The passes of one picture: what is traced, then all surfaces.
 
+use std::ops::Range;
+
 use glam::{DMat4, DVec3, DVec4};
 
 use super::bindings::bind_group;
 use super::chains::ChainScene;
 use super::draws::{Draw, DrawList, Manner, visible_objects};
 use super::draws::{EyeQuality, Sample};
-use super::pipelines::Writes;
+use super::geometry::Segment;
+use super::pipelines::{PipelineKey, Writes};
 use super::sky::Sky;
 use super::targets::{Targets, TracedTargets};
 use super::timing::Timing;
@@ -316,24 +319,35 @@ impl Renderer {
     }
 
     fn draw_each(&self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw]) {
-        let (mut present_key, mut present_page) = (None, None);
+        // Instances that follow each other are one draw.
+        let mut runs: Vec<(PipelineKey, &Segment, Range<u32>)> = Vec::new();
         for draw in draws {
-            let Some(pipeline) = self.surfaces.get(draw.key) else {
-                continue;
-            };
-            if present_key.replace(draw.key) != Some(draw.key) {
-                pass.set_pipeline(pipeline);
-            }
             let object = draw.object as u32;
             for segment in &self.geometry.segments[draw.object] {
-                if present_page.replace(segment.page) != Some(segment.page) {
-                    let page = &self.geometry.pages[segment.page];
-                    pass.set_vertex_buffer(0, page.corners.slice(..));
-                    pass.set_vertex_buffer(1, page.map_uvs.slice(..));
-                    pass.set_index_buffer(page.indices.slice(..), wgpu::IndexFormat::Uint32);
+                match runs.last_mut() {
+                    Some((key, of, run)) if *key == draw.key && *of == segment && run.end == object => {
+                        run.end += 1;
+                    }
+                    _ => runs.push((draw.key, segment, object..object + 1)),
                 }
-                pass.draw_indexed(segment.indices.clone(), 0, object..object + 1);
             }
+        }
+        pass.set_vertex_buffer(2, self.objects.records.buffer().slice(..));
+        let (mut present_key, mut present_page) = (None, None);
+        for (key, segment, objects) in runs {
+            let Some(pipeline) = self.surfaces.get(key) else {
+                continue;
+            };
+            if present_key.replace(key) != Some(key) {
+                pass.set_pipeline(pipeline);
+            }
+            if present_page.replace(segment.page) != Some(segment.page) {
+                let page = &self.geometry.pages[segment.page];
+                pass.set_vertex_buffer(0, page.corners.slice(..));
+                pass.set_vertex_buffer(1, page.map_uvs.slice(..));
+                pass.set_index_buffer(page.indices.slice(..), wgpu::IndexFormat::Uint32);
+            }
+            pass.draw_indexed(segment.indices.clone(), 0, objects);
         }
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use super::bindings::{bind_group_layout, pipeline_layout, storage, texture, uniform};
-use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
+use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
 use super::objects::Inspected;
 use super::objects::surface_code;
 use super::shaders::{
@@ -335,7 +335,7 @@ impl SurfacePipelines {
                     module,
                     entry_point: Some("place"),
                     compilation_options: Default::default(),
-                    buffers: &[Some(CORNER_LAYOUT), Some(MAP_UV_LAYOUT)],
+                    buffers: &[Some(CORNER_LAYOUT), Some(MAP_UV_LAYOUT), Some(OBJECT_LAYOUT)],
                 },
                 primitive: wgpu::PrimitiveState {
                     cull_mode: match key.faces {

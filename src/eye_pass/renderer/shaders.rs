@@ -1,6 +1,6 @@
 //! The eye pass's shader modules and what they share with Rust.
 
-use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT};
+use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
 use super::pipelines::{Faces, PipelineFlags, PipelineKey, Writes};
 use super::tone_mapping;
 use super::uniforms::{
@@ -129,7 +129,7 @@ pub fn shared_structs() -> Vec<StructLayout> {
 
 /// Every attribute of the surface pass's vertex buffers, for the tests.
 pub fn vertex_attributes() -> Vec<wgpu::VertexAttribute> {
-    [CORNER_LAYOUT, MAP_UV_LAYOUT]
+    [CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT]
         .iter()
         .flat_map(|layout| layout.attributes)
         .copied()

@@ -133,6 +133,10 @@ shader_struct! {
         glow: u32,
         padding0: u32,
         padding1: u32,
+        /// Rows of the way from its mesh's coordinates to the scene.
+        row_x: [f32; 4],
+        row_y: [f32; 4],
+        row_z: [f32; 4],
     }
 }
 
@@ -159,25 +163,25 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// A node of the hierarchy.
+    /// A node of a hierarchy, of triangles or of instances; or a part of an instance.
     Node {
         /// Minimum corner, local.
         low: [f32; 3],
-        /// Of a leaf its first triangle, of others the first of two children.
+        /// Of a leaf its first triangle or the first node of its instance, of others the first of two children.
         first: u32,
         /// Maximum corner, local.
         high: [f32; 3],
-        /// Triangles of a leaf; 0 for other nodes.
+        /// Triangles of a leaf, or `INSTANCE`; 0 for other nodes.
         count: u32,
     }
 }
 
 shader_struct! {
-    /// A triangle of the hierarchy.
+    /// A triangle of a hierarchy. Where its mesh has instances, it has the mesh's coordinates, and they its numbers.
     Triangle {
         /// First corner, local.
         a: [f32; 3],
-        /// Index into the scene's objects.
+        /// Index into the scene's objects; `NO_OBJECT` where it is not there any more.
         object: u32,
         /// Second corner, local.
         b: [f32; 3],

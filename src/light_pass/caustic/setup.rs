@@ -391,7 +391,7 @@ impl ItemBufferBuilder<'_> {
 fn bounds_of(scene: &Scene, objects: &[usize]) -> Option<(DVec3, DVec3)> {
     objects
         .iter()
-        .filter_map(|&object| scene.objects[object].mesh_in_scene().bounds())
+        .filter_map(|&object| scene.objects[object].bounds())
         .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 

@@ -196,13 +196,13 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
             vec![Polygon::new(corners.collect(), normal, false)]
         }
         LightKind::Surface { object, .. } => {
-            let mesh = scene.objects.get(object)?.mesh_in_scene();
-            if mesh.triangles.len() > MAX_POLYGONS {
+            let mesh = scene.objects.get(object)?.in_scene();
+            if mesh.triangle_count() > MAX_POLYGONS {
                 return None;
             }
             let both_sides = scene.material_of(object).double_sided;
             let with_area =
-                (0..mesh.triangles.len()).filter(|triangle| mesh.face_normal(*triangle) != DVec3::ZERO);
+                (0..mesh.triangle_count()).filter(|triangle| mesh.face_normal(*triangle) != DVec3::ZERO);
             with_area
                 .map(|triangle| {
                     let corners = mesh.corners(triangle).to_vec();

@@ -66,7 +66,7 @@ impl Network {
             first += count;
         }
         let is_closed = |object: usize| {
-            let mesh = scene.objects[object].mesh_in_scene();
+            let mesh = scene.objects[object].copy_in_scene();
             enclosure::is_closed(&mesh.positions, &mesh.triangles)
         };
         Self {

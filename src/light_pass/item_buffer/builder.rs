@@ -8,9 +8,8 @@ use rayon::prelude::*;
 use super::bits::CellBits;
 use super::hidden::{Hidden, HiddenCells};
 use super::search::{Bounds, Search};
-use crate::geometry::bvh::Node;
 use crate::light_pass::launch::Launch;
-use crate::transport::Tracer;
+use crate::transport::{SceneNode, Tracer};
 
 /// Triangles of an object that are tried before its nodes are searched for one that the light sees.
 const TRIED_FIRST: usize = 16;
@@ -19,7 +18,6 @@ const TRIED_FIRST: usize = 16;
 pub(super) struct Builder<'a> {
     pub(super) launch: &'a Launch,
     pub(super) tracer: &'a Tracer,
-    pub(super) owners: Owners,
     /// Of every object; `None` of one without corners.
     pub(super) bounds: &'a [Option<Bounds>],
     /// Of the wanted objects.
@@ -30,8 +28,8 @@ pub(super) struct Builder<'a> {
 }
 
 impl Builder<'_> {
-    fn root(&self) -> Option<Node<'_>> {
-        self.tracer.bvh().root()
+    fn roots(&self) -> Vec<SceneNode<'_>> {
+        self.tracer.roots()
     }
 
     fn count(&self, tests: u64) {
@@ -41,16 +39,16 @@ impl Builder<'_> {
 
     /// Whether any of the cells sees an object.
     pub(super) fn sees(&self, object: usize, bounds: Bounds, visible: &[CellBits]) -> bool {
-        let wanted = |triangle: u32| self.owners.of(triangle) == object;
+        let wanted = |other: usize| other == object;
         let bounds = [bounds];
-        let mesh = self.tracer.scene().objects[object].mesh_in_scene();
+        let mesh = self.tracer.scene().objects[object].in_scene();
         visible.iter().enumerate().any(|(face, visible)| {
             let search = Search::new(self.launch, face, &bounds, &[], &wanted);
-            let first = 0..mesh.triangles.len().min(TRIED_FIRST);
+            let first = 0..mesh.triangle_count().min(TRIED_FIRST);
             let at_once = first
                 .into_iter()
                 .any(|triangle| search.touches(&mesh.corners(triangle), visible));
-            let seen = at_once || self.root().is_some_and(|root| search.finds(root, visible));
+            let seen = at_once || search.finds(self.roots(), visible);
             self.count(search.tests());
             seen
         })
@@ -58,17 +56,15 @@ impl Builder<'_> {
 
     /// The lit cells of each face that a triangle of a wanted object touches. `others`: boxes of all other objects.
     pub(super) fn mark(&self, lit: &[CellBits], others: &[Bounds]) -> Vec<CellBits> {
-        let wanted = |triangle: u32| self.wanted[self.owners.of(triangle)];
+        let wanted = |object: usize| self.wanted[object];
         let mark = |(face, lit): (usize, &CellBits)| {
             let mut open = lit.clone();
             let search = Search::new(self.launch, face, &self.boxes, others, &wanted);
             let objects = self.tracer.scene().objects.iter().zip(self.wanted);
             for (object, _) in objects.filter(|(_, wanted)| **wanted) {
-                search.close_some(object.mesh_in_scene(), &mut open);
+                search.close_some(object.in_scene(), &mut open);
             }
-            if let Some(root) = self.root() {
-                search.close(root, &mut open);
-            }
+            search.close(self.roots(), &mut open);
             self.count(search.tests());
             lit.without(&open)
         };
@@ -81,7 +77,7 @@ impl Builder<'_> {
         if hiders.is_empty() {
             return Vec::new();
         }
-        let wanted = |triangle: u32| self.wanted[self.owners.of(triangle)];
+        let wanted = |object: usize| self.wanted[object];
         let find = |(face, marked): (usize, &CellBits)| {
             let mut cells = HiddenCells::new(self.launch, face);
             let mut tests = 0;
@@ -94,16 +90,14 @@ impl Builder<'_> {
                 .map(|bounds| bounds.is_some_and(is_near))
                 .collect();
             for &(object, triangle) in hiders.iter().filter(|(object, _)| are_near[*object]) {
-                let mesh = self.tracer.scene().objects[object].mesh_in_scene();
+                let mesh = self.tracer.scene().objects[object].in_scene();
                 let marked = (!self.wanted[object]).then_some(marked);
                 tests += cells.add_opaque(object, &mesh.corners(triangle), marked);
             }
             let doubtful = cells.doubtful().clone();
-            if let Some(root) = self.root() {
-                search.visit(root, &doubtful, |triangle, corners| {
-                    tests += cells.add_caster(self.owners.of(triangle), corners);
-                });
-            }
+            search.visit(self.roots(), &doubtful, |object, corners| {
+                tests += cells.add_caster(object, corners);
+            });
             self.count(tests + search.tests());
             let found = cells.find();
             (doubtful, found)
@@ -121,12 +115,10 @@ impl Builder<'_> {
             if !scene.material_of(object).is_opaque() || self.is_the_only_caster(object) {
                 continue;
             }
-            for triangle in 0..item.mesh_in_scene().triangles.len() {
+            let mesh = item.in_scene();
+            for triangle in 0..mesh.triangle_count() {
                 tests += 1;
-                let (corner, normal) = (
-                    item.mesh_in_scene().corners(triangle)[0],
-                    item.mesh_in_scene().face_normal(triangle),
-                );
+                let (corner, normal) = (mesh.corners(triangle)[0], mesh.face_normal(triangle));
                 let side = self.launch.side_of_light(corner, normal);
                 let has_behind = self.boxes.iter().any(|(low, high)| {
                     let height = ((*low + *high) * 0.5 - corner).dot(normal);
@@ -143,7 +135,7 @@ impl Builder<'_> {
             return Vec::new();
         }
         hiders.sort_by_cached_key(|&(object, triangle)| {
-            let [a, b, c] = scene.objects[object].mesh_in_scene().corners(triangle);
+            let [a, b, c] = scene.objects[object].in_scene().corners(triangle);
             // Bits of positive numbers are ordered as the numbers are.
             let area = (b - a).cross(c - a).length().to_bits();
             (self.wanted[object], Reverse(area))
@@ -154,28 +146,5 @@ impl Builder<'_> {
     /// Nothing hides itself.
     fn is_the_only_caster(&self, object: usize) -> bool {
         self.wanted[object] && self.wanted.iter().filter(|wanted| **wanted).count() == 1
-    }
-}
-
-/// Which object a triangle of the hierarchy belongs to: they are counted object by object.
-pub(super) struct Owners {
-    /// Index after the last triangle of each object.
-    ends: Vec<u32>,
-}
-
-impl Owners {
-    pub(super) fn new(tracer: &Tracer) -> Self {
-        let mut end = 0;
-        let count = |object: &crate::scene::Object| {
-            end += object.mesh_in_scene().triangles.len() as u32;
-            end
-        };
-        Self {
-            ends: tracer.scene().objects.iter().map(count).collect(),
-        }
-    }
-
-    pub(super) fn of(&self, triangle: u32) -> usize {
-        self.ends.partition_point(|&end| end <= triangle)
     }
 }

@@ -8,9 +8,9 @@ use super::bits::CellBits;
 use super::grid::{CellRange, Grid};
 use super::hidden::Facet;
 use super::polygon::{Polygon, WIDENED};
-use crate::geometry::bvh::Node;
 use crate::light_pass::launch::Launch;
-use crate::scene::Mesh;
+use crate::scene::InScene;
+use crate::transport::SceneNode;
 
 /// A box, as minimum and maximum corner [m].
 pub(super) type Bounds = (DVec3, DVec3);
@@ -24,8 +24,8 @@ pub(super) struct Search<'a> {
     boxes: &'a [Bounds],
     /// Boxes of all other objects: a node beyond all of these holds nothing else than what is looked for.
     others: &'a [Bounds],
-    /// Whether a triangle of the hierarchy is one of theirs.
-    wanted: &'a (dyn Fn(u32) -> bool + Sync),
+    /// Whether an object is one of them.
+    wanted: &'a (dyn Fn(usize) -> bool + Sync),
     /// Absolute values of the linear part of the way from the scene to the face: what a box's half sides reach there.
     reach: DMat3,
     /// Nodes and triangles tested so far.
@@ -49,7 +49,7 @@ impl<'a> Search<'a> {
         face: usize,
         boxes: &'a [Bounds],
         others: &'a [Bounds],
-        wanted: &'a (dyn Fn(u32) -> bool + Sync),
+        wanted: &'a (dyn Fn(usize) -> bool + Sync),
     ) -> Self {
         let to_face = |point: DVec3| launch.to_face(face, point);
         let along = |axis: DVec3| (to_face(axis) - to_face(DVec3::ZERO)).abs();
@@ -84,7 +84,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether a box lies before any part of a wanted triangle, in the marked cells that it may lie in.
-    pub(super) fn may_hide(&self, bounds: Bounds, marked: &CellBits, root: Option<Node>) -> bool {
+    pub(super) fn may_hide(&self, bounds: Bounds, marked: &CellBits, roots: Vec<SceneNode>) -> bool {
         let range = match self.project(bounds) {
             Projection::Outside => return false,
             Projection::Cells { cells, .. } => cells,
@@ -96,16 +96,14 @@ impl<'a> Search<'a> {
         }
         let nearness = self.nearest(bounds);
         let mut found = false;
-        if let Some(root) = root {
-            self.visit(root, &cells, |_, corners| {
-                let facet = Facet::new(self.launch, self.face, corners);
-                let behind = |&(column, row): &(usize, usize)| {
-                    let farthest = facet.farthest_in(self.grid.cell(column, row));
-                    farthest.is_none_or(|farthest| farthest < nearness)
-                };
-                found = found || self.touched(corners, &cells).iter().any(behind);
-            });
-        }
+        self.visit(roots, &cells, |_, corners| {
+            let facet = Facet::new(self.launch, self.face, corners);
+            let behind = |&(column, row): &(usize, usize)| {
+                let farthest = facet.farthest_in(self.grid.cell(column, row));
+                farthest.is_none_or(|farthest| farthest < nearness)
+            };
+            found = found || self.touched(corners, &cells).iter().any(behind);
+        });
         found
     }
 
@@ -125,17 +123,21 @@ impl<'a> Search<'a> {
         corners.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Hands out the wanted triangles, with their index, below a node that may touch any cell of a set.
-    pub(super) fn visit(&self, root: Node, cells: &CellBits, mut take: impl FnMut(u32, &[DVec3; 3])) {
-        let mut waiting = vec![root];
+    /// Hands out the wanted triangles, with their object, below nodes that may touch any cell of a set.
+    pub(super) fn visit(
+        &self,
+        mut waiting: Vec<SceneNode>,
+        cells: &CellBits,
+        mut take: impl FnMut(usize, &[DVec3; 3]),
+    ) {
         while let Some(node) = waiting.pop() {
             let bounds = node.bounds();
             if !self.may_touch(bounds, cells) || !overlaps(bounds, self.boxes) {
                 continue;
             }
             waiting.extend(node.children().into_iter().flatten());
-            for (triangle, corners) in node.triangles().filter(|(triangle, _)| (self.wanted)(*triangle)) {
-                take(triangle, corners);
+            for (object, corners) in self.wanted_of(&node) {
+                take(object, &corners);
             }
         }
     }
@@ -143,8 +145,7 @@ impl<'a> Search<'a> {
     /// Clears the bits of all cells in `open` that a wanted triangle touches.
     ///
     /// A node whose cells are all closed is passed over; in a node within a single cell, any wanted triangle will do.
-    pub(super) fn close(&self, root: Node, open: &mut CellBits) {
-        let mut waiting = vec![root];
+    pub(super) fn close(&self, mut waiting: Vec<SceneNode>, open: &mut CellBits) {
         while let Some(node) = waiting.pop() {
             let bounds = node.bounds();
             if !overlaps(bounds, self.boxes) {
@@ -164,8 +165,8 @@ impl<'a> Search<'a> {
             match node.children() {
                 Some(children) => waiting.extend(children),
                 None => {
-                    for (_, corners) in node.triangles().filter(|(triangle, _)| (self.wanted)(*triangle)) {
-                        for (column, row) in self.touched(corners, open) {
+                    for (_, corners) in self.wanted_of(&node) {
+                        for (column, row) in self.touched(&corners, open) {
                             open.clear(column, row);
                         }
                     }
@@ -176,18 +177,18 @@ impl<'a> Search<'a> {
 
     /// Clears the bits of cells in `open` that some corners of a large mesh lie in, spread over it, for as long as that
     /// closes cells faster than the search does.
-    pub(super) fn close_some(&self, mesh: &Mesh, open: &mut CellBits) {
+    pub(super) fn close_some(&self, mesh: InScene, open: &mut CellBits) {
         const BATCH: u64 = 1024;
         const MIN_CLOSED: u64 = BATCH / 12;
-        let count = mesh.triangles.len() as u64;
+        let count = mesh.triangle_count() as u64;
         for batch in 0..count / BATCH {
             let before = open.count();
             for sample in batch * BATCH..(batch + 1) * BATCH {
                 // Multiples of the golden ratio fill an interval evenly.
                 let share = sample.wrapping_mul(0x9e37_79b9_7f4a_7c15);
                 let triangle = (u128::from(share) * u128::from(count)) >> 64;
-                let vertex = mesh.triangles[triangle as usize][0];
-                self.close_at(mesh.positions[vertex as usize], open);
+                let vertex = mesh.triangle(triangle as usize)[0];
+                self.close_at(mesh.position(vertex as usize), open);
             }
             if before - open.count() < MIN_CLOSED {
                 return;
@@ -209,20 +210,26 @@ impl<'a> Search<'a> {
     }
 
     /// Whether any wanted triangle touches a cell that is set in `lit`.
-    pub(super) fn finds(&self, root: Node, lit: &CellBits) -> bool {
-        let mut waiting = vec![root];
+    pub(super) fn finds(&self, mut waiting: Vec<SceneNode>, lit: &CellBits) -> bool {
         while let Some(node) = waiting.pop() {
             let bounds = node.bounds();
             if !self.may_touch(bounds, lit) || !overlaps(bounds, self.boxes) {
                 continue;
             }
             waiting.extend(node.children().into_iter().flatten());
-            let mut wanted = node.triangles().filter(|(triangle, _)| (self.wanted)(*triangle));
-            if wanted.any(|(_, corners)| self.touches(corners, lit)) {
+            if self
+                .wanted_of(&node)
+                .any(|(_, corners)| self.touches(&corners, lit))
+            {
                 return true;
             }
         }
         false
+    }
+
+    /// Wanted triangles of a leaf, with their object.
+    fn wanted_of(&self, node: &SceneNode<'a>) -> impl Iterator<Item = (usize, [DVec3; 3])> {
+        node.triangles().filter(|(object, _)| (self.wanted)(*object))
     }
 
     /// Whether a triangle touches a cell that is set.
@@ -241,8 +248,8 @@ impl<'a> Search<'a> {
     }
 
     /// Whether any triangle below a node is wanted.
-    fn holds_wanted(&self, node: Node) -> bool {
-        if !overlaps(node.bounds(), self.others) {
+    fn holds_wanted(&self, node: SceneNode) -> bool {
+        if !node.may_be_left() && !overlaps(node.bounds(), self.others) {
             return true;
         }
         let mut waiting = vec![node];
@@ -250,7 +257,7 @@ impl<'a> Search<'a> {
             if !overlaps(node.bounds(), self.boxes) {
                 continue;
             }
-            if node.triangles().any(|(triangle, _)| (self.wanted)(triangle)) {
+            if self.wanted_of(&node).next().is_some() {
                 return true;
             }
             waiting.extend(node.children().into_iter().flatten());

@@ -271,7 +271,7 @@ fn spheres(scene: &Scene, objects: &[usize], most: usize) -> Vec<Sphere> {
     let mut bounded: Vec<(usize, DVec3)> = objects
         .iter()
         .filter_map(|&object| {
-            let (low, high) = scene.objects[object].mesh_in_scene().bounds()?;
+            let (low, high) = scene.objects[object].bounds()?;
             Some((object, low * 0.5 + high * 0.5))
         })
         .collect();
@@ -302,10 +302,10 @@ fn around(scene: &Scene, objects: &[(usize, DVec3)]) -> Option<Sphere> {
     let vertices = || {
         objects
             .iter()
-            .flat_map(|(object, _)| &scene.objects[*object].mesh_in_scene().positions)
+            .flat_map(|(object, _)| scene.objects[*object].in_scene().positions())
     };
-    let low = vertices().fold(DVec3::INFINITY, |low, position| low.min(*position));
-    let high = vertices().fold(DVec3::NEG_INFINITY, |high, position| high.max(*position));
+    let low = vertices().fold(DVec3::INFINITY, |low, position| low.min(position));
+    let high = vertices().fold(DVec3::NEG_INFINITY, |high, position| high.max(position));
     let centre = low * 0.5 + high * 0.5;
     let radius_m = vertices()
         .map(|position| position.distance(centre))

@@ -118,7 +118,7 @@ impl SmallBodies {
             .iter()
             .enumerate()
             .filter_map(|(index, object)| {
-                let (low, high) = object.mesh_in_scene().bounds()?;
+                let (low, high) = object.bounds()?;
                 let body = Body {
                     ends: [low * 0.5 + high * 0.5; 2],
                     radius_m: 0.5 * (high - low).length(),

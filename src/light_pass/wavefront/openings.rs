@@ -107,7 +107,7 @@ impl Search<'_> {
     fn edges(&self) -> Vec<[DVec3; 2]> {
         let scene = self.tracer.scene();
         let blocks = |&object: &usize| {
-            let bounds = scene.objects[object].mesh_in_scene().bounds();
+            let bounds = scene.objects[object].bounds();
             !scene.material_of(object).surface.is_specular()
                 && bounds.is_some_and(|bounds| self.visible.is_marked_towards(self.launch, bounds))
         };

@@ -152,7 +152,7 @@ impl<'a> Receivers<'a> {
             bounds: scene
                 .objects
                 .iter()
-                .map(|object| object.mesh_in_scene().bounds().unwrap_or(empty))
+                .map(|object| object.bounds().unwrap_or(empty))
                 .collect(),
             scene_bounds: scene.bounds().unwrap_or(empty),
         }

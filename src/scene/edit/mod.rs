@@ -123,7 +123,7 @@ fn place(scene: &mut Scene, object: usize, motion: &Motion) -> Result<()> {
     let pivot = scene.pivot(object);
     for part in scene.objects.iter_mut().filter(|part| part.node == node) {
         part.set_motion(motion, pivot);
-        if let Some((low, high)) = part.mesh_in_scene().bounds() {
+        if let Some((low, high)) = part.bounds() {
             check_place(low, &owner)?;
             check_place(high, &owner)?;
         }

@@ -25,6 +25,9 @@ const LARGEST_SIDE: u32 = 16_384;
 /// sRGB code of linear 0.5: stands in for an image that cannot be read.
 const GREY: u8 = 188;
 
+/// Texels, how they repeat along u and v, and whether the nearest one counts.
+type Pixels = (Rc<RgbaImage>, [Wrap; 2], bool);
+
 /// Reads the images that materials ask for, each once.
 #[derive(Debug)]
 pub struct Images<'a> {
@@ -88,7 +91,7 @@ impl<'a> Images<'a> {
         Ok(Some(self.textures.len() - 1))
     }
 
-    /// The texels of a glTF texture, how it repeats, and whether the nearest one counts; `None` where it has no image.
+    /// The texels of a glTF texture; `None` where it has no image.
     ///
     /// # Errors
     /// More memory than the budget has.
@@ -98,7 +101,7 @@ impl<'a> Images<'a> {
         owner: &str,
         budget: &mut Budget,
         report: &mut Report,
-    ) -> Result<Option<(Rc<RgbaImage>, [Wrap; 2], bool)>> {
+    ) -> Result<Option<Pixels>> {
         let Some(image) = self.image_index(texture, owner, report) else {
             return Ok(None);
         };

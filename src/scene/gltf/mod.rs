@@ -216,14 +216,14 @@ pub fn rebase(scene: &mut Scene) {
 /// spectrum is the material's.
 pub fn add_lights(scene: &mut Scene) {
     for object in 0..scene.objects.len() {
-        let mesh = scene.objects[object].mesh_in_scene();
+        let mesh = scene.objects[object].in_scene();
         let image = scene.material_of(object).emission_texture.as_ref();
         let glow = image.and_then(|image| Glow::new(mesh, image, &scene.textures[image.texture]));
         scene.glows.extend(glow.map(|glow| (object, Arc::new(glow))));
         let emitted = scene.emitted_radiance(object);
         let luminance = emitted.luminance();
         let part = &scene.objects[object];
-        if luminance > 0.0 && part.mesh_in_scene().area_m2() > 0.0 {
+        if luminance > 0.0 && part.in_scene().area_m2() > 0.0 {
             scene.lights.push(Light {
                 name: part.name.clone(),
                 colour: emitted / luminance,

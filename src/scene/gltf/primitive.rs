@@ -29,6 +29,15 @@ const VERTEX_BYTES: u64 = 2 * 80;
 const TRIANGLE_BYTES: u64 = 2 * 12;
 const COLOUR_BYTES: u64 = 2 * 12;
 
+/// Takes the memory of one more copy of a mesh.
+///
+/// # Errors
+/// Not so much is left.
+pub fn take_copy(mesh: &Mesh, owner: &str, budget: &mut Budget) -> Result<()> {
+    budget.take(mesh.positions.len() as u64 * VERTEX_BYTES, owner)?;
+    budget.take(3 * mesh.triangles.len() as u64 * TRIANGLE_BYTES, owner)
+}
+
 /// The primitives that were read: nodes with the same mesh share them.
 #[derive(Debug, Default)]
 pub struct Primitives {
@@ -113,14 +122,7 @@ impl Primitives {
     ) -> Result<Option<(Arc<Mesh>, Option<LinearSrgb>)>> {
         let bent_by = source.poses.is_own(place.node).then_some(place.node);
         let known = match self.known.entry((place.mesh, place.primitive, bent_by)) {
-            Entry::Occupied(known) => {
-                let known = known.into_mut();
-                if let Some(Local { mesh, .. }) = &known.source {
-                    budget.take(mesh.positions.len() as u64 * VERTEX_BYTES, owner)?;
-                    budget.take(3 * mesh.triangles.len() as u64 * TRIANGLE_BYTES, owner)?;
-                }
-                known
-            }
+            Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(entry) => {
                 let local = read_local(source, (place, primitive, has_colours), owner, budget, report)?;
                 entry.insert(Known {
@@ -153,6 +155,9 @@ impl Primitives {
         };
         if let Some((_, made)) = known.made.iter().find(|(made, _)| *made == variant) {
             return Ok(Some((Arc::clone(made), local.colour)));
+        }
+        if !known.made.is_empty() {
+            take_copy(source, owner, budget)?;
         }
         let mut mesh = variant.of(source, has_normals, owner, report);
         if variant.stands_at_origin {

@@ -1,6 +1,7 @@
 //! The objects of a scene: every primitive of every placed node.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 use glam::DAffine3;
 use gltf::json::mesh;
@@ -12,8 +13,8 @@ use super::report::{Budget, Report};
 use super::{material, names};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
-use crate::scene::closed::is_solid;
-use crate::scene::{Material, Mesh, Object, Scene};
+use crate::scene::closed::{has_volume, is_closed};
+use crate::scene::{Material, Mesh, Object, Scene, instances};
 
 /// Adds all objects, and to `materials` (in file order so far) those that the file only implies. `solid_glass` reads thin
 /// walls as solid glass where their mesh encloses space.
@@ -31,6 +32,7 @@ pub fn add_objects(
 ) -> Result<()> {
     let root = source.reader.root;
     let mut primitives = Primitives::default();
+    let mut closed = HashMap::new();
     let mut uses = vec![0; root.meshes.len()];
     let meshes = placed.iter().filter_map(|placed| root.nodes[placed.node].mesh);
     for mesh in meshes {
@@ -69,10 +71,14 @@ pub fn add_objects(
             };
             let mut object = Object::new(placed.name.as_str(), (placed.node, index), 0, mesh);
             object.place(world_from_node);
-            let mesh = object.mesh_in_scene();
-            let material = materials.thin_or_solid(material, || solid_glass && is_solid(mesh));
+            let is_solid = || {
+                let mesh = object.mesh();
+                let mut is_closed = || *closed.entry(Arc::as_ptr(mesh)).or_insert_with(|| is_closed(mesh));
+                solid_glass && has_volume(object.in_scene()) && is_closed()
+            };
+            let material = materials.thin_or_solid(material, is_solid);
             let material = materials.tinted(material, colour);
-            materials.check_coordinates(material, mesh, &placed.name, report);
+            materials.check_coordinates(material, object.mesh(), &placed.name, report);
             object.material = material;
             scene.objects.push(object);
         }
@@ -81,6 +87,7 @@ pub fn add_objects(
             primitives.forget(mesh_index.value());
         }
     }
+    take_copies(&scene.objects, budget)?;
     let degenerate = primitives.degenerate;
     if degenerate > 0 {
         report.warn(
@@ -88,6 +95,24 @@ pub fn add_objects(
             format!("{degenerate} triangles without area were dropped"),
             "nothing needs to be done: they can neither be seen nor lit",
         );
+    }
+    Ok(())
+}
+
+/// Takes the memory of the copies that will be made of meshes that several objects have.
+///
+/// # Errors
+/// Not so much is left.
+fn take_copies(objects: &[Object], budget: &mut Budget) -> Result<()> {
+    let mut known = HashSet::new();
+    for (object, is_instance) in objects
+        .iter()
+        .zip(instances::find(objects, instances::MAX_COPIED))
+    {
+        if !known.insert(Arc::as_ptr(object.mesh())) && !is_instance {
+            let owner = format!("node `{}`", object.name);
+            primitive::take_copy(object.mesh(), &owner, budget)?;
+        }
     }
     Ok(())
 }

@@ -104,7 +104,7 @@ impl Model {
         let ball = match self.choices.selection.held() {
             Some(GizmoTarget::Object(object)) => {
                 let bounds = self.scene().objects.get(object);
-                let bounds = bounds.and_then(|object| object.mesh_in_scene().bounds());
+                let bounds = bounds.and_then(|object| object.bounds());
                 bounds.map(|(low, high)| (0.5 * (low + high), 0.5 * (high - low).length()))
             }
             Some(GizmoTarget::Light(light)) => {

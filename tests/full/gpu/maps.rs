@@ -326,7 +326,7 @@ fn edited_scene_shows_as_a_new_one() {
     let ior = Edit::Material(1, MaterialEdit::Ior(1.2));
     let tint = Edit::Material(1, MaterialEdit::BaseColour(LinearSrgb::new(1.0, 0.5, 0.2)));
     // All objects are written at once.
-    let uniform = 112 * scene.objects.len() as u64;
+    let uniform = 160 * scene.objects.len() as u64;
     let ball = 32 * scene.objects[1].mesh_in_scene().positions.len() as u64;
     let turned = moved(2, 0.3);
     for (edit, most_bytes) in [

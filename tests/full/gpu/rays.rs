@@ -278,8 +278,7 @@ impl Across {
 impl Judge {
     pub fn new(scene: Arc<Scene>) -> Self {
         let tracer = Tracer::new(scene.clone());
-        let packed = tracer.bvh().packed();
-        let (centre, scale) = (packed.centre, packed.scale);
+        let (centre, scale) = (tracer.frame().centre, tracer.frame().scale);
         let (mut firsts, mut corners) = (Vec::new(), Vec::new());
         for object in &scene.objects {
             firsts.push(corners.len());
@@ -297,7 +296,9 @@ impl Judge {
     }
 
     pub fn bounding_sphere(&self) -> (DVec3, f64) {
-        self.tracer.bvh().bounding_sphere()
+        let (low, high) = self.tracer.scene().bounds().expect("it has triangles");
+        let centre = low * 0.5 + high * 0.5;
+        (centre, (high - centre).length())
     }
 
     pub fn all(&self, rays: &[Ray], answers: &[Answer]) -> Vec<Verdict> {

@@ -213,7 +213,7 @@ fn shone_by(image: Option<Texture>) -> f64 {
         vec![],
     );
     if let Some(image) = image {
-        let glow = Glow::new(scene.objects[1].mesh_in_scene(), &texture_reference(), &image);
+        let glow = Glow::new(scene.objects[1].in_scene(), &texture_reference(), &image);
         scene.glows.insert(1, Arc::new(glow.expect("it glows")));
         scene.textures.push(Arc::new(image));
     }
@@ -235,7 +235,7 @@ fn lamps_that_are_mostly_black_shine() {
     let lamp = &mut scene.materials[2];
     lamp.emitted_radiance = LinearSrgb::grey(10.0);
     lamp.emission_texture = Some(texture_reference());
-    let glow = Glow::new(scene.objects[2].mesh_in_scene(), &texture_reference(), &image);
+    let glow = Glow::new(scene.objects[2].in_scene(), &texture_reference(), &image);
     scene.glows.insert(2, Arc::new(glow.expect("it glows")));
     let radiance = Radiance(scene.emitted_radiance(2).luminance());
     scene.lights = vec![light(LightKind::Surface { object: 2, radiance })];

@@ -1,9 +1,10 @@
 //! One picture: the device against the CPU, both against a closed form, and the perceptual difference of pictures.
 
+use glam::DAffine3;
 use nephroid::eye_pass::Picture;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
 use nephroid::illumination::IlluminationMap;
-use nephroid::scene::{Environment, Glow, TextureRef};
+use nephroid::scene::{Environment, Glow, Object, TextureRef};
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip, unlike};
 use crate::prelude::*;
@@ -32,7 +33,7 @@ fn exhibit() -> (Scene, Vec<IlluminationMap>) {
     let mesh = scene.objects[0].mesh_in_scene_mut();
     let swapped = |uv: &DVec2| dvec2(uv.y, uv.x);
     mesh.uv1 = mesh.uv0.as_ref().map(|uvs| uvs.iter().map(swapped).collect());
-    let of_floor = Glow::new(mesh, &glow, &pattern).expect("it glows");
+    let of_floor = Glow::new((&*mesh).into(), &glow, &pattern).expect("it glows");
     scene.glows.insert(0, of_floor.into());
     scene.textures.extend([four_colours(), pattern].map(Arc::new));
     let mirror = with(parts::mirror(), |it| it.base_colour = rgb(0.9, 0.7, 0.5));
@@ -105,6 +106,69 @@ fn device_shows_what_the_cpu_shows() {
     let apart = |pair: (&u8, &u8)| pair.0.abs_diff(*pair.1);
     let most = rig.drawn(&view).iter().zip(&bytes).map(apart).max();
     assert!(most <= Some(1), "{most:?}");
+}
+
+/// Two balls of one mesh, one of them mirrored, look as copies do, wherever they are moved. Only that is sent then.
+#[test]
+fn what_shares_a_mesh_is_drawn_where_it_is_moved() {
+    let (mut scene, maps) = exhibit();
+    let mesh = Arc::new(shapes::sphere(DVec3::ZERO, 0.18, 4));
+    for (index, x, sign) in [(1, 0.25, 1.0), (2, 0.75, -1.0)] {
+        let before = &scene.objects[index];
+        let mut ball = Object::new(&before.name, (before.node, 0), before.material, Arc::clone(&mesh));
+        let (scale, turn) = (dvec3(sign, 0.9, 1.1), DQuat::from_rotation_y(0.3));
+        let place = DAffine3::from_scale_rotation_translation(scale, turn, dvec3(x, 0.2, 0.35));
+        ball.place(place);
+        scene.objects[index] = ball;
+    }
+    let view = view(dvec3(0.6, 0.8, 1.9), dvec3(0.5, 0.15, 0.45), 0.75, [96, 64]);
+    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &maps));
+    let moves = [
+        (2, 0.5, dvec3(-0.1, 0.1, 0.0)),
+        (1, 0.0, dvec3(0.1, 0.0, 0.2)),
+        (2, 0.1, dvec3(0.1, 0.0, 0.1)),
+    ];
+    for (index, yaw_rad, way) in moves {
+        rig.picture(&view);
+        let edit = Edit::Place(index, Motion::turned(yaw_rad, way));
+        scene = edit.apply(&scene).expect("it can be moved");
+        let bytes = rig.set_scene(&scene).other_bytes;
+        assert!((1..=160 * scene.objects.len() as u64).contains(&bytes), "{bytes}");
+        let moved = rig.picture(&view);
+        let afresh = or_skip!(Rig::at(AS_CPU, &scene, &maps)).picture(&view);
+        assert!(moved.radiance == afresh.radiance);
+        let mut copies = scene.clone();
+        for copy in &mut copies.objects {
+            copy.mesh_in_scene_mut();
+        }
+        let copied = or_skip!(Rig::at(AS_CPU, &copies, &maps)).picture(&view);
+        assert!(unlike(&moved, &copied) < 2e-3, "{}", unlike(&moved, &copied));
+    }
+
+    // Of what waves lift, the corners are sent again.
+    let mirror = scene.objects[1].material;
+    scene.materials[mirror].waves = Some(ripples());
+    scene.swells.insert(1, Arc::clone(&mesh));
+    rig.set_scene(&scene);
+    for time_s in [0.3, 0.5] {
+        let lifted = scene.at(time_s);
+        let bytes = rig.set_scene(&lifted).other_bytes as usize;
+        let corners = 48 * mesh.positions.len();
+        assert!((corners..2 * corners).contains(&bytes), "{bytes}");
+        let afresh = or_skip!(Rig::at(AS_CPU, &lifted, &maps)).picture(&view);
+        assert!(rig.picture(&view).radiance == afresh.radiance);
+    }
+}
+
+fn ripples() -> Waves {
+    let wave = Wave {
+        amplitude_m: 0.01,
+        wavelength_m: 0.2,
+        direction: DVec3::X,
+        phase_rad: 0.4,
+        period_s: 1.0,
+    };
+    Waves::new(vec![wave]).expect("a gentle wave")
 }
 
 /// Stripes, a disc and a gradient, changed by `change`.

@@ -192,12 +192,8 @@ fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -
     let shift = read.origin_world - edited.origin_world;
     let is_at = |a: DVec3, b: DVec3| (a + shift).distance(b) <= SAME * extent_m;
     for (read, is) in read.objects.iter().zip(&edited.objects) {
-        let mut corners = read
-            .mesh_in_scene()
-            .positions
-            .iter()
-            .zip(&is.mesh_in_scene().positions);
-        if !corners.all(|(read, is)| is_at(*read, *is)) {
+        let mut corners = read.in_scene().positions().zip(is.in_scene().positions());
+        if !corners.all(|(read, is)| is_at(read, is)) {
             return Err(differs(format!("object `{}`", is.name)));
         }
     }
