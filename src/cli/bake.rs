@@ -10,7 +10,7 @@ use nephroid::export::map_folder::MapFolder;
 use nephroid::export::sequence::{FrameTimes, SequenceFolder};
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest};
 use nephroid::light_pass::ledger::CarriedFlux;
-use nephroid::light_pass::share::Share;
+use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::scene::LoadOptions;
 use nephroid::session::forecast::forecast;
 use nephroid::session::{self, Bake, Forecast, ForecastReport, StopReason};
@@ -38,7 +38,7 @@ pub struct BakeArguments {
     force: bool,
     /// Bake part I of N for `merge` (with --density and --map-resolution N)
     #[arg(long, value_name = "I/N", value_parser = values::share_of_bake, allow_hyphen_values = true)]
-    shard: Option<Share>,
+    shard: Option<ShardIndex>,
     #[command(flatten)]
     moment: MomentOptions,
     #[command(flatten)]
@@ -146,7 +146,7 @@ impl BakeArguments {
 
     fn bake_shard(
         &self,
-        share: Share,
+        share: ShardIndex,
         settings: &BakeSettings,
         loaded: &LoadedScene,
         options: LoadOptions,

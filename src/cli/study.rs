@@ -291,7 +291,7 @@ impl StudyArguments {
                 )),
             };
         };
-        let desk = Desk { common, console };
+        let desk = StudyRun { common, console };
         match kind {
             Kind::Convergence(study) => desk.convergence(study),
             Kind::Reference(study) => desk.reference(study),
@@ -313,7 +313,7 @@ fn list(console: &Console) -> Result<()> {
 }
 
 /// A study that is done: the result as text and as `--json` prints it, and the files.
-struct Done {
+struct FinishedStudy {
     text: String,
     report: Value,
     files: Vec<String>,
@@ -321,12 +321,12 @@ struct Done {
 
 /// Options and console of a study.
 #[derive(Clone, Copy)]
-struct Desk<'a> {
+struct StudyRun<'a> {
     common: &'a Common,
     console: &'a Console,
 }
 
-impl Desk<'_> {
+impl StudyRun<'_> {
     fn convergence(self, study: &ConvergenceArguments) -> Result<()> {
         let settings = self.settings(&study.size, SIDE)?;
         let few = if self.common.quick {
@@ -448,7 +448,7 @@ impl Desk<'_> {
         name: &'static str,
         output: &Path,
         make: impl FnOnce(&Bench) -> Result<Sweep>,
-    ) -> Result<Done> {
+    ) -> Result<FinishedStudy> {
         let folder = open_folder(output, self.common.force, &format!("{name}.csv"))?;
         let bar = self.console.bar();
         let bench = Bench {
@@ -473,7 +473,7 @@ impl Desk<'_> {
             "table": outcome.table,
             "costs": outcome.costs,
         });
-        Ok(Done { text, report, files })
+        Ok(FinishedStudy { text, report, files })
     }
 
     /// Traces, writes the maps, and says how noisy they are.

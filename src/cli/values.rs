@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use nephroid::light_pass::share::Share;
+use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::settings::options;
 use strum::VariantArray;
 
@@ -22,10 +22,10 @@ pub fn within(
 const MAX_SHARDS: u32 = 100_000;
 
 /// `I/N`: one part of several.
-pub fn share_of_bake(text: &str) -> Result<Share, String> {
+pub fn share_of_bake(text: &str) -> Result<ShardIndex, String> {
     let numbers = text.split_once('/').and_then(|(number, count)| {
         let count = count.parse().ok().filter(|count| *count <= MAX_SHARDS)?;
-        Share::new(number.parse().ok()?, count)
+        ShardIndex::new(number.parse().ok()?, count)
     });
     numbers.ok_or_else(|| format!("give one of several, such as 3/8, of up to {MAX_SHARDS}"))
 }

@@ -160,7 +160,9 @@ pub fn measure(
 ) -> Result<Vec<MannerTimes>> {
     gpu.check_texture_size("picture", walk.view.width, walk.view.height)?;
     let target = target(gpu, &walk.view);
-    let manners = switches.iter().map(|switch| Manner::new(gpu, walk, *switch));
+    let manners = switches
+        .iter()
+        .map(|switch| TimedRenderer::new(gpu, walk, *switch));
     let mut manners = manners.collect::<Result<Vec<_>>>()?;
     for (frame, camera) in walk.cameras.iter().enumerate() {
         progress.advance(Stage::Picture, frame as u64, walk.cameras.len() as u64);
@@ -179,7 +181,7 @@ pub fn measure(
             }
         }
     }
-    Ok(manners.into_iter().map(Manner::times).collect())
+    Ok(manners.into_iter().map(TimedRenderer::times).collect())
 }
 
 /// Exposure that suits what the walk's view shows [stops].
@@ -217,7 +219,7 @@ fn target(gpu: &Gpu, view: &View) -> wgpu::Texture {
 
 /// One drawing.
 #[derive(Clone, Copy, Debug)]
-struct Drawing {
+struct TimedFrame {
     wall_ms: f64,
     device_ms: Option<GpuMs>,
     objects: u64,
@@ -229,14 +231,14 @@ fn sum(ms: GpuMs) -> f64 {
 }
 
 /// A renderer of its own, since switching chains off gives up what they took.
-struct Manner {
+struct TimedRenderer {
     chains: EffectSwitch,
     renderer: Renderer,
-    drawings: Vec<Drawing>,
+    drawings: Vec<TimedFrame>,
     warm_up: Vec<WarmUp>,
 }
 
-impl Manner {
+impl TimedRenderer {
     fn new(gpu: &Gpu, walk: &Walk<'_>, chains: EffectSwitch) -> Result<Self> {
         let mut renderer = Renderer::new(gpu, walk.scene, FORMAT, SAMPLES)?;
         renderer.set_maps(gpu, walk.scene, walk.maps)?;
@@ -274,7 +276,7 @@ impl Manner {
         Ok(())
     }
 
-    fn draw(&mut self, gpu: &Gpu, target: &wgpu::Texture, view: &View) -> Result<Drawing> {
+    fn draw(&mut self, gpu: &Gpu, target: &wgpu::Texture, view: &View) -> Result<TimedFrame> {
         let start = Instant::now();
         let target = target.create_view(&wgpu::TextureViewDescriptor::default());
         let mut encoder = gpu
@@ -287,7 +289,7 @@ impl Manner {
         // The device is done: what it tells now is of this frame.
         let is_told = self.renderer.collect_times(gpu);
         let counts = self.renderer.counts();
-        Ok(Drawing {
+        Ok(TimedFrame {
             wall_ms,
             device_ms: counts.gpu_ms.filter(|_| is_told),
             objects: counts.drawn_objects,
@@ -298,7 +300,7 @@ impl Manner {
     fn times(self) -> MannerTimes {
         let counts = self.renderer.counts();
         let drawings = &self.drawings;
-        let spread = |value: &dyn Fn(&Drawing) -> f64| Spread::of(drawings.iter().map(value).collect());
+        let spread = |value: &dyn Fn(&TimedFrame) -> f64| Spread::of(drawings.iter().map(value).collect());
         MannerTimes {
             chains: self.chains,
             frames: drawings.len(),
@@ -314,7 +316,7 @@ impl Manner {
 }
 
 /// Of frames that the device has all told of.
-fn device_ms(drawings: &[Drawing]) -> Option<DeviceMs> {
+fn device_ms(drawings: &[TimedFrame]) -> Option<DeviceMs> {
     let told: Vec<GpuMs> = drawings
         .iter()
         .map(|drawing| drawing.device_ms)

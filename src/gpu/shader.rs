@@ -2,7 +2,7 @@
 
 /// One WGSL file, built into the program.
 #[derive(Clone, Copy, Debug)]
-pub struct Source {
+pub struct ShaderFile {
     /// Its path below `shaders/` without the ending: `shared/srgb`.
     pub name: &'static str,
     /// Its text.
@@ -15,13 +15,13 @@ pub struct Program {
     /// For messages and captures.
     pub name: &'static str,
     /// What it consists of.
-    pub sources: &'static [Source],
+    pub sources: &'static [ShaderFile],
 }
 
 /// A file of `shaders/` by its name.
 macro_rules! shader_source {
     ($name:literal) => {
-        $crate::gpu::shader::Source {
+        $crate::gpu::shader::ShaderFile {
             name: $name,
             text: include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/shaders/", $name, ".wgsl")),
         }

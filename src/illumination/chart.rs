@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-use super::seams::{Joint, SeamTexel};
+use super::seams::{SeamTexel, SeamTexels};
 use super::tiles::TileLayout;
 use super::{Receiver, Side};
 
@@ -48,7 +48,7 @@ pub struct Chart {
     /// Texels beside the surface that stand for where it goes on.
     pub beyond: Vec<SeamTexel>,
     /// Texels that touch where there is no room beside the surface.
-    pub joints: Vec<Joint>,
+    pub joints: Vec<SeamTexels>,
 }
 
 impl Chart {

@@ -37,7 +37,7 @@ pub struct SeamTexel {
 /// Two texels that touch on the surface, and in the map have no room between them and its border, or another chart, for
 /// one to stand for the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Joint {
+pub struct SeamTexels {
     /// Row·width + column of both.
     pub texels: [usize; 2],
     /// How much of a texel's side they touch along.
@@ -98,7 +98,7 @@ impl Seam {
 }
 
 /// A seam in texels: its ends, and unit steps along it and out of the chart.
-struct Laid {
+struct SeamInTexels {
     a: DVec2,
     b: DVec2,
     along: DVec2,
@@ -107,14 +107,14 @@ struct Laid {
 
 impl Seam {
     /// `None` where it has no length in the map.
-    fn laid(&self, size: DVec2) -> Option<Laid> {
+    fn laid(&self, size: DVec2) -> Option<SeamInTexels> {
         let [a, b] = self.ends.map(|end| end * size);
         let along = (b - a).try_normalize()?;
         let mut out = along.perp();
         if out.dot(self.inner * size - a) > 0.0 {
             out = -out;
         }
-        Some(Laid { a, b, along, out })
+        Some(SeamInTexels { a, b, along, out })
     }
 }
 
@@ -123,7 +123,7 @@ pub fn joints(
     seams: &[Seam],
     (width, height): (usize, usize),
     is_covered: impl Fn(usize) -> bool,
-) -> Vec<Joint> {
+) -> Vec<SeamTexels> {
     let size = DVec2::new(width as f64, height as f64);
     let texel_at = |place: DVec2| {
         let inside = place.cmpge(DVec2::ZERO).all() && place.cmplt(size).all();
@@ -131,7 +131,7 @@ pub fn joints(
     };
     let mut found: Vec<([usize; 2], f64)> = Vec::new();
     for seam in seams {
-        let Some(Laid { a, b, along, out }) = seam.laid(size) else {
+        let Some(SeamInTexels { a, b, along, out }) = seam.laid(size) else {
             continue;
         };
         let length = a.distance(b);
@@ -153,7 +153,7 @@ pub fn joints(
     }
     found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let pairs = found.chunk_by(|a, b| a.0 == b.0);
-    let joint = |pair: &[([usize; 2], f64)]| Joint {
+    let joint = |pair: &[([usize; 2], f64)]| SeamTexels {
         texels: pair[0].0,
         share: pair.iter().map(|(_, share)| share).sum::<f64>().min(1.0),
     };
@@ -170,7 +170,7 @@ pub fn texels(
     // Distance, texel, place.
     let mut found: Vec<(f64, SeamTexel)> = Vec::new();
     for seam in seams {
-        let Some(Laid { a, b, along, out }) = seam.laid(size) else {
+        let Some(SeamInTexels { a, b, along, out }) = seam.laid(size) else {
             continue;
         };
         let length = a.distance(b);

@@ -79,16 +79,16 @@ impl Blocks {
     }
 
     /// The blocks with their light, by means over each.
-    pub fn lit(&self, all: &[f64], traced: &[f64]) -> impl Iterator<Item = Lit> {
+    pub fn lit(&self, all: &[f64], traced: &[f64]) -> impl Iterator<Item = BlockLight> {
         let light = all.iter().zip(traced);
         let blocks = light.zip(&self.areas_m2);
-        blocks.map(|((&all, &traced), &area_m2)| Lit { area_m2, all, traced })
+        blocks.map(|((&all, &traced), &area_m2)| BlockLight { area_m2, all, traced })
     }
 }
 
 /// The light of one block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Lit {
+pub struct BlockLight {
     /// Of its surface [m²].
     pub area_m2: f64,
     /// Mean luminance of E, of all layers [W/m²].
@@ -97,7 +97,7 @@ pub struct Lit {
     pub traced: f64,
 }
 
-impl Lit {
+impl BlockLight {
     /// What an error is relative to here [W/m²].
     pub fn scale(&self, white: f64) -> f64 {
         if self.all >= white {
@@ -115,8 +115,8 @@ impl Lit {
 
 /// Luminance of E [W/m²] that exposure makes white: by the mean logarithm of E, of the area that is neither in the night
 /// nor among its darkest or brightest tenth. `None` without light.
-pub fn white(blocks: impl Iterator<Item = Lit>) -> Option<f64> {
-    let mut blocks: Vec<Lit> = blocks.filter(|block| block.area_m2 > 0.0).collect();
+pub fn white(blocks: impl Iterator<Item = BlockLight>) -> Option<f64> {
+    let mut blocks: Vec<BlockLight> = blocks.filter(|block| block.area_m2 > 0.0).collect();
     let (sum, area_m2) = blocks.iter().fold((0.0, 0.0), |(sum, area_m2), block| {
         (sum + block.all * block.area_m2, area_m2 + block.area_m2)
     });
@@ -156,7 +156,7 @@ pub fn visible_error(maps: &[IlluminationMap], given_up: f64) -> (Option<f64>, V
             let error = map.error.as_ref().map_or(0.0, |error| f64::from(error[texel]));
             error * error + (given_up * traced_of_texels[texel]).powi(2)
         });
-        let light: Vec<Lit> = blocks.lit(&all, &traced).collect();
+        let light: Vec<BlockLight> = blocks.lit(&all, &traced).collect();
         lit.push((light, squares));
     }
     let Some(white) = white(lit.iter().flat_map(|(light, _)| light.iter().copied())) else {
@@ -199,8 +199,8 @@ impl IlluminationMap {
 mod tests {
     use super::*;
 
-    fn even(all: f64, traced: f64) -> Lit {
-        Lit {
+    fn even(all: f64, traced: f64) -> BlockLight {
+        BlockLight {
             area_m2: 2.0,
             all,
             traced,

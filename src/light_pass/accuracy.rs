@@ -275,7 +275,7 @@ impl TileOf {
 
 /// What the round before this one knew, where this one refined only some tiles.
 #[derive(Clone, Copy, Debug)]
-pub struct Before<'a> {
+pub struct PreviousRound<'a> {
     pub error: &'a LightError,
     /// Where this round is finer.
     pub refined: &'a RoughTiles,
@@ -286,7 +286,7 @@ pub struct Before<'a> {
 pub fn estimate(
     fine: &Images,
     coarser: [Option<&Images>; 2],
-    before: Option<Before>,
+    before: Option<PreviousRound>,
     ledger: &EnergyLedger,
 ) -> Option<LightError> {
     let middle = coarser[0]?;

@@ -57,7 +57,7 @@ pub fn cells_towards(
 
 /// What becomes of cells whose casters lie behind opaque faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Hiding {
+pub enum HiddenCellPolicy {
     /// They are marked like all others.
     Keep,
     /// They are dropped.
@@ -66,7 +66,7 @@ pub enum Hiding {
 
 impl ItemBuffer {
     /// Marks the cells that may see one of the `casters` (indices of specular objects).
-    pub fn build(launch: &Launch, tracer: &Tracer, casters: &[usize], hiding: Hiding) -> Self {
+    pub fn build(launch: &Launch, tracer: &Tracer, casters: &[usize], hiding: HiddenCellPolicy) -> Self {
         let lit: Vec<CellBits> = (0..launch.face_count())
             .into_par_iter()
             .map(|face| lit::lit_cells(launch, face))
@@ -89,8 +89,8 @@ impl ItemBuffer {
         };
         let mut faces = builder.mark(&lit, &boxes(false));
         let hidden = match hiding {
-            Hiding::Keep => Vec::new(),
-            Hiding::Drop => builder.hidden(&faces),
+            HiddenCellPolicy::Keep => Vec::new(),
+            HiddenCellPolicy::Drop => builder.hidden(&faces),
         };
         let mut hidden_cells = 0;
         // Where no caster is hidden; all that the light shines on, where that is known to be everywhere.

@@ -49,11 +49,11 @@ pub struct EnergyLedger {
 
 fn with_total<S: Serializer>(by_cause: &Truncated, serializer: S) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
-    struct Told {
+    struct LedgerText {
         truncated: f64,
         truncated_by_cause: Truncated,
     }
-    let told = Told {
+    let told = LedgerText {
         truncated: by_cause.total(),
         truncated_by_cause: *by_cause,
     };

@@ -11,7 +11,7 @@ pub mod ledger;
 pub mod ledger_sum;
 pub mod photon;
 pub mod receiver_maps;
-pub mod share;
+pub mod shard_index;
 pub mod sketch;
 pub mod spectral_node;
 pub mod wavefront;

@@ -105,7 +105,7 @@ impl ReceiverMaps {
 
     /// Takes out maps that are a millionth as bright as all together: what strayed there between the traced rays. Returns
     /// whose they are and the flux on them.
-    pub fn take_strays(&mut self) -> (Vec<Receiver>, [i128; 3]) {
+    pub fn drop_negligible_maps(&mut self) -> (Vec<Receiver>, [i128; 3]) {
         let fluxes: Vec<(Receiver, [i128; 3], f64)> = self
             .iter()
             .map(|(receiver, map)| (receiver, map.flux_counts(), map.chart.area_m2()))
@@ -267,7 +267,7 @@ impl ReceiverMap {
     }
 
     /// A level's flux, to be added to, beside what says where it may go.
-    pub fn level(&mut self, level: usize) -> (&mut FluxAccumulator, Covered<'_>) {
+    pub fn level(&mut self, level: usize) -> (&mut FluxAccumulator, IslandCoverage<'_>) {
         self.make_levels(level);
         let flux = &mut self.levels[level];
         let size = (flux.width(), flux.height());
@@ -275,7 +275,7 @@ impl ReceiverMap {
         let chart = (!self.chart.is_full()).then_some(&*self.chart);
         (
             flux,
-            Covered {
+            IslandCoverage {
                 size,
                 chart,
                 islands: self.islands.as_ref(),
@@ -286,14 +286,14 @@ impl ReceiverMap {
 
 /// Which texels of a map are covered, and by which island.
 #[derive(Clone, Copy, Debug)]
-pub struct Covered<'a> {
+pub struct IslandCoverage<'a> {
     size: (usize, usize),
     /// `None` where all texels are covered.
     chart: Option<&'a Chart>,
     islands: Option<&'a Islands>,
 }
 
-impl Coverage for Covered<'_> {
+impl Coverage for IslandCoverage<'_> {
     fn size(&self) -> (usize, usize) {
         self.size
     }

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::{PathLimits, PathSignature, PathTracer};
-use crate::light_pass::caustic::setup::{Aim, CullMode, VisibleLight};
+use crate::light_pass::caustic::setup::{CullMode, LightVisibility, VisibleLight};
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
 use crate::progress::Control;
 use crate::settings::ItemBufferKind;
@@ -33,7 +33,7 @@ pub struct SketchLimits {
 
 /// A ray that landed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Landing {
+pub struct LandedRay {
     /// Index into `Scene::lights`.
     pub light: usize,
     /// On a matte surface [m].
@@ -53,7 +53,7 @@ pub struct SketchedPatch {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PathPreview {
     /// Of every ray, once for each way on which it came to a matte surface.
-    pub landings: Vec<Landing>,
+    pub landings: Vec<LandedRay>,
     /// Between neighbouring rays that met the same objects in the same way.
     pub patches: Vec<SketchedPatch>,
     /// Light rays.
@@ -65,7 +65,7 @@ type Corner = (usize, u32, u32);
 
 /// How a ray came to a point.
 #[derive(Clone, Copy, Debug)]
-struct Arrived {
+struct ArrivalKind {
     way: (PathSignature, Receiver),
     point: DVec3,
 }
@@ -73,33 +73,33 @@ struct Arrived {
 /// Follows thin wavefronts of all lights; lamps with a size shine from their middles, glass bends all light as at
 /// 587.56 nm, and rough surfaces are smooth. Ends early where it is cancelled.
 pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> PathPreview {
-    let aim = Aim::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, false);
+    let aim = LightVisibility::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, false);
     let mut all = PathPreview::default();
-    for aimed in &aim.lights {
+    for visible_light in &aim.lights {
         if control.is_cancelled() {
             break;
         }
-        of_light(tracer, aimed, limits, &mut all);
+        of_light(tracer, visible_light, limits, &mut all);
     }
     all
 }
 
-fn of_light(tracer: &Tracer, aimed: &VisibleLight, limits: SketchLimits, all: &mut PathPreview) {
-    let (side, cells) = cells(aimed, limits.cells);
+fn of_light(tracer: &Tracer, visible_light: &VisibleLight, limits: SketchLimits, all: &mut PathPreview) {
+    let (side, cells) = cells(visible_light, limits.cells);
     let corners: BTreeSet<Corner> = cells.iter().flat_map(|cell| corners_of(*cell)).collect();
     let corners: Vec<Corner> = corners.into_iter().collect();
-    let arrived: Vec<Vec<Arrived>> = corners
+    let arrived: Vec<Vec<ArrivalKind>> = corners
         .par_iter()
-        .map(|corner| follow(tracer, aimed, limits, *corner, side))
+        .map(|corner| follow(tracer, visible_light, limits, *corner, side))
         .collect();
-    let light = aimed.light;
+    let light = visible_light.light;
     let points = arrived.iter().flatten();
-    all.landings.extend(points.map(|arrived| Landing {
+    all.landings.extend(points.map(|arrived| LandedRay {
         light,
         point: arrived.point,
     }));
     all.rays += corners.len() as u64;
-    let known: BTreeMap<Corner, Vec<Arrived>> = corners.into_iter().zip(arrived).collect();
+    let known: BTreeMap<Corner, Vec<ArrivalKind>> = corners.into_iter().zip(arrived).collect();
     for cell in cells {
         let at = corners_of(cell).map(|corner| &known[&corner][..]);
         all.patches
@@ -108,14 +108,14 @@ fn of_light(tracer: &Tracer, aimed: &VisibleLight, limits: SketchLimits, all: &m
 }
 
 /// Cells that are worth a ray, as many as there may be or a quarter of that, and how many lie side by side.
-fn cells(aimed: &VisibleLight, most: usize) -> (u32, BTreeSet<Corner>) {
+fn cells(visible_light: &VisibleLight, most: usize) -> (u32, BTreeSet<Corner>) {
     let marked = |face: usize| {
         let all = (0..CELLS_PER_SIDE).flat_map(|row| (0..CELLS_PER_SIDE).map(move |column| (column, row)));
-        let buffer = aimed.visible();
+        let buffer = visible_light.visible();
         all.filter(move |(column, row)| buffer.is_marked(face, *column, *row))
             .map(move |(column, row)| (face, column as u32, row as u32))
     };
-    let mut cells: BTreeSet<Corner> = (0..aimed.launch.face_count()).flat_map(marked).collect();
+    let mut cells: BTreeSet<Corner> = (0..visible_light.launch.face_count()).flat_map(marked).collect();
     let mut level = CELLS_PER_SIDE.trailing_zeros();
     while cells.len() > most && level > 0 {
         cells = cells
@@ -143,15 +143,15 @@ fn corners_of((face, column, row): Corner) -> [Corner; 4] {
 /// All landings of the ray of a corner.
 fn follow(
     tracer: &Tracer,
-    aimed: &VisibleLight,
+    visible_light: &VisibleLight,
     limits: SketchLimits,
     (face, column, row): Corner,
     side: u32,
-) -> Vec<Arrived> {
+) -> Vec<ArrivalKind> {
     let place = DVec2::new(f64::from(column), f64::from(row)) / f64::from(side);
     let square = place.clamp(DVec2::splat(MARGIN), DVec2::splat(1.0 - MARGIN));
-    let ray = aimed.launch.ray(face, square);
-    let flux_w = aimed.launch.flux_density_w(square, ray.direction);
+    let ray = visible_light.launch.ray(face, square);
+    let flux_w = visible_light.launch.flux_density_w(square, ray.direction);
     let mut found = Vec::new();
     if !(flux_w.is_finite() && flux_w.max_channel() > 0.0) {
         return found;
@@ -164,8 +164,8 @@ fn follow(
     };
     let unit = FluxUnit::for_power(flux_w.max_channel());
     let mut paths = PathTracer::new(tracer, limits, unit);
-    paths.trace(ray, flux_w, aimed.launch.media(), |arrival| {
-        found.push(Arrived {
+    paths.trace(ray, flux_w, visible_light.launch.media(), |arrival| {
+        found.push(ArrivalKind {
             way: (arrival.signature, arrival.receiver),
             point: arrival.point,
         });
@@ -174,10 +174,10 @@ fn follow(
 }
 
 /// What four rays span that went the same way.
-fn patches<'a>(at: [&'a [Arrived]; 4]) -> impl Iterator<Item = [DVec3; 4]> + 'a {
+fn patches<'a>(at: [&'a [ArrivalKind]; 4]) -> impl Iterator<Item = [DVec3; 4]> + 'a {
     let [first, others @ ..] = at;
     first.iter().filter_map(move |arrived| {
-        let same = |others: &[Arrived]| Some(others.iter().find(|other| other.way == arrived.way)?.point);
+        let same = |others: &[ArrivalKind]| Some(others.iter().find(|other| other.way == arrived.way)?.point);
         let [b, c, d] = others.map(same);
         Some([arrived.point, b?, c?, d?])
     })

@@ -1,13 +1,13 @@
 //! Which effects a scene calls for, and why.
 
-mod compartments;
 mod decide;
 mod eye;
 mod reach;
+mod sealed_regions;
 
 pub use decide::{LightReach, decide, is_wanted, wants_caustics};
 pub use eye::{chains, dispersion};
-pub use reach::Reach;
+pub use reach::SceneReach;
 
 use serde::{Deserialize, Serialize};
 

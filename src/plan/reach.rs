@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 
-use super::compartments::Compartments;
+use super::sealed_regions::Compartments;
 use crate::geometry::enclosure::Bounds;
 use crate::scene::{InScene, Light, LightKind, Scene, SurfaceKind};
 
@@ -18,7 +18,7 @@ const TOLERANCE: f64 = 1e-9;
 
 /// What may send light to what.
 #[derive(Debug)]
-pub struct Reach<'a> {
+pub struct SceneReach<'a> {
     scene: &'a Scene,
     compartments: Compartments,
     bounds: Vec<Option<Bounds>>,
@@ -29,7 +29,7 @@ pub struct Reach<'a> {
     is_useful: Vec<bool>,
 }
 
-impl<'a> Reach<'a> {
+impl<'a> SceneReach<'a> {
     /// Looks at a scene.
     pub fn of(scene: &'a Scene) -> Self {
         let of_kind = |wanted: fn(SurfaceKind) -> bool| -> Vec<usize> {

@@ -104,26 +104,26 @@ impl Emitter {
     pub fn middle(light: &Light, scene: &Scene) -> Option<Self> {
         match light.kind {
             LightKind::Environment { .. } => None,
-            _ => Places::new(light, scene).at(None),
+            _ => EmitterSampler::new(light, scene).at(None),
         }
     }
 
     /// The place of a light at a point of the unit square; `None` where it sends nothing.
     pub fn sample(light: &Light, scene: &Scene, square: DVec2) -> Option<Self> {
-        Places::new(light, scene).sample(square)
+        EmitterSampler::new(light, scene).sample(square)
     }
 }
 
 /// A light whose places are asked for many times.
 #[derive(Debug)]
-pub struct Places<'a> {
+pub struct EmitterSampler<'a> {
     light: &'a Light,
     scene: &'a Scene,
     /// Of an object that glows.
     surface: Option<Glowing<'a>>,
 }
 
-impl<'a> Places<'a> {
+impl<'a> EmitterSampler<'a> {
     /// Of a light of a scene.
     pub fn new(light: &'a Light, scene: &'a Scene) -> Self {
         Self::chosen_by(light, scene, weight)

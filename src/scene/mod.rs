@@ -17,8 +17,7 @@ pub mod builtin;
 pub mod camera;
 pub mod camera_path;
 pub mod changes;
-pub mod closed;
-pub mod contact;
+pub mod coincident_faces;
 pub mod edit;
 pub mod emitter;
 pub mod environment;
@@ -34,6 +33,7 @@ pub mod normal_map;
 pub mod object;
 pub mod texture;
 pub mod turntable;
+pub mod watertight;
 pub mod waves;
 
 pub use adjacency::Adjacency;

@@ -4,7 +4,7 @@
 //! tell what the target would cost by photons, and patches go on while they cost less than that. Costs are counted
 //! operations, so that the choice does not depend on the machine.
 
-use super::caustic::{CausticLayer, Course, LightProgress};
+use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::{LightLevel, LightState};
 use super::map_size::Sizes;
 use super::photon_level::GROWTH;
@@ -137,46 +137,53 @@ impl CausticLayer<'_> {
         light: &VisibleLight,
         sizes: &Sizes,
         state: &mut LightState,
-        climb: &mut LightProgress,
-        course: &mut Course,
+        light_progress: &mut LightProgress,
+        course: &mut BakeContext,
     ) -> Result<bool> {
         let Some(target) = self.settings.max_error else {
             return Ok(false);
         };
-        let is_first = climb.rival.is_none();
-        if is_first || self.are_photons_sooner(light, climb) || self.lacks_auditors(light, climb) {
-            let before = (climb.rival.as_mut(), climb.aim);
+        let is_first = light_progress.rival.is_none();
+        if is_first
+            || self.are_photons_sooner(light, light_progress)
+            || self.lacks_auditors(light, light_progress)
+        {
+            let before = (light_progress.rival.as_mut(), light_progress.aim);
             let made = self.more_photons(light, sizes, state, before, course)?;
             let is_made = made.is_some();
-            climb.rival = made.or(climb.rival.take());
+            light_progress.rival = made.or(light_progress.rival.take());
             if is_made || !is_first {
                 return Ok(is_made);
             }
         }
-        let Some((segments, per_photon)) = climb.rival.as_ref().and_then(photon_segments) else {
+        let Some((segments, per_photon)) = light_progress.rival.as_ref().and_then(photon_segments) else {
             // Nothing arrived: patches find what is too rare for a few photons.
-            climb.carrier = Carrier::Patches;
+            light_progress.carrier = Carrier::Patches;
             return Ok(false);
         };
-        let most_share = climb.most_share.unwrap_or(target);
-        let by_photons = match climb.shares.first() {
+        let most_share = light_progress.most_share.unwrap_or(target);
+        let by_photons = match light_progress.shares.first() {
             Some((0, share)) => segments * (share / most_share).powi(2).max(1.0),
             _ => f64::INFINITY,
         };
         let cost = |level: &LightLevel| cost(level, per_photon);
-        let so_far = cost_of(&climb.levels, per_photon);
-        let next = climb.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
-        let promised = promised(climb, cost, most_share).unwrap_or(0.0);
-        let goes_many_ways = climb.levels.is_empty() && per_photon > MAX_WAYS;
-        let is_late = are_photons_in_time(climb, state, course);
-        let is_biased = is_biased(climb) && climb.shares.last().is_some_and(|(_, share)| *share > most_share);
+        let so_far = cost_of(&light_progress.levels, per_photon);
+        let next = light_progress.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
+        let promised = promised(light_progress, cost, most_share).unwrap_or(0.0);
+        let goes_many_ways = light_progress.levels.is_empty() && per_photon > MAX_WAYS;
+        let is_late = are_photons_in_time(light_progress, state, course);
+        let is_biased = is_biased(light_progress)
+            && light_progress
+                .shares
+                .last()
+                .is_some_and(|(_, share)| *share > most_share);
         if goes_many_ways
             || is_late
             || is_biased
             || so_far + next > by_photons
             || promised > PROMISE * by_photons
         {
-            climb.turn_to_photons();
+            light_progress.turn_to_photons();
         }
         // How many ways its cells have to be divided shows only when they are.
         course.most_queries = ((by_photons - so_far) / RECEIVER_QUERY) as u64;
@@ -185,8 +192,8 @@ impl CausticLayer<'_> {
 
     /// Whether patches may have a bias that the first photons are too few to see, and more of them take less than the
     /// patches did.
-    fn lacks_auditors(&self, light: &VisibleLight, climb: &LightProgress) -> bool {
-        let Some(rival) = climb
+    fn lacks_auditors(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
+        let Some(rival) = light_progress
             .rival
             .as_ref()
             .filter(|_| self.spectra.is_interpolated(light.light))
@@ -198,13 +205,15 @@ impl CausticLayer<'_> {
             .as_ref()
             .is_some_and(|error| error.estimate.relative_rmse > AUDITORS);
         let known = photon_segments(rival).filter(|_| is_coarse);
-        known.is_some_and(|(segments, per_photon)| GROWTH.1 * segments < cost_of(&climb.levels, per_photon))
+        known.is_some_and(|(segments, per_photon)| {
+            GROWTH.1 * segments < cost_of(&light_progress.levels, per_photon)
+        })
     }
 
     /// Whether another level of photons takes less than the first one of patches.
-    fn are_photons_sooner(&self, light: &VisibleLight, climb: &LightProgress) -> bool {
-        let known = climb.rival.as_ref().and_then(photon_segments);
-        let (Some((segments, per_photon)), true) = (known, climb.levels.is_empty()) else {
+    fn are_photons_sooner(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
+        let known = light_progress.rival.as_ref().and_then(photon_segments);
+        let (Some((segments, per_photon)), true) = (known, light_progress.levels.is_empty()) else {
             return false;
         };
         let cells: f64 = self
@@ -233,38 +242,46 @@ fn cost_of(levels: &[LightLevel], per_photon: f64) -> f64 {
 }
 
 /// Whether audits found more than the last two levels of patches show of themselves: finer ones will not mend that.
-fn is_biased(climb: &LightProgress) -> bool {
-    let mut last = climb.levels.iter().rev().take(2);
-    climb.levels.len() > 1
+fn is_biased(light_progress: &LightProgress) -> bool {
+    let mut last = light_progress.levels.iter().rev().take(2);
+    light_progress.levels.len() > 1
         && last.all(|level| level.error.as_ref().is_some_and(|error| error.estimate.is_raised))
 }
 
 /// Whether there is no time left for another level of patches, but for photons that are better than the last one.
-fn are_photons_in_time(climb: &LightProgress, state: &LightState, course: &Course) -> bool {
+fn are_photons_in_time(light_progress: &LightProgress, state: &LightState, course: &BakeContext) -> bool {
     let (Some(left_s), Some(photon_s)) = (course.limited.time_left_s(), state.photon_s) else {
         return false;
     };
-    let photons = climb
+    let photons = light_progress
         .rival
         .as_ref()
         .and_then(|rival| rival.key.photons)
         .unwrap_or(0);
-    let (Some(&(0, of_photons)), Some(&(_, of_patches))) = (climb.shares.first(), climb.shares.last()) else {
+    let (Some(&(0, of_photons)), Some(&(_, of_patches))) =
+        (light_progress.shares.first(), light_progress.shares.last())
+    else {
         return false;
     };
     let own_s = left_s / course.open_lights as f64;
     let times = 1.0 + own_s / (photon_s * f64::from(photons));
-    climb.level_s * LEVEL_GROWTH > own_s && of_photons / times.sqrt() < of_patches
+    light_progress.level_s * LEVEL_GROWTH > own_s && of_photons / times.sqrt() < of_patches
 }
 
 /// What patches are expected to take for a share of the whole error, by their last two levels whose own share is known.
-fn promised(climb: &LightProgress, cost: impl Fn(&LightLevel) -> f64, most_share: f64) -> Option<f64> {
-    let cost_of = |levels: usize| -> f64 { climb.levels.iter().take(levels).map(&cost).sum() };
+fn promised(
+    light_progress: &LightProgress,
+    cost: impl Fn(&LightLevel) -> f64,
+    most_share: f64,
+) -> Option<f64> {
+    let cost_of = |levels: usize| -> f64 { light_progress.levels.iter().take(levels).map(&cost).sum() };
     let has_error = |levels: usize| {
-        let last = levels.checked_sub(1).and_then(|last| climb.levels.get(last));
+        let last = levels
+            .checked_sub(1)
+            .and_then(|last| light_progress.levels.get(last));
         last.is_some_and(|level| level.error.is_some())
     };
-    let known: Vec<(f64, f64)> = climb
+    let known: Vec<(f64, f64)> = light_progress
         .shares
         .iter()
         .filter(|(levels, _)| has_error(*levels))

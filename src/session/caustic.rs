@@ -5,24 +5,24 @@ use std::time::Instant;
 use super::BakeCounts;
 use super::carrier::Carrier;
 use super::clock::Clock;
-use super::finish::Shown;
+use super::finish::CompletedLevel;
 use super::forecast::{CostPoint, Forecast, forecast};
 use super::goals::{Errors, Goal};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates};
 use super::map_size::Sizes;
-use super::metric::{Backdrop, Counting};
+use super::metric::{Backdrop, ErrorTerms};
 use super::shards::{PassSums, ShardRole};
 use super::sizes::ChartCache;
 use super::spectra::Spectra;
 use crate::error::{Error, Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
-use crate::light_pass::accuracy::{self, Before, Images, LightError};
+use crate::light_pass::accuracy::{self, Images, LightError, PreviousRound};
 use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
-use crate::light_pass::caustic::setup::{Aim, VisibleLight};
+use crate::light_pass::caustic::setup::{LightVisibility, VisibleLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::ChartFor;
-use crate::light_pass::share::Share;
+use crate::light_pass::shard_index::ShardIndex;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::plan::{Effect, EffectPlan};
@@ -51,7 +51,7 @@ const PART_BEFORE_INDIRECT: f64 = 0.85;
 /// All that the layer needs.
 pub(super) struct CausticLayer<'a> {
     pub(super) tracer: &'a Tracer,
-    pub(super) aim: &'a Aim,
+    pub(super) aim: &'a LightVisibility,
     pub(super) settings: &'a BakeSettings,
     pub(super) sizes: &'a ChartCache,
     /// Of lights whose wavelengths go different ways.
@@ -146,12 +146,17 @@ impl LightProgress {
 }
 
 /// Observer of a bake.
-pub(super) trait Onlooker {
+pub(super) trait BakeObserver {
     /// Takes a picture that is not the last: levels, where the bake stands, and the clock.
     ///
     /// # Errors
     /// What ends the bake.
-    fn show(&mut self, _levels: &[Shown], _so_far: &CausticOutcome, _clock: &mut Clock) -> Result<()> {
+    fn show(
+        &mut self,
+        _levels: &[CompletedLevel],
+        _so_far: &CausticOutcome,
+        _clock: &mut Clock,
+    ) -> Result<()> {
         Ok(())
     }
 
@@ -159,29 +164,37 @@ pub(super) trait Onlooker {
     ///
     /// # Errors
     /// What ends the bake.
-    fn show_first(&mut self, _levels: &[Shown], _so_far: &CausticOutcome, _clock: &mut Clock) -> Result<()> {
+    fn show_first(
+        &mut self,
+        _levels: &[CompletedLevel],
+        _so_far: &CausticOutcome,
+        _clock: &mut Clock,
+    ) -> Result<()> {
         Ok(())
     }
 
     /// The light of other layers on the maps of these levels and of all others.
-    fn backdrop(&mut self, _levels: &[Shown]) -> Backdrop {
+    fn backdrop(&mut self, _levels: &[CompletedLevel]) -> Backdrop {
         Backdrop::new()
     }
 }
 
 /// No observer.
-impl Onlooker for () {}
+impl BakeObserver for () {}
 
 /// The pictures of all lights so far.
-pub(super) fn shown<'a>(lights: &[&VisibleLight], climbs: &'a [LightProgress]) -> Vec<Shown<'a>> {
-    let pictures = lights.iter().zip(climbs);
+pub(super) fn shown<'a>(
+    lights: &[&VisibleLight],
+    all_progress: &'a [LightProgress],
+) -> Vec<CompletedLevel<'a>> {
+    let pictures = lights.iter().zip(all_progress);
     pictures
-        .filter_map(|(light, climb)| Some((light.light, climb.shown()?)))
+        .filter_map(|(light, light_progress)| Some((light.light, light_progress.shown()?)))
         .collect()
 }
 
 /// Mutable state of a running bake.
-pub(super) struct Course<'a> {
+pub(super) struct BakeContext<'a> {
     pub(super) control: &'a Control,
     pub(super) clock: &'a mut Clock,
     pub(super) outcome: &'a mut CausticOutcome,
@@ -197,7 +210,7 @@ pub(super) struct Course<'a> {
     pub(super) open_lights: usize,
 }
 
-impl Course<'_> {
+impl BakeContext<'_> {
     /// A pass over the lattice of a light: `run` does it, or a share of it, adding to the sums that it is given, which are
     /// nothing yet; or shards did.
     ///
@@ -207,7 +220,7 @@ impl Course<'_> {
         &mut self,
         chart_for: &ChartFor,
         nothing: PassSums,
-        run: impl FnOnce(&Self, Option<Share>, PassSums) -> PassSums,
+        run: impl FnOnce(&Self, Option<ShardIndex>, PassSums) -> PassSums,
     ) -> Result<PassSums> {
         if let ShardRole::Merge(merging) = self.role {
             return merging.pass(chart_for, nothing);
@@ -228,7 +241,7 @@ impl CausticLayer<'_> {
         &self,
         states: &mut LightStates,
         (clock, role): (&mut Clock, &mut ShardRole),
-        onlooker: &mut dyn Onlooker,
+        observer: &mut dyn BakeObserver,
     ) -> Result<CausticOutcome> {
         if role.is_cut() && !self.fits_anyway() {
             return Err(Error::failure(
@@ -251,7 +264,7 @@ impl CausticLayer<'_> {
         };
         let limit_s = self.settings.max_time_s.map(|limit_s| part * limit_s);
         let limited = super::limited(self.control, limit_s, self.began);
-        let mut course = Course {
+        let mut course = BakeContext {
             control: &limited,
             clock,
             outcome: &mut outcome,
@@ -270,9 +283,9 @@ impl CausticLayer<'_> {
         }
         let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
         course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());
-        let mut climbs = Vec::with_capacity(lights.len());
+        let mut all_progress = Vec::with_capacity(lights.len());
         for light in &lights {
-            climbs.push(LightProgress {
+            all_progress.push(LightProgress {
                 carrier: self.carrier(light),
                 ..LightProgress::default()
             });
@@ -280,53 +293,72 @@ impl CausticLayer<'_> {
         course.control = &whole;
         let mut is_first = true;
         let errors = loop {
-            course.open_lights = climbs.iter().filter(|climb| !climb.done).count();
-            for (light, climb) in lights.iter().zip(&mut climbs).filter(|(_, climb)| !climb.done) {
-                self.climb(light, &sizes, states.of_mut(light.light), climb, &mut course)?;
+            course.open_lights = all_progress
+                .iter()
+                .filter(|light_progress| !light_progress.done)
+                .count();
+            for (light, light_progress) in lights
+                .iter()
+                .zip(&mut all_progress)
+                .filter(|(_, light_progress)| !light_progress.done)
+            {
+                self.light_progress(
+                    light,
+                    &sizes,
+                    states.of_mut(light.light),
+                    light_progress,
+                    &mut course,
+                )?;
             }
             if std::mem::take(&mut is_first) && !self.control.is_cancelled() {
-                onlooker.show_first(&shown(&lights, &climbs), course.outcome, course.clock)?;
+                observer.show_first(&shown(&lights, &all_progress), course.outcome, course.clock)?;
             }
-            let mut counting = self.counting(&lights, &climbs, onlooker);
-            let mut errors = self.errors(&lights, &climbs, &counting);
-            let underrated = self.underrated(&errors, &climbs);
-            for &index in &underrated {
-                climbs[index] = LightProgress {
+            let mut counting = self.counting(&lights, &all_progress, observer);
+            let mut errors = self.errors(&lights, &all_progress, &counting);
+            let promote_dim_lights = self.promote_dim_lights(&errors, &all_progress);
+            for &index in &promote_dim_lights {
+                all_progress[index] = LightProgress {
                     is_underrated: true,
-                    carrier: climbs[index].carrier,
+                    carrier: all_progress[index].carrier,
                     ..LightProgress::default()
                 };
                 let state = states.of_mut(lights[index].light);
-                self.climb(lights[index], &sizes, state, &mut climbs[index], &mut course)?;
+                self.light_progress(
+                    lights[index],
+                    &sizes,
+                    state,
+                    &mut all_progress[index],
+                    &mut course,
+                )?;
             }
-            if !underrated.is_empty() {
-                counting = self.counting(&lights, &climbs, onlooker);
-                errors = self.errors(&lights, &climbs, &counting);
+            if !promote_dim_lights.is_empty() {
+                counting = self.counting(&lights, &all_progress, observer);
+                errors = self.errors(&lights, &all_progress, &counting);
             }
-            self.decide(&lights, &mut climbs, &errors, &counting);
-            self.note_cost(states, &lights, &climbs, &errors, &mut course);
+            self.decide(&lights, &mut all_progress, &errors, &counting);
+            self.note_cost(states, &lights, &all_progress, &errors, &mut course);
             // The first picture is worth waiting for, the others have their time.
             course.control = &limited;
-            if limited.is_cancelled() || climbs.iter().all(|climb| climb.done) {
+            if limited.is_cancelled() || all_progress.iter().all(|light_progress| light_progress.done) {
                 break errors;
             }
-            onlooker.show(&shown(&lights, &climbs), course.outcome, course.clock)?;
+            observer.show(&shown(&lights, &all_progress), course.outcome, course.clock)?;
         };
-        outcome.stopped = self.stopped(&climbs, &errors, &limited);
-        for (light, mut climb) in lights.iter().zip(climbs) {
+        outcome.stopped = self.stopped(&all_progress, &errors, &limited);
+        for (light, mut light_progress) in lights.iter().zip(all_progress) {
             // The last level is the picture; a rival that is not is kept for the next bake.
-            let is_better = climb.is_rival_better();
-            if let Some(rival) = climb.rival.take() {
-                let place = if is_better { climb.levels.len() } else { 0 };
-                climb.levels.insert(place, rival);
+            let is_better = light_progress.is_rival_better();
+            if let Some(rival) = light_progress.rival.take() {
+                let place = if is_better { light_progress.levels.len() } else { 0 };
+                light_progress.levels.insert(place, rival);
             }
-            if let Some(level) = climb.levels.last() {
+            if let Some(level) = light_progress.levels.last() {
                 outcome.finished.push(light.light);
                 let strays = level.strays.iter().map(|&receiver| self.stray(light, receiver));
                 outcome.warnings.extend(strays);
             }
             let state = states.of_mut(light.light);
-            state.keep(climb.levels, self.settings.memory_bytes);
+            state.keep(light_progress.levels, self.settings.memory_bytes);
         }
         Ok(outcome)
     }
@@ -336,15 +368,18 @@ impl CausticLayer<'_> {
         &self,
         states: &LightStates,
         lights: &[&VisibleLight],
-        climbs: &[LightProgress],
+        all_progress: &[LightProgress],
         errors: &Errors,
-        course: &mut Course,
+        course: &mut BakeContext,
     ) {
         let error = errors.error();
         // What the first photons cost says nothing of patches.
-        let is_open = climbs.iter().any(|climb| {
-            climb.carrier == Carrier::Undecided
-                && climb.levels.last().is_none_or(|level| level.error.is_none())
+        let is_open = all_progress.iter().any(|light_progress| {
+            light_progress.carrier == Carrier::Undecided
+                && light_progress
+                    .levels
+                    .last()
+                    .is_none_or(|level| level.error.is_none())
         });
         // Nor does a level that was cut off.
         let is_known = course
@@ -355,9 +390,9 @@ impl CausticLayer<'_> {
         if !errors.are_of_all(lights) || !error.is_finite() || is_open || is_known {
             return;
         }
-        let held = climbs
+        let held = all_progress
             .iter()
-            .flat_map(|climb| &climb.levels)
+            .flat_map(|light_progress| &light_progress.levels)
             .map(LightLevel::bytes);
         let clock = &course.clock;
         let point = CostPoint {
@@ -366,14 +401,16 @@ impl CausticLayer<'_> {
             wall_s: clock.plan.wall + clock.trace.wall + clock.deposit.wall,
             bytes: states.bytes() + held.sum::<u64>(),
             error,
-            is_coarse: lights.iter().zip(climbs).any(|(light, climb)| {
-                let begins = match climb.carrier {
+            is_coarse: lights.iter().zip(all_progress).any(|(light, light_progress)| {
+                let begins = match light_progress.carrier {
                     Carrier::Photons => 1,
                     _ => self.lattices(light).len(),
                 };
-                !climb.done && climb.levels.len() < begins
+                !light_progress.done && light_progress.levels.len() < begins
             }),
-            is_by_photons: climbs.iter().any(|climb| climb.carrier == Carrier::Photons),
+            is_by_photons: all_progress
+                .iter()
+                .any(|light_progress| light_progress.carrier == Carrier::Photons),
         };
         course.outcome.course.push(point);
         let Some(target) = self.settings.max_error else {
@@ -404,11 +441,11 @@ impl CausticLayer<'_> {
     }
 
     /// Why there is no finer level.
-    fn stopped(&self, climbs: &[LightProgress], errors: &Errors, limited: &Control) -> Option<Stopped> {
+    fn stopped(&self, all_progress: &[LightProgress], errors: &Errors, limited: &Control) -> Option<Stopped> {
         if self.control.is_cancelled() {
             return Some(Stopped::Cancelled);
         }
-        if limited.is_cancelled() && !climbs.iter().all(|climb| climb.done) {
+        if limited.is_cancelled() && !all_progress.iter().all(|light_progress| light_progress.done) {
             return Some(Stopped::Time);
         }
         let target = self.settings.max_error?;
@@ -423,46 +460,46 @@ impl CausticLayer<'_> {
     }
 
     /// One level more of a light.
-    fn climb(
+    fn light_progress(
         &self,
         light: &VisibleLight,
         sizes: &Sizes,
         state: &mut LightState,
-        climb: &mut LightProgress,
-        course: &mut Course,
+        light_progress: &mut LightProgress,
+        course: &mut BakeContext,
     ) -> Result<()> {
-        if climb.carrier == Carrier::Undecided {
+        if light_progress.carrier == Carrier::Undecided {
             // Photons are shown before anything that takes longer.
-            let made_photons = self.decide_carrier(light, sizes, state, climb, course)?;
+            let made_photons = self.decide_carrier(light, sizes, state, light_progress, course)?;
             if made_photons {
                 return Ok(());
             }
         }
-        if climb.carrier == Carrier::Photons {
-            return self.climb_photons(light, sizes, state, climb, course);
+        if light_progress.carrier == Carrier::Photons {
+            return self.advance_photons(light, sizes, state, light_progress, course);
         }
         let unit = self.unit(light)?;
-        let step = climb.levels.len();
-        let key = self.key(light, step, climb, sizes);
+        let step = light_progress.levels.len();
+        let key = self.key(light, step, light_progress, sizes);
         let began = Instant::now();
         let made = match state.take(&key) {
             Some(level) => Some(level),
             None => self.make(light, key, unit, state, course)?,
         };
-        climb.level_s = began.elapsed().as_secs_f64();
+        light_progress.level_s = began.elapsed().as_secs_f64();
         course.most_queries = u64::MAX;
         let Some(mut level) = made else {
-            if climb.carrier == Carrier::Undecided && !course.control.is_cancelled() {
-                climb.turn_to_photons();
+            if light_progress.carrier == Carrier::Undecided && !course.control.is_cancelled() {
+                light_progress.turn_to_photons();
             }
             return Ok(());
         };
-        if climb.carrier == Carrier::Undecided && level.in_one_place > MAX_IN_ONE_PLACE {
-            climb.turn_to_photons();
-            climb.rival = None;
+        if light_progress.carrier == Carrier::Undecided && level.in_one_place > MAX_IN_ONE_PLACE {
+            light_progress.turn_to_photons();
+            light_progress.rival = None;
             return Ok(());
         }
-        if level.key.trace.is_dim {
+        if level.key.trace.is_negligible {
             // Not known better, and not worth knowing.
             let whole = accuracy::images(&level.maps, level.unit);
             let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
@@ -472,22 +509,22 @@ impl CausticLayer<'_> {
                 auditors: None,
                 estimate,
             });
-            climb.levels.push(level);
-            climb.done = true;
+            light_progress.levels.push(level);
+            light_progress.done = true;
             return Ok(());
         }
         let predecessors = step.min(ESTIMATED_LEVELS - 1);
-        let auditors = climb.rival.as_ref().and_then(|rival| rival.key.photons);
+        let auditors = light_progress.rival.as_ref().and_then(|rival| rival.key.photons);
         let is_known = |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
-            let estimate = self.error_of(light, &level, state, climb, course)?;
+            let estimate = self.error_of(light, &level, state, light_progress, course)?;
             level.error = estimate.map(|estimate| KeptError {
                 predecessors,
                 auditors,
                 estimate,
             });
         }
-        climb.levels.push(level);
+        light_progress.levels.push(level);
         Ok(())
     }
 
@@ -495,32 +532,35 @@ impl CausticLayer<'_> {
     fn decide(
         &self,
         lights: &[&VisibleLight],
-        climbs: &mut [LightProgress],
+        all_progress: &mut [LightProgress],
         errors: &Errors,
-        counting: &Counting,
+        counting: &ErrorTerms,
     ) {
-        let goals = self.goals(lights, climbs, errors);
-        for ((light, climb), goal) in lights.iter().zip(climbs).zip(goals) {
-            if climb.done {
+        let goals = self.goals(lights, all_progress, errors);
+        for ((light, light_progress), goal) in lights.iter().zip(all_progress).zip(goals) {
+            if light_progress.done {
                 continue;
             }
-            climb.done = match goal {
-                Goal::Enough => true,
-                Goal::NextLevel => !self.has_next_level(light, climb),
-                Goal::Refine(target) if climb.carrier == Carrier::Photons => {
-                    let is_good = climb.error().is_some_and(|error| error.relative_rmse <= target);
-                    is_good || !self.has_next_level(light, climb)
+            light_progress.done = match goal {
+                Goal::Converged => true,
+                Goal::NextLevel => !self.has_next_level(light, light_progress),
+                Goal::Refine(target) if light_progress.carrier == Carrier::Photons => {
+                    let is_good = light_progress
+                        .error()
+                        .is_some_and(|error| error.relative_rmse <= target);
+                    is_good || !self.has_next_level(light, light_progress)
                 }
-                Goal::Refine(target) => !self.refine(climb, target, counting),
+                Goal::Refine(target) => !self.refine(light_progress, target, counting),
             };
         }
     }
 
-    fn has_next_level(&self, light: &VisibleLight, climb: &LightProgress) -> bool {
-        if climb.carrier == Carrier::Photons {
-            self.next_photons(light, climb.levels.last(), climb.aim).is_some()
+    fn has_next_level(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
+        if light_progress.carrier == Carrier::Photons {
+            self.next_photons(light, light_progress.levels.last(), light_progress.aim)
+                .is_some()
         } else {
-            climb.levels.len() < self.lattices(light).len()
+            light_progress.levels.len() < self.lattices(light).len()
         }
     }
 
@@ -530,7 +570,7 @@ impl CausticLayer<'_> {
         key: LevelKey,
         unit: FluxUnit,
         state: &mut LightState,
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         match self.settings.estimator {
             estimator if estimator.refines() => self.make_wavefront(light, key, unit, state, course),
@@ -544,8 +584,8 @@ impl CausticLayer<'_> {
         light: &VisibleLight,
         level: &LightLevel,
         state: &mut LightState,
-        climb: &LightProgress,
-        course: &mut Course,
+        light_progress: &LightProgress,
+        course: &mut BakeContext,
     ) -> Result<Option<LightError>> {
         let is_shard = course.role.is_shard();
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
@@ -553,19 +593,19 @@ impl CausticLayer<'_> {
             estimator if estimator.refines() && is_shard => None,
             estimator if estimator.refines() => {
                 let watch = Stopwatch::start();
-                let levels = climb.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
+                let levels = light_progress.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
                 let coarser: Vec<Images> = levels
                     .map(|level| accuracy::images(&level.maps, level.unit))
                     .collect();
-                let before = climb.rounds.last().and_then(|round| {
-                    let error = &climb.levels.last()?.error.as_ref()?.estimate;
+                let before = light_progress.rounds.last().and_then(|round| {
+                    let error = &light_progress.levels.last()?.error.as_ref()?.estimate;
                     let refined = &round.tiles;
-                    Some(Before { error, refined })
+                    Some(PreviousRound { error, refined })
                 });
                 let fine = accuracy::images(&level.maps, level.unit);
                 let mut estimate =
                     accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &ledger);
-                if let (Some(estimate), Some(photons)) = (&mut estimate, &climb.rival) {
+                if let (Some(estimate), Some(photons)) = (&mut estimate, &light_progress.rival) {
                     self.audit(light, &fine, photons, estimate);
                 }
                 course.clock.deposit.add(watch.elapsed());
@@ -585,8 +625,8 @@ impl CausticLayer<'_> {
     }
 
     /// Decides on another round of refinement towards a relative RMSE; false where there is nothing more to do.
-    fn refine(&self, climb: &mut LightProgress, target: f64, counting: &Counting) -> bool {
-        let Some(error) = climb.error() else {
+    fn refine(&self, light_progress: &mut LightProgress, target: f64, counting: &ErrorTerms) -> bool {
+        let Some(error) = light_progress.error() else {
             return false;
         };
         if error.relative_rmse <= target {
@@ -594,22 +634,22 @@ impl CausticLayer<'_> {
         }
         // No round can do much more, and a bake that has its time shows what came of it.
         let goal = (GOAL * target).max(ROUND_GAIN * error.relative_rmse);
-        if self.settings.estimator == Estimator::Splat || climb.rounds.len() >= MAX_ROUNDS {
+        if self.settings.estimator == Estimator::Splat || light_progress.rounds.len() >= MAX_ROUNDS {
             return false;
         }
-        let Some(level) = climb.levels.last() else {
+        let Some(level) = light_progress.levels.last() else {
             return false;
         };
         let counted = match counting {
-            Counting::Rmse => None,
-            Counting::Visible(counts) => Some(counts.of_tiles(level, error)),
+            ErrorTerms::Rmse => None,
+            ErrorTerms::Visible(counts) => Some(counts.of_tiles(level, error)),
         };
         let tiles = accuracy::rough_tiles(error, goal, counted.as_ref());
         let is_any = !tiles.is_empty();
-        let overreaches = &level.overreaches[..];
-        let round = Round::new(tiles, overreaches);
-        climb.rounds.push(round);
-        climb.goal = Some(goal);
+        let overshoots = &level.overshoots[..];
+        let round = Round::new(tiles, overshoots);
+        light_progress.rounds.push(round);
+        light_progress.goal = Some(goal);
         is_any
     }
 }

@@ -38,11 +38,11 @@ type Key = (usize, Receiver, [usize; 3]);
 pub(super) struct DirectCache {
     layers: BTreeMap<Key, DirectLayer>,
     /// All lights together, at their strengths of this bake.
-    together: Mutex<BTreeMap<Receiver, Together>>,
+    together: Mutex<BTreeMap<Receiver, SummedIrradiance>>,
 }
 
 /// E of all lights on a chart [W/m²].
-type Together = (Arc<Chart>, Vec<[f32; 3]>);
+type SummedIrradiance = (Arc<Chart>, Vec<[f32; 3]>);
 
 /// What a look for direct light took.
 #[derive(Clone, Copy, Debug, Default)]

@@ -34,7 +34,7 @@ use crate::scene::{Light, Scene};
 use crate::settings::{BakeSettings, LayerKind, Sigma};
 
 /// The finest level of a light, with the light's place in the scene.
-pub(super) type Shown<'a> = (usize, &'a LightLevel);
+pub(super) type CompletedLevel<'a> = (usize, &'a LightLevel);
 
 /// All that finishing needs.
 #[derive(Clone, Copy)]
@@ -48,13 +48,13 @@ pub(super) struct MapAssembler<'a> {
 }
 
 /// Levels of all lights that have maps, in the scene's order.
-pub(super) type Levels<'a> = [Shown<'a>];
+pub(super) type Levels<'a> = [CompletedLevel<'a>];
 
 /// Charts of all maps, by receiver.
 pub(super) type Charts = BTreeMap<Receiver, Arc<Chart>>;
 
 /// Light on one map.
-type Lit<'a> = (&'a Light, &'a LightLevel, &'a ReceiverMap);
+type LitMap<'a> = (&'a Light, &'a LightLevel, &'a ReceiverMap);
 
 impl MapAssembler<'_> {
     /// Puts everything together, but for layers that were baked only for others to gather from.
@@ -165,14 +165,15 @@ impl MapAssembler<'_> {
         let memory = MapMemory::PLAIN;
         let caustic = memory.bytes(charts.values().map(|chart| chart.texel_count() as u64));
         let left = self.settings.memory_bytes.saturating_sub(caustic);
-        let wished = map_size::wished(&wishes);
+        let requested = map_size::requested(&wishes);
         let sizes = map_size::fit(&wishes, (left, memory));
         for (&receiver, size) in &sizes {
             if let Some(chart) = self.sizes.chart_of(receiver, size) {
                 charts.insert(receiver, chart);
             }
         }
-        let warning = (sizes != wished).then(|| map_plan::scarce(&wished, &sizes, (left, memory)));
+        let warning =
+            (sizes != requested).then(|| map_plan::memory_warning(&requested, &sizes, (left, memory)));
         (charts, warning)
     }
 
@@ -225,7 +226,7 @@ impl MapAssembler<'_> {
     }
 
     fn map(&self, chart: &Arc<Chart>, levels: &Levels, direct: &DirectCache) -> IlluminationMap {
-        let lit: Vec<Lit> = levels
+        let lit: Vec<LitMap> = levels
             .iter()
             .filter_map(|(light, level)| {
                 let map = level.maps.get(chart.receiver)?;
@@ -252,7 +253,7 @@ impl MapAssembler<'_> {
     }
 
     /// E = ΣΦ/A per texel; nothing where the surface does not reach, but for the gutter.
-    fn caustic_layer(&self, chart: &Chart, lit: &[Lit]) -> Layer {
+    fn caustic_layer(&self, chart: &Chart, lit: &[LitMap]) -> Layer {
         let fluxes: Vec<(FluxAccumulator, LinearSrgb)> = lit
             .iter()
             .map(|(light, level, map)| {
@@ -463,7 +464,7 @@ impl Resampled<'_> {
 }
 
 /// The error with what texels larger than they should be leave out.
-fn with_resolution(chart: &Chart, lit: &[Lit], layers: &[Layer], error: Vec<f32>) -> Vec<f32> {
+fn with_resolution(chart: &Chart, lit: &[LitMap], layers: &[Layer], error: Vec<f32>) -> Vec<f32> {
     let halved = lit
         .iter()
         .find_map(|(_, level, _)| level.key.sizes.get(&chart.receiver))
@@ -499,7 +500,7 @@ fn given_up_share(ledgers: &[LightLedger]) -> f64 {
 }
 
 /// Error of each texel's luminance [W/m²], of all lights together; `None` where one is not known.
-fn error_of(chart: &Chart, lit: &[Lit]) -> Option<Vec<f32>> {
+fn error_of(chart: &Chart, lit: &[LitMap]) -> Option<Vec<f32>> {
     let mut squares = vec![0.0; chart.texel_count()];
     for (light, level, _) in lit {
         let strength = light.strength().luminance();

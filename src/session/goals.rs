@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::carrier::Carrier;
 use super::caustic::{CausticLayer, LightProgress};
-use super::metric::Counting;
+use super::metric::ErrorTerms;
 use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::ledger_sum::Account;
 
@@ -20,7 +20,7 @@ const DIM_SHARE: f64 = 0.5;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Goal {
     /// Nothing more.
-    Enough,
+    Converged,
     /// The next lattice.
     NextLevel,
     /// A relative RMSE of its own maps.
@@ -81,7 +81,7 @@ impl Errors {
 impl CausticLayer<'_> {
     /// Whether all the flux that a light can add to the maps is less than the error that is aimed at: then one coarse
     /// lattice is enough, whatever it misses, unless it shines all on one spot.
-    pub(super) fn is_dim(&self, light: &VisibleLight) -> bool {
+    pub(super) fn is_negligible(&self, light: &VisibleLight) -> bool {
         let Some(target) = self.settings.max_error else {
             return false;
         };
@@ -99,15 +99,15 @@ impl CausticLayer<'_> {
     }
 
     /// Lights that were taken to be dim and, bright on some spot, are worth knowing better.
-    pub(super) fn underrated(&self, errors: &Errors, climbs: &[LightProgress]) -> Vec<usize> {
+    pub(super) fn promote_dim_lights(&self, errors: &Errors, all_progress: &[LightProgress]) -> Vec<usize> {
         let Some(target) = self.settings.max_error else {
             return Vec::new();
         };
-        let is_dim = |light: &&ErrorOfLight| {
-            let last = climbs[light.index].levels.last();
-            last.is_some_and(|level| level.key.trace.is_dim)
+        let is_negligible = |light: &&ErrorOfLight| {
+            let last = all_progress[light.index].levels.last();
+            last.is_some_and(|level| level.key.trace.is_negligible)
         };
-        let mut dim: Vec<&ErrorOfLight> = errors.lights.iter().filter(is_dim).collect();
+        let mut dim: Vec<&ErrorOfLight> = errors.lights.iter().filter(is_negligible).collect();
         dim.sort_by(|a, b| a.share.total_cmp(&b.share));
         let mut left = DIM_SHARE * target * target;
         let stays = |light: &&ErrorOfLight| {
@@ -119,8 +119,8 @@ impl CausticLayer<'_> {
     }
 
     /// What a light deposits [W], as far as that is known.
-    fn flux_w(&self, light: &VisibleLight, climb: &LightProgress) -> Option<f64> {
-        let level = climb.shown()?;
+    fn flux_w(&self, light: &VisibleLight, light_progress: &LightProgress) -> Option<f64> {
+        let level = light_progress.shown()?;
         let strength = level.strength(&self.tracer.scene().lights[light.light]);
         Some(level.ledger.watts(Account::Deposited, level.unit, strength))
     }
@@ -129,13 +129,13 @@ impl CausticLayer<'_> {
     pub(super) fn errors(
         &self,
         lights: &[&VisibleLight],
-        climbs: &[LightProgress],
-        counting: &Counting,
+        all_progress: &[LightProgress],
+        counting: &ErrorTerms,
     ) -> Errors {
         match counting {
-            Counting::Visible(counts) => {
-                let of = |(index, (light, climb)): (usize, (&&VisibleLight, &LightProgress))| {
-                    let level = climb.shown()?;
+            ErrorTerms::Visible(counts) => {
+                let of = |(index, (light, light_progress)): (usize, (&&VisibleLight, &LightProgress))| {
+                    let level = light_progress.shown()?;
                     let error = &level.error.as_ref()?.estimate;
                     let strength = level.strength(&self.tracer.scene().lights[light.light]);
                     Some(ErrorOfLight {
@@ -144,21 +144,21 @@ impl CausticLayer<'_> {
                         share: counts.of_light(level, error) * strength.luminance(),
                     })
                 };
-                let lights = lights.iter().zip(climbs).enumerate().filter_map(of);
+                let lights = lights.iter().zip(all_progress).enumerate().filter_map(of);
                 Errors {
                     lights: lights.collect(),
                 }
             }
-            Counting::Rmse => self.errors_by_rmse(lights, climbs),
+            ErrorTerms::Rmse => self.errors_by_rmse(lights, all_progress),
         }
     }
 
     /// By area and flux: the relative RMSE over all maps.
-    fn errors_by_rmse(&self, lights: &[&VisibleLight], climbs: &[LightProgress]) -> Errors {
+    fn errors_by_rmse(&self, lights: &[&VisibleLight], all_progress: &[LightProgress]) -> Errors {
         let (mut areas_m2, mut all_w) = (BTreeMap::new(), 0.0);
-        let of = |(index, (light, climb)): (usize, (&&VisibleLight, &LightProgress))| {
-            let level = climb.shown()?;
-            let flux_w = self.flux_w(light, climb)?;
+        let of = |(index, (light, light_progress)): (usize, (&&VisibleLight, &LightProgress))| {
+            let level = light_progress.shown()?;
+            let flux_w = self.flux_w(light, light_progress)?;
             // Light whose error is not known yet counts as well.
             all_w += flux_w;
             let of_light = level.maps.iter();
@@ -170,8 +170,12 @@ impl CausticLayer<'_> {
             let error = &level.error.as_ref()?.estimate;
             Some((index, error.relative_rmse, flux_w, area_m2))
         };
-        let known: Vec<(usize, f64, f64, f64)> =
-            lights.iter().zip(climbs).enumerate().filter_map(of).collect();
+        let known: Vec<(usize, f64, f64, f64)> = lights
+            .iter()
+            .zip(all_progress)
+            .enumerate()
+            .filter_map(of)
+            .collect();
         let all_m2: f64 = areas_m2.values().sum();
         let of = |&(index, relative_rmse, flux_w, area_m2): &(usize, f64, f64, f64)| ErrorOfLight {
             index,
@@ -192,11 +196,12 @@ impl CausticLayer<'_> {
     pub(super) fn goals(
         &self,
         lights: &[&VisibleLight],
-        climbs: &mut [LightProgress],
+        all_progress: &mut [LightProgress],
         errors: &Errors,
     ) -> Vec<Goal> {
-        let has_ladder = |light: &VisibleLight, climb: &LightProgress| {
-            climb.carrier != Carrier::Photons && climb.levels.len() < self.lattices(light).len()
+        let has_ladder = |light: &VisibleLight, light_progress: &LightProgress| {
+            light_progress.carrier != Carrier::Photons
+                && light_progress.levels.len() < self.lattices(light).len()
         };
         let Some(target) = self.settings.max_error else {
             return vec![Goal::NextLevel; lights.len()];
@@ -204,37 +209,40 @@ impl CausticLayer<'_> {
         let all_known = errors.are_of_all(lights);
         let level = errors.level(target);
         // Without an error there is nothing to aim at once all lattices are through.
-        let without_error = |(light, climb): (&&VisibleLight, &LightProgress)| {
-            if has_ladder(light, climb) || climb.carrier == Carrier::Photons {
+        let without_error = |(light, light_progress): (&&VisibleLight, &LightProgress)| {
+            if has_ladder(light, light_progress) || light_progress.carrier == Carrier::Photons {
                 Goal::NextLevel
             } else {
-                Goal::Enough
+                Goal::Converged
             }
         };
-        let mut goals: Vec<Goal> = lights.iter().zip(&*climbs).map(without_error).collect();
+        let mut goals: Vec<Goal> = lights.iter().zip(&*all_progress).map(without_error).collect();
         for &ErrorOfLight {
             index,
             relative_rmse,
             share,
         } in &errors.lights
         {
-            let climb = &mut climbs[index];
-            climb.shares.retain(|(levels, _)| *levels < climb.levels.len());
-            climb.shares.push((climb.levels.len(), share));
-            climb.most_share = level.is_finite().then_some(level);
-            climb.aim = (share > 0.0 && level.is_finite()).then(|| relative_rmse * level / share);
-            goals[index] = if level.is_infinite() && all_known && climb.carrier == Carrier::Undecided {
+            let light_progress = &mut all_progress[index];
+            light_progress
+                .shares
+                .retain(|(levels, _)| *levels < light_progress.levels.len());
+            light_progress.shares.push((light_progress.levels.len(), share));
+            light_progress.most_share = level.is_finite().then_some(level);
+            light_progress.aim = (share > 0.0 && level.is_finite()).then(|| relative_rmse * level / share);
+            goals[index] = if level.is_infinite() && all_known && light_progress.carrier == Carrier::Undecided
+            {
                 // Its first photons are enough.
-                Goal::Enough
-            } else if has_ladder(lights[index], climb) {
+                Goal::Converged
+            } else if has_ladder(lights[index], light_progress) {
                 let is_negligible = all_known && lights.len() > 1 && share < NEGLIGIBLE * level;
                 if is_negligible && level.is_finite() {
-                    Goal::Enough
+                    Goal::Converged
                 } else {
                     Goal::NextLevel
                 }
             } else {
-                climb.aim.map_or(Goal::Enough, Goal::Refine)
+                light_progress.aim.map_or(Goal::Converged, Goal::Refine)
             };
         }
         goals

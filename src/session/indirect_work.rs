@@ -43,7 +43,7 @@ pub(super) struct IndirectWork {
 }
 
 /// What the gathering needs of a bake.
-pub(super) struct Gathering<'a> {
+pub(super) struct GatherInput<'a> {
     pub(super) tracer: &'a Tracer,
     pub(super) sizes: &'a ChartCache,
     pub(super) settings: &'a BakeSettings,
@@ -59,7 +59,7 @@ impl IndirectWork {
     /// where it was cancelled before there was anything. `better` is called for each solution but the last.
     pub(super) fn gather(
         &mut self,
-        gathering: &Gathering,
+        gathering: &GatherInput,
         cache: &mut IndirectCache,
         maps: &[IlluminationMap],
         better: &mut dyn FnMut(&Self, &IndirectCache),
@@ -95,7 +95,7 @@ impl IndirectWork {
     /// One solution by as many passes as are asked for; whether there is one.
     fn step(
         &mut self,
-        gathering: &Gathering,
+        gathering: &GatherInput,
         cache: &mut IndirectCache,
         maps: &[IlluminationMap],
         passes: &[u8],

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::caustic::{CausticLayer, Course, ESTIMATED_LEVELS, LightProgress};
+use super::caustic::{BakeContext, CausticLayer, ESTIMATED_LEVELS, LightProgress};
 use super::light_level::{LevelKey, LightStates, TraceKey};
 use super::map_size::Sizes;
 use super::splat_level::LEVEL_STRIDES;
@@ -90,7 +90,7 @@ impl CausticLayer<'_> {
         &self,
         light: &VisibleLight,
         step: usize,
-        climb: &LightProgress,
+        light_progress: &LightProgress,
         sizes: &Sizes,
     ) -> LevelKey {
         let lattices = self.lattices(light);
@@ -99,12 +99,12 @@ impl CausticLayer<'_> {
         let before_last = (lattices.len() - 1).saturating_sub(step);
         LevelKey {
             trace: TraceKey {
-                is_dim: !climb.is_underrated && self.is_dim(light),
-                ..self.trace_key(light, size, before_last as i32, &climb.rounds)
+                is_negligible: !light_progress.is_underrated && self.is_negligible(light),
+                ..self.trace_key(light, size, before_last as i32, &light_progress.rounds)
             },
             photons: None,
             sizes: sizes.clone(),
-            coarseness: coarseness(self.settings.max_error, climb.goal)
+            coarseness: coarseness(self.settings.max_error, light_progress.goal)
                 * (before_last as f64).exp2().min(MAX_COARSE),
             kernels: self.kernels(),
             stride: match self.settings.estimator {
@@ -145,7 +145,7 @@ impl CausticLayer<'_> {
             },
             rounds: rounds.to_vec(),
             spectrum: self.spectra.key(light.light).cloned(),
-            is_dim: false,
+            is_negligible: false,
         }
     }
 
@@ -235,7 +235,7 @@ impl CausticLayer<'_> {
         &self,
         states: &mut LightStates,
         lights: &[&VisibleLight],
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> Result<Sizes> {
         if self.wants_statistics() {
             let paths: BTreeMap<usize, TraceKey> = lights

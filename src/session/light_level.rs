@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use super::band_layers::LevelBand;
+use super::band_maps::BandMaps;
 use super::map_size::Sizes;
-use super::part_maps::PartMaps;
 use super::spectra::SpectralKey;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::{LightError, Noise};
-use crate::light_pass::caustic::kept::ArrivalCache;
+use crate::light_pass::caustic::arrival_cache::ArrivalCache;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger::CarriedFlux;
@@ -17,7 +17,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::wavefront::cell::SubdivisionLimits;
 use crate::light_pass::wavefront::kept_rays::RayCache;
-use crate::light_pass::wavefront::overreach::PatchOvershoot;
+use crate::light_pass::wavefront::overshoot::PatchOvershoot;
 use crate::light_pass::wavefront::pass::TracedLight;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
@@ -43,7 +43,7 @@ pub(super) struct TraceKey {
     /// What chose its wavelengths, where it is traced by wavelength.
     pub(super) spectrum: Option<SpectralKey>,
     /// Whether the light is taken to show hardly beside the others.
-    pub(super) is_dim: bool,
+    pub(super) is_negligible: bool,
 }
 
 /// All that mean footprints depend on: the paths of each light, and the density that maps are made for [rays/sr].
@@ -87,7 +87,7 @@ pub(super) struct LightLevel {
     /// Maps that were given up: next to no light was on them.
     pub(super) strays: Vec<Receiver>,
     /// Patches that reach farther than their rays.
-    pub(super) overreaches: Vec<PatchOvershoot>,
+    pub(super) overshoots: Vec<PatchOvershoot>,
     /// Of splats: the squared difference of half sets, by receiver.
     pub(super) noise: Option<Noise>,
     /// By the levels before it; `None` where there are none, or no light arrived.
@@ -110,7 +110,7 @@ pub(super) struct LightLevel {
 pub(super) struct PhotonSums {
     pub(super) ledger: LedgerSum,
     /// Maps of both halves, in the channels that the light is followed in.
-    pub(super) halves: Vec<PartMaps>,
+    pub(super) halves: Vec<BandMaps>,
 }
 
 impl PhotonSums {
@@ -243,7 +243,7 @@ impl LightLevel {
         let halves = self.photons.iter().flat_map(|sums| &sums.halves);
         let all = std::iter::once(&self.maps)
             .chain(self.bands.iter().map(|band| &band.maps))
-            .chain(halves.flat_map(PartMaps::sets));
+            .chain(halves.flat_map(BandMaps::sets));
         let maps = all.flat_map(ReceiverMaps::iter);
         let texels = maps.map(|(_, map)| map.chart.texel_count() as u64);
         texels.sum::<u64>() * size_of::<FluxCount>() as u64

@@ -57,9 +57,9 @@ impl CausticLayer<'_> {
         };
         let wishes: BTreeMap<Receiver, SizeRequest> = receivers.filter_map(wish).collect();
         let (limit, memory) = self.map_memory();
-        let wished = map_size::wished(&wishes);
+        let requested = map_size::requested(&wishes);
         let mut sizes = map_size::fit(&wishes, (limit, memory));
-        let is_scarce = sizes != wished;
+        let is_scarce = sizes != requested;
         if let (MapResolution::Fixed { width, height }, false) = (self.settings.map_resolution, is_scarce) {
             // What only the full lattice lights.
             for receiver in Receiver::all(self.tracer.scene().objects.len()) {
@@ -67,7 +67,7 @@ impl CausticLayer<'_> {
             }
         }
         let warnings = if is_scarce {
-            vec![scarce(&wished, &sizes, self.map_memory())]
+            vec![memory_warning(&requested, &sizes, self.map_memory())]
         } else if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, statistics) {
             self.coarse_maps(&sizes, statistics)
         } else {
@@ -207,14 +207,18 @@ impl CausticLayer<'_> {
 pub(super) const MEMORY: &str = "--memory";
 
 /// Says that maps are coarser than wished for, for want of memory [bytes].
-pub(super) fn scarce(wished: &Sizes, granted: &Sizes, (limit, memory): (u64, MapMemory)) -> Warning {
+pub(super) fn memory_warning(
+    requested: &Sizes,
+    granted: &Sizes,
+    (limit, memory): (u64, MapMemory),
+) -> Warning {
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     let taken = |sizes: &Sizes| mebibytes(memory.bytes(sizes.values().map(MapSize::texels)));
     Warning::new(
         MEMORY,
         format!(
             "the maps need {:.1} MiB, the limit is {:.1} MiB: they were made coarser and take {:.1} MiB",
-            taken(wished),
+            taken(requested),
             mebibytes(limit),
             taken(granted),
         ),

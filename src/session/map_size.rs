@@ -9,7 +9,7 @@ use std::sync::Arc;
 use super::sizes::MapMemory;
 use crate::illumination::Receiver;
 use crate::illumination::tiles::{self, COARSEST, TileLayout};
-use crate::light_pass::caustic::statistics::Spot;
+use crate::light_pass::caustic::statistics::FootprintSample;
 
 /// Size of one map.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -77,7 +77,7 @@ impl TileDemand {
 
     /// Asks for a level at least.
     fn refine(&mut self, level: u8) {
-        if self.wished() > f64::from(level) {
+        if self.requested() > f64::from(level) {
             *self = Self {
                 fineness: f64::from(level),
                 dimness: 0.0,
@@ -86,12 +86,12 @@ impl TileDemand {
     }
 
     /// The level at which nothing is missed.
-    fn wished(&self) -> f64 {
+    fn requested(&self) -> f64 {
         self.fineness + self.dimness.clamp(0.0, MAX_DIM)
     }
 
     /// The level at which as much is missed everywhere, but for a number of levels.
-    fn spared(&self) -> f64 {
+    fn reduced(&self) -> f64 {
         self.fineness + self.dimness
     }
 }
@@ -170,7 +170,10 @@ impl SizeRequest {
             (MemoryReduction::Nothing, Some(tiles)) if !self.is_even => self.in_tiles(tiles, None),
             (MemoryReduction::Nothing, _) => MapSize::dense(self.size),
             (MemoryReduction::Levels(levels), Some(tiles)) => {
-                let finest = tiles.iter().map(TileDemand::spared).fold(f64::INFINITY, f64::min);
+                let finest = tiles
+                    .iter()
+                    .map(TileDemand::reduced)
+                    .fold(f64::INFINITY, f64::min);
                 if finest + levels < f64::from(COARSEST) {
                     self.in_tiles(tiles, Some(levels))
                 } else {
@@ -203,11 +206,11 @@ impl SizeRequest {
         let wanted = if self.is_even {
             vec![0; tiles.len()]
         } else {
-            balanced(&TileDemand::wished, self.coarsest)
+            balanced(&TileDemand::requested, self.coarsest)
         };
         let mut levels = wanted.clone();
-        if let Some(spared) = sparing {
-            let coarser = balanced(&|tile| tile.spared() + spared, COARSEST);
+        if let Some(reduced) = sparing {
+            let coarser = balanced(&|tile| tile.reduced() + reduced, COARSEST);
             // Nothing gets finer than it asks for.
             levels = wanted
                 .iter()
@@ -241,7 +244,7 @@ const SPARING_STEP: f64 = 0.125;
 const MAX_LEVELS: f64 = 20.0;
 
 /// Sizes of all maps as they are wished for.
-pub(super) fn wished(wishes: &BTreeMap<Receiver, SizeRequest>) -> Sizes {
+pub(super) fn requested(wishes: &BTreeMap<Receiver, SizeRequest>) -> Sizes {
     granted(wishes, MemoryReduction::Nothing)
 }
 
@@ -255,9 +258,9 @@ fn granted(wishes: &BTreeMap<Receiver, SizeRequest>, sparing: MemoryReduction) -
 /// Sizes of all maps within a memory limit [bytes]: as requested, or as little coarser as possible.
 pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u64, MapMemory)) -> Sizes {
     let fits = |sizes: &Sizes| memory.bytes(sizes.values().map(MapSize::texels)) <= limit;
-    let wished = wished(wishes);
-    if fits(&wished) {
-        return wished;
+    let requested = requested(wishes);
+    if fits(&requested) {
+        return requested;
     }
     // Tiles with far more texels than light needs come first; then every other.
     let steps = (2.0 * MAX_LEVELS / SPARING_STEP) as i32;
@@ -281,7 +284,10 @@ const MAX_CELLS: usize = 64;
 const BINS: usize = 36;
 
 /// What each tile of a map asks for, row by row.
-pub(super) fn needs<'a>(size: (usize, usize), spots: impl Iterator<Item = &'a Spot>) -> Vec<TileDemand> {
+pub(super) fn needs<'a>(
+    size: (usize, usize),
+    spots: impl Iterator<Item = &'a FootprintSample>,
+) -> Vec<TileDemand> {
     let (columns, rows) = tiles::tile_counts(size.0, size.1);
     let (across, down) = (columns.min(MAX_CELLS), rows.min(MAX_CELLS));
     let mut cells = vec![[0.0_f64; BINS]; across * down];

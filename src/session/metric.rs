@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::caustic::{CausticLayer, LightProgress, Onlooker, shown};
+use super::caustic::{BakeObserver, CausticLayer, LightProgress, shown};
 use super::light_level::LightLevel;
-use crate::illumination::visible::{self, Blocks, Lit};
+use crate::illumination::visible::{self, BlockLight, Blocks};
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::accuracy::{self, Image, LightError};
 use crate::light_pass::caustic::setup::VisibleLight;
@@ -23,7 +23,7 @@ pub(super) struct ComparisonView {
 }
 
 /// What the error of a bake is made of.
-pub(super) enum Counting {
+pub(super) enum ErrorTerms {
     /// The relative RMSE.
     Rmse,
     /// What an eye sees.
@@ -38,26 +38,26 @@ impl CausticLayer<'_> {
     pub(super) fn counting(
         &self,
         lights: &[&VisibleLight],
-        climbs: &[LightProgress],
-        onlooker: &mut dyn Onlooker,
-    ) -> Counting {
+        all_progress: &[LightProgress],
+        observer: &mut dyn BakeObserver,
+    ) -> ErrorTerms {
         if self.settings.error_metric == ErrorMetric::Rmse || self.settings.max_error.is_none() {
-            return Counting::Rmse;
+            return ErrorTerms::Rmse;
         }
-        let backdrop = onlooker.backdrop(&shown(lights, climbs));
-        Counting::Visible(self.visible_counts(lights, climbs, &backdrop))
+        let backdrop = observer.backdrop(&shown(lights, all_progress));
+        ErrorTerms::Visible(self.visible_counts(lights, all_progress, &backdrop))
     }
 
     fn visible_counts(
         &self,
         lights: &[&VisibleLight],
-        climbs: &[LightProgress],
+        all_progress: &[LightProgress],
         backdrop: &Backdrop,
     ) -> Counts {
         let mut charts: BTreeMap<Receiver, Arc<Chart>> = BTreeMap::new();
         let mut traced: BTreeMap<Receiver, Vec<f64>> = BTreeMap::new();
-        for (light, climb) in lights.iter().zip(climbs) {
-            let Some(level) = climb.shown() else {
+        for (light, light_progress) in lights.iter().zip(all_progress) {
+            let Some(level) = light_progress.shown() else {
                 continue;
             };
             let strength = level.strength(&self.tracer.scene().lights[light.light]);
@@ -95,17 +95,17 @@ impl CausticLayer<'_> {
                     beside.map(|beside| at(Some(&beside.direct), texel) + at(Some(&beside.indirect), texel));
                 at(own, texel) + others.unwrap_or(0.0)
             });
-            let light: Vec<Lit> = blocks.lit(&all, &own_means).collect();
+            let light: Vec<BlockLight> = blocks.lit(&all, &own_means).collect();
             (*receiver, blocks, light)
         });
-        let lit: Vec<(Receiver, Blocks, Vec<Lit>)> = lit.collect();
+        let lit: Vec<(Receiver, Blocks, Vec<BlockLight>)> = lit.collect();
         let blocks = || lit.iter().flat_map(|(_, _, light)| light.iter().copied());
         let Some(white) = visible::white(blocks()) else {
             return Counts(BTreeMap::new());
         };
         let all_m2: f64 = blocks().map(|block| block.weight_m2(white)).sum();
         let counts = lit.iter().map(|(receiver, blocks, light)| {
-            let of_block = |block: &Lit| {
+            let of_block = |block: &BlockLight| {
                 if block.area_m2 > 0.0 && all_m2 > 0.0 {
                     block.weight_m2(white) / (block.scale(white).powi(2) * block.area_m2 * all_m2)
                 } else {

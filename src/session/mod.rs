@@ -1,6 +1,7 @@
 //! A bake as a session: scene and settings in, maps out. The command line's `bake` is a session that runs once.
 
 mod band_layers;
+mod band_maps;
 mod carrier;
 mod caustic;
 mod clock;
@@ -17,7 +18,6 @@ mod light_level;
 mod map_plan;
 mod map_size;
 mod metric;
-mod part_maps;
 mod photon_level;
 pub mod result;
 mod scene_change;
@@ -45,24 +45,24 @@ pub use survey::{PresetForecast, Survey};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::pass::Stopwatch;
-use crate::light_pass::caustic::setup::{Aim, CullMode};
+use crate::light_pass::caustic::setup::{CullMode, LightVisibility};
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
 use crate::settings::{BakeSettings, ItemBufferKind};
 use crate::transport::Tracer;
-use caustic::{CausticLayer, CausticOutcome, Onlooker, Stopped};
+use caustic::{BakeObserver, CausticLayer, CausticOutcome, Stopped};
 use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
-use finish::{MapAssembler, Shown};
+use finish::{CompletedLevel, MapAssembler};
 use first_look::FirstLook;
 use indirect_cache::IndirectCache;
-use indirect_work::{Gathering, IndirectWork};
+use indirect_work::{GatherInput, IndirectWork};
 use light_level::LightStates;
 use scene_change::SceneChange;
 use shards::ShardRole;
-use showing::{Showing, TakeLevel};
+use showing::{LevelCallback, Showing};
 use sizes::ChartCache;
 use spectra::Spectra;
 
@@ -72,7 +72,7 @@ use spectra::Spectra;
 pub struct Baker {
     scene: Arc<Scene>,
     tracer: Option<Arc<Tracer>>,
-    aim: Option<(AimKey, Arc<Aim>)>,
+    aim: Option<(VisibilityKey, Arc<LightVisibility>)>,
     sizes: ChartCache,
     lights: LightStates,
     direct: DirectCache,
@@ -80,11 +80,11 @@ pub struct Baker {
     threads: Threads,
 }
 
-/// What an [`Aim`] depends on beside the scene: how directions are divided, how thoroughly what cannot matter is left out,
+/// What a [`LightVisibility`] depends on beside the scene: how directions are divided, how thoroughly what cannot matter is left out,
 /// and whether lights have sizes.
-type AimKey = (ItemBufferKind, CullMode, bool);
+type VisibilityKey = (ItemBufferKind, CullMode, bool);
 
-fn aim_key(settings: &BakeSettings) -> AimKey {
+fn aim_key(settings: &BakeSettings) -> VisibilityKey {
     let aiming = match settings.effects.get(Effect::LightPass) {
         EffectSwitch::On => CullMode::Everything,
         EffectSwitch::Auto | EffectSwitch::Off => CullMode::Reachable,
@@ -266,7 +266,7 @@ impl Baker {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: Option<&mut TakeLevel>,
+        level: Option<&mut LevelCallback>,
     ) -> Result<Bake> {
         settings.validate()?;
         self.threads
@@ -274,7 +274,7 @@ impl Baker {
             .install(|| self.bake_here(settings, progress, control, level, &mut ShardRole::Alone))
     }
 
-    fn aim(&mut self, settings: &BakeSettings) -> Arc<Aim> {
+    fn aim(&mut self, settings: &BakeSettings) -> Arc<LightVisibility> {
         if !plan::wants_caustics(settings) {
             // No caustic layer requested: skip the item buffers.
             return Arc::default();
@@ -283,7 +283,12 @@ impl Baker {
         match &self.aim {
             Some((known, aim)) if *known == wanted => aim.clone(),
             _ => {
-                let aim = Arc::new(Aim::take(&self.tracer(), wanted.0, wanted.1, wanted.2));
+                let aim = Arc::new(LightVisibility::take(
+                    &self.tracer(),
+                    wanted.0,
+                    wanted.1,
+                    wanted.2,
+                ));
                 self.aim = Some((wanted, aim.clone()));
                 aim
             }
@@ -297,14 +302,14 @@ impl Baker {
         progress: &'a dyn Progress,
         control: &'a Control,
         (clock, began): (&mut Clock, Instant),
-    ) -> Ground<'a> {
+    ) -> PreparedBake<'a> {
         progress.advance(Stage::Build, 0, 1);
         let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
         progress.advance(Stage::Plan, 0, 1);
         let known = self.aim.as_ref().map(|(_, aim)| Arc::clone(aim));
         let aim = clock.time(|clock| &mut clock.plan, || self.aim(settings));
         let is_new = known.is_none_or(|known| !Arc::ptr_eq(&known, &aim));
-        Ground {
+        PreparedBake {
             plan: plan::decide(&self.scene, settings, &aim.sights),
             item_buffer_tests: if is_new { aim.tests() } else { 0 },
             tracer,
@@ -321,7 +326,7 @@ impl Baker {
         &mut self,
         settings: &BakeSettings,
         (progress, control): (&dyn Progress, &Control),
-        (level, clock): (&mut Option<&mut TakeLevel>, &mut Clock),
+        (level, clock): (&mut Option<&mut LevelCallback>, &mut Clock),
     ) -> Option<FirstLook> {
         let is_new = self.lights.is_empty() && self.direct.is_empty();
         let level = level.as_mut().filter(|_| is_new)?;
@@ -350,7 +355,7 @@ impl Baker {
         settings: &BakeSettings,
         progress: &dyn Progress,
         control: &Control,
-        level: Option<&mut TakeLevel>,
+        level: Option<&mut LevelCallback>,
         role: &mut ShardRole,
     ) -> Result<Bake> {
         let (whole, began) = (Stopwatch::start(), Instant::now());
@@ -358,7 +363,7 @@ impl Baker {
         let mut level = level;
         let first_look = self.first_look(settings, (progress, control), (&mut level, &mut clock));
         let ground = self.ground(settings, progress, control, (&mut clock, began));
-        let Ground {
+        let PreparedBake {
             tracer,
             aim,
             plan,
@@ -403,13 +408,13 @@ impl Baker {
             mut level,
             ..
         } = showing;
-        let finished: Vec<Shown> = outcome
+        let finished: Vec<CompletedLevel> = outcome
             .finished
             .iter()
             .filter_map(|&light| Some((light, lights.finest(light)?)))
             .collect();
-        let (charts, scarce) = finish.charts(&finished);
-        outcome.warnings.extend(scarce);
+        let (charts, memory_warning) = finish.charts(&finished);
+        outcome.warnings.extend(memory_warning);
         if plan.is_on(Effect::Direct) {
             let direct_charts = finish.direct_charts(&charts);
             let complete = lamps.shine(tracer, &direct_charts, direct, (progress, control));
@@ -426,7 +431,7 @@ impl Baker {
         if plan.is_on(Effect::Indirect) {
             let mut gathered = IndirectWork::default();
             let limited = limited(control, settings.max_time_s, began);
-            let gathering = Gathering {
+            let gathering = GatherInput {
                 tracer,
                 sizes: &self.sizes,
                 settings,
@@ -492,9 +497,9 @@ impl Threads {
 }
 
 /// What every bake begins with: the scene made ready, and what there is to do.
-struct Ground<'a> {
+struct PreparedBake<'a> {
     tracer: Arc<Tracer>,
-    aim: Arc<Aim>,
+    aim: Arc<LightVisibility>,
     plan: EffectPlan,
     /// Tests that looking around took, where it was done now.
     item_buffer_tests: u64,
@@ -505,7 +510,7 @@ struct Ground<'a> {
     began: Instant,
 }
 
-impl Ground<'_> {
+impl PreparedBake<'_> {
     /// The caustic layer, where there is one.
     fn bake(
         &self,
@@ -513,7 +518,7 @@ impl Ground<'_> {
         lights: &mut LightStates,
         clock: &mut Clock,
         role: &mut ShardRole,
-        onlooker: &mut dyn Onlooker,
+        observer: &mut dyn BakeObserver,
     ) -> Result<CausticOutcome> {
         if !self.plan.is_on(Effect::LightPass) {
             return Ok(CausticOutcome::default());
@@ -531,18 +536,18 @@ impl Ground<'_> {
             control: self.control,
             began: self.began,
         };
-        layer.bake(lights, (clock, role), onlooker)
+        layer.bake(lights, (clock, role), observer)
     }
 }
 
 /// Writes down what a bake took so far.
-fn account(result: &mut Bake, finish: &MapAssembler, aim: &Aim, clock: &Clock) {
+fn account(result: &mut Bake, finish: &MapAssembler, aim: &LightVisibility, clock: &Clock) {
     (result.timings_s, result.cpu_s) = clock.timings();
     result.item_buffers = item_buffers(finish.scene, aim);
 }
 
 /// What looking around took, light by light.
-fn item_buffers(scene: &Scene, aim: &Aim) -> Vec<ItemBufferReport> {
+fn item_buffers(scene: &Scene, aim: &LightVisibility) -> Vec<ItemBufferReport> {
     let lights = scene.lights.iter().zip(&aim.looks);
     lights
         .map(|(light, look)| ItemBufferReport {

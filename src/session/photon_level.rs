@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::time::Instant;
 
-use super::caustic::{CausticLayer, Course, LightProgress};
+use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums, drop_coarse};
 use super::map_size::Sizes;
 use super::shards::PassSums;
@@ -57,7 +57,7 @@ const MIN_GROWTH: f64 = 1.2;
 
 /// Photons of a level after one with fewer, or as many as there is part of the time for: a level that is cut off leaves
 /// nothing.
-fn in_time(photons: u32, before: u32, part: f64, state: &LightState, course: &Course) -> u32 {
+fn in_time(photons: u32, before: u32, part: f64, state: &LightState, course: &BakeContext) -> u32 {
     let (1.., Some(left_s), Some(photon_s)) = (before, course.control.time_left_s(), state.photon_s) else {
         return photons;
     };
@@ -155,25 +155,28 @@ impl CausticLayer<'_> {
     ///
     /// # Errors
     /// A light whose power is no number.
-    pub(super) fn climb_photons(
+    pub(super) fn advance_photons(
         &self,
         light: &VisibleLight,
         sizes: &Sizes,
         state: &mut LightState,
-        climb: &mut LightProgress,
-        course: &mut Course,
+        light_progress: &mut LightProgress,
+        course: &mut BakeContext,
     ) -> Result<()> {
-        let last = climb.levels.last_mut();
-        if self.next_photons(light, last.as_deref(), climb.aim).is_none() {
-            climb.done = true;
+        let last = light_progress.levels.last_mut();
+        if self
+            .next_photons(light, last.as_deref(), light_progress.aim)
+            .is_none()
+        {
+            light_progress.done = true;
             return Ok(());
         }
-        let made = self.more_photons(light, sizes, state, (last, climb.aim), course)?;
+        let made = self.more_photons(light, sizes, state, (last, light_progress.aim), course)?;
         // Not known better, and not worth knowing.
-        climb.done |= !climb.is_underrated && made.is_some() && self.is_dim(light);
-        climb.levels.extend(made);
+        light_progress.done |= !light_progress.is_underrated && made.is_some() && self.is_negligible(light);
+        light_progress.levels.extend(made);
         // None but the last is needed, though a bake after this one is sooner at it with all of them.
-        drop_coarse(&mut climb.levels, 1, self.settings.memory_bytes / 8);
+        drop_coarse(&mut light_progress.levels, 1, self.settings.memory_bytes / 8);
         Ok(())
     }
 
@@ -187,7 +190,7 @@ impl CausticLayer<'_> {
         sizes: &Sizes,
         state: &mut LightState,
         (last, aim): (Option<&mut LightLevel>, Option<f64>),
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         let Some(photons) = self.next_photons(light, last.as_deref(), aim) else {
             return Ok(None);
@@ -221,7 +224,7 @@ impl CausticLayer<'_> {
         light: &VisibleLight,
         key: LevelKey,
         before: Option<&mut LightLevel>,
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         let unit = self.photon_unit(light)?;
         let photons = key.photons.unwrap_or(FIRST_PHOTONS);

@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::caustic::{CausticOutcome, Onlooker};
+use super::caustic::{BakeObserver, CausticOutcome};
 use super::clock::Clock;
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
-use super::finish::{MapAssembler, Shown};
+use super::finish::{CompletedLevel, MapAssembler};
 use super::first_look::FirstLook;
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
@@ -15,7 +15,7 @@ use super::{Bake, LightLayer, account};
 use crate::error::Result;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::caustic::pass::Stopwatch;
-use crate::light_pass::caustic::setup::Aim;
+use crate::light_pass::caustic::setup::LightVisibility;
 use crate::optics::luminance;
 use crate::plan::Effect;
 use crate::progress::{Control, Progress};
@@ -23,20 +23,20 @@ use crate::settings::LayerKind;
 use crate::transport::Tracer;
 
 /// Takes pictures.
-pub(super) type TakeLevel<'a> = dyn FnMut(Bake) + Send + 'a;
+pub(super) type LevelCallback<'a> = dyn FnMut(Bake) + Send + 'a;
 
 /// Hands the levels of a bake to a callback.
 pub(super) struct Showing<'a, 'level> {
     pub(super) finish: &'a MapAssembler<'a>,
     pub(super) tracer: &'a Tracer,
-    pub(super) aim: &'a Aim,
+    pub(super) aim: &'a LightVisibility,
     pub(super) progress: &'a dyn Progress,
     pub(super) control: &'a Control,
     /// Of the whole bake.
     pub(super) watch: &'a Stopwatch,
     /// Tests that looking around took.
     pub(super) item_buffer_tests: u64,
-    pub(super) level: Option<&'a mut TakeLevel<'level>>,
+    pub(super) level: Option<&'a mut LevelCallback<'level>>,
     pub(super) direct: &'a mut DirectCache,
     pub(super) indirect: &'a mut IndirectCache,
     pub(super) lamps: DirectWork,
@@ -52,7 +52,7 @@ impl Showing<'_, '_> {
     fn hand_out(
         &mut self,
         maps: (Vec<IlluminationMap>, Vec<LightLayer>),
-        levels: &[Shown],
+        levels: &[CompletedLevel],
         so_far: &CausticOutcome,
         clock: &mut Clock,
     ) {
@@ -65,8 +65,13 @@ impl Showing<'_, '_> {
     }
 }
 
-impl Onlooker for Showing<'_, '_> {
-    fn show_first(&mut self, levels: &[Shown], so_far: &CausticOutcome, clock: &mut Clock) -> Result<()> {
+impl BakeObserver for Showing<'_, '_> {
+    fn show_first(
+        &mut self,
+        levels: &[CompletedLevel],
+        so_far: &CausticOutcome,
+        clock: &mut Clock,
+    ) -> Result<()> {
         if self.level.is_none() || levels.is_empty() || !self.finish.plan.is_on(Effect::Direct) {
             return Ok(());
         }
@@ -78,7 +83,7 @@ impl Onlooker for Showing<'_, '_> {
         self.show(levels, so_far, clock)
     }
 
-    fn show(&mut self, levels: &[Shown], so_far: &CausticOutcome, clock: &mut Clock) -> Result<()> {
+    fn show(&mut self, levels: &[CompletedLevel], so_far: &CausticOutcome, clock: &mut Clock) -> Result<()> {
         let is_first = std::mem::take(&mut self.is_first);
         if self.level.is_none() {
             return Ok(());
@@ -93,7 +98,7 @@ impl Onlooker for Showing<'_, '_> {
             return Ok(());
         }
         let (finish, plan) = (self.finish, self.finish.plan);
-        let (charts, scarce) = finish.charts(levels);
+        let (charts, memory_warning) = finish.charts(levels);
         let direct_charts = finish.direct_charts(&charts);
         // The first picture after a change is to come soon: direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
@@ -104,7 +109,7 @@ impl Onlooker for Showing<'_, '_> {
         }
         let mut so_far = self.lamps.added_to(so_far);
         so_far.counts.item_buffer_tests = self.item_buffer_tests;
-        so_far.warnings.extend(scarce);
+        so_far.warnings.extend(memory_warning);
         let (mut maps, mut parts) = finish.maps(levels, &charts, self.direct);
         if plan.is_on(Effect::Indirect) && !waits {
             let look = self.first_look.as_ref();
@@ -115,7 +120,7 @@ impl Onlooker for Showing<'_, '_> {
         Ok(())
     }
 
-    fn backdrop(&mut self, levels: &[Shown]) -> Backdrop {
+    fn backdrop(&mut self, levels: &[CompletedLevel]) -> Backdrop {
         let finish = self.finish;
         if !finish.plan.is_on(Effect::Direct) && !finish.plan.is_on(Effect::Indirect) {
             return Backdrop::new();

@@ -13,7 +13,7 @@ use crate::illumination::{Chart, Receiver, Side, UvSet};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::direct::find_borders;
 use crate::progress::Control;
-use crate::scene::closed::is_closed;
+use crate::scene::watertight::is_closed;
 use crate::scene::{LightKind, Scene};
 use crate::settings::{BakeSettings, Estimator, MapResolution};
 use crate::transport::Tracer;

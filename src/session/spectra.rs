@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use super::band_layers::LevelBand;
 use crate::error::Result;
-use crate::light_pass::caustic::setup::{Aim, VisibleLight};
+use crate::light_pass::caustic::setup::{LightVisibility, VisibleLight};
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::photon::spectrum::PhotonSpectrum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
@@ -89,7 +89,7 @@ impl Spectra {
     /// A light's colour has no spectrum.
     pub(super) fn new(
         tracer: &Tracer,
-        aim: &Aim,
+        aim: &LightVisibility,
         plan: &EffectPlan,
         settings: &BakeSettings,
     ) -> Result<Self> {
@@ -106,9 +106,9 @@ impl Spectra {
         if !plan.is_on(Effect::Dispersion) && !settings.keep_spectrum {
             return Ok(spectra);
         }
-        for aimed in &aim.lights {
-            let light = &scene.lights[aimed.light];
-            let reached = &aim.sights[aimed.light].reached;
+        for visible_light in &aim.lights {
+            let light = &scene.lights[visible_light.light];
+            let reached = &aim.sights[visible_light.light].reached;
             let parts = |&(object, _): &(usize, Option<usize>)| scene.material_of(object).is_dispersive();
             let is_parted = plan.is_on(Effect::Dispersion) && reached.iter().any(parts);
             if light.strength().max_channel() > 0.0 && (is_parted || settings.keep_spectrum) {
@@ -125,7 +125,7 @@ impl Spectra {
                     PhotonSpectrum::new(tracer.with_metals_under(&key.lamp), bands, settings.keep_spectrum)
                 });
                 let light = SpectralLight { key, traced, photons };
-                spectra.of_lights.insert(aimed.light, light);
+                spectra.of_lights.insert(visible_light.light, light);
             }
         }
         Ok(spectra)

@@ -1,22 +1,22 @@
 //! One light by splats: the full lattice at once, and sparser ones to estimate the error.
 
-use super::caustic::{CausticLayer, Course};
+use super::band_maps::BandMaps;
+use super::caustic::{BakeContext, CausticLayer};
 use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
-use super::part_maps::PartMaps;
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images};
-use crate::light_pass::caustic::deposit::{Depositor, Halves};
-use crate::light_pass::caustic::kept::ArrivalCache;
+use crate::light_pass::caustic::arrival_cache::ArrivalCache;
+use crate::light_pass::caustic::deposit::{Depositor, HalfBuffers};
 use crate::light_pass::caustic::lattice::Lattice;
-use crate::light_pass::caustic::pass::{self, PassReport, ProgressScope, Source};
+use crate::light_pass::caustic::pass::{self, PassInput, PassReport, ProgressScope};
 use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
-use crate::light_pass::share::Share;
+use crate::light_pass::shard_index::ShardIndex;
 use crate::settings::{BakeSettings, Footprint, Sigma};
 
 /// Strides of the lattice for mean footprints, at most.
@@ -32,8 +32,8 @@ const ERROR_STRIDE: usize = 2;
 #[derive(Clone, Copy, Debug)]
 struct Worker<'a> {
     /// Its share of the lattice, of rays that are not kept; `None` for all of it.
-    share: Option<Share>,
-    source: Source<'a>,
+    share: Option<ShardIndex>,
+    source: PassInput<'a>,
 }
 
 impl CausticLayer<'_> {
@@ -45,14 +45,14 @@ impl CausticLayer<'_> {
         key: LevelKey,
         unit: FluxUnit,
         state: &mut LightState,
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         let lattice = Lattice {
             strides: (key.stride, key.stride),
             ..self.lattice(light, unit)
         };
         let source = match source_of(state, &key.trace) {
-            Source::Rays { .. } if key.stride == 1 && !self.spectra.has(light.light) => Source::Rays {
+            PassInput::Rays { .. } if key.stride == 1 && !self.spectra.has(light.light) => PassInput::Rays {
                 keep_bytes: self.settings.kept_light_bytes(),
             },
             source => source,
@@ -105,12 +105,12 @@ impl CausticLayer<'_> {
         worker: Worker,
         key: &LevelKey,
         mut sums: PassSums,
-        course: &Course,
+        course: &BakeContext,
     ) -> (PassSums, Option<ArrivalCache>) {
         let mut kept = None;
         let (first, second) = sums.maps.split_at_mut(1);
         for (number, (band, part)) in self.spectra.parts(light.light).into_iter().enumerate() {
-            let mut halves = Halves {
+            let mut halves = HalfBuffers {
                 first: first[0].of(band),
                 second: second.first_mut().map(|second| second.of(band)),
             };
@@ -123,7 +123,7 @@ impl CausticLayer<'_> {
             let worker = Worker {
                 share: worker.share.map(|share| share.shifted(number as u64)),
                 source: if band.is_some() {
-                    Source::Rays { keep_bytes: 0 }
+                    PassInput::Rays { keep_bytes: 0 }
                 } else {
                     worker.source
                 },
@@ -144,8 +144,8 @@ impl CausticLayer<'_> {
         lattice: Lattice,
         worker: Worker,
         key: &LevelKey,
-        halves: &mut Halves,
-        course: &Course,
+        halves: &mut HalfBuffers,
+        course: &BakeContext,
     ) -> (PassReport, Option<ArrivalCache>) {
         let depositor = Depositor {
             lattice,
@@ -178,7 +178,7 @@ impl CausticLayer<'_> {
         light: &VisibleLight,
         level: &LightLevel,
         state: &LightState,
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> Result<Option<Images>> {
         if level.key.stride > 1 {
             return Ok(None);
@@ -204,8 +204,8 @@ impl CausticLayer<'_> {
     }
 
     /// Maps without light, by band where those are kept.
-    pub(super) fn part_maps(&self) -> PartMaps {
-        PartMaps::new(self.tracer.scene().objects.len(), self.spectra.kept_bands())
+    pub(super) fn part_maps(&self) -> BandMaps {
+        BandMaps::new(self.tracer.scene().objects.len(), self.spectra.kept_bands())
     }
 
     pub(super) fn no_maps(&self) -> ReceiverMaps {
@@ -218,7 +218,7 @@ impl CausticLayer<'_> {
         light: &VisibleLight,
         unit: FluxUnit,
         state: &LightState,
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> FootprintStatistics {
         let settings = BakeSettings {
             footprint: Footprint::Ellipse,
@@ -243,7 +243,7 @@ impl CausticLayer<'_> {
             self.sizes.chart(receiver, super::sizes::first_size(aspect))
         };
         let mut maps = self.no_maps();
-        let mut all = Halves {
+        let mut all = HalfBuffers {
             first: &mut maps,
             second: None,
         };
@@ -261,10 +261,10 @@ impl CausticLayer<'_> {
 pub(super) const LEVEL_STRIDES: [usize; 2] = [8, 1];
 
 /// What arrived before, or rays that are not kept.
-fn source_of<'a>(state: &'a LightState, key: &TraceKey) -> Source<'a> {
+fn source_of<'a>(state: &'a LightState, key: &TraceKey) -> PassInput<'a> {
     match &state.arrivals {
-        Some((known, kept)) if known == key => Source::Kept(kept),
-        _ => Source::Rays { keep_bytes: 0 },
+        Some((known, kept)) if known == key => PassInput::Cached(kept),
+        _ => PassInput::Rays { keep_bytes: 0 },
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::carrier::Carrier;
-use super::caustic::{CausticLayer, Course};
+use super::caustic::{BakeContext, CausticLayer};
 use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
 use super::shards::PassSums;
 use crate::error::Result;
@@ -14,16 +14,16 @@ use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::light_pass::wavefront::bodies::SmallBodies;
 use crate::light_pass::wavefront::bumps::BumpCells;
 use crate::light_pass::wavefront::cell::SubdivisionLimits;
-use crate::light_pass::wavefront::closeness::EdgeSearch;
+use crate::light_pass::wavefront::edge_search::EdgeSearch;
 use crate::light_pass::wavefront::kept_rays::RayCache;
 use crate::light_pass::wavefront::lattice::WavefrontLattice;
 use crate::light_pass::wavefront::pass::{Room, WavefrontDepositor};
 use crate::light_pass::wavefront::receivers::Receivers;
 use crate::light_pass::wavefront::refine::Refinement;
 use crate::light_pass::wavefront::spectrum::LightPart;
+use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
 use crate::light_pass::wavefront::trace::StrandTracer;
 use crate::progress::Control;
 use crate::settings::Estimator;
@@ -42,7 +42,7 @@ impl CausticLayer<'_> {
         key: LevelKey,
         unit: FluxUnit,
         state: &mut LightState,
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let receivers = Receivers::new(self.tracer, &chart_for);
@@ -106,11 +106,11 @@ impl CausticLayer<'_> {
         let traced = traced.filter(|_| room.bands_bytes > 0);
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
-        let strays = take_strays(&mut maps, &mut report.ledger);
+        let strays = drop_negligible_maps(&mut maps, &mut report.ledger);
         course.outcome.count(&report, course.clock);
         Ok((!report.cancelled).then(|| LightLevel {
             strays,
-            overreaches: report.overreaches,
+            overshoots: report.overshoots,
             traced,
             work: (report.cells, report.receiver_queries),
             in_one_place: report.in_one_place[1] as f64 / report.in_one_place[0].max(1) as f64,
@@ -135,7 +135,7 @@ impl CausticLayer<'_> {
             reach_m: light.reach_m,
             ledger,
             strays: Vec::new(),
-            overreaches: Vec::new(),
+            overshoots: Vec::new(),
             noise: None,
             error: None,
             photons: None,
@@ -152,12 +152,12 @@ impl CausticLayer<'_> {
         light: &VisibleLight,
         unit: FluxUnit,
         state: &mut LightState,
-        course: &mut Course,
+        course: &mut BakeContext,
     ) -> FootprintStatistics {
         let chart_for: &ChartFor =
             &|receiver: Receiver| self.sizes.chart(receiver, self.first_size(receiver.object())?);
         let receivers = Receivers::new(self.tracer, chart_for);
-        let none = SmallBodies::default();
+        let none = SubcellFeatures::default();
         let size = self.statistics_size(light);
         let mut lattice = WavefrontLattice {
             // Light that goes very many ways lies as wide as its cells: pieces of them say nothing of it.
@@ -231,7 +231,7 @@ impl CausticLayer<'_> {
     }
 
     fn closeness(trace: &TraceKey) -> EdgeSearch {
-        if trace.is_dim {
+        if trace.is_negligible {
             EdgeSearch::DIM
         } else {
             EdgeSearch::SHARP
@@ -244,9 +244,9 @@ impl CausticLayer<'_> {
         light: &VisibleLight,
         (columns, rows): (usize, usize),
         closeness: EdgeSearch,
-    ) -> SmallBodies {
+    ) -> SubcellFeatures {
         let cell = DVec2::new(1.0 / columns as f64, 1.0 / rows as f64);
-        SmallBodies::find(self.tracer, &light.launch, light.visible(), cell, closeness)
+        SubcellFeatures::find(self.tracer, &light.launch, light.visible(), cell, closeness)
     }
 
     /// A level's lattice, with cells as fine as the detail of normals asks for.
@@ -255,7 +255,7 @@ impl CausticLayer<'_> {
         light: &'a VisibleLight,
         part: LightPart<'a>,
         trace: &TraceKey,
-        bodies: &'a SmallBodies,
+        bodies: &'a SubcellFeatures,
         unit: FluxUnit,
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
@@ -272,7 +272,7 @@ impl CausticLayer<'_> {
         light: &'a VisibleLight,
         part: LightPart<'a>,
         size: (usize, usize),
-        bodies: &'a SmallBodies,
+        bodies: &'a SubcellFeatures,
         unit: FluxUnit,
         control: &'a Control,
     ) -> WavefrontLattice<'a> {
@@ -299,8 +299,8 @@ impl CausticLayer<'_> {
 }
 
 /// Light on maps that next to none of it reaches is none that was traced: it is given up, and booked.
-pub(super) fn take_strays(maps: &mut ReceiverMaps, ledger: &mut LedgerSum) -> Vec<Receiver> {
-    let (receivers, strays) = maps.take_strays();
+pub(super) fn drop_negligible_maps(maps: &mut ReceiverMaps, ledger: &mut LedgerSum) -> Vec<Receiver> {
+    let (receivers, strays) = maps.drop_negligible_maps();
     ledger.book_sum(Account::Deposited, strays.map(|count| -count));
     ledger.book_sum(Account::Unresolved, strays);
     receivers

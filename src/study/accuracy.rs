@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::paper::{AUTO, SPLAT, Way, auto, over_a_floor, scene, splat};
+use super::paper::{AUTO, Method, SPLAT, auto, over_a_floor, scene, splat};
 use super::plot::Plot;
 use super::references::Reference;
 use super::sweep::{
@@ -101,7 +101,7 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
             Some(reference) => Against::Known(reference),
             None => Against::Bake(Arc::clone(&scene), Box::new(towards(0.002, 60.0))),
         };
-        let variant = |way: Way, target, settings: BakeSettings| {
+        let variant = |way: Method, target, settings: BakeSettings| {
             let labels = vec![
                 name.into(),
                 way.0.into(),

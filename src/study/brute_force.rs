@@ -20,7 +20,7 @@ use crate::illumination::parametrisation::parametrise;
 use crate::illumination::{Chart, IlluminationMap, Receiver};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::path::{Arrival, PathLimits, PathTracer};
-use crate::light_pass::caustic::setup::{Aim, CullMode, VisibleLight};
+use crate::light_pass::caustic::setup::{CullMode, LightVisibility, VisibleLight};
 use crate::light_pass::emitter::Emitter;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::LinearSrgb;
@@ -83,7 +83,7 @@ fn run(
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);
     let sizes = settings.effects.get(Effect::AreaLights) != EffectSwitch::Off;
-    let aim = Aim::take(tracer, settings.item_buffer, CullMode::Everything, sizes);
+    let aim = LightVisibility::take(tracer, settings.item_buffer, CullMode::Everything, sizes);
     let plan = plan::decide(scene, settings, &aim.sights);
     let lights: &[VisibleLight] = if plan.is_on(Effect::LightPass) {
         &aim.lights
@@ -167,7 +167,7 @@ const OF_A_LIGHT: u64 = 1 << 30;
 
 /// Which rays of a light.
 #[derive(Clone, Copy, Debug)]
-struct Part {
+struct RayRange {
     /// Of one half set; `None` for both.
     half: Option<usize>,
     /// Share of the light's flux.
@@ -208,7 +208,7 @@ impl Run<'_> {
     fn light(&self, light: &VisibleLight) -> Tally {
         let source = &self.tracer.scene().lights[light.light];
         if !(self.sizes && source.has_extent()) {
-            let whole = Part {
+            let whole = RayRange {
                 half: None,
                 share: 1.0 / HALVES as f64,
                 place: 0,
@@ -234,7 +234,7 @@ impl Run<'_> {
                 let there = emitter
                     .filter(|_| !self.control.is_cancelled())
                     .and_then(|emitter| light.from_place(self.tracer, self.aiming, &emitter));
-                let part = Part {
+                let part = RayRange {
                     half: Some(half),
                     share: 1.0 / (HALVES * PLACES) as f64,
                     place: place as u64 + 1,
@@ -247,7 +247,7 @@ impl Run<'_> {
     }
 
     /// Rays from one place of a light, of both half sets or one.
-    fn part(&self, light: &VisibleLight, part: Part) -> Tally {
+    fn part(&self, light: &VisibleLight, part: RayRange) -> Tally {
         let measure = light.item_buffer.marked_measure(&light.launch);
         let halves = part.half.map_or(0..HALVES, |half| half..half + 1);
         let places = if part.half.is_some() { PLACES } else { 1 };
@@ -278,7 +278,7 @@ impl Run<'_> {
         light: &VisibleLight,
         size: (usize, usize),
         place: (usize, usize, usize),
-        part: &Part,
+        part: &RayRange,
     ) -> Tally {
         let (half, face, row) = place;
         let mut paths = PathTracer::new(self.tracer, self.limits, self.unit);

@@ -29,11 +29,11 @@ use crate::units::Flux;
 /// The paper's densest lattice but one [1/sr].
 const DENSITY_PER_SR: f64 = 79_577.5;
 
-pub(super) type Way = (&'static str, fn(f64) -> BakeSettings);
-const AS_PAPER: Way = ("splat, as the paper", paper);
-pub(super) const SPLAT: Way = ("splat", splat);
-pub(super) const WAVEFRONT: Way = ("wavefront", wavefront);
-pub(super) const AUTO: Way = ("auto", auto);
+pub(super) type Method = (&'static str, fn(f64) -> BakeSettings);
+const AS_PAPER: Method = ("splat, as the paper", paper);
+pub(super) const SPLAT: Method = ("splat", splat);
+pub(super) const WAVEFRONT: Method = ("wavefront", wavefront);
+pub(super) const AUTO: Method = ("auto", auto);
 
 /// What "as the paper" means.
 const AS_PAPER_NOTE: &str = "As the paper: jittered rays, a cube around the light, discs of the wavefront's area, point samples \
@@ -294,7 +294,7 @@ pub(super) fn kernels(bench: &Bench) -> Result<Sweep> {
 pub(super) fn connectivity(bench: &Bench) -> Result<Sweep> {
     let (scene, against) = scene_and_truth("ring")?;
     let density = if bench.quick { 8e3 } else { DENSITY_PER_SR };
-    let variant = |name: &str, hits: Option<u64>, (_, settings): Way| Variant {
+    let variant = |name: &str, hits: Option<u64>, (_, settings): Method| Variant {
         estimate: hits.map(|_| nearest_hits as fn(&Variant, Bake) -> Bake),
         sheet: Some("connectivity".into()),
         ..Variant::new(

@@ -293,7 +293,7 @@ fn light_pass_cpu_s(result: &Bake) -> f64 {
 
 /// All that a study found.
 #[derive(Clone, Debug)]
-pub struct Outcome {
+pub struct StudyResult {
     /// Of the sweep.
     pub name: &'static str,
     what: &'static str,
@@ -312,7 +312,7 @@ impl Sweep {
     ///
     /// # Errors
     /// Those of a bake; a reference that does not fit; stopped before the end.
-    pub fn run(&self, bench: &Bench) -> Result<Outcome> {
+    pub fn run(&self, bench: &Bench) -> Result<StudyResult> {
         let mut table = Table {
             columns: self.labels.to_vec(),
             rows: Vec::new(),
@@ -334,7 +334,7 @@ impl Sweep {
         }
         let curves = |plot: &'static Plot| (plot, plot.curves(&table));
         let plots: Vec<_> = self.plots.iter().map(curves).collect();
-        Ok(Outcome {
+        Ok(StudyResult {
             name: self.name,
             what: self.what,
             note: self.note.clone(),
@@ -463,7 +463,7 @@ fn costs(plots: &[(&'static Plot, Vec<Curve>)]) -> Table {
     table
 }
 
-impl Outcome {
+impl StudyResult {
     /// The files that it consists of, each with its name: table, plots, pictures, and the page that shows them.
     ///
     /// # Errors

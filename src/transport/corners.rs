@@ -26,7 +26,7 @@ const MAX_CORNERS: usize = 64;
 const MAX_EDGES: usize = 1 << 12;
 
 /// A mesh whose vertices at one place are one.
-struct Joined {
+struct WeldedMesh {
     /// Places [m].
     points: Vec<DVec3>,
     /// Normals of the sides around each point, those that are alike once.
@@ -46,7 +46,7 @@ struct JoinedEdge {
     is_crease: bool,
 }
 
-impl Joined {
+impl WeldedMesh {
     /// `None` for larger meshes.
     fn new(mesh: InScene) -> Option<Self> {
         if mesh.triangle_count() > MAX_TRIANGLES {
@@ -88,7 +88,7 @@ impl Joined {
 
 /// Sharp corners [m]; none where there are very many, or in a very fine mesh.
 pub fn sharp_corners(mesh: InScene) -> Vec<DVec3> {
-    let Some(Joined { points, sides, edges }) = Joined::new(mesh) else {
+    let Some(WeldedMesh { points, sides, edges }) = WeldedMesh::new(mesh) else {
         return Vec::new();
     };
     let mut border: Vec<Vec<usize>> = vec![Vec::new(); points.len()];
@@ -116,7 +116,7 @@ pub fn sharp_corners(mesh: InScene) -> Vec<DVec3> {
 
 /// Both ends [m] of each sharp edge; none where there are very many, or in a very fine mesh.
 pub fn sharp_edges(mesh: InScene) -> Vec<[DVec3; 2]> {
-    let Some(joined) = Joined::new(mesh) else {
+    let Some(joined) = WeldedMesh::new(mesh) else {
         return Vec::new();
     };
     let is_sharp = |edge: &JoinedEdge| edge.count == 1 || edge.is_crease;

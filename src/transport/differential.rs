@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::bend;
 use super::curvature;
 use super::interaction::{Branch, Event, NormalSource};
-use super::microfacets::Turn;
+use super::microfacets::MicrofacetEvent;
 use super::{SurfaceHit, Tracer};
 use crate::geometry::Ray;
 
@@ -123,11 +123,11 @@ impl Tracer {
         };
         if let NormalSource::Micro(facet) = branch.by {
             let turn = match branch.event {
-                Event::Refraction => Turn::Refracted {
+                Event::Refraction => MicrofacetEvent::Refracted {
                     eta: 1.0 / branch.ior_ratio,
                 },
-                Event::ThinTransmission | Event::Passage => Turn::ThroughThinWall,
-                Event::Reflection | Event::TotalInternalReflection => Turn::Reflected,
+                Event::ThinTransmission | Event::Passage => MicrofacetEvent::ThroughThinWall,
+                Event::Reflection | Event::TotalInternalReflection => MicrofacetEvent::Reflected,
             };
             return at_hit.map(|derivative| RayDerivative {
                 origin: derivative.origin,

@@ -4,7 +4,7 @@
 use glam::{DVec2, DVec3};
 
 use super::effects::EffectSet;
-use super::microfacets::{self, Facet, Turn};
+use super::microfacets::{self, Facet, MicrofacetEvent};
 use super::{MediumStack, SurfaceHit, Tracer};
 use crate::geometry::Ray;
 use crate::optics::{LinearSrgb, fresnel, refraction};
@@ -66,7 +66,7 @@ pub enum NormalSource {
 
 /// What the diffuse body of a surface takes of the light that falls on it, for its illumination map.
 #[derive(Clone, Copy, Debug)]
-pub struct Taking {
+pub struct DiffuseResponse {
     /// Part of the surface that it is, [0, 1].
     pub share: f64,
     /// Part of it that polish covers, [0, 1].
@@ -75,7 +75,7 @@ pub struct Taking {
     pub ior: f64,
 }
 
-impl Taking {
+impl DiffuseResponse {
     /// Of light that comes at an angle out of a medium of an index.
     pub fn of(&self, cosine: f64, ior_around: f64) -> f64 {
         if self.polish == 0.0 {
@@ -116,7 +116,7 @@ struct HitFrame {
 }
 
 /// A direction with the normal that gave it.
-struct Turned {
+struct ScatteredDirection {
     direction: DVec3,
     normal: DVec3,
     by: NormalSource,
@@ -152,10 +152,14 @@ impl HitFrame {
     }
 
     /// By a micro-facet; on the facet's right side in any case.
-    fn turned_by(&self, facet: Facet, incident: DVec3, turn: Turn) -> Option<Turned> {
-        let side = if turn == Turn::Reflected { 1.0 } else { -1.0 };
+    fn turned_by(&self, facet: Facet, incident: DVec3, turn: MicrofacetEvent) -> Option<ScatteredDirection> {
+        let side = if turn == MicrofacetEvent::Reflected {
+            1.0
+        } else {
+            -1.0
+        };
         let direction = facet.turned(incident, self.shading, turn)?;
-        Some(Turned {
+        Some(ScatteredDirection {
             direction: microfacets::out_of(direction, self.geometric, side),
             normal: self.shading,
             by: NormalSource::Micro(facet),
@@ -163,10 +167,10 @@ impl HitFrame {
     }
 
     /// Mirror direction by the shading normal; by the geometric one where the former would end below the surface.
-    fn reflected(&self, incident: DVec3) -> Turned {
+    fn reflected(&self, incident: DVec3) -> ScatteredDirection {
         let by_micro = self
             .micro
-            .and_then(|facet| self.turned_by(facet, incident, Turn::Reflected));
+            .and_then(|facet| self.turned_by(facet, incident, MicrofacetEvent::Reflected));
         if let Some(turned) = by_micro {
             return turned;
         }
@@ -174,7 +178,7 @@ impl HitFrame {
         if direction.dot(self.geometric) > 0.0 {
             self.turned(direction)
         } else {
-            Turned {
+            ScatteredDirection {
                 direction: refraction::reflect(incident, self.geometric),
                 normal: self.geometric,
                 by: NormalSource::Geometric,
@@ -183,15 +187,15 @@ impl HitFrame {
     }
 
     /// Refracted direction by the shading normal; by the geometric one where the former would stay above the surface.
-    fn refracted(&self, incident: DVec3, eta: f64) -> Option<Turned> {
+    fn refracted(&self, incident: DVec3, eta: f64) -> Option<ScatteredDirection> {
         if let Some(facet) = self.micro {
-            return self.turned_by(facet, incident, Turn::Refracted { eta });
+            return self.turned_by(facet, incident, MicrofacetEvent::Refracted { eta });
         }
         let direction = refraction::refract(incident, self.shading, eta)?;
         if direction.dot(self.geometric) < 0.0 {
             Some(self.turned(direction))
         } else {
-            Some(Turned {
+            Some(ScatteredDirection {
                 direction: refraction::refract(incident, self.geometric, eta)?,
                 normal: self.geometric,
                 by: NormalSource::Geometric,
@@ -200,16 +204,16 @@ impl HitFrame {
     }
 
     /// Straight on through a thin wall, but for its roughness.
-    fn passed(&self, incident: DVec3) -> Turned {
+    fn passed(&self, incident: DVec3) -> ScatteredDirection {
         let by_micro = self
             .micro
-            .and_then(|facet| self.turned_by(facet, incident, Turn::ThroughThinWall));
+            .and_then(|facet| self.turned_by(facet, incident, MicrofacetEvent::ThroughThinWall));
         by_micro.unwrap_or_else(|| self.turned(incident))
     }
 
     /// A direction that came by the shading normal.
-    fn turned(&self, direction: DVec3) -> Turned {
-        Turned {
+    fn turned(&self, direction: DVec3) -> ScatteredDirection {
+        ScatteredDirection {
             direction,
             normal: self.shading,
             by: if self.is_smooth {
@@ -240,11 +244,11 @@ pub struct Meeting<'a> {
     pub absorbed: LinearSrgb,
     /// What a branch would have taken that is switched off.
     pub switched_off: LinearSrgb,
-    through: Through,
+    through: BehindSurface,
 }
 
 /// What lies behind a surface.
-enum Through {
+enum BehindSurface {
     /// Nothing: all that does not go back stays.
     Nothing,
     /// A medium that light cannot enter at this angle.
@@ -255,7 +259,7 @@ enum Through {
     Hole,
     /// Another medium.
     Medium {
-        turned: Turned,
+        turned: ScatteredDirection,
         media: MediumStack,
         ior_ratio: f64,
     },
@@ -271,7 +275,7 @@ impl Meeting<'_> {
             ray: self.hit.spawn(turned.direction),
             share,
             event: match self.through {
-                Through::Unreachable => Event::TotalInternalReflection,
+                BehindSurface::Unreachable => Event::TotalInternalReflection,
                 _ => Event::Reflection,
             },
             media: *self.media,
@@ -287,16 +291,16 @@ impl Meeting<'_> {
         let share = self.transmitted?;
         let passed;
         let (turned, event, media, ior_ratio) = match &self.through {
-            Through::Nothing | Through::Unreachable => return None,
-            Through::Hole => {
+            BehindSurface::Nothing | BehindSurface::Unreachable => return None,
+            BehindSurface::Hole => {
                 passed = self.facing.turned(self.incident);
                 (&passed, Event::Passage, self.media, 1.0)
             }
-            Through::ThinWall => {
+            BehindSurface::ThinWall => {
                 passed = self.facing.passed(self.incident);
                 (&passed, Event::ThinTransmission, self.media, 1.0)
             }
-            Through::Medium {
+            BehindSurface::Medium {
                 turned,
                 media,
                 ior_ratio,
@@ -404,7 +408,7 @@ impl Tracer {
             leaving: None,
             absorbed: LinearSrgb::BLACK,
             switched_off: LinearSrgb::BLACK,
-            through: Through::Nothing,
+            through: BehindSurface::Nothing,
         };
         match material.surface {
             SurfaceKind::Diffuse => meeting.deposit = LinearSrgb::WHITE,
@@ -440,7 +444,7 @@ impl Tracer {
         let eta = material.ior / media.ior(self.scene());
         let cos_incident = meeting.facing.cos_incident(incident);
         let reflectance = fresnel::thin_wall_reflectance(cos_incident, eta);
-        meeting.through = Through::ThinWall;
+        meeting.through = BehindSurface::ThinWall;
         meeting.sends_back(effects, LinearSrgb::grey(reflectance));
         meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
     }
@@ -458,7 +462,7 @@ impl Tracer {
             }
             meeting.scale(mixture.clear);
         } else if mixture.hole > 0.0 {
-            meeting.through = Through::Hole;
+            meeting.through = BehindSurface::Hole;
             meeting.lets_through(effects, 0.0, || LinearSrgb::WHITE);
             meeting.scale(mixture.hole);
         }
@@ -498,10 +502,10 @@ impl Tracer {
         };
         let eta = ior_far / ior_near;
         let Some(turned) = meeting.facing.refracted(incident, eta) else {
-            meeting.through = Through::Unreachable;
+            meeting.through = BehindSurface::Unreachable;
             return meeting.sends_back(effects, LinearSrgb::WHITE);
         };
-        meeting.through = Through::Medium {
+        meeting.through = BehindSurface::Medium {
             turned,
             media: beyond,
             ior_ratio: ior_near / ior_far,

@@ -50,7 +50,7 @@ pub struct Facet {
 
 /// What sends light on.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Turn {
+pub enum MicrofacetEvent {
     /// Back.
     Reflected,
     /// Through an interface of n_t/n_i.
@@ -79,12 +79,12 @@ impl Facet {
     }
 
     /// Where light goes on; `None` where a refraction is total.
-    pub fn turned(&self, incident: DVec3, normal: DVec3, turn: Turn) -> Option<DVec3> {
+    pub fn turned(&self, incident: DVec3, normal: DVec3, turn: MicrofacetEvent) -> Option<DVec3> {
         let micro = self.normal(incident, normal);
         let (direction, side) = match turn {
-            Turn::Reflected => (refraction::reflect(incident, micro), 1.0),
-            Turn::Refracted { eta } => (refraction::refract(incident, micro, eta)?, -1.0),
-            Turn::ThroughThinWall => {
+            MicrofacetEvent::Reflected => (refraction::reflect(incident, micro), 1.0),
+            MicrofacetEvent::Refracted { eta } => (refraction::refract(incident, micro, eta)?, -1.0),
+            MicrofacetEvent::ThroughThinWall => {
                 let back = out_of(refraction::reflect(incident, micro), normal, 1.0);
                 (mirrored(back, normal), -1.0)
             }
@@ -98,7 +98,7 @@ impl Facet {
         &self,
         (incident, incident_change): (DVec3, DVec3),
         (normal, normal_change): (DVec3, DVec3),
-        turn: Turn,
+        turn: MicrofacetEvent,
     ) -> DVec3 {
         let size = incident_change.length().max(normal_change.length());
         // Also where it is not a number.

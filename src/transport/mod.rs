@@ -18,7 +18,7 @@ pub mod tracer;
 pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use effects::EffectSet;
 pub use hierarchy::SceneNode;
-pub use interaction::{Branch, Event, Interaction, Meeting, NormalSource, Taking};
+pub use interaction::{Branch, DiffuseResponse, Event, Interaction, Meeting, NormalSource};
 pub use medium::MediumStack;
 pub use microfacets::Microfacets;
 pub use packed::{PackedInstance, PackedMesh};

@@ -8,7 +8,7 @@ use super::curvature::dual_edges;
 use crate::scene::{InScene, NormalMap, Scene, TextureRef, normal_map::Slope};
 
 /// A triangle with its texture coordinates.
-struct Place {
+struct TexturedTriangle {
     /// Gradients of u and v along the triangle [1/m].
     gradients: [DVec3; 2],
     /// +X along growing u, +Y along falling v, both along the surface [1].
@@ -18,7 +18,7 @@ struct Place {
 
 /// A gradient [1] with what tells how it changes.
 pub struct TextureBump {
-    place: Place,
+    place: TexturedTriangle,
     slope: Slope,
 }
 
@@ -30,7 +30,7 @@ impl TextureBump {
         (triangle, barycentric): (usize, [f64; 3]),
         normal: DVec3,
     ) -> Option<Self> {
-        let place = Place::of(mesh, &map.image, triangle, barycentric, normal)?;
+        let place = TexturedTriangle::of(mesh, &map.image, triangle, barycentric, normal)?;
         let slope = map.slope(&scene.textures[map.image.texture], place.uv);
         Some(Self { place, slope })
     }
@@ -51,7 +51,7 @@ impl TextureBump {
     }
 }
 
-impl Place {
+impl TexturedTriangle {
     fn of(
         mesh: InScene,
         image: &TextureRef,

@@ -10,7 +10,7 @@ use super::bend;
 use super::corners::{sharp_corners, sharp_edges};
 use super::curvature::NormalField;
 use super::hierarchy::{self, Hierarchy, SceneNode};
-use super::interaction::Taking;
+use super::interaction::DiffuseResponse;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
 use crate::geometry::{Ray, ray};
@@ -319,7 +319,7 @@ impl Tracer {
     }
 
     /// Where the nearest surface in front of the ray's origin is met.
-    pub fn closest_place(&self, ray: &Ray) -> Option<RayHit> {
+    pub fn intersect(&self, ray: &Ray) -> Option<RayHit> {
         Some(self.closest(ray)?.0)
     }
 
@@ -480,7 +480,7 @@ impl Tracer {
     }
 
     /// What the diffuse body of a surface takes at a place of a triangle.
-    pub fn taking(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> Taking {
+    pub fn taking(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> DiffuseResponse {
         let material = self.scene.material_of(object);
         let (share, polish) = match material.surface {
             SurfaceKind::Mixed => (1.0, material.polish),
@@ -490,7 +490,7 @@ impl Tracer {
             }
             _ => (1.0, 0.0),
         };
-        Taking {
+        DiffuseResponse {
             share,
             polish,
             ior: material.ior,

@@ -2,7 +2,7 @@
 
 mod drawing;
 mod files;
-mod hands;
+mod input;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -21,7 +21,7 @@ use super::command::Command;
 use super::exposure::AutoExposure;
 use super::files::{Choice, Dialog};
 use super::gizmo::Gizmo;
-use super::graphics::{Graphics, RETRY_AFTER, Shown};
+use super::graphics::{FrameOutcome, Graphics, RETRY_AFTER};
 use super::interface::{Painting, accessibility};
 use super::lens::Viewport;
 use super::model::{MapsShown, Model};
@@ -29,7 +29,7 @@ use super::overlay;
 use super::pace::Pace;
 use super::panel::Panel;
 use super::timing::{FrameTimes, sum_ms};
-use super::{ViewerOptions, beside, probe, sketching};
+use super::{ViewerOptions, comparison_view, probe, sketching};
 use crate::error::{Error, Result};
 use crate::eye_pass::renderer::MapStyle;
 use crate::illumination::IlluminationMap;
@@ -125,7 +125,7 @@ pub struct App {
     /// Whether the picture is still to become better though nothing changes.
     is_refining: bool,
     /// Why there are no chains, as it was told.
-    told_refusal: Option<String>,
+    shown_refusal: Option<String>,
     pictures: u64,
     frames: u64,
     /// Number of pictures when the log last reported an idle window.
@@ -178,7 +178,7 @@ impl App {
             losses: Vec::new(),
             pace: Pace::default(),
             is_refining: false,
-            told_refusal: None,
+            shown_refusal: None,
             pictures: 0,
             frames: 0,
             rested_at: 0,
@@ -337,7 +337,7 @@ impl App {
         };
         let shown = graphics.show(&mut painting);
         // A broken window is reported once it is restored.
-        if shown != Shown::Broken
+        if shown != FrameOutcome::Broken
             && let Some(error) = graphics.gpu().take_error()
         {
             self.tell_fault(&error);
@@ -374,7 +374,7 @@ impl App {
             let rect = overlay::show(ui, picture, model, self.notice.as_deref());
             self.picture_rect = rect;
             if let Some((beside, reference)) = beside.zip(model.reference.as_ref()) {
-                beside::show(ui, rect, &mut self.divider, (beside, reference));
+                comparison_view::show(ui, rect, &mut self.divider, (beside, reference));
             }
             let camera = model.navigator.camera_for(f64::from(rect.aspect_ratio()));
             let lens = Viewport {
@@ -406,34 +406,34 @@ impl App {
     }
 
     /// Decides when the next frame comes.
-    fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: Shown, repaint_after: Duration) {
+    fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: FrameOutcome, repaint_after: Duration) {
         let now = Instant::now();
         if self.is_software() && (self.model.is_moving() || self.looking_from.is_some()) {
             self.model.worker.hold(BAKE_WAITS);
         }
         let wait = match shown {
-            Shown::Broken => {
+            FrameOutcome::Broken => {
                 self.recover(event_loop);
                 return;
             }
-            Shown::Hidden => Duration::MAX,
-            Shown::Later => RETRY_AFTER,
-            Shown::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
+            FrameOutcome::Hidden => Duration::MAX,
+            FrameOutcome::Later => RETRY_AFTER,
+            FrameOutcome::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
             // The panel glides on while the picture waits for hands to rest.
-            Shown::Yes if self.is_refining => self.pace.pause(now).min(repaint_after),
-            Shown::Yes if self.model.state.is_working() && self.is_software() => {
+            FrameOutcome::Yes if self.is_refining => self.pace.pause(now).min(repaint_after),
+            FrameOutcome::Yes if self.model.state.is_working() && self.is_software() => {
                 repaint_after.min(BAKING_FRAME_OF_SOFTWARE)
             }
-            Shown::Yes if self.model.state.is_working() => repaint_after.min(BAKING_FRAME),
-            Shown::Yes => repaint_after,
+            FrameOutcome::Yes if self.model.state.is_working() => repaint_after.min(BAKING_FRAME),
+            FrameOutcome::Yes => repaint_after,
         };
-        let is_report_due = self.reports_due > 0 && shown == Shown::Yes;
+        let is_report_due = self.reports_due > 0 && shown == FrameOutcome::Yes;
         let wait = if is_report_due {
             wait.min(REPORT_AFTER)
         } else {
             wait
         };
-        if shown == Shown::Yes {
+        if shown == FrameOutcome::Yes {
             self.frames += 1;
             self.model.picture.latencies.show(now);
         }
@@ -449,7 +449,7 @@ impl App {
         // A frame that could not be shown yet is no rest.
         let is_working = self.model.state.is_working() || self.is_refining || is_report_due;
         let is_coming = self.is_exposing() || self.warm_up.is_coming();
-        let is_working = is_working || shown == Shown::Later || self.model.is_moving() || is_coming;
+        let is_working = is_working || shown == FrameOutcome::Later || self.model.is_moving() || is_coming;
         if self.rested_at != self.pictures && !is_working {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);

@@ -8,7 +8,7 @@ use crate::scene::Scene;
 
 /// A place of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
+pub struct BrightSpot {
     /// Where [m].
     pub point: DVec3,
     /// Unit, away from the side that is lit.
@@ -18,7 +18,7 @@ pub struct Spot {
 }
 
 /// The middle of the texel with the most light of all; `None` where no light fell.
-pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<Spot> {
+pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<BrightSpot> {
     let brightest = maps.iter().filter_map(|map| {
         let total = map.total();
         let lit = (0..total.len()).filter(|texel| map.chart.texel_area_m2(*texel) > 0.0);
@@ -30,7 +30,7 @@ pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<Spot> {
     });
     let (map, texel, irradiance_w_m2) = brightest.max_by(|a, b| a.2.total_cmp(&b.2))?;
     let (point, normal) = place(scene, &map.chart, texel)?;
-    (irradiance_w_m2 > 0.0).then_some(Spot {
+    (irradiance_w_m2 > 0.0).then_some(BrightSpot {
         point,
         normal,
         irradiance_w_m2,

@@ -66,7 +66,7 @@ pub enum Command {
     /// Stop the bake.
     Cancel,
     /// Find what this effect is worth to the maps that are shown.
-    Worth(Effect),
+    EffectDifference(Effect),
     /// Compare, or stop comparing.
     Compare(CompareCommand),
     /// Record, play or film the camera's path.

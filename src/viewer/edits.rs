@@ -26,7 +26,7 @@ pub struct EditedScene {
 
 /// One of the things that a step changes, as it was before the step or as it is since.
 #[derive(Clone, Debug)]
-pub enum Part {
+pub enum EditedItem {
     Scene(Arc<EditState>),
     Settings(Box<BakeSettings>),
     /// The camera's path.
@@ -43,8 +43,8 @@ struct Step {
     text: String,
     /// What of the scene.
     target: Option<String>,
-    before: Part,
-    after: Part,
+    before: EditedItem,
+    after: EditedItem,
 }
 
 impl Step {
@@ -53,7 +53,9 @@ impl Step {
         let is_of_same = discriminant(&self.after) == discriminant(&next.after)
             && self.text == next.text
             && self.target == next.target;
-        is_of_same && !matches!(self.after, Part::Automatic(_)) && self.target.as_deref() != Some("LightList")
+        is_of_same
+            && !matches!(self.after, EditedItem::Automatic(_))
+            && self.target.as_deref() != Some("LightList")
     }
 }
 
@@ -136,14 +138,14 @@ impl EditedScene {
         self.history.record(Step {
             text: edit.in_words(&self.scene),
             target: Some(edit.target()),
-            before: Part::Scene(before),
-            after: Part::Scene(after),
+            before: EditedItem::Scene(before),
+            after: EditedItem::Scene(after),
         });
         self.scene = Arc::new(scene);
         Ok(())
     }
 
-    fn note(&mut self, text: String, before: Part, after: Part) {
+    fn note(&mut self, text: String, before: EditedItem, after: EditedItem) {
         self.history.record(Step {
             text,
             target: None,
@@ -155,7 +157,7 @@ impl EditedScene {
     /// Notes that settings were changed, if they were.
     pub fn note_settings(&mut self, before: &BakeSettings, after: &BakeSettings) {
         if before != after {
-            let parts = [before, after].map(|settings| Part::Settings(Box::new(settings.clone())));
+            let parts = [before, after].map(|settings| EditedItem::Settings(Box::new(settings.clone())));
             let [from, to] = parts;
             self.note(changed(before, after), from, to);
         }
@@ -166,15 +168,15 @@ impl EditedScene {
         if before != after {
             self.note(
                 changed(&before, &after),
-                Part::Display(before),
-                Part::Display(after),
+                EditedItem::Display(before),
+                EditedItem::Display(after),
             );
         }
     }
 
     /// Notes another path for the camera.
     pub fn note_film(&mut self, before: &Film, after: &Film) {
-        let [from, to] = [before, after].map(|film| Part::Film(Box::new(film.clone())));
+        let [from, to] = [before, after].map(|film| EditedItem::Film(Box::new(film.clone())));
         self.note(before.change_to(after).into(), from, to);
     }
 
@@ -182,8 +184,8 @@ impl EditedScene {
     pub fn note_automatic(&mut self, after: bool) {
         self.note(
             "automatic".into(),
-            Part::Automatic(!after),
-            Part::Automatic(after),
+            EditedItem::Automatic(!after),
+            EditedItem::Automatic(after),
         );
     }
 
@@ -194,7 +196,7 @@ impl EditedScene {
 
     /// Takes the newest step back, or does the one again that was taken back last: its name, and what was changed, from
     /// what to what. The scene is changed here.
-    pub fn turn(&mut self, is_back: bool) -> Option<(String, [Part; 2])> {
+    pub fn turn(&mut self, is_back: bool) -> Option<(String, [EditedItem; 2])> {
         let History {
             done,
             undone,
@@ -207,7 +209,7 @@ impl EditedScene {
         if is_back {
             parts.reverse();
         }
-        if let Part::Scene(state) = &parts[1] {
+        if let EditedItem::Scene(state) = &parts[1] {
             self.scene = match Arc::ptr_eq(state, &self.states[0]) {
                 true => Arc::clone(&self.loaded),
                 false => Arc::new(state.set(&self.scene)),

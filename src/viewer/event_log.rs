@@ -8,7 +8,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::exporting::ExportState;
-use super::worker::{BakedLevel, Worth};
+use super::worker::{BakedLevel, EffectDifference};
 use crate::error::{Error, Result};
 
 /// What a bake that gave whole maps was like.
@@ -28,7 +28,7 @@ pub(super) fn baked(baked: &BakedLevel) -> Value {
 }
 
 /// What an effect is worth.
-pub(super) fn compared(worth: &Worth) -> Value {
+pub(super) fn compared(worth: &EffectDifference) -> Value {
     let effect = worth.effect.name();
     match &worth.difference {
         Ok(found) => json!({

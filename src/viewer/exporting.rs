@@ -2,7 +2,7 @@
 
 use super::background::{Background, Task, Wake};
 use super::files::free_names;
-use super::filming::Shooting;
+use super::filming::FilmJob;
 use super::worker::BakedLevel;
 use crate::error::{Error, Result};
 use crate::export::map_folder::{self, MapFolder};
@@ -73,7 +73,7 @@ impl Exporter {
     }
 
     /// Draws frames and writes them into a folder within a working folder. Does nothing while anything is written.
-    pub fn film(&mut self, shooting: Shooting, folder: PathBuf) {
+    pub fn film(&mut self, shooting: FilmJob, folder: PathBuf) {
         let total = shooting.cameras.len() as u64;
         let begun = ExportState::Filming { done: 0, total };
         self.run(begun, move |task| shooting.shoot(&folder, task, &task.control));

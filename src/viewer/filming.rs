@@ -178,7 +178,7 @@ impl Player {
 
 /// All that frames are made of.
 #[derive(Debug)]
-pub struct Shooting {
+pub struct FilmJob {
     /// What is filmed.
     pub scene: Arc<Scene>,
     /// Its light.
@@ -195,7 +195,7 @@ pub struct Shooting {
     pub name: &'static str,
 }
 
-impl Shooting {
+impl FilmJob {
     /// Draws every frame on a device of its own and writes it to a new folder in `folder`; tells which.
     ///
     /// # Errors

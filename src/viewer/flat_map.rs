@@ -15,7 +15,7 @@ const MAX_SAMPLES: f64 = 4.0;
 
 /// What of a map a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Part {
+pub struct MapCrop {
     /// Column at the picture's left edge [finest texels]; may lie outside.
     pub left: f64,
     /// Row at its upper edge [finest texels]; may lie outside.
@@ -26,7 +26,7 @@ pub struct Part {
 
 /// Pixels as the display shows them.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shown {
+pub struct ShownPixels {
     /// Pixels across and down.
     pub size: [usize; 2],
     /// sRGB and opacity, row by row; nothing beside the map.
@@ -35,7 +35,7 @@ pub struct Shown {
 
 /// A map's values at a place.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Reading {
+pub struct MapReading {
     /// Column and row [finest texels].
     pub texel: [usize; 2],
     /// Luminance of the irradiance of each layer [W/m²].
@@ -45,12 +45,12 @@ pub struct Reading {
 }
 
 /// The whole map, at most [`THUMBNAIL`] pixels long and wide, in an exposure that suits it alone.
-pub fn thumbnail(map: &IlluminationMap) -> Shown {
+pub fn thumbnail(map: &IlluminationMap) -> ShownPixels {
     let longest = map.width().max(map.height()) as f64;
     let texels_per_pixel = longest / THUMBNAIL as f64;
     let pixels = |texels: usize| ((texels as f64 / texels_per_pixel).round() as usize).max(1);
     let size = [pixels(map.width()), pixels(map.height())];
-    let part = Part {
+    let part = MapCrop {
         left: 0.0,
         top: 0.0,
         texels_per_pixel,
@@ -73,7 +73,7 @@ pub fn exposure_stops(map: &IlluminationMap) -> f64 {
 }
 
 /// A part of a map in a picture of so many pixels, exposed by so many stops: as white paper under that light.
-pub fn show(map: &IlluminationMap, part: Part, size: [usize; 2], exposure_stops: f64) -> Shown {
+pub fn show(map: &IlluminationMap, part: MapCrop, size: [usize; 2], exposure_stops: f64) -> ShownPixels {
     let places = (0..size[0] * size[1]).map(|index| [index % size[0], index / size[0]]);
     let means: Vec<Option<[f32; 3]>> = places.map(|place| mean(map, part, place)).collect();
     let picture = Picture {
@@ -87,14 +87,14 @@ pub fn show(map: &IlluminationMap, part: Part, size: [usize; 2], exposure_stops:
             pixel.fill(0);
         }
     }
-    Shown { size, rgba }
+    ShownPixels { size, rgba }
 }
 
 /// Values at a place [finest texels]; `None` beside the map.
-pub fn read(map: &IlluminationMap, x: f64, y: f64) -> Option<Reading> {
+pub fn read(map: &IlluminationMap, x: f64, y: f64) -> Option<MapReading> {
     let (column, row) = inside(map, x, y)?;
     let texel = map.chart.texel_at(column, row);
-    Some(Reading {
+    Some(MapReading {
         texel: [column, row],
         layers_w_per_m2: layers_at(map, texel),
         error_w_per_m2: map.error.as_ref().map(|error| f64::from(error[texel])),
@@ -115,7 +115,7 @@ fn inside(map: &IlluminationMap, x: f64, y: f64) -> Option<(usize, usize)> {
 }
 
 /// Mean radiance of a pixel; `None` where its middle lies beside the map.
-fn mean(map: &IlluminationMap, part: Part, [x, y]: [usize; 2]) -> Option<[f32; 3]> {
+fn mean(map: &IlluminationMap, part: MapCrop, [x, y]: [usize; 2]) -> Option<[f32; 3]> {
     let at = |origin: f64, pixel: usize, share: f64| origin + (pixel as f64 + share) * part.texels_per_pixel;
     inside(map, at(part.left, x, 0.5), at(part.top, y, 0.5))?;
     let samples = part.texels_per_pixel.ceil().clamp(1.0, MAX_SAMPLES) as usize;

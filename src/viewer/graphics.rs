@@ -28,7 +28,7 @@ pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 /// Whether a frame reached the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Shown {
+pub enum FrameOutcome {
     /// It did.
     Yes,
     /// The window is hidden or has no area; an event will tell when it can be seen.
@@ -395,14 +395,14 @@ impl Graphics {
     }
 
     /// Shows a painting of the interface.
-    pub fn show(&mut self, painting: &mut Painting) -> Shown {
+    pub fn show(&mut self, painting: &mut Painting) -> FrameOutcome {
         self.interface.upload(&self.gpu.device, &self.gpu.queue, painting);
         let shown = self.show_frame(painting);
         self.interface.release(painting);
         shown
     }
 
-    fn show_frame(&mut self, painting: &Painting) -> Shown {
+    fn show_frame(&mut self, painting: &Painting) -> FrameOutcome {
         let Self {
             interface,
             screen,
@@ -410,13 +410,13 @@ impl Graphics {
             ..
         } = self;
         if gpu.is_lost() {
-            return Shown::Broken;
+            return FrameOutcome::Broken;
         }
         let frame = match screen.acquire(&gpu.device, &gpu.instance) {
             Acquired::Frame(frame) => frame,
-            Acquired::Hidden => return Shown::Hidden,
-            Acquired::Later => return Shown::Later,
-            Acquired::Broken => return Shown::Broken,
+            Acquired::Hidden => return FrameOutcome::Hidden,
+            Acquired::Later => return FrameOutcome::Later,
+            Acquired::Broken => return FrameOutcome::Broken,
         };
         let target = frame.texture.create_view(&wgpu::TextureViewDescriptor::default());
         let mut encoder = gpu
@@ -434,11 +434,11 @@ impl Graphics {
         );
         gpu.queue.submit([encoder.finish()]);
         screen.present(&gpu.queue, frame);
-        Shown::Yes
+        FrameOutcome::Yes
     }
 }
 
-/// How long to wait before a frame that came [`Shown::Later`] is tried again.
+/// How long to wait before a frame that came [`FrameOutcome::Later`] is tried again.
 pub const RETRY_AFTER: Duration = Duration::from_millis(50);
 
 fn window_error(what: &str) -> Error {

@@ -2,9 +2,9 @@
 
 mod app;
 pub mod background;
-pub mod beside;
 pub mod brightest;
 pub mod command;
+pub mod comparison_view;
 pub mod edits;
 pub mod event_log;
 pub mod exporting;

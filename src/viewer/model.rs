@@ -1,11 +1,11 @@
 //! The state of the window and everything that it does, apart from the window itself.
 
 mod filming;
-mod keeping;
 mod opening;
+mod pending_search;
 mod picking;
 mod playing;
-mod seeking;
+mod saved_state;
 mod showing;
 
 use std::sync::Arc;
@@ -14,12 +14,12 @@ use std::time::{Duration, Instant};
 pub use self::showing::MapsShown;
 use super::ViewerOptions;
 use super::background::Wake;
-use super::beside::Reference;
 use super::command::{Choices, Command};
-use super::edits::{EditedScene, Part};
+use super::comparison_view::SavedMaps;
+use super::edits::{EditedItem, EditedScene};
 use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
-use super::files::keeper::Autosaver;
+use super::files::autosaver::Autosaver;
 use super::files::{Files, working_folder};
 use super::filming::Player;
 use super::navigation::{NavigationMode, Navigator};
@@ -28,8 +28,8 @@ use super::probe::{Probed, Prober};
 use super::sketching::PreviewTask;
 use super::timing::{FrameTimes, Latencies};
 use super::views::MapSurvey;
-use super::walking::{Solid, Surroundings};
-use super::worker::{BakeRequest, BakeState, BakedLevel, Worker, Worth};
+use super::walking::{Collider, CollisionScene};
+use super::worker::{BakeRequest, BakeState, BakedLevel, EffectDifference, Worker};
 use crate::error::Result;
 use crate::geometry::Ray;
 use crate::illumination::IlluminationMap;
@@ -68,13 +68,13 @@ pub struct Model {
     pub worker: Worker,
     /// Writes maps to files.
     pub exporter: Exporter,
-    surroundings: Surroundings,
+    surroundings: CollisionScene,
     /// Where the bake stood at the last [`poll`](Self::poll).
     pub state: BakeState,
     /// The maps that the picture shows.
     pub last: Option<Arc<BakedLevel>>,
     /// What an effect is worth to these maps, where that was asked for.
-    pub worth: Option<Worth>,
+    pub worth: Option<EffectDifference>,
     /// Maps that were baked before the start; until the first bake.
     pub given: Vec<IlluminationMap>,
     /// When a change is baked unless another one follows.
@@ -96,13 +96,13 @@ pub struct Model {
     prober: Prober,
     sketcher: PreviewTask,
     /// The maps to compare with.
-    pub reference: Option<Reference>,
+    pub reference: Option<SavedMaps>,
     /// What is to be picked once surfaces are known.
     picking: Option<Ray>,
     /// The light in the mouse's hand.
-    placing: picking::Placing,
+    placing: picking::DraggedLight,
     /// What waits for the surfaces of the scene.
-    sought: seeking::PendingSearch,
+    pending_search: pending_search::PendingSearch,
     /// The camera's path, while it is played.
     player: Option<Player>,
     /// What became of the last file of a path.
@@ -112,7 +112,7 @@ pub struct Model {
     /// Whether the exposure is that of an earlier time.
     pub exposure_is_kept: bool,
     /// What was kept of it and not taken over.
-    left_alone: keeping::IgnoredState,
+    left_alone: saved_state::IgnoredState,
     /// The scene in the window by its full path.
     full_source: String,
     /// What is read from files, and from which.
@@ -151,13 +151,13 @@ impl Model {
             log: EventLog::open(options.event_log.as_deref())?,
             worker,
             exporter: Exporter::new(wake),
-            surroundings: Surroundings::new(wake),
+            surroundings: CollisionScene::new(wake),
             prober: Prober::new(wake),
             sketcher: PreviewTask::new(wake),
             reference: None,
             picking: None,
-            placing: picking::Placing::default(),
-            sought: seeking::PendingSearch::default(),
+            placing: picking::DraggedLight::default(),
+            pending_search: pending_search::PendingSearch::default(),
             player: None,
             film_told: None,
             probed_scene: None,
@@ -172,7 +172,7 @@ impl Model {
             asked: options.maps.is_some().then_some((0, wanted)),
             first_request: 1,
             exposure_is_kept: false,
-            left_alone: keeping::IgnoredState::default(),
+            left_alone: saved_state::IgnoredState::default(),
             full_source: String::new(),
             refusal: None,
             survey: MapSurvey::default(),
@@ -197,7 +197,7 @@ impl Model {
     /// Gets about in another way from now on.
     pub fn travel(&mut self, travel: NavigationMode) {
         let surfaces = self.surfaces();
-        let solid = surfaces.as_deref().map(|tracer| tracer as &dyn Solid);
+        let solid = surfaces.as_deref().map(|tracer| tracer as &dyn Collider);
         self.navigator.set_travel(travel, solid);
         self.log.write("travel", json!({"way": travel.name()}));
     }
@@ -237,8 +237,8 @@ impl Model {
 
     /// When something is to be done though nothing happens.
     pub fn due(&self) -> Option<Instant> {
-        let keeper = self.files.keeper.as_ref();
-        let dues = [self.bake_due, keeper.and_then(Autosaver::due)];
+        let autosaver = self.files.autosaver.as_ref();
+        let dues = [self.bake_due, autosaver.and_then(Autosaver::due)];
         dues.into_iter().flatten().min()
     }
 
@@ -435,14 +435,14 @@ impl Model {
             Command::Redo => self.turn_back(false),
             Command::Rebake => self.rebake(),
             Command::Cancel => self.cancel(),
-            Command::Worth(effect) => self.compare(effect),
+            Command::EffectDifference(effect) => self.compare(effect),
             Command::Compare(command) => self.compare_with(&command),
             Command::Film(command) => self.film(&command),
             Command::Play(command) => self.set_time(command),
             Command::Export(export) => self.export(export),
             Command::ClearProbe => self.probe(None),
-            Command::Brightest => self.seek(|sought| sought.brightest = true),
-            Command::AddLight(light) => self.seek(|sought| sought.light = Some(light)),
+            Command::Brightest => self.seek(|pending_search| pending_search.brightest = true),
+            Command::AddLight(light) => self.seek(|pending_search| pending_search.light = Some(light)),
             Command::Open(source) => self.open(&source),
             Command::Browse | Command::SaveScene | Command::SavePicture | Command::MeasureExposure => {
                 return Some(command);
@@ -518,13 +518,13 @@ impl Model {
         let event = if is_back { "undone" } else { "redone" };
         self.log.write(event, json!({"what": text}));
         match (from, to) {
-            (_, Part::Settings(settings)) => {
+            (_, EditedItem::Settings(settings)) => {
                 let before = std::mem::replace(&mut self.choices.settings, *settings);
                 self.note_settings_since(before);
             }
-            (Part::Display(from), Part::Display(to)) => self.choices.display.restore(&from, &to),
-            (_, Part::Film(film)) => self.choices.film = *film,
-            (_, Part::Automatic(automatic)) => {
+            (EditedItem::Display(from), EditedItem::Display(to)) => self.choices.display.restore(&from, &to),
+            (_, EditedItem::Film(film)) => self.choices.film = *film,
+            (_, EditedItem::Automatic(automatic)) => {
                 self.choices.automatic = automatic;
                 self.revision += 1;
             }

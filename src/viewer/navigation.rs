@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
 use super::files::config::KeptViews;
-use super::walking::{self, Solid, Walker};
+use super::walking::{self, Collider, Walker};
 use crate::scene::{Camera, Scene};
 
 /// Time after which the velocity has closed 1 − 1/e of its gap to what the keys ask for [s].
@@ -217,7 +217,7 @@ impl Navigator {
     }
 
     /// Gets about in another way from now on; an orbit is around what is straight ahead, or else around the scene.
-    pub fn set_travel(&mut self, travel: NavigationMode, solid: Option<&dyn Solid>) {
+    pub fn set_travel(&mut self, travel: NavigationMode, solid: Option<&dyn Collider>) {
         if travel == self.travel {
             return;
         }
@@ -300,7 +300,7 @@ impl Navigator {
     }
 
     /// The same among surfaces: those who walk stand on them and are stopped by them.
-    pub fn advance_among(&mut self, seconds: f64, solid: &dyn Solid) {
+    pub fn advance_among(&mut self, seconds: f64, solid: &dyn Collider) {
         if self.travel != NavigationMode::Walk || seconds <= 0.0 {
             return self.advance(seconds);
         }
@@ -311,7 +311,7 @@ impl Navigator {
         }
     }
 
-    fn look_and_step(&mut self, seconds: f64, solid: &dyn Solid) {
+    fn look_and_step(&mut self, seconds: f64, solid: &dyn Collider) {
         let asked_m_per_s = self.drift(seconds) / seconds;
         let (eye, left_m_per_s) = self.walker.step(self.position, asked_m_per_s, seconds, solid);
         self.position = eye;

@@ -40,7 +40,7 @@ pub enum NewLight {
 
 /// What is looked at.
 #[derive(Clone, Copy, Debug)]
-pub struct Aim {
+pub struct ViewTarget {
     /// Where [m].
     pub point: DVec3,
     /// Unit, towards the eye.
@@ -49,11 +49,11 @@ pub struct Aim {
     pub to_eye: DVec3,
 }
 
-impl Aim {
+impl ViewTarget {
     /// What a gaze meets; the point `otherwise` where it meets nothing.
     pub fn of(surfaces: &Tracer, gaze: &Ray, otherwise: DVec3) -> Self {
         let to_eye = -gaze.direction;
-        match surfaces.closest_place(gaze) {
+        match surfaces.intersect(gaze) {
             Some(place) => {
                 let normal = surfaces.surface_at(&place).geometric_normal;
                 Self {
@@ -89,7 +89,7 @@ impl NewLight {
     pub fn make(
         self,
         (surfaces, radius_m): (&Tracer, f64),
-        aim: &Aim,
+        aim: &ViewTarget,
         exposure_stops: f64,
         scene: &Scene,
     ) -> Light {
@@ -135,13 +135,13 @@ impl NewLight {
 }
 
 /// Up, leaning towards the eye [1, of the height]; unit.
-fn above(aim: &Aim, leaning: f64) -> DVec3 {
+fn above(aim: &ViewTarget, leaning: f64) -> DVec3 {
     let level = DVec3::new(aim.to_eye.x, 0.0, aim.to_eye.z).normalize_or(DVec3::X);
     (DVec3::Y + level * leaning).normalize()
 }
 
 /// Where a light has room: above what is looked at, or else before it, or else towards the eye [m].
-fn place(surfaces: &Tracer, aim: &Aim, radius_m: f64) -> DVec3 {
+fn place(surfaces: &Tracer, aim: &ViewTarget, radius_m: f64) -> DVec3 {
     let from = aim.point + aim.normal * (OFF * radius_m);
     let room = |direction: DVec3| {
         let ray = Ray {
@@ -149,7 +149,7 @@ fn place(surfaces: &Tracer, aim: &Aim, radius_m: f64) -> DVec3 {
             direction,
         };
         let free_m = surfaces
-            .closest_place(&ray)
+            .intersect(&ray)
             .map_or(f64::INFINITY, |place| place.distance_m);
         (OF_ROOM * free_m).min(FARTHEST * radius_m)
     };

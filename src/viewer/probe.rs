@@ -131,7 +131,7 @@ impl Probed {
 
 /// What is looked at, and from where.
 #[derive(Clone, Copy, Debug)]
-pub struct Seen {
+pub struct ProbeTarget {
     /// Of a matte surface.
     pub hit: SurfaceHit,
     /// Unit, the way the gaze came.
@@ -139,14 +139,14 @@ pub struct Seen {
 }
 
 /// The matte surface that a gaze ends at: through glass and over mirrors, always the stronger way on.
-pub fn seen(tracer: &Tracer, gaze: &Ray) -> Option<Seen> {
+pub fn seen(tracer: &Tracer, gaze: &Ray) -> Option<ProbeTarget> {
     let mut ray = *gaze;
     let mut media: MediumStack = media_at(tracer, gaze.origin);
     for _ in 0..MAX_SEEN_THROUGH {
         let hit = tracer.closest_hit(&ray)?;
         let interaction = tracer.interact(&hit, ray.direction, &media);
         if interaction.deposit.max_channel() > 0.0 {
-            return Some(Seen {
+            return Some(ProbeTarget {
                 hit,
                 direction: ray.direction,
             });
@@ -162,7 +162,7 @@ pub fn seen(tracer: &Tracer, gaze: &Ray) -> Option<Seen> {
 }
 
 /// Reads the maps at what is seen.
-pub fn read(tracer: &Tracer, maps: &[IlluminationMap], seen: &Seen) -> (Probed, Option<Target>) {
+pub fn read(tracer: &Tracer, maps: &[IlluminationMap], seen: &ProbeTarget) -> (Probed, Option<Target>) {
     let found = maps.iter().find_map(|map| {
         let target = Target::new(tracer, &map.chart, &seen.hit, seen.direction)?;
         Some((map, target))

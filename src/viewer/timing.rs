@@ -18,12 +18,12 @@ pub const PICTURES: usize = 120;
 #[derive(Clone, Debug, Default)]
 pub struct FrameTimes {
     pictures: VecDeque<GpuMs>,
-    made: Option<Made>,
+    made: Option<FrameStats>,
 }
 
 /// How the picture that is shown was made.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Made {
+pub struct FrameStats {
     /// Traced pixels per pixel along a side; `None` where nothing specular is in view.
     pub traced_scale: Option<f64>,
     /// Pictures of which it is the mean.
@@ -40,12 +40,12 @@ impl FrameTimes {
     }
 
     /// Says how the picture that is shown was made.
-    pub fn set_made(&mut self, made: Made) {
+    pub fn set_made(&mut self, made: FrameStats) {
         self.made = Some(made);
     }
 
     /// How the picture that is shown was made.
-    pub fn made(&self) -> Option<Made> {
+    pub fn made(&self) -> Option<FrameStats> {
         self.made
     }
 

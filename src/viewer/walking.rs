@@ -57,7 +57,7 @@ impl Walker {
         mut eye: DVec3,
         mut velocity_m_per_s: DVec3,
         seconds: f64,
-        solid: &dyn Solid,
+        solid: &dyn Collider,
     ) -> (DVec3, DVec3) {
         if velocity_m_per_s != DVec3::ZERO {
             let wanted = velocity_m_per_s * seconds;
@@ -73,7 +73,7 @@ impl Walker {
     }
 
     /// How far the eyes rise or fall.
-    fn settle(&mut self, eye: DVec3, seconds: f64, solid: &dyn Solid) -> f64 {
+    fn settle(&mut self, eye: DVec3, seconds: f64, solid: &dyn Collider) -> f64 {
         // From the eyes: who comes flying lands on whatever is below.
         let Some((below_m, _)) = solid.meets(eye, DVec3::NEG_Y, DEEPEST_M) else {
             // Over nothing.
@@ -110,7 +110,7 @@ impl Allowed {
 }
 
 /// The part of a step along the ground that walls leave.
-fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Solid) -> Allowed {
+fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
     let mut allowed = Allowed {
         along: wanted,
         away: DVec3::ZERO,
@@ -166,15 +166,15 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Solid) -> Allowed {
 }
 
 /// Surfaces that stop a person.
-pub trait Solid {
+pub trait Collider {
     /// Distance [m] along a unit direction to the first surface that is nearer than `within_m`, and its unit normal on the
     /// side it is met from.
     fn meets(&self, from: DVec3, direction: DVec3, within_m: f64) -> Option<(f64, DVec3)>;
 }
 
-impl Solid for Tracer {
+impl Collider for Tracer {
     fn meets(&self, origin: DVec3, direction: DVec3, within_m: f64) -> Option<(f64, DVec3)> {
-        let place = self.closest_place(&Ray { origin, direction })?;
+        let place = self.intersect(&Ray { origin, direction })?;
         if place.distance_m >= within_m {
             return None;
         }
@@ -185,12 +185,12 @@ impl Solid for Tracer {
 
 /// The collision surfaces of the scene, built on first use.
 #[derive(Debug)]
-pub struct Surroundings {
+pub struct CollisionScene {
     found: Option<(Arc<Scene>, Arc<Tracer>)>,
     coming: Background<Arc<Scene>, Tracer>,
 }
 
-impl Surroundings {
+impl CollisionScene {
     /// Nothing yet; the window is woken when there is something.
     pub fn new(wake: &Wake) -> Self {
         Self {
@@ -236,7 +236,7 @@ mod tests {
     #[test]
     fn surfaces_are_found_once_and_again_for_another_scene() {
         let scene = Arc::new(builtin::build("ring").expect("it is built in"));
-        let mut surroundings = Surroundings::new(&Wake::new(|| ()));
+        let mut surroundings = CollisionScene::new(&Wake::new(|| ()));
         let mut wait = |scene: &Arc<Scene>| loop {
             if let Some(tracer) = surroundings.of(scene) {
                 return tracer;

@@ -149,7 +149,7 @@ pub struct BakedLevel {
 
 /// What the light of a scene owes to an effect.
 #[derive(Clone, Debug)]
-pub struct Worth {
+pub struct EffectDifference {
     /// The effect that was left out.
     pub effect: Effect,
     /// The bake with it.
@@ -209,7 +209,7 @@ impl Worker {
         let mut slot = self.shared.lock();
         slot.serial += 1;
         let serial = slot.serial;
-        self.shared.put(&mut slot, asked, Purpose::Maps { serial });
+        self.shared.put(&mut slot, asked, BakePurpose::Maps { serial });
         serial
     }
 
@@ -226,7 +226,8 @@ impl Worker {
         }
         let mut asked = with.request.clone();
         asked.settings.effects.set(effect, EffectSwitch::Off);
-        self.shared.put(&mut slot, asked, Purpose::Worth { effect, with });
+        self.shared
+            .put(&mut slot, asked, BakePurpose::EffectDifference { effect, with });
         true
     }
 
@@ -262,7 +263,7 @@ impl Worker {
     }
 
     /// What the last comparison found, unless that was taken or something else was asked for since.
-    pub fn take_worth(&self) -> Option<Worth> {
+    pub fn take_worth(&self) -> Option<EffectDifference> {
         self.shared.lock().worth.take()
     }
 
@@ -293,11 +294,11 @@ impl Drop for Worker {
 
 /// What maps are baked for.
 #[derive(Debug)]
-enum Purpose {
+enum BakePurpose {
     /// They are handed out under this number.
     Maps { serial: u64 },
     /// For a comparison.
-    Worth { effect: Effect, with: Arc<BakedLevel> },
+    EffectDifference { effect: Effect, with: Arc<BakedLevel> },
 }
 
 /// One bake, waiting or running.
@@ -305,7 +306,7 @@ enum Purpose {
 struct Job {
     asked: BakeRequest,
     since: Instant,
-    purpose: Purpose,
+    purpose: BakePurpose,
     control: Control,
     /// What it is doing, and how much of that is done.
     progress: Mutex<(Stage, f64)>,
@@ -313,18 +314,18 @@ struct Job {
 
 impl Job {
     fn is_for_maps(&self) -> bool {
-        matches!(self.purpose, Purpose::Maps { .. })
+        matches!(self.purpose, BakePurpose::Maps { .. })
     }
 
     fn state(&self) -> BakeState {
         let (stage, fraction) = *self.progress.lock().unwrap_or_else(PoisonError::into_inner);
         match self.purpose {
-            Purpose::Maps { .. } => BakeState::Baking {
+            BakePurpose::Maps { .. } => BakeState::Baking {
                 stage,
                 fraction,
                 since: self.since,
             },
-            Purpose::Worth { effect, .. } => BakeState::Comparing {
+            BakePurpose::EffectDifference { effect, .. } => BakeState::Comparing {
                 effect,
                 stage,
                 fraction,
@@ -350,7 +351,7 @@ struct Slot {
     /// The state while nothing is asked for or running.
     settled: BakeState,
     newest: Option<BakedLevel>,
-    worth: Option<Worth>,
+    worth: Option<EffectDifference>,
     quit: bool,
 }
 
@@ -376,7 +377,7 @@ impl Shared {
     }
 
     /// Asks for a bake in the place of every other.
-    fn put(&self, slot: &mut Slot, asked: BakeRequest, purpose: Purpose) {
+    fn put(&self, slot: &mut Slot, asked: BakeRequest, purpose: BakePurpose) {
         slot.cancel_running();
         slot.worth = None;
         slot.waiting = Some(Arc::new(Job {
@@ -428,7 +429,7 @@ fn serve<B: LevelBaker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Res
     while let Some(job) = shared.next() {
         shared.wake.wake();
         match &job.purpose {
-            Purpose::Maps { serial } => {
+            BakePurpose::Maps { serial } => {
                 let state = bake_in_levels(shared, &mut baker, make_baker, &job, *serial);
                 shared.end(|slot| {
                     // Complete before it noticed that a newer request came, which was itself cancelled.
@@ -436,7 +437,7 @@ fn serve<B: LevelBaker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Res
                     slot.settled = if outdated { BakeState::Cancelled } else { state };
                 });
             }
-            Purpose::Worth { effect, with } => {
+            BakePurpose::EffectDifference { effect, with } => {
                 // The session of the maps that are shown keeps all it has.
                 let outcome = bake(&mut None, make_baker, &job, &mut |_| ());
                 // Asking may wait, which is not to be done under the lock.
@@ -486,13 +487,13 @@ fn worth(
     effect: Effect,
     with: &Arc<BakedLevel>,
     without: std::result::Result<Bake, BakeState>,
-) -> Option<Worth> {
+) -> Option<EffectDifference> {
     let difference = match without {
         Ok(without) => difference(&with.result.maps, &without.maps).map_err(|error| error.to_string()),
         Err(BakeState::Failed(sentence)) => Err(sentence),
         Err(_) => return None,
     };
-    Some(Worth {
+    Some(EffectDifference {
         effect,
         with: Arc::clone(with),
         difference,

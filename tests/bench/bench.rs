@@ -360,11 +360,7 @@ fn segments_per_s(scene: Scene, density_per_sr: f64) {
     let rays = paths(&tracer, 600);
     let bare = (0..5).map(|_| {
         let clock = ProcessTime::now();
-        let met = |rays: &[Ray]| {
-            rays.iter()
-                .filter(|ray| tracer.closest_place(ray).is_some())
-                .count()
-        };
+        let met = |rays: &[Ray]| rays.iter().filter(|ray| tracer.intersect(ray).is_some()).count();
         assert!(rays.par_chunks(4096).map(met).sum::<usize>() > 0);
         rays.len() as f64 / clock.elapsed().as_secs_f64()
     });

@@ -6,7 +6,7 @@ use nephroid::optics::refraction::{cos_transmitted, refract};
 use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{Glass, LinearSrgb, Nanometres, glass};
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Mesh, Scene, Volume, contact};
+use nephroid::scene::{Material, Mesh, Scene, Volume, coincident_faces};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::Flux;
 
@@ -304,9 +304,9 @@ fn slabs(borders: &[[f64; 2]]) -> Scene {
 }
 
 fn common_face() {
-    let found = contact::touching(&slabs(&[[0.3, 0.5], [0.5, 0.7]]));
+    let found = coincident_faces::touching(&slabs(&[[0.3, 0.5], [0.5, 0.7]]));
     assert!(found.get(&(1, 2)).is_some_and(|faces| *faces > 0));
-    assert!(contact::touching(&slabs(&[[0.3, 0.5], [0.5 + 1e-6, 0.7]])).is_empty());
+    assert!(coincident_faces::touching(&slabs(&[[0.3, 0.5], [0.5 + 1e-6, 0.7]])).is_empty());
 }
 
 /// Glass that lets a share of each channel through a distance.

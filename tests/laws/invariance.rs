@@ -13,7 +13,7 @@ use nephroid::units::{Flux, Radiance};
 
 use support::laws::law::*;
 use support::laws::scenes::*;
-use support::laws::{Baked, Table, books_open, is_long};
+use support::laws::{Baked, Table, energy_residual, is_long};
 use support::tools::{at, bake, builtin_scene, photons, set, settings, transformed};
 
 pub fn fill(t: &mut Table) {
@@ -290,14 +290,14 @@ fn ledgers(t: &mut Table) {
 
 fn faults_are_noticed() {
     let sound = bake(builtin_scene("ring"), &at(500.0, 16));
-    assert!(books_open(&sound) <= 1e-6);
+    assert!(energy_residual(&sound) <= 1e-6);
     let mut lost = sound.clone();
     lost.ledgers[0].energy_w.deposited *= 1.0 + 1e-5;
-    assert!(books_open(&lost) > 1e-6);
+    assert!(energy_residual(&lost) > 1e-6);
     for bad in [f32::NAN, f32::INFINITY, -1e-3] {
         let mut broken = sound.clone();
         broken.maps[0].layers[0].irradiance[7][2] = bad;
-        assert!(books_open(&broken).is_infinite(), "{bad}");
+        assert!(energy_residual(&broken).is_infinite(), "{bad}");
     }
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use nephroid::geometry::cube_face::{self, FaceMapping};
 use nephroid::light_pass::emitter::Emitter;
-use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, Hiding, ItemBuffer};
+use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, HiddenCellPolicy, ItemBuffer};
 use nephroid::light_pass::launch::Launch;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Light, LightKind, Material, Mesh, Scene};
@@ -126,7 +126,12 @@ fn equal(light: &Light, scene: &Scene) -> Launch {
 }
 
 fn build(launch: &Launch, scene: &Scene) -> ItemBuffer {
-    ItemBuffer::build(launch, &Tracer::new(Arc::new(scene.clone())), &[0], Hiding::Keep)
+    ItemBuffer::build(
+        launch,
+        &Tracer::new(Arc::new(scene.clone())),
+        &[0],
+        HiddenCellPolicy::Keep,
+    )
 }
 
 /// A cloud of triangles.
@@ -277,7 +282,12 @@ fn diffuse_marks_nothing() {
     among.materials.push(Material::default());
     for light in lights() {
         let launch = equal(&light, &alone);
-        let buffer = ItemBuffer::build(&launch, &Tracer::new(Arc::new(among.clone())), &[1], Hiding::Keep);
+        let buffer = ItemBuffer::build(
+            &launch,
+            &Tracer::new(Arc::new(among.clone())),
+            &[1],
+            HiddenCellPolicy::Keep,
+        );
         let faces = launch.face_count();
         assert_eq!(marks(&buffer, faces), marks(&build(&launch, &alone), faces));
     }
@@ -308,7 +318,12 @@ fn beside_a_cone() {
         &casters,
         ItemBufferKind::Equal,
     );
-    let buffer = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene)), &casters, Hiding::Keep);
+    let buffer = ItemBuffer::build(
+        &launch,
+        &Tracer::new(Arc::new(scene)),
+        &casters,
+        HiddenCellPolicy::Keep,
+    );
     assert_eq!(buffer.casters, [1, 2]);
 }
 
@@ -340,7 +355,7 @@ fn dropped_cells() {
         let tracer = Tracer::new(Arc::clone(&scene));
         let launch = launch(&scene.lights[0], &scene, &[0, 1], ItemBufferKind::Equal);
         let build = |hiding| ItemBuffer::build(&launch, &tracer, &[0, 1], hiding);
-        let (kept, visible) = (build(Hiding::Keep), build(Hiding::Drop));
+        let (kept, visible) = (build(HiddenCellPolicy::Keep), build(HiddenCellPolicy::Drop));
         assert_eq!(visible.marked_cells() + visible.hidden_cells, kept.marked_cells());
         let faces = launch.face_count();
         let [all, seen] = [marks(&kept, faces), marks(&visible, faces)];
@@ -370,7 +385,12 @@ fn shut_in() {
     let scene = scene.diffuse("round", shapes::sphere(DVec3::ZERO, 0.2, 3));
     let lamp = parts::point_light("lamp", DVec3::new(0.01, 0.02, 0.03), Flux(1.0));
     let launch = equal(&lamp, &scene);
-    let buffer = ItemBuffer::build(&launch, &Tracer::new(Arc::new(scene)), &[0], Hiding::Drop);
+    let buffer = ItemBuffer::build(
+        &launch,
+        &Tracer::new(Arc::new(scene)),
+        &[0],
+        HiddenCellPolicy::Drop,
+    );
     assert_eq!((buffer.marked_cells(), buffer.casters.len()), (0, 0));
     assert!(buffer.hidden_cells > 100);
 }

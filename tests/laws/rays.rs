@@ -115,7 +115,7 @@ fn no_ray_slips_through() {
             for target in [*a, *b, (*a + *b) * 0.5, *b * 0.7 + *c * 0.3] {
                 let ray = towards(origin, target);
                 assert!(
-                    tracer.closest_place(&ray).is_some(),
+                    tracer.intersect(&ray).is_some(),
                     "scale {scale}: a ray to {target}"
                 );
                 assert!(
@@ -139,7 +139,7 @@ fn signed_zeros() {
             origin: DVec3::ZERO,
             direction,
         };
-        let hit = tracer.closest_place(&ray).expect("a wall of the sphere");
+        let hit = tracer.intersect(&ray).expect("a wall of the sphere");
         assert!((hit.distance_m - 1.0).abs() < 0.01, "{direction}: {hit:?}");
     }
 }
@@ -156,7 +156,7 @@ fn close_hits() {
             origin: DVec3::new(0.3, 0.5 * gap, 0.2),
             direction: DVec3::Y,
         };
-        let hit = tracer.closest_place(&ray).expect("the upper square");
+        let hit = tracer.intersect(&ray).expect("the upper square");
         assert!(
             (hit.distance_m - 0.5 * gap).abs() <= 1e-6 * gap,
             "gap {gap}: {hit:?}"

@@ -30,7 +30,7 @@ pub fn write(
     if determinant == 0.0 || !node_from_world.is_finite() {
         return None;
     }
-    let parted = Parted::new(object.mesh_in_scene(), chart, determinant < 0.0);
+    let parted = SplitMesh::new(object.mesh_in_scene(), chart, determinant < 0.0);
     let normal_from_world = world_from_node.matrix3.transpose();
     let position = |vertex: usize| {
         let world = object.mesh_in_scene().positions[vertex] + scene.origin_world;
@@ -97,14 +97,14 @@ pub fn write(
 }
 
 /// A mesh whose vertices have one map coordinate each.
-struct Parted {
+struct SplitMesh {
     /// Which vertex of the mesh each one is, and its coordinate.
     vertices: Vec<(usize, DVec2)>,
     /// Three per triangle.
     corners: Vec<u32>,
 }
 
-impl Parted {
+impl SplitMesh {
     fn new(mesh: &Mesh, chart: &Chart, is_mirrored: bool) -> Self {
         let mut known: HashMap<(u32, [u64; 2]), u32> = HashMap::new();
         let mut parted = Self {
@@ -134,7 +134,7 @@ impl Parted {
 fn add_sets(
     glb: &mut Glb,
     mesh: &Mesh,
-    parted: &Parted,
+    parted: &SplitMesh,
     was: &Value,
     generated: usize,
     attributes: &mut Value,
@@ -178,7 +178,7 @@ fn keep_others(
     glb: &mut Glb,
     name: &str,
     mesh: &Mesh,
-    parted: &Parted,
+    parted: &SplitMesh,
     was: &Value,
     attributes: &mut Value,
     warnings: &mut Vec<Warning>,
@@ -209,7 +209,7 @@ fn keep_others(
 }
 
 /// An accessor with its elements in the order of the new vertices; `None` if it cannot be read.
-fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &Parted) -> Option<usize> {
+fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &SplitMesh) -> Option<usize> {
     let stated = glb.json["accessors"].get(accessor)?.clone();
     if stated.get("sparse").is_some() || stated["count"].as_u64()? != vertices as u64 {
         return None;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::cache::ContentHash;
-use crate::light_pass::share::Share;
+use crate::light_pass::shard_index::ShardIndex;
 use crate::scene::Scene;
 use crate::session::{ShardSums, Timings};
 use crate::settings::BakeSettings;
@@ -93,7 +93,7 @@ impl ShardManifest {
         scene: &Scene,
         origin: SceneOrigin,
         settings: &BakeSettings,
-        share: Share,
+        share: ShardIndex,
         sums: &ShardSums,
     ) -> Self {
         Self {

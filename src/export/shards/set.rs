@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use super::manifest::{self, ShardManifest, ShardNumber, StoredPass, hash_of};
 use crate::error::{Error, Result};
 use crate::files::{self, OutputFolder, StagedFolder};
-use crate::light_pass::share::Share;
+use crate::light_pass::shard_index::ShardIndex;
 use crate::scene::Scene;
 use crate::session::{ShardSource, ShardSums, Timings};
 
@@ -216,7 +216,7 @@ impl ShardFolder {
     ///
     /// # Errors
     /// A place that cannot be written; other files or another shard in it.
-    pub fn open(path: &Path, share: Share, force: bool) -> Result<Self> {
+    pub fn open(path: &Path, share: ShardIndex, force: bool) -> Result<Self> {
         let number = ShardNumber {
             number: share.number(),
             count: share.count(),

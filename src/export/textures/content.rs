@@ -25,7 +25,7 @@ pub enum Content {
 
 /// The light of one texture.
 #[derive(Clone, Debug)]
-pub struct Part {
+pub struct TextureLight {
     /// Layers whose sum it is.
     pub layers: Vec<LayerKind>,
     /// Of one light alone.
@@ -36,7 +36,7 @@ pub struct Part {
     pub irradiance: Vec<[f32; 3]>,
 }
 
-impl Part {
+impl TextureLight {
     /// What it is of, with no light and no layer yet.
     pub fn without_light(&self) -> Self {
         Self {
@@ -91,11 +91,11 @@ impl Content {
     ///
     /// # Errors
     /// A map that lacks the parts of lights that are asked for.
-    pub fn parts(self, stored: &StoredMap) -> Result<(Vec<Part>, Option<Warning>)> {
+    pub fn parts(self, stored: &StoredMap) -> Result<(Vec<TextureLight>, Option<Warning>)> {
         let map = &stored.map;
         let kinds: Vec<LayerKind> = map.layers.iter().map(|layer| layer.kind).collect();
         let layer = |kind: LayerKind| {
-            map.layer(kind).map(|layer| Part {
+            map.layer(kind).map(|layer| TextureLight {
                 layers: vec![kind],
                 light: None,
                 key: kind.name().into(),
@@ -104,7 +104,7 @@ impl Content {
         };
         match self {
             Self::Sum => {
-                let sum = Part {
+                let sum = TextureLight {
                     layers: kinds,
                     light: None,
                     key: String::new(),
@@ -135,15 +135,15 @@ fn lacking(stored: &StoredMap, what: impl Into<String>, remedy: &str) -> Error {
 }
 
 /// One for each light, in the order of the file.
-fn parts_of_lights(stored: &StoredMap) -> Vec<Part> {
-    let mut parts: Vec<Part> = Vec::new();
+fn parts_of_lights(stored: &StoredMap) -> Vec<TextureLight> {
+    let mut parts: Vec<TextureLight> = Vec::new();
     for StoredLight { channels, irradiance } in &stored.lights {
         // Lights of the same name differ by their channels.
         let own = channels.channels.split_once('.').map_or("", |(_, own)| own);
         let key = files::slug(own, "light");
         let known = parts.iter().position(|part| part.key == key);
         let Some(known) = known else {
-            parts.push(Part {
+            parts.push(TextureLight {
                 layers: vec![channels.layer],
                 light: Some(channels.light.clone()),
                 key,
@@ -162,7 +162,7 @@ fn parts_of_lights(stored: &StoredMap) -> Vec<Part> {
 }
 
 /// Says where light is in no light's texture.
-fn rest(stored: &StoredMap, parts: &[Part]) -> Option<Warning> {
+fn rest(stored: &StoredMap, parts: &[TextureLight]) -> Option<Warning> {
     let sum = |values: &[[f32; 3]]| {
         let values = values.as_flattened().iter();
         values.map(|value| f64::from(*value)).sum::<f64>()

@@ -51,7 +51,7 @@ pub enum Encoding {
 
 /// What a file says of itself.
 #[derive(Clone, Debug)]
-pub struct Notes<'a> {
+pub struct FileMetadata<'a> {
     /// What its numbers mean.
     pub quantity: Quantity,
     /// What light was multiplied by: 2 to this power.
@@ -62,7 +62,7 @@ pub struct Notes<'a> {
     pub location: &'a str,
 }
 
-impl Notes<'_> {
+impl FileMetadata<'_> {
     /// One sentence.
     pub fn comment(&self) -> String {
         format!(
@@ -145,7 +145,7 @@ impl Encoding {
     ///
     /// # Errors
     /// Light beyond what the format holds, unless it ends at white; sizes that it cannot have.
-    pub fn encode(self, texels: &Texels, notes: &Notes<'_>) -> Result<Encoded> {
+    pub fn encode(self, texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
         self.check_range(texels, notes)?;
         match self {
             Self::Half => {
@@ -176,7 +176,7 @@ impl Encoding {
     }
 
     /// Nothing is clamped but at a white that was chosen.
-    fn check_range(self, texels: &Texels, notes: &Notes<'_>) -> Result<()> {
+    fn check_range(self, texels: &Texels, notes: &FileMetadata<'_>) -> Result<()> {
         let (most, peak) = (self.most(), texels.peak());
         if matches!(self, Self::Png16 { .. }) || peak <= most {
             return Ok(());

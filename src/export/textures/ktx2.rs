@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::bc6h;
-use super::encoding::{Encoded, Notes};
+use super::encoding::{Encoded, FileMetadata};
 use super::shared_exponent::RGB9E5;
 use super::texels::Texels;
 use crate::error::{Error, Result};
@@ -64,7 +64,7 @@ impl Packing {
 ///
 /// # Errors
 /// Memory that zstd does not get.
-pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &Notes<'_>) -> Result<Encoded> {
+pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadata<'_>) -> Result<Encoded> {
     let (packed, stored) = packing.pack(texels);
     let mut images = vec![packed];
     let mut smaller = texels.clone();
@@ -136,7 +136,7 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &Notes<'_>) 
 }
 
 /// Keys and values, by the keys' order.
-fn about(notes: &Notes<'_>) -> Vec<u8> {
+fn about(notes: &FileMetadata<'_>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (key, value) in [
         // Columns go right, rows down: (0, 0) is glTF's origin of coordinates.
@@ -166,7 +166,7 @@ mod tests {
     fn descriptors_are_those_of_the_formats() {
         let texels = Texels::black((1, 1));
         let words = |packing| -> Vec<u32> {
-            let notes = Notes {
+            let notes = FileMetadata {
                 quantity: crate::export::Quantity::Irradiance,
                 exposure_stops: 0.0,
                 what: String::new(),

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use self::content::Part;
-use self::encoding::Notes;
+use self::content::TextureLight;
+use self::encoding::FileMetadata;
 use self::index::{PlacedMap, Rectangle, TextureEntry, TextureIndex};
 use self::texels::Texels;
 use super::Quantity;
@@ -229,14 +229,14 @@ impl Writer<'_> {
             .transpose()
     }
 
-    fn parts(&mut self, stored: &StoredMap) -> Result<Vec<Part>> {
+    fn parts(&mut self, stored: &StoredMap) -> Result<Vec<TextureLight>> {
         let (parts, warning) = self.options.content.parts(stored)?;
         self.warnings.extend(warning);
         Ok(parts)
     }
 
     /// The values of a part of a map as they are written.
-    fn texels(&self, stored: &StoredMap, part: &Part) -> Texels {
+    fn texels(&self, stored: &StoredMap, part: &TextureLight) -> Texels {
         let factor = self.options.quantity.factor() * self.exposure_stops.exp2();
         Texels::new(&stored.map.chart, &part.irradiance, factor)
     }
@@ -246,13 +246,13 @@ impl Writer<'_> {
         &mut self,
         name: &str,
         texels: &Texels,
-        part: &Part,
+        part: &TextureLight,
         maps: Vec<PlacedMap>,
     ) -> Result<TextureEntry> {
         self.check()?;
         let file = format!("{name}.{}", self.options.encoding.extension());
         let location = self.folder.path().join(&file).display().to_string();
-        let notes = Notes {
+        let notes = FileMetadata {
             quantity: self.options.quantity,
             exposure_stops: self.exposure_stops,
             what: part.what(&maps),
@@ -290,7 +290,7 @@ impl Writer<'_> {
 /// A texture of an atlas that is being filled.
 struct Sheet {
     texels: Texels,
-    part: Part,
+    part: TextureLight,
     maps: Vec<PlacedMap>,
 }
 
@@ -352,7 +352,7 @@ impl TextureFolder {
 
 /// The parts of an index that tell what belongs to it.
 #[derive(Deserialize)]
-struct Known {
+struct KnownIndex {
     kind: String,
     textures: Vec<TextureEntry>,
 }
@@ -360,7 +360,7 @@ struct Known {
 /// Files of the export that lies in a folder; `None` where none of ours does.
 fn files_of_ours(path: &Path) -> Option<Vec<String>> {
     let bytes = files::read_file(&path.join(index::FILE_NAME), MAX_INDEX_BYTES).ok()?;
-    let known: Known = serde_json::from_slice(&bytes).ok()?;
+    let known: KnownIndex = serde_json::from_slice(&bytes).ok()?;
     if known.kind != index::KIND {
         return None;
     }

@@ -2,7 +2,7 @@
 
 use png::{BitDepth, ColorType, ScaledFloat, SrgbRenderingIntent};
 
-use super::encoding::{Encoded, Notes, Transfer};
+use super::encoding::{Encoded, FileMetadata, Transfer};
 use super::texels::Texels;
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
@@ -15,7 +15,7 @@ const WHITE: f64 = u16::MAX as f64;
 ///
 /// # Errors
 /// Sizes that the format cannot have.
-pub fn encode(texels: &Texels, transfer: Transfer, notes: &Notes<'_>) -> Result<Encoded> {
+pub fn encode(texels: &Texels, transfer: Transfer, notes: &FileMetadata<'_>) -> Result<Encoded> {
     let codes: Vec<[u16; 3]> = texels
         .values()
         .iter()
@@ -49,7 +49,7 @@ fn encoder<'a>(
     bytes: &'a mut Vec<u8>,
     (width, height): (usize, usize),
     transfer: Transfer,
-    notes: &Notes<'_>,
+    notes: &FileMetadata<'_>,
 ) -> std::result::Result<png::Encoder<'static, &'a mut Vec<u8>>, png::EncodingError> {
     let mut encoder = png::Encoder::new(bytes, width as u32, height as u32);
     encoder.set_color(ColorType::Rgb);

@@ -3,7 +3,7 @@
 use image::Rgb;
 use image::codecs::hdr::HdrEncoder;
 
-use super::encoding::{Encoded, Notes};
+use super::encoding::{Encoded, FileMetadata};
 use super::shared_exponent::RGBE;
 use super::texels::Texels;
 use crate::error::{Error, Result};
@@ -13,7 +13,7 @@ use crate::error::{Error, Result};
 ///
 /// # Errors
 /// None that is known of: it is written in memory.
-pub fn encode(texels: &Texels, notes: &Notes<'_>) -> Result<Encoded> {
+pub fn encode(texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
     let (width, height) = texels.size();
     let mut bytes = format!(
         "#?RADIANCE\nSOFTWARE=nephroid {}\nFORMAT=32-bit_rle_rgbe\n",

@@ -1,8 +1,8 @@
 //! What a picture draws: the objects in view, each by the pipelines that it calls for.
 
 use super::MapStyle;
-use super::objects::{Look, Objects};
-use super::pipelines::{Faces, PipelineFlags, PipelineKey, Writes};
+use super::objects::{Appearance, Objects};
+use super::pipelines::{Faces, PipelineFlags, PipelineKey, RenderTarget};
 use crate::eye_pass::View;
 
 /// An object drawn once.
@@ -15,7 +15,7 @@ pub(super) struct Draw {
 
 /// What objects are drawn as.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Manner {
+pub(super) struct DrawState {
     pub(super) style: MapStyle,
     /// Whether mirrors, polish and clear bodies show more than themselves.
     pub(super) has_chains: bool,
@@ -35,38 +35,38 @@ pub(super) struct Manner {
     pub(super) has_masks: bool,
 }
 
-impl Manner {
+impl DrawState {
     /// Whether an object is drawn by the pipelines of specular surfaces.
-    pub(super) fn is_specular(self, look: &Look) -> bool {
+    pub(super) fn is_specular(self, look: &Appearance) -> bool {
         self.style == MapStyle::Lit && self.has_chains && look.surface.is_specular()
     }
 
     /// How an object appears in the picture; `None` where it is left out.
-    pub(super) fn key(self, look: &Look) -> Option<PipelineKey> {
+    pub(super) fn key(self, look: &Appearance) -> Option<PipelineKey> {
         let writes = match self.style {
-            MapStyle::AsItIs => Writes::MapValue,
-            MapStyle::Inspected { what, .. } => Writes::Inspected(what),
-            MapStyle::Lit if self.is_specular(look) => Writes::Composed,
-            MapStyle::Lit => Writes::Own,
+            MapStyle::AsItIs => RenderTarget::MapValue,
+            MapStyle::Inspected { what, .. } => RenderTarget::Inspected(what),
+            MapStyle::Lit if self.is_specular(look) => RenderTarget::Composed,
+            MapStyle::Lit => RenderTarget::Own,
         };
-        let is_shape = matches!(writes, Writes::Inspected(what) if what.is_of_shape());
-        let is_left_out = look.surface.is_clear() && writes != Writes::Composed && !is_shape;
+        let is_shape = matches!(writes, RenderTarget::Inspected(what) if what.is_of_shape());
+        let is_left_out = look.surface.is_clear() && writes != RenderTarget::Composed && !is_shape;
         (!is_left_out).then(|| self.of(look, writes))
     }
 
     /// How an object appears in the traced picture: what hides others, and what is traced.
-    pub(super) fn traced_keys(self, look: &Look) -> Vec<PipelineKey> {
-        let writes: &[Writes] = if self.is_specular(look) {
-            &[Writes::Depth, Writes::Traced]
+    pub(super) fn traced_keys(self, look: &Appearance) -> Vec<PipelineKey> {
+        let writes: &[RenderTarget] = if self.is_specular(look) {
+            &[RenderTarget::Depth, RenderTarget::Traced]
         } else if !look.surface.is_clear() {
-            &[Writes::Depth]
+            &[RenderTarget::Depth]
         } else {
             &[]
         };
         writes.iter().map(|writes| self.of(look, *writes)).collect()
     }
 
-    fn of(self, look: &Look, writes: Writes) -> PipelineKey {
+    fn of(self, look: &Appearance, writes: RenderTarget) -> PipelineKey {
         let faces = if look.double_sided {
             Faces::Both
         } else {
@@ -74,19 +74,19 @@ impl Manner {
         };
         let how = PipelineFlags {
             has_texture: match writes {
-                Writes::Traced => self.has_tinted_glass,
+                RenderTarget::Traced => self.has_tinted_glass,
                 _ => look.has_texture,
             },
             is_scaled: self.is_scaled,
             traces_lights: self.traces_lights,
             has_bumps: match writes {
-                Writes::Traced => self.has_bumps,
+                RenderTarget::Traced => self.has_bumps,
                 _ => look.has_bumps,
             },
             has_sky: self.has_sky,
             parts_wavelengths: self.parts_wavelengths,
             has_mask: match writes {
-                Writes::Traced => self.has_masks,
+                RenderTarget::Traced => self.has_masks,
                 _ => look.has_mask(),
             },
             is_logarithmic: self.style.is_logarithmic(),
@@ -110,18 +110,19 @@ pub(super) struct DrawList {
 
 impl DrawList {
     /// The objects of `visible`, in order; what draws alike together.
-    pub(super) fn new(objects: &Objects, visible: &[usize], manner: Manner) -> Self {
+    pub(super) fn new(objects: &Objects, visible: &[usize], draw_state: DrawState) -> Self {
         let mut list = Self::default();
         let look = |object: usize| &objects.list[object];
-        let is_specular = |object: &&usize| manner.is_specular(look(**object));
+        let is_specular = |object: &&usize| draw_state.is_specular(look(**object));
         list.specular_objects = visible.iter().filter(is_specular).count();
         for &object in visible {
             let draw = |key| Draw { object, key };
-            list.surfaces.extend(manner.key(look(object)).map(draw));
+            list.surfaces.extend(draw_state.key(look(object)).map(draw));
             if list.specular_objects > 0 {
-                let keys = manner.traced_keys(look(object)).into_iter();
-                let (depths, traced): (Vec<_>, Vec<_>) =
-                    keys.map(draw).partition(|draw| draw.key.writes == Writes::Depth);
+                let keys = draw_state.traced_keys(look(object)).into_iter();
+                let (depths, traced): (Vec<_>, Vec<_>) = keys
+                    .map(draw)
+                    .partition(|draw| draw.key.writes == RenderTarget::Depth);
                 list.depths.extend(depths);
                 list.traced.extend(traced);
             }

@@ -43,7 +43,7 @@ use std::sync::Arc;
 
 use self::accumulation::Mean;
 use self::chains::ChainScene;
-use self::draws::Manner;
+use self::draws::DrawState;
 use self::draws::Sample;
 use self::geometry::Geometry;
 use self::maps::ShownMap;
@@ -392,8 +392,8 @@ impl Renderer {
     }
 
     /// How objects are drawn now.
-    fn manner(&self) -> Manner {
-        Manner {
+    fn draw_state(&self) -> DrawState {
+        DrawState {
             style: self.map_style,
             has_chains: self.chains != EffectSwitch::Off && self.refusal.is_none(),
             traces_lights: self.traces_lights && self.map_style == MapStyle::Lit && self.refusal.is_none(),

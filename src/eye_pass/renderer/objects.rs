@@ -17,7 +17,7 @@ use crate::scene::{InScene, Material, Scene, SurfaceKind};
 
 /// What an object looks like but for its map.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Look {
+pub(super) struct Appearance {
     /// How its material is treated.
     pub(super) surface: SurfaceKind,
     pub(super) double_sided: bool,
@@ -37,7 +37,7 @@ const MAX_GLASSES: usize = 128;
 /// All objects with the images they share.
 #[derive(Debug)]
 pub(super) struct Objects {
-    pub(super) list: Vec<Look>,
+    pub(super) list: Vec<Appearance>,
     pub(super) images: Images,
     pub(super) records: Storage,
     /// Each glass that parts wavelengths once.
@@ -67,7 +67,7 @@ impl Objects {
         let mut uploaded = self.images.set_scene(gpu, scene);
         self.texels_per_m.resize(2 * scene.objects.len(), None);
         self.list = (0..scene.objects.len())
-            .map(|object| Look::of(scene, object, geometry.rows(object)))
+            .map(|object| Appearance::of(scene, object, geometry.rows(object)))
             .collect();
         self.number_glasses(scene);
         uploaded += self.write_records(gpu);
@@ -159,7 +159,7 @@ impl Objects {
 
     /// Whether anything has holes.
     pub(super) fn has_masks(&self) -> bool {
-        self.list.iter().any(Look::has_mask)
+        self.list.iter().any(Appearance::has_mask)
     }
 
     /// Whether normals of anything are bent.
@@ -192,7 +192,7 @@ impl Objects {
     }
 }
 
-impl Look {
+impl Appearance {
     fn of(scene: &Scene, index: usize, [row_x, row_y, row_z]: [[f32; 4]; 3]) -> Self {
         let object = &scene.objects[index];
         let material = &scene.materials[object.material];

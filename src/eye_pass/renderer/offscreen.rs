@@ -119,10 +119,10 @@ impl Renderer {
 
     /// Pictures of a view, of whose pixels so many places are looked at: enough for all colours.
     fn pictures(&self, view: &View, places: u32) -> u32 {
-        let manner = self.manner();
-        let is_chain = |object: &usize| manner.is_specular(&self.objects.list[*object]);
+        let draw_state = self.draw_state();
+        let is_chain = |object: &usize| draw_state.is_specular(&self.objects.list[*object]);
         let has_chains = || visible_objects(&self.objects, view).iter().any(is_chain);
-        if manner.parts_wavelengths && has_chains() {
+        if draw_state.parts_wavelengths && has_chains() {
             MIN_PARTED.div_ceil(places) * places
         } else {
             places

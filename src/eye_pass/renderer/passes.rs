@@ -6,10 +6,10 @@ use glam::{DMat4, DVec3, DVec4};
 
 use super::bindings::bind_group;
 use super::chains::ChainScene;
-use super::draws::{Draw, DrawList, Manner, visible_objects};
+use super::draws::{Draw, DrawList, DrawState, visible_objects};
 use super::draws::{EyeQuality, Sample};
 use super::geometry::Segment;
-use super::pipelines::{PipelineKey, Writes};
+use super::pipelines::{PipelineKey, RenderTarget};
 use super::sky::Sky;
 use super::targets::{Targets, TracedTargets};
 use super::timing::Timing;
@@ -79,7 +79,7 @@ impl Renderer {
         let (composed, own): (Vec<Draw>, Vec<Draw>) = list
             .surfaces
             .iter()
-            .partition(|draw| draw.key.writes == Writes::Composed);
+            .partition(|draw| draw.key.writes == RenderTarget::Composed);
         self.draw_each(&mut pass, &composed);
         if let Some(chains) = &through_scene {
             pass.set_bind_group(1, chains, &[]);
@@ -105,7 +105,7 @@ impl Renderer {
             ..ChainLimits::default()
         };
         let start = scene.start(view, &limits, self.traces_lights);
-        let wavelengths = if self.manner().parts_wavelengths {
+        let wavelengths = if self.draw_state().parts_wavelengths {
             SeenWavelengths::of(&wavelengths::of_picture(sample.picture), &self.objects.glasses)
         } else {
             SeenWavelengths::default()
@@ -159,16 +159,16 @@ impl Renderer {
         let pixel_rad = view.camera.vertical_fov_rad / f64::from(view.height);
         self.objects
             .keep_budget(gpu, view.camera.position, pixel_rad, &visible);
-        let manner = self.manner();
-        let is_specular = |object: &usize| manner.is_specular(&self.objects.list[*object]);
-        if manner.traces_lights || visible.iter().any(is_specular) {
+        let draw_state = self.draw_state();
+        let is_specular = |object: &usize| draw_state.is_specular(&self.objects.list[*object]);
+        if draw_state.traces_lights || visible.iter().any(is_specular) {
             self.make_chain_scene(gpu);
         }
-        if let Some(scene) = self.chain_scene.as_mut().filter(|_| manner.traces_lights) {
+        if let Some(scene) = self.chain_scene.as_mut().filter(|_| draw_state.traces_lights) {
             scene.set_lights(gpu, &self.scene);
         }
         // What chains are traced through may have been refused.
-        let list = DrawList::new(&self.objects, &visible, self.manner());
+        let list = DrawList::new(&self.objects, &visible, self.draw_state());
         for draw in list.all() {
             self.surfaces.make(gpu, draw.key);
         }
@@ -209,23 +209,23 @@ impl Renderer {
 
     /// Makes what any view could call for, with maps as light.
     pub(super) fn make_everything(&mut self, gpu: &Gpu) {
-        let lit = |manner: Manner| Manner {
+        let lit = |draw_state: DrawState| DrawState {
             style: MapStyle::Lit,
-            ..manner
+            ..draw_state
         };
-        let is_specular = |look| lit(self.manner()).is_specular(look);
+        let is_specular = |look| lit(self.draw_state()).is_specular(look);
         let has_specular = self.objects.list.iter().any(is_specular);
         if has_specular {
             self.make_chain_scene(gpu);
         }
-        let manner = lit(self.manner());
+        let draw_state = lit(self.draw_state());
         for look in &self.objects.list {
             let traced = if has_specular {
-                manner.traced_keys(look)
+                draw_state.traced_keys(look)
             } else {
                 Vec::new()
             };
-            for key in manner.key(look).into_iter().chain(traced) {
+            for key in draw_state.key(look).into_iter().chain(traced) {
                 self.surfaces.make(gpu, key);
             }
         }

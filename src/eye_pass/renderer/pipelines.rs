@@ -21,7 +21,7 @@ pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth3
 
 /// What a pipeline writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) enum Writes {
+pub(super) enum RenderTarget {
     /// What an opaque surface sends by itself.
     Own,
     /// The same, lit straight from the lamps by shadow rays.
@@ -38,7 +38,7 @@ pub(super) enum Writes {
     Composed,
 }
 
-impl Writes {
+impl RenderTarget {
     /// Every one.
     pub(super) fn all() -> impl Iterator<Item = Self> {
         let others = [
@@ -80,7 +80,7 @@ pub(super) enum Faces {
 /// All that a pipeline is specialised by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct PipelineKey {
-    pub(super) writes: Writes,
+    pub(super) writes: RenderTarget,
     pub(super) faces: Faces,
     /// Of what shows itself only.
     surface: SurfaceKind,
@@ -110,17 +110,20 @@ pub(super) struct PipelineFlags {
 
 impl PipelineKey {
     /// The key of a kind of drawing. What does not matter to it is left out, so that fewer pipelines serve.
-    pub(super) fn new(writes: Writes, surface: SurfaceKind, faces: Faces, how: PipelineFlags) -> Self {
+    pub(super) fn new(writes: RenderTarget, surface: SurfaceKind, faces: Faces, how: PipelineFlags) -> Self {
         let is_lit = how.traces_lights && surface != SurfaceKind::Mirror;
         let writes = match writes {
-            Writes::Own if is_lit => Writes::OwnUnderLights,
+            RenderTarget::Own if is_lit => RenderTarget::OwnUnderLights,
             other => other,
         };
-        let shows_itself = matches!(writes, Writes::Own | Writes::OwnUnderLights);
+        let shows_itself = matches!(writes, RenderTarget::Own | RenderTarget::OwnUnderLights);
         let looks_up = match writes {
-            Writes::Own | Writes::OwnUnderLights => surface != SurfaceKind::Mirror,
-            Writes::Traced => true,
-            Writes::MapValue | Writes::Inspected(_) | Writes::Depth | Writes::Composed => false,
+            RenderTarget::Own | RenderTarget::OwnUnderLights => surface != SurfaceKind::Mirror,
+            RenderTarget::Traced => true,
+            RenderTarget::MapValue
+            | RenderTarget::Inspected(_)
+            | RenderTarget::Depth
+            | RenderTarget::Composed => false,
         };
         Self {
             writes,
@@ -132,14 +135,14 @@ impl PipelineKey {
             },
             how: PipelineFlags {
                 has_texture: how.has_texture && looks_up,
-                is_scaled: how.is_scaled && writes == Writes::Composed,
-                traces_lights: how.traces_lights && writes == Writes::Traced,
+                is_scaled: how.is_scaled && writes == RenderTarget::Composed,
+                traces_lights: how.traces_lights && writes == RenderTarget::Traced,
                 has_bumps: how.has_bumps
-                    && (writes == Writes::Traced || (shows_itself && surface == SurfaceKind::Mixed)),
-                has_sky: how.has_sky && writes == Writes::Traced,
-                parts_wavelengths: how.parts_wavelengths && writes == Writes::Traced,
+                    && (writes == RenderTarget::Traced || (shows_itself && surface == SurfaceKind::Mixed)),
+                has_sky: how.has_sky && writes == RenderTarget::Traced,
+                parts_wavelengths: how.parts_wavelengths && writes == RenderTarget::Traced,
                 has_mask: how.has_mask,
-                is_logarithmic: how.is_logarithmic && matches!(writes, Writes::Inspected(_)),
+                is_logarithmic: how.is_logarithmic && matches!(writes, RenderTarget::Inspected(_)),
             },
         }
     }
@@ -147,29 +150,29 @@ impl PipelineKey {
     /// Its fragment stage, if it has one.
     pub(super) fn entry_point(self) -> Option<&'static str> {
         match self.writes {
-            Writes::Own => Some("own"),
-            Writes::OwnUnderLights => Some("own_under_lights"),
-            Writes::MapValue => Some("map_value"),
-            Writes::Inspected(_) => Some("inspected"),
-            Writes::Depth => self.how.has_mask.then_some("masked_depth"),
-            Writes::Traced => Some("traced"),
-            Writes::Composed => Some("composed"),
+            RenderTarget::Own => Some("own"),
+            RenderTarget::OwnUnderLights => Some("own_under_lights"),
+            RenderTarget::MapValue => Some("map_value"),
+            RenderTarget::Inspected(_) => Some("inspected"),
+            RenderTarget::Depth => self.how.has_mask.then_some("masked_depth"),
+            RenderTarget::Traced => Some("traced"),
+            RenderTarget::Composed => Some("composed"),
         }
     }
 
     /// The shader module it is part of.
     pub(super) fn program(self) -> Program {
         match self.writes {
-            Writes::Own | Writes::MapValue | Writes::Depth => SURFACE,
-            Writes::OwnUnderLights => UNDER_LIGHTS,
-            Writes::Inspected(_) => INSPECTED,
-            Writes::Traced => match (self.how.parts_wavelengths, self.how.has_sky) {
+            RenderTarget::Own | RenderTarget::MapValue | RenderTarget::Depth => SURFACE,
+            RenderTarget::OwnUnderLights => UNDER_LIGHTS,
+            RenderTarget::Inspected(_) => INSPECTED,
+            RenderTarget::Traced => match (self.how.parts_wavelengths, self.how.has_sky) {
                 (false, false) => TRACED,
                 (false, true) => TRACED_UNDER_SKY,
                 (true, false) => PARTED,
                 (true, true) => PARTED_UNDER_SKY,
             },
-            Writes::Composed => COMPOSED,
+            RenderTarget::Composed => COMPOSED,
         }
     }
 
@@ -177,24 +180,27 @@ impl PipelineKey {
     pub(super) fn constants(self) -> Vec<(&'static str, f64)> {
         let mask = ("HAS_MASK", flag(self.how.has_mask));
         match self.writes {
-            Writes::Own | Writes::OwnUnderLights | Writes::MapValue | Writes::Depth => vec![
+            RenderTarget::Own
+            | RenderTarget::OwnUnderLights
+            | RenderTarget::MapValue
+            | RenderTarget::Depth => vec![
                 mask,
                 ("SURFACE", f64::from(surface_code(self.surface))),
                 ("HAS_TEXTURE", flag(self.how.has_texture)),
                 ("HAS_BUMPS", flag(self.how.has_bumps)),
             ],
-            Writes::Inspected(what) => vec![
+            RenderTarget::Inspected(what) => vec![
                 mask,
                 ("INSPECTED", f64::from(what.code())),
                 ("IS_LOGARITHMIC", flag(self.how.is_logarithmic)),
             ],
-            Writes::Traced => vec![
+            RenderTarget::Traced => vec![
                 mask,
                 ("HAS_TINTED_GLASS", flag(self.how.has_texture)),
                 ("TRACES_LIGHTS", flag(self.how.traces_lights)),
                 ("HAS_BUMPS", flag(self.how.has_bumps)),
             ],
-            Writes::Composed => vec![mask, ("IS_SCALED", flag(self.how.is_scaled))],
+            RenderTarget::Composed => vec![mask, ("IS_SCALED", flag(self.how.is_scaled))],
         }
     }
 }
@@ -294,9 +300,11 @@ impl SurfacePipelines {
 
     fn layout(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::PipelineLayout {
         let second = match key.writes {
-            Writes::Own | Writes::MapValue | Writes::Inspected(_) | Writes::Depth => None,
-            Writes::OwnUnderLights | Writes::Traced => self.traced_layout.as_ref(),
-            Writes::Composed => Some(&self.composed_layout),
+            RenderTarget::Own | RenderTarget::MapValue | RenderTarget::Inspected(_) | RenderTarget::Depth => {
+                None
+            }
+            RenderTarget::OwnUnderLights | RenderTarget::Traced => self.traced_layout.as_ref(),
+            RenderTarget::Composed => Some(&self.composed_layout),
         };
         let third = key.how.has_sky.then(|| sky::layout(gpu));
         let groups: Vec<_> = std::iter::once(&self.frame_layout)
@@ -311,7 +319,11 @@ impl SurfacePipelines {
         let module = &self.modules[key.program().name];
         let constants = key.constants();
         let target = [Some(wgpu::ColorTargetState::from(HDR_FORMAT))];
-        let targets = if writes == Writes::Depth { &[][..] } else { &target };
+        let targets = if writes == RenderTarget::Depth {
+            &[][..]
+        } else {
+            &target
+        };
         let fragment = key.entry_point().map(|entry_point| wgpu::FragmentState {
             module,
             entry_point: Some(entry_point),
@@ -322,7 +334,7 @@ impl SurfacePipelines {
             targets,
         });
         // Chains are traced once per pixel: where the surface is the nearest, which was drawn before.
-        let (depth_write, depth_compare) = if writes == Writes::Traced {
+        let (depth_write, depth_compare) = if writes == RenderTarget::Traced {
             (false, wgpu::CompareFunction::Equal)
         } else {
             (true, wgpu::CompareFunction::Greater)

@@ -1,7 +1,7 @@
 //! The eye pass's shader modules and what they share with Rust.
 
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
-use super::pipelines::{Faces, PipelineFlags, PipelineKey, Writes};
+use super::pipelines::{Faces, PipelineFlags, PipelineKey, RenderTarget};
 use super::tone_mapping;
 use super::uniforms::{
     Accumulation, ChainStart, DisplayWhite, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay,
@@ -163,10 +163,10 @@ pub fn specialisations() -> Vec<Specialisation> {
         constants: Vec::new(),
     };
     let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
-    for writes in Writes::all() {
+    for writes in RenderTarget::all() {
         for kind in KINDS {
             for flags in 0..64 {
-                let manner = PipelineFlags {
+                let draw_state = PipelineFlags {
                     has_texture: flags & 1 > 0,
                     is_scaled: flags & 1 > 0,
                     traces_lights: flags & 2 > 0,
@@ -176,7 +176,7 @@ pub fn specialisations() -> Vec<Specialisation> {
                     has_mask: flags & 32 > 0,
                     is_logarithmic: flags & 1 > 0,
                 };
-                let key = PipelineKey::new(writes, kind, Faces::Both, manner);
+                let key = PipelineKey::new(writes, kind, Faces::Both, draw_state);
                 all.extend(key.entry_point().map(|entry_point| Specialisation {
                     program: key.program().name,
                     entry_point,

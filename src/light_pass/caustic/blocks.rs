@@ -5,7 +5,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::prelude::*;
 
-use super::deposit::Placed;
+use super::deposit::PlacedSplat;
 use super::splat::{Coverage, Splat, Window, fold};
 use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -23,13 +23,13 @@ const ROWS_PER_STRIPE: usize = 16;
 
 /// Texels that a splat may add to, after folding at the map's borders.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Reach {
+pub(super) struct SplatBounds {
     /// First and last.
     columns: (u32, u32),
     rows: (u32, u32),
 }
 
-impl Reach {
+impl SplatBounds {
     /// On a map of the given size.
     pub(super) fn of(splat: &Splat, (width, height): (usize, usize)) -> Self {
         let (columns, rows) = splat.columns_and_rows();
@@ -76,7 +76,7 @@ fn folded((first, last): (i64, i64), centre: f64, size: usize) -> (u32, u32) {
 
 /// Adds splats to one level of a map.
 pub(super) fn add(
-    splats: &[&Placed],
+    splats: &[&PlacedSplat],
     flux: &mut FluxAccumulator,
     coverage: &impl Coverage,
     sampling: KernelSampling,
@@ -103,7 +103,12 @@ pub(super) fn add(
             || (Window::default(), Block::default()),
             |(window, block), task| {
                 let splats = task.iter().map(|key| splats[(key & 0xffff_ffff) as usize]);
-                block.clear(splats.clone().map(|placed| placed.reach).reduce(Reach::around));
+                block.clear(
+                    splats
+                        .clone()
+                        .map(|placed| placed.reach)
+                        .reduce(SplatBounds::around),
+                );
                 let ledger = add_all(
                     splats.map(|placed| &placed.splat),
                     coverage,
@@ -156,10 +161,10 @@ pub struct Block {
 }
 
 impl Block {
-    fn clear(&mut self, reach: Option<Reach>) {
+    fn clear(&mut self, reach: Option<SplatBounds>) {
         self.texels.clear();
         self.size = (0, 0);
-        if let Some(Reach { columns, rows }) = reach {
+        if let Some(SplatBounds { columns, rows }) = reach {
             let count = |range: (u32, u32)| (range.1 - range.0) as usize + 1;
             self.origin = (columns.0 as usize, rows.0 as usize);
             self.size = (count(columns), count(rows));

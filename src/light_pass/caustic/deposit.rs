@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-use super::blocks::{self, Reach};
+use super::blocks::{self, SplatBounds};
 use super::footprint::{Neighbours, footprint};
 use super::kernel::Profile;
 use super::lattice::{Lattice, TracedRow};
@@ -43,14 +43,14 @@ pub struct RowContext<'a> {
 
 /// Maps of both half sets of rays, or of all in one.
 #[derive(Debug)]
-pub struct Halves<'a> {
+pub struct HalfBuffers<'a> {
     /// Of every ray, or of every other one.
     pub first: &'a mut ReceiverMaps,
     /// Of the rest.
     pub second: Option<&'a mut ReceiverMaps>,
 }
 
-impl Halves<'_> {
+impl HalfBuffers<'_> {
     fn maps(&mut self, is_second: bool) -> &mut ReceiverMaps {
         match &mut self.second {
             Some(second) if is_second => second,
@@ -81,13 +81,13 @@ pub struct DepositReport {
 impl Depositor<'_> {
     /// Deposits rows of one face. Maps must have been touched for every receiver of the arrivals. Of neighbouring rays every
     /// other one goes to the second half set, where there is one.
-    pub fn deposit(&self, rows: &[RowContext], halves: &mut Halves) -> DepositReport {
+    pub fn deposit(&self, rows: &[RowContext], halves: &mut HalfBuffers) -> DepositReport {
         let parts: Vec<RowSplats> = rows
             .par_iter()
             .map(|row| self.splats_of(row, halves.first))
             .collect();
         let mut report = DepositReport::default();
-        let mut groups: BTreeMap<(bool, Receiver, u32), Vec<&Placed>> = BTreeMap::new();
+        let mut groups: BTreeMap<(bool, Receiver, u32), Vec<&PlacedSplat>> = BTreeMap::new();
         for part in &parts {
             report.ledger.merge(&part.ledger);
             report.statistics.merge(&part.statistics);
@@ -138,7 +138,7 @@ impl Depositor<'_> {
                 .and_then(|surface| self.place(arrival, &neighbours, surface, &unbent_area_m2, &mut made));
             match placed {
                 Some(placed) => {
-                    made.splats.push(Placed {
+                    made.splats.push(PlacedSplat {
                         is_second: (column + context.index) % 2 == 1,
                         ..placed
                     });
@@ -158,7 +158,7 @@ impl Depositor<'_> {
         surface: &Surface,
         unbent_area_m2: &dyn Fn() -> f64,
         made: &mut RowSplats,
-    ) -> Option<Placed> {
+    ) -> Option<PlacedSplat> {
         let map = surface.map;
         let mean = self
             .statistics
@@ -210,8 +210,8 @@ impl Depositor<'_> {
             0
         };
         let splat = if level > 0 { splat.at_level(level) } else { splat };
-        let reach = Reach::of(&splat, (map.chart.width >> level, map.chart.height >> level));
-        Some(Placed {
+        let reach = SplatBounds::of(&splat, (map.chart.width >> level, map.chart.height >> level));
+        Some(PlacedSplat {
             receiver: arrival.receiver,
             level: level as u32,
             is_second: false,
@@ -223,21 +223,21 @@ impl Depositor<'_> {
 
 /// A splat with where it goes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Placed {
+pub(super) struct PlacedSplat {
     receiver: Receiver,
     /// Of its map.
     level: u32,
     /// Whether its ray belongs to the second half set.
     is_second: bool,
     /// Where it may add.
-    pub(super) reach: Reach,
+    pub(super) reach: SplatBounds,
     pub(super) splat: Splat,
 }
 
 /// What one row gave.
 #[derive(Debug, Default)]
 struct RowSplats {
-    splats: Vec<Placed>,
+    splats: Vec<PlacedSplat>,
     ledger: LedgerSum,
     statistics: FootprintStatistics,
 }

@@ -3,8 +3,8 @@
 
 use glam::DVec2;
 
+use super::bivariate_normal::{BivariateNormal, Borders};
 use super::footprint::Ellipse;
-use super::joint::{Borders, Joint};
 use super::kernel::normal_distribution;
 use super::numeric::{exp, floor};
 
@@ -31,7 +31,7 @@ pub(super) struct Block {
 pub(super) struct Cornered {
     across: Axis,
     down: Axis,
-    joint: Joint,
+    joint: BivariateNormal,
 }
 
 /// Borders between texels along one axis.

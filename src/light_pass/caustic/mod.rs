@@ -1,11 +1,11 @@
 //! The caustic layer: light that met at least one specular surface (LS+D), by the paper's method.
 
+pub mod arrival_cache;
+mod bivariate_normal;
 mod blocks;
 pub mod deposit;
 pub mod footprint;
 mod gaussian;
-mod joint;
-pub mod kept;
 pub mod kernel;
 pub mod lattice;
 mod neighbourhood;

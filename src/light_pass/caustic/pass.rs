@@ -6,15 +6,15 @@ use cpu_time::ProcessTime;
 use rayon::prelude::*;
 use std::time::Instant;
 
-use super::deposit::{DepositReport, Depositor, Halves, RowContext};
-use super::kept::ArrivalCache;
+use super::arrival_cache::ArrivalCache;
+use super::deposit::{DepositReport, Depositor, HalfBuffers, RowContext};
 use super::lattice::{Lattice, TracedRow};
 use super::statistics::FootprintStatistics;
 use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::receiver_maps::ChartFor;
-use crate::light_pass::share::Share;
-use crate::light_pass::wavefront::overreach::PatchOvershoot;
+use crate::light_pass::shard_index::ShardIndex;
+use crate::light_pass::wavefront::overshoot::PatchOvershoot;
 use crate::progress::{Control, Progress, Stage};
 
 /// Rays that a band aims at: enough for all cores, and few enough that what they bring stays in their caches.
@@ -42,7 +42,7 @@ pub struct PassReport {
     /// Sizes of footprints.
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their rays.
-    pub overreaches: Vec<PatchOvershoot>,
+    pub overshoots: Vec<PatchOvershoot>,
     /// Luminous flux of all patches [counts], and of those that hold a part of the spectrum in one place.
     pub in_one_place: [i128; 2],
     /// Wall-clock and CPU seconds of tracing.
@@ -113,22 +113,22 @@ pub struct ProgressScope<'a> {
 
 /// Where the light of a pass comes from.
 #[derive(Clone, Copy, Debug)]
-pub enum Source<'a> {
+pub enum PassInput<'a> {
     /// From rays; what arrives is kept while it takes no more than so many bytes.
     Rays {
         /// Most memory to keep [bytes].
         keep_bytes: u64,
     },
     /// From rays of an earlier pass over the same lattice, or one with strides of 1.
-    Kept(&'a ArrivalCache),
+    Cached(&'a ArrivalCache),
 }
 
 /// Traces, or takes as traced before, and deposits the whole lattice of one light. Gives what arrived, where it was
 /// traced to the end and may be kept.
 pub fn run(
     depositor: &Depositor,
-    source: Source,
-    halves: &mut Halves,
+    source: PassInput,
+    halves: &mut HalfBuffers,
     chart_for: &ChartFor,
     listener: &ProgressScope,
 ) -> (PassReport, Option<ArrivalCache>) {
@@ -149,14 +149,14 @@ pub fn run(
             let traced: Vec<TracedRow> = (first_row..end)
                 .into_par_iter()
                 .map(|row| match source {
-                    Source::Rays { .. } => lattice.trace_row(face, row),
-                    Source::Kept(light) => light.row(lattice, face, row),
+                    PassInput::Rays { .. } => lattice.trace_row(face, row),
+                    PassInput::Cached(light) => light.row(lattice, face, row),
                 })
                 .collect();
             recorder.take(&traced);
             match source {
-                Source::Rays { .. } => report.trace_s.add(watch.elapsed()),
-                Source::Kept(_) => report.deposit_s.add(watch.elapsed()),
+                PassInput::Rays { .. } => report.trace_s.add(watch.elapsed()),
+                PassInput::Cached(_) => report.deposit_s.add(watch.elapsed()),
             }
             report.count(&traced);
             let watch = Stopwatch::start();
@@ -172,8 +172,8 @@ pub fn run(
             );
             report.deposit_s.add(watch.elapsed());
             let done = match source {
-                Source::Rays { .. } => report.rays,
-                Source::Kept(_) => report.splats,
+                PassInput::Rays { .. } => report.rays,
+                PassInput::Cached(_) => report.splats,
             };
             listener
                 .progress
@@ -181,7 +181,7 @@ pub fn run(
             first_row = end;
         }
     }
-    if let Source::Kept(light) = source {
+    if let PassInput::Cached(light) = source {
         report.ledger.merge(light.ledger());
     }
     (report, recorder.light)
@@ -192,8 +192,8 @@ pub fn run(
 /// A band needs its neighbours' rows: they are traced again for it, and booked by their own band only.
 pub fn run_share(
     depositor: &Depositor,
-    share: Share,
-    halves: &mut Halves,
+    share: ShardIndex,
+    halves: &mut HalfBuffers,
     chart_for: &ChartFor,
     listener: &ProgressScope,
 ) -> PassReport {
@@ -249,10 +249,10 @@ struct Recorder {
 }
 
 impl Recorder {
-    fn new(source: Source) -> Self {
+    fn new(source: PassInput) -> Self {
         let most_bytes = match source {
-            Source::Rays { keep_bytes } => keep_bytes,
-            Source::Kept(_) => 0,
+            PassInput::Rays { keep_bytes } => keep_bytes,
+            PassInput::Cached(_) => 0,
         };
         Self {
             light: (most_bytes > 0).then(ArrivalCache::default),
@@ -289,7 +289,7 @@ fn band_end(lattice: &Lattice, face: usize, first_row: usize) -> usize {
 )]
 fn deposit_band(
     depositor: &Depositor,
-    halves: &mut Halves,
+    halves: &mut HalfBuffers,
     chart_for: &ChartFor,
     mut rows: Vec<TracedRow>,
     traced: Vec<TracedRow>,
@@ -319,7 +319,7 @@ fn deposit_band(
 fn deposit_rows(
     depositor: &Depositor,
     contexts: &[RowContext],
-    halves: &mut Halves,
+    halves: &mut HalfBuffers,
     chart_for: &ChartFor,
     report: &mut PassReport,
 ) {
@@ -344,7 +344,7 @@ impl PassReport {
         self.cells += other.cells;
         self.receiver_queries += other.receiver_queries;
         self.statistics.merge(&other.statistics);
-        self.overreaches.extend(other.overreaches);
+        self.overshoots.extend(other.overshoots);
         let flux = self.in_one_place.iter_mut().zip(other.in_one_place);
         flux.for_each(|(sum, flux)| *sum += flux);
         self.trace_s.add(other.trace_s);

@@ -8,10 +8,10 @@ use rayon::prelude::*;
 use super::pass::{Seconds, Stopwatch};
 use crate::geometry::sampling::even_point;
 use crate::light_pass::emitter::Emitter;
-use crate::light_pass::item_buffer::{Hiding, ItemBuffer};
+use crate::light_pass::item_buffer::{HiddenCellPolicy, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::light_pass::photon::spheres::Spheres;
-use crate::plan::{LightReach, Reach};
+use crate::plan::{LightReach, SceneReach};
 use crate::scene::{Light, LightKind, Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
 use crate::transport::{Tracer, media_at};
@@ -109,7 +109,7 @@ pub struct ItemBufferStats {
 
 /// What all lights see.
 #[derive(Debug, Default)]
-pub struct Aim {
+pub struct LightVisibility {
     /// Lights with at least one marked cell.
     pub lights: Vec<VisibleLight>,
     /// What each light of the scene sees.
@@ -118,7 +118,7 @@ pub struct Aim {
     pub looks: Vec<ItemBufferStats>,
 }
 
-impl Aim {
+impl LightVisibility {
     /// Builds the item buffers of all lights that something specular could call for.
     ///
     /// `sizes`: whether lights are as large as they are, or shine from their middles.
@@ -140,21 +140,21 @@ impl Aim {
                 aiming,
             },
             sizes,
-            reach: Reach::of(scene),
+            reach: SceneReach::of(scene),
         };
         for light in 0..scene.lights.len() {
             let watch = Stopwatch::start();
-            let (sight, aimed, mut look) = looker.look(light);
+            let (sight, visible_light, mut look) = looker.look(light);
             look.seconds = watch.elapsed();
             aim.sights.push(sight);
             aim.looks.push(look);
-            aim.lights.extend(aimed);
+            aim.lights.extend(visible_light);
         }
         aim
     }
 }
 
-impl Aim {
+impl LightVisibility {
     /// Nodes, triangles and cells that were tested for all lights.
     pub fn tests(&self) -> u64 {
         self.looks.iter().map(|look| look.tests).sum()
@@ -211,7 +211,7 @@ impl EmissionCuller<'_> {
                 return None;
             }
             let launch = self.launch(emitter, casters)?;
-            let item_buffer = ItemBuffer::build(&launch, self.tracer, casters, Hiding::Drop);
+            let item_buffer = ItemBuffer::build(&launch, self.tracer, casters, HiddenCellPolicy::Drop);
             tests += item_buffer.tests;
             Some((launch, item_buffer))
         };
@@ -240,7 +240,7 @@ impl EmissionCuller<'_> {
             Some(view) => (view.launch, Some(view.item_buffer)),
             None => (self.launch(emitter, &specular)?, None),
         };
-        let item_buffer = ItemBuffer::build(&launch, self.tracer, &specular, Hiding::Keep);
+        let item_buffer = ItemBuffer::build(&launch, self.tracer, &specular, HiddenCellPolicy::Keep);
         Some(View {
             tests: tests + item_buffer.tests,
             launch,
@@ -285,7 +285,7 @@ struct ItemBufferBuilder<'a> {
     aimer: EmissionCuller<'a>,
     /// Whether lights have sizes.
     sizes: bool,
-    reach: Reach<'a>,
+    reach: SceneReach<'a>,
 }
 
 impl ItemBufferBuilder<'_> {
@@ -332,7 +332,7 @@ impl ItemBufferBuilder<'_> {
             return (sight, None, look);
         }
         let near = if visibly.is_empty() { &sight.seen } else { &visibly };
-        let aimed = VisibleLight {
+        let visible_light = VisibleLight {
             light,
             reach_m: reach_m(scene, near),
             launch: view.launch,
@@ -341,7 +341,7 @@ impl ItemBufferBuilder<'_> {
             casters,
             spheres: Arc::default(),
         };
-        (sight, Some(aimed), look)
+        (sight, Some(visible_light), look)
     }
 
     fn sight(&self, light: usize, casters: &[usize], seen: Vec<usize>) -> LightReach {

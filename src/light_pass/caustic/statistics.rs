@@ -9,12 +9,12 @@ use glam::DVec2;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FootprintStatistics {
     receivers: BTreeMap<Receiver, Sums>,
-    spots: Vec<Spot>,
+    spots: Vec<FootprintSample>,
 }
 
 /// Light on a part of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spot {
+pub struct FootprintSample {
     /// Whose map it is.
     pub receiver: Receiver,
     /// Least and largest map coordinates that it reaches; both within the map.
@@ -61,7 +61,7 @@ impl FootprintStatistics {
     }
 
     /// Notes where light lies: what covers nothing, or lies off the map, is left out.
-    pub fn add_spot(&mut self, spot: Spot) {
+    pub fn add_spot(&mut self, spot: FootprintSample) {
         let (low, high) = spot.bounds;
         let bounds = (
             low.clamp(DVec2::ZERO, DVec2::ONE),
@@ -69,7 +69,7 @@ impl FootprintStatistics {
         );
         let is_on_map = low.cmple(DVec2::ONE).all() && high.cmpge(DVec2::ZERO).all();
         if is_on_map && spot.flux_w > 0.0 && spot.map_share > 0.0 {
-            self.spots.push(Spot {
+            self.spots.push(FootprintSample {
                 bounds,
                 map_share: spot.map_share.max(MIN_SHARE),
                 ..spot
@@ -78,7 +78,7 @@ impl FootprintStatistics {
     }
 
     /// Where light lies on the map of a receiver.
-    pub fn spots(&self, receiver: Receiver) -> impl Iterator<Item = &Spot> {
+    pub fn spots(&self, receiver: Receiver) -> impl Iterator<Item = &FootprintSample> {
         self.spots.iter().filter(move |spot| spot.receiver == receiver)
     }
 

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::texel::{Lit, Texel};
+use super::texel::{LightsOfTexel, Texel};
 use crate::illumination::Chart;
 use crate::illumination::gutter::neighbours;
 use crate::illumination::lookup::blend;
@@ -13,7 +13,7 @@ const STEEP: f32 = 0.5;
 
 /// Values of small texels, into which some of a chart's are divided.
 #[derive(Clone, Debug)]
-pub struct Divided<T> {
+pub struct SubdividedTexels<T> {
     /// Small texels along a side of one.
     side: usize,
     /// Texels across and down the chart.
@@ -25,7 +25,7 @@ pub struct Divided<T> {
 
 const WHOLE: u32 = u32::MAX;
 
-impl<T: Copy> Divided<T> {
+impl<T: Copy> SubdividedTexels<T> {
     /// Divides the texels of a chart that are marked, and those around them.
     pub(super) fn new(chart: &Chart, side: usize, marked: &[bool], value: T) -> Self {
         let size = (chart.width, chart.height);
@@ -77,8 +77,8 @@ impl<T: Copy> Divided<T> {
         (begin != WHOLE).then(|| &self.values[begin as usize..][..self.side * self.side])
     }
 
-    pub(super) fn map<U>(self, f: impl Fn(T) -> U) -> Divided<U> {
-        Divided {
+    pub(super) fn map<U>(self, f: impl Fn(T) -> U) -> SubdividedTexels<U> {
+        SubdividedTexels {
             side: self.side,
             size: self.size,
             begins: self.begins,
@@ -87,7 +87,7 @@ impl<T: Copy> Divided<T> {
     }
 }
 
-impl Divided<Texel> {
+impl SubdividedTexels<Texel> {
     /// Whether a small texel asks for another look.
     pub(super) fn is_unclear(&self, small: usize) -> bool {
         let (width, height) = self.small_size();
@@ -96,7 +96,7 @@ impl Divided<Texel> {
     }
 }
 
-impl Divided<[f32; 3]> {
+impl SubdividedTexels<[f32; 3]> {
     /// E between the middles of small texels [W/m²], at a place of the map in [0, 1]; `None` where texels are whole.
     pub fn at(&self, uv: DVec2) -> Option<LinearSrgb> {
         let (width, height) = self.small_size();
@@ -121,7 +121,7 @@ impl Divided<[f32; 3]> {
 /// Whether light changes much between the neighbours of a texel.
 pub(super) fn is_steep(chart: &Chart, texels: &[Texel], texel: usize) -> bool {
     let around = neighbours(texel, chart.width, chart.height).chain([texel]);
-    let covered = around.filter(|&other| texels[other].lit != Lit::EMPTY);
+    let covered = around.filter(|&other| texels[other].lit != LightsOfTexel::EMPTY);
     let brightness = covered.map(|other| luminance(&texels[other].irradiance) as f32);
     let (low, high) = brightness.fold((f32::INFINITY, 0.0_f32), |(low, high), e| {
         (low.min(e), high.max(e))

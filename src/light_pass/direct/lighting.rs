@@ -3,13 +3,13 @@
 use glam::DVec3;
 
 use super::facet::SurfacePoint;
-use super::surroundings::Surroundings;
+use super::surroundings::MediumAround;
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, EmitterKind};
-use crate::transport::Taking;
+use crate::transport::DiffuseResponse;
 
 /// Light on its way to a point, whatever surface is there.
-pub struct Beam {
+pub struct IncidentLight {
     /// Unit.
     pub to_light: DVec3,
     /// To the light [m], infinite for a sun.
@@ -19,7 +19,7 @@ pub struct Beam {
     pub strength: LinearSrgb,
 }
 
-impl Beam {
+impl IncidentLight {
     /// From a source; `None` at its very place.
     pub fn new(emitter: &Emitter, point: DVec3) -> Option<Self> {
         Self::of_patch(emitter, point, 0.0)
@@ -49,7 +49,7 @@ impl Beam {
 }
 
 /// Light that a surface takes if nothing stands in its way.
-pub struct Arriving {
+pub struct UnshadowedLight {
     /// E that it would give there [W/m²].
     pub irradiance: LinearSrgb,
     /// Unit.
@@ -60,14 +60,14 @@ pub struct Arriving {
     pub open: f64,
 }
 
-impl Arriving {
+impl UnshadowedLight {
     /// What a beam gives a point; `None` where it is nothing, or comes to the wrong side. The light comes all the way
     /// through what is around its source.
     pub fn from_beam(
-        beam: &Beam,
+        beam: &IncidentLight,
         point: &SurfacePoint,
-        taking: &Taking,
-        within: &Surroundings,
+        taking: &DiffuseResponse,
+        within: &MediumAround,
     ) -> Option<Self> {
         if beam.to_light.dot(point.geometric_normal) < 0.0 {
             return None;

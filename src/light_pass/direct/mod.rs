@@ -24,11 +24,11 @@ use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Light, Material};
 use crate::transport::Tracer;
-use border::{Divided, is_steep};
+use border::{SubdividedTexels, is_steep};
 use facet::Facet;
-use lighting::{Arriving, Beam};
-use source::{Emission, Source};
-use texel::{Lit, Look, Part, Row, Sample, Texel, TexelSum, mark_of};
+use lighting::{IncidentLight, UnshadowedLight};
+use source::{DirectSource, Emission};
+use texel::{LargestOverlap, LightsOfTexel, Sample, SamplingDetail, Texel, TexelRow, TexelSum, mark_of};
 
 /// Moves all samples by a millionth of a texel, so that none lies on the diagonal of a square of two triangles, where
 /// both would count it.
@@ -40,7 +40,7 @@ pub struct DirectLayer {
     /// Mean E over the covered part of each texel [W/m²], gutters filled.
     pub irradiance: Vec<[f32; 3]>,
     /// The same of smaller texels, where light ends within little.
-    pub divided: Option<Divided<[f32; 3]>>,
+    pub divided: Option<SubdividedTexels<[f32; 3]>>,
     /// Any-hit queries made for it.
     pub shadow_rays: u64,
     /// False where it was cancelled: rows that are missing are black.
@@ -83,7 +83,7 @@ pub fn find_borders(
     let mut shadow_rays = 0;
     let of = |chart: &&Chart| {
         let baker = Baker::new(tracer, &sources, chart);
-        let mut seen = Seen::new(chart);
+        let mut seen = ChartStatistics::new(chart);
         baker.look_around(&mut seen, &|| (), control);
         shadow_rays += seen.shadow_rays;
         let texels = &seen.texels;
@@ -95,15 +95,15 @@ pub fn find_borders(
     Some((found?, shadow_rays))
 }
 
-fn sources(tracer: &Tracer, lights: &[Light]) -> Vec<Option<Source>> {
+fn sources(tracer: &Tracer, lights: &[Light]) -> Vec<Option<DirectSource>> {
     let lights = lights.iter().enumerate();
     lights
-        .map(|(index, light)| Source::new(light, tracer, index))
+        .map(|(index, light)| DirectSource::new(light, tracer, index))
         .collect()
 }
 
 /// Whether some lights have extent, and a glance may be enough for each of them.
-fn begins_with_glance(sources: &[Option<Source>]) -> bool {
+fn begins_with_glance(sources: &[Option<DirectSource>]) -> bool {
     let soft = sources
         .iter()
         .flatten()
@@ -116,14 +116,14 @@ fn begins_with_glance(sources: &[Option<Source>]) -> bool {
 }
 
 /// What was seen of a chart so far.
-struct Seen {
+struct ChartStatistics {
     width: usize,
     texels: Vec<Texel>,
     shadow_rays: u64,
     complete: bool,
 }
 
-impl Seen {
+impl ChartStatistics {
     fn new(chart: &Chart) -> Self {
         Self {
             width: chart.width,
@@ -133,7 +133,7 @@ impl Seen {
         }
     }
 
-    fn take(&mut self, rows: Vec<Row>) {
+    fn take(&mut self, rows: Vec<TexelRow>) {
         for (row, content) in rows.into_iter().enumerate() {
             self.count(&content);
             for (column, texel) in content.texels {
@@ -142,7 +142,7 @@ impl Seen {
         }
     }
 
-    fn take_small(&mut self, rows: Vec<Row>, divided: &mut Divided<Texel>) {
+    fn take_small(&mut self, rows: Vec<TexelRow>, divided: &mut SubdividedTexels<Texel>) {
         for (row, content) in rows.into_iter().enumerate() {
             self.count(&content);
             for (column, texel) in content.texels {
@@ -151,7 +151,7 @@ impl Seen {
         }
     }
 
-    fn count(&mut self, row: &Row) {
+    fn count(&mut self, row: &TexelRow) {
         self.shadow_rays += row.shadow_rays;
         self.complete &= !row.cancelled;
     }
@@ -160,7 +160,7 @@ impl Seen {
 struct Baker<'a> {
     tracer: &'a Tracer,
     /// By light; `None` where it sends nothing.
-    sources: &'a [Option<Source>],
+    sources: &'a [Option<DirectSource>],
     chart: &'a Chart,
     material: &'a Material,
     /// Triangles that reach each row: those of row r are `triangles[first[r]..first[r + 1]]`.
@@ -169,7 +169,7 @@ struct Baker<'a> {
 }
 
 impl<'a> Baker<'a> {
-    fn new(tracer: &'a Tracer, sources: &'a [Option<Source>], chart: &'a Chart) -> Self {
+    fn new(tracer: &'a Tracer, sources: &'a [Option<DirectSource>], chart: &'a Chart) -> Self {
         let size = DVec2::new(1.0, chart.height as f64);
         let reach = |uvs: &[DVec2; 3]| rows(uvs.map(|uv| uv * size), chart.height);
         let mut first = vec![0; chart.height + 1];
@@ -202,14 +202,14 @@ impl<'a> Baker<'a> {
     /// A coarse look everywhere or, where a glance is enough for what is seen whole or not at all, at the rest; then a fine
     /// one where light meets shadow within a texel or between neighbours, in smaller texels where it does so within little.
     fn bake(&self, smaller: Option<&Baker>, row_done: &(impl Fn() + Sync), control: &Control) -> DirectLayer {
-        let mut seen = Seen::new(self.chart);
+        let mut seen = ChartStatistics::new(self.chart);
         self.look_around(&mut seen, row_done, control);
         let texels = &seen.texels;
         let mut unclear: Vec<bool> = (0..texels.len())
             .map(|texel| texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.lit))
             .collect();
         let divided = smaller.map(|smaller| self.divide(smaller, &mut unclear, &mut seen, row_done, control));
-        let fine = self.pass(row_done, control, Look::FINE, |texel| unclear[texel]);
+        let fine = self.pass(row_done, control, SamplingDetail::FINE, |texel| unclear[texel]);
         seen.take(fine);
         let irradiance = seen.texels.into_iter().map(|texel| texel.irradiance);
         let mut irradiance: Vec<[f32; 3]> = irradiance.collect();
@@ -223,22 +223,22 @@ impl<'a> Baker<'a> {
     }
 
     /// The first look at every texel.
-    fn look_around(&self, seen: &mut Seen, row_done: &(impl Fn() + Sync), control: &Control) {
+    fn look_around(&self, seen: &mut ChartStatistics, row_done: &(impl Fn() + Sync), control: &Control) {
         seen.take(self.pass(row_done, control, self.first_look(), |_| true));
         if begins_with_glance(self.sources) {
             let texels = &seen.texels;
-            let coarse = self.pass(row_done, control, Look::COARSE, |texel| {
+            let coarse = self.pass(row_done, control, SamplingDetail::COARSE, |texel| {
                 texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.soft_lit)
             });
             seen.take(coarse);
         }
     }
 
-    fn first_look(&self) -> Look {
+    fn first_look(&self) -> SamplingDetail {
         if begins_with_glance(self.sources) {
-            Look::GLANCE
+            SamplingDetail::GLANCE
         } else {
-            Look::COARSE
+            SamplingDetail::COARSE
         }
     }
 
@@ -247,19 +247,21 @@ impl<'a> Baker<'a> {
         &self,
         smaller: &Baker,
         unclear: &mut [bool],
-        seen: &mut Seen,
+        seen: &mut ChartStatistics,
         row_done: &(impl Fn() + Sync),
         control: &Control,
-    ) -> Divided<Texel> {
+    ) -> SubdividedTexels<Texel> {
         let texels = &seen.texels;
         let steep = |texel: usize| is_steep(self.chart, texels, texel) && self.is_unclear(texels, texel);
         let steep: Vec<bool> = (0..unclear.len()).map(steep).collect();
         let side = smaller.chart.width / self.chart.width;
-        let mut divided = Divided::new(self.chart, side, &steep, Texel::DARK);
+        let mut divided = SubdividedTexels::new(self.chart, side, &steep, Texel::DARK);
         let is_there = |small: usize| divided.get(small).is_some();
         let rows = smaller.pass(row_done, control, self.first_look(), is_there);
         seen.take_small(rows, &mut divided);
-        let rows = smaller.pass(row_done, control, Look::SMALL, |small| divided.is_unclear(small));
+        let rows = smaller.pass(row_done, control, SamplingDetail::SMALL, |small| {
+            divided.is_unclear(small)
+        });
         seen.take_small(rows, &mut divided);
         for (texel, unclear) in unclear.iter_mut().enumerate() {
             let Some(small) = divided.within(texel) else {
@@ -281,7 +283,7 @@ impl<'a> Baker<'a> {
     }
 
     /// Whether other lights reach a neighbour, or a part of the texel.
-    fn meets_other(&self, texels: &[Texel], texel: usize, lit: impl Fn(&Texel) -> Lit) -> bool {
+    fn meets_other(&self, texels: &[Texel], texel: usize, lit: impl Fn(&Texel) -> LightsOfTexel) -> bool {
         let around = neighbours(texel, self.chart.width, self.chart.height);
         lit(&texels[texel]).differs(around.map(|other| lit(&texels[other])))
     }
@@ -290,16 +292,16 @@ impl<'a> Baker<'a> {
         &self,
         row_done: &(impl Fn() + Sync),
         control: &Control,
-        look: Look,
+        look: SamplingDetail,
         wanted: impl Fn(usize) -> bool + Sync,
-    ) -> Vec<Row> {
+    ) -> Vec<TexelRow> {
         (0..self.chart.height)
             .into_par_iter()
             .map(|row| {
                 if control.is_cancelled() {
-                    return Row {
+                    return TexelRow {
                         cancelled: true,
-                        ..Row::default()
+                        ..TexelRow::default()
                     };
                 }
                 let content = self.row(row, look, &wanted);
@@ -309,10 +311,10 @@ impl<'a> Baker<'a> {
             .collect()
     }
 
-    fn row(&self, row: usize, look: Look, wanted: &impl Fn(usize) -> bool) -> Row {
+    fn row(&self, row: usize, look: SamplingDetail, wanted: &impl Fn(usize) -> bool) -> TexelRow {
         let width = self.chart.width;
         let mut sums = vec![TexelSum::EMPTY; width];
-        let mut content = Row::default();
+        let mut content = TexelRow::default();
         for &triangle in &self.triangles[self.first[row]..self.first[row + 1]] {
             let Some(facet) = self.facet(triangle) else {
                 continue;
@@ -327,7 +329,7 @@ impl<'a> Baker<'a> {
             });
         }
         for (column, sum) in sums.iter_mut().enumerate() {
-            if let (true, Some(part)) = (sum.lit == Lit::EMPTY, sum.largest)
+            if let (true, Some(part)) = (sum.lit == LightsOfTexel::EMPTY, sum.largest)
                 && let Some(facet) = self.facet(part.triangle)
             {
                 let sample = self.sample(
@@ -339,7 +341,7 @@ impl<'a> Baker<'a> {
                 content.shadow_rays += sample.shadow_rays;
                 sum.add(sample, part.area_m2);
             }
-            if sum.lit != Lit::EMPTY {
+            if sum.lit != LightsOfTexel::EMPTY {
                 content.texels.push((column as u32, sum.finished()));
             }
         }
@@ -352,12 +354,12 @@ impl<'a> Baker<'a> {
         facet: &Facet,
         part: &Polygon,
         (texel, hash): (DVec2, u64),
-        look: Look,
+        look: SamplingDetail,
         sum: &mut TexelSum,
     ) -> u64 {
         let area_m2 = part.area() * facet.m2_per_texel2;
         if sum.largest.is_none_or(|largest| largest.area_m2 < area_m2) {
-            sum.largest = Some(Part {
+            sum.largest = Some(LargestOverlap {
                 triangle: facet.triangle,
                 area_m2,
                 middle: part.centroid(),
@@ -386,7 +388,7 @@ impl<'a> Baker<'a> {
         facet: &Facet,
         place: DVec2,
         (hash, index): (u64, usize),
-        look: (usize, Look),
+        look: (usize, SamplingDetail),
     ) -> Sample {
         let point = facet.at(place);
         let object = self.chart.object();
@@ -402,8 +404,8 @@ impl<'a> Baker<'a> {
             let Some(source) = source else { continue };
             match &source.emission {
                 Emission::Single(emitter) => {
-                    let arriving = Beam::new(emitter, point.position)
-                        .and_then(|beam| Arriving::from_beam(&beam, &point, &taking, &source.within));
+                    let arriving = IncidentLight::new(emitter, point.position)
+                        .and_then(|beam| UnshadowedLight::from_beam(&beam, &point, &taking, &source.within));
                     let Some(arriving) = arriving else { continue };
                     sample.shadow_rays += 1;
                     let ray = point.spawn(arriving.to_light);

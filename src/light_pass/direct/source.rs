@@ -11,15 +11,15 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 
 use super::facet::SurfacePoint;
-use super::lighting::{Arriving, Beam};
+use super::lighting::{IncidentLight, UnshadowedLight};
 use super::polygon::Polygon;
-use super::surroundings::Surroundings;
-use super::texel::Look;
+use super::surroundings::MediumAround;
+use super::texel::SamplingDetail;
 use crate::geometry::sampling::even_point;
 use crate::optics::LinearSrgb;
-use crate::scene::emitter::{Emitter, Places};
+use crate::scene::emitter::{Emitter, EmitterSampler};
 use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
-use crate::transport::{Taking, Tracer};
+use crate::transport::{DiffuseResponse, Tracer};
 
 /// Places of a light that are ready: a power of 2.
 const READY: usize = 1 << 13;
@@ -36,11 +36,11 @@ const BEFORE_LAMP: f64 = 1e-9;
 const SEED: u64 = 0x6c69_6768_7473;
 
 /// A light ready to be looked for.
-pub struct Source {
+pub struct DirectSource {
     /// Where its light comes from.
     pub emission: Emission,
     /// What the light goes through.
-    pub within: Surroundings,
+    pub within: MediumAround,
 }
 
 /// Where light comes from.
@@ -96,7 +96,7 @@ pub struct Gathered {
     pub blocked_rays: u64,
 }
 
-impl Source {
+impl DirectSource {
     /// A light of a scene, the `index`th that is looked for; `None` where it sends nothing.
     pub fn new(light: &Light, tracer: &Tracer, index: usize) -> Option<Self> {
         let scene = tracer.scene();
@@ -104,7 +104,7 @@ impl Source {
         let within = middle
             .as_ref()
             .and_then(|middle| middle.kind.position())
-            .map_or(Surroundings::VACUUM, |place| Surroundings::at(tracer, place));
+            .map_or(MediumAround::VACUUM, |place| MediumAround::at(tracer, place));
         let emission = if light.has_extent() {
             let shape = shape(light, scene);
             let has_image =
@@ -151,8 +151,8 @@ impl ManyPlaces {
             }
             _ => {
                 let places = match has_shape {
-                    true => Places::spread_evenly(light, scene),
-                    false => Places::new(light, scene),
+                    true => EmitterSampler::spread_evenly(light, scene),
+                    false => EmitterSampler::new(light, scene),
                 };
                 let all: Option<Vec<Emitter>> = squares().map(|square| places.sample(square)).collect();
                 Self::Emitters {
@@ -214,13 +214,13 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
     };
     Some(Shape {
         polygons,
-        area_m2: Places::new(light, scene).area_m2(),
+        area_m2: EmitterSampler::new(light, scene).area_m2(),
     })
 }
 
 impl Soft {
     /// The places of the light for one of the places of a texel, which a look has so many of.
-    pub fn run(&self, texel: u64, place: usize, (places, look): (usize, Look)) -> Range<usize> {
+    pub fn run(&self, texel: u64, place: usize, (places, look): (usize, SamplingDetail)) -> Range<usize> {
         let (ready, of_texel) = match self.places {
             ManyPlaces::Sky { .. } => (2 * READY_OF_SKY, look.samples_of_sky),
             _ => (READY, look.samples_of_lamp),
@@ -237,8 +237,8 @@ impl Soft {
         &self,
         tracer: &Tracer,
         point: &SurfacePoint,
-        (material, taking): (&Material, &Taking),
-        within: &Surroundings,
+        (material, taking): (&Material, &DiffuseResponse),
+        within: &MediumAround,
         run: Range<usize>,
     ) -> Gathered {
         let count = run.len() as f64;
@@ -246,7 +246,7 @@ impl Soft {
         for index in run.clone() {
             let arriving = self
                 .beam(index, &run, point, material)
-                .and_then(|beam| Arriving::from_beam(&beam, point, taking, within));
+                .and_then(|beam| UnshadowedLight::from_beam(&beam, point, taking, within));
             let Some(arriving) = arriving else { continue };
             sum.shadow_rays += 1;
             sum.open += arriving.open;
@@ -278,7 +278,7 @@ impl Soft {
         run: &Range<usize>,
         point: &SurfacePoint,
         material: &Material,
-    ) -> Option<Beam> {
+    ) -> Option<IncidentLight> {
         match &self.places {
             ManyPlaces::Emitters { all, area_m2 } => {
                 let patch_m2 = if self.shape.is_some() {
@@ -286,7 +286,7 @@ impl Soft {
                 } else {
                     area_m2 / run.len() as f64
                 };
-                Beam::of_patch(&all[index], point.position, patch_m2)
+                IncidentLight::of_patch(&all[index], point.position, patch_m2)
             }
             ManyPlaces::Sky {
                 sky,
@@ -304,7 +304,7 @@ impl Soft {
                 };
                 // Veach and Guibas, "Optimally combining sampling techniques", SIGGRAPH 1995: the balance heuristic.
                 let density_per_sr = 0.5 * (sky.density_per_sr(to_light) + surface.density_per_sr(to_light));
-                (density_per_sr > 0.0).then(|| Beam {
+                (density_per_sr > 0.0).then(|| IncidentLight {
                     to_light,
                     distance_m: f64::INFINITY,
                     across_beam: 1.0 / density_per_sr,
@@ -379,7 +379,13 @@ impl Shape {
 
 /// A ray towards a ball of even radiance, evenly by solid angle (Shirley, Wang and Zimmerman, "Monte Carlo techniques
 /// for direct lighting calculations", 1996); `None` within it.
-fn ball(centre: DVec3, radius_m: f64, radiance: LinearSrgb, point: DVec3, square: DVec2) -> Option<Beam> {
+fn ball(
+    centre: DVec3,
+    radius_m: f64,
+    radiance: LinearSrgb,
+    point: DVec3,
+    square: DVec2,
+) -> Option<IncidentLight> {
     let offset = centre - point;
     let distance_m = offset.length();
     let axis = offset.try_normalize().filter(|_| distance_m > radius_m)?;
@@ -395,7 +401,7 @@ fn ball(centre: DVec3, radius_m: f64, radiance: LinearSrgb, point: DVec3, square
     let within = (radius_m * radius_m - (distance_m * sideways).powi(2))
         .max(0.0)
         .sqrt();
-    Some(Beam {
+    Some(IncidentLight {
         to_light,
         distance_m: nearest - within,
         across_beam: TAU * cap,

@@ -8,13 +8,13 @@ use crate::transport::{Tracer, media_at};
 
 /// The medium around a lamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surroundings {
+pub struct MediumAround {
     /// Refractive index [1].
     pub ior: f64,
     volume: Option<Volume>,
 }
 
-impl Surroundings {
+impl MediumAround {
     /// Where nothing is.
     pub const VACUUM: Self = Self {
         ior: 1.0,

@@ -6,7 +6,7 @@ use crate::optics::LinearSrgb;
 
 /// How thoroughly a texel is looked at.
 #[derive(Clone, Copy, Debug)]
-pub struct Look {
+pub struct SamplingDetail {
     /// Places across and down.
     pub side: usize,
     /// Samples of a lamp with extent, over all places.
@@ -15,7 +15,7 @@ pub struct Look {
     pub samples_of_sky: usize,
 }
 
-impl Look {
+impl SamplingDetail {
     /// Where lights with extent are seen whole or not at all.
     pub const GLANCE: Self = Self::new(2, 8, 8);
     /// Where light is all there or all away, or fades little.
@@ -36,9 +36,9 @@ impl Look {
 
 /// Which lights reach a texel, small enough to be kept for a whole map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Lit(u32);
+pub struct LightsOfTexel(u32);
 
-impl Lit {
+impl LightsOfTexel {
     /// No surface is there.
     pub const EMPTY: Self = Self(0);
     /// Some samples see what others do not.
@@ -76,10 +76,10 @@ pub struct TexelSum {
     pub flux: LinearSrgb,
     /// Σ A [m²].
     pub area_m2: f64,
-    pub lit: Lit,
+    pub lit: LightsOfTexel,
     /// The same of lights with extent: mixed where one is partly hidden.
-    pub soft_lit: Lit,
-    pub largest: Option<Part>,
+    pub soft_lit: LightsOfTexel,
+    pub largest: Option<LargestOverlap>,
     /// Of lights with extent.
     pub soft: Spread,
 }
@@ -116,7 +116,7 @@ impl Spread {
 
 /// The largest part of a texel that is covered by one triangle: what is looked at where no sample lies on the surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Part {
+pub struct LargestOverlap {
     pub triangle: u32,
     pub area_m2: f64,
     pub middle: DVec2,
@@ -126,8 +126,8 @@ impl TexelSum {
     pub const EMPTY: Self = Self {
         flux: LinearSrgb::BLACK,
         area_m2: 0.0,
-        lit: Lit::EMPTY,
-        soft_lit: Lit::EMPTY,
+        lit: LightsOfTexel::EMPTY,
+        soft_lit: LightsOfTexel::EMPTY,
         largest: None,
         soft: Spread {
             count: 0.0,
@@ -142,7 +142,7 @@ impl TexelSum {
         self.lit = self.lit.and(sample.mask);
         self.soft_lit = match sample.soft_mask {
             Some(mask) => self.soft_lit.and(mask),
-            None => Lit::MIXED,
+            None => LightsOfTexel::MIXED,
         };
         self.soft.add(sample.soft);
     }
@@ -174,8 +174,8 @@ pub struct Sample {
 #[derive(Clone, Copy, Debug)]
 pub struct Texel {
     pub irradiance: [f32; 3],
-    pub lit: Lit,
-    pub soft_lit: Lit,
+    pub lit: LightsOfTexel,
+    pub soft_lit: LightsOfTexel,
     /// Whether lights with extent were looked for with too few samples.
     pub is_uncertain: bool,
 }
@@ -184,21 +184,21 @@ impl Texel {
     /// Where nothing was looked at.
     pub const DARK: Self = Self {
         irradiance: [0.0; 3],
-        lit: Lit::EMPTY,
-        soft_lit: Lit::EMPTY,
+        lit: LightsOfTexel::EMPTY,
+        soft_lit: LightsOfTexel::EMPTY,
         is_uncertain: false,
     };
 
     /// Whether it asks for another look: some of its neighbours or its parts are lit otherwise, or too little is known.
     pub fn is_unclear<Around: Iterator<Item = Self>>(&self, around: impl Fn() -> Around) -> bool {
-        let differs = |lit: fn(&Self) -> Lit| lit(self).differs(around().map(|other| lit(&other)));
+        let differs = |lit: fn(&Self) -> LightsOfTexel| lit(self).differs(around().map(|other| lit(&other)));
         self.is_uncertain || differs(|texel| texel.lit) || differs(|texel| texel.soft_lit)
     }
 }
 
 /// The covered texels of one row that were asked for, by column.
 #[derive(Debug, Default)]
-pub struct Row {
+pub struct TexelRow {
     pub texels: Vec<(u32, Texel)>,
     pub shadow_rays: u64,
     pub cancelled: bool,
@@ -212,11 +212,11 @@ mod tests {
     fn shadows_of_lights_64_apart_do_not_cancel() {
         let both = mark_of(0) ^ mark_of(64);
         for other in [0, mark_of(0), mark_of(64)] {
-            assert_eq!(Lit::EMPTY.and(both).and(other), Lit::MIXED);
+            assert_eq!(LightsOfTexel::EMPTY.and(both).and(other), LightsOfTexel::MIXED);
         }
         assert_ne!(
-            Lit::EMPTY.and(mark_of(32)),
-            Lit::EMPTY.and(mark_of(0) ^ mark_of(1))
+            LightsOfTexel::EMPTY.and(mark_of(32)),
+            LightsOfTexel::EMPTY.and(mark_of(0) ^ mark_of(1))
         );
     }
 }

@@ -15,11 +15,11 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::{DMat2, DVec2, DVec3};
 
-use self::search::{Piece, TexelSearch};
-use self::walk::{Walker, Way};
+use self::search::{LitCell, TexelSearch};
+use self::walk::{LightPathWalker, WalkedPath};
 use crate::geometry::sampling::even_point;
 use crate::light_pass::caustic::path::PathSignature;
-use crate::light_pass::caustic::setup::{Aim, CullMode, VisibleLight};
+use crate::light_pass::caustic::setup::{CullMode, LightVisibility, VisibleLight};
 use crate::light_pass::direct::bake_direct;
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
@@ -121,14 +121,21 @@ pub fn explain(
     scale_w_m2: f64,
     control: &Control,
 ) -> Explanation {
-    let aim = Aim::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, true);
+    let aim = LightVisibility::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, true);
     let negligible_w = NEGLIGIBLE * scale_w_m2 * target.area_m2;
     let mut found = Explanation {
         is_complete: true,
         ..Explanation::default()
     };
-    for aimed in &aim.lights {
-        explain_light(tracer, aimed, target, (limits, negligible_w), control, &mut found);
+    for visible_light in &aim.lights {
+        explain_light(
+            tracer,
+            visible_light,
+            target,
+            (limits, negligible_w),
+            control,
+            &mut found,
+        );
     }
     explain_direct(tracer, target, control, &mut found);
     let brightness = |path: &LightPath| path.irradiance.luminance();
@@ -141,14 +148,14 @@ pub fn explain(
 
 fn explain_light(
     tracer: &Tracer,
-    aimed: &VisibleLight,
+    visible_light: &VisibleLight,
     target: &Target,
     (limits, negligible_w): (Limits, f64),
     control: &Control,
     found: &mut Explanation,
 ) {
     let scene = tracer.scene();
-    let light = &scene.lights[aimed.light];
+    let light = &scene.lights[visible_light.light];
     let unit = light.of_unit_strength();
     let places = if light.has_extent() { PLACES } else { 1 };
     let strength = light.strength() * (1.0 / f64::from(places));
@@ -160,13 +167,13 @@ fn explain_light(
         let wavefront = match emitter {
             Some(None) => None,
             Some(Some(emitter)) => {
-                aimed.from_place(tracer, (ItemBufferKind::Equal, CullMode::Reachable), &emitter)
+                visible_light.from_place(tracer, (ItemBufferKind::Equal, CullMode::Reachable), &emitter)
             }
-            None => Some(aimed.clone()),
+            None => Some(visible_light.clone()),
         };
         let Some(wavefront) = wavefront else { continue };
         let searcher = TexelSearch {
-            walker: Walker {
+            walker: LightPathWalker {
                 tracer,
                 launch: &wavefront.launch,
                 target,
@@ -182,7 +189,7 @@ fn explain_light(
         found.is_complete &= search.is_complete;
         for pieces in hanging_together(search.pieces) {
             let way = pieces[0].way;
-            let Some(mut path) = path_of(&searcher.walker, aimed.light, &pieces) else {
+            let Some(mut path) = path_of(&searcher.walker, visible_light.light, &pieces) else {
                 continue;
             };
             path.irradiance = path.irradiance * strength;
@@ -200,7 +207,7 @@ fn explain_light(
 }
 
 /// Pieces that share a corner and go the same way.
-fn hanging_together(pieces: Vec<Piece>) -> Vec<Vec<Piece>> {
+fn hanging_together(pieces: Vec<LitCell>) -> Vec<Vec<LitCell>> {
     let mut groups: Vec<usize> = (0..pieces.len()).collect();
     fn root(groups: &mut [usize], mut at: usize) -> usize {
         while groups[at] != at {
@@ -217,7 +224,7 @@ fn hanging_together(pieces: Vec<Piece>) -> Vec<Vec<Piece>> {
             groups[a.max(b)] = a.min(b);
         }
     }
-    let mut together: Vec<Vec<Piece>> = Vec::new();
+    let mut together: Vec<Vec<LitCell>> = Vec::new();
     let mut number: HashMap<usize, usize> = HashMap::new();
     for (index, piece) in pieces.into_iter().enumerate() {
         let group = root(&mut groups, index);
@@ -231,12 +238,12 @@ fn hanging_together(pieces: Vec<Piece>) -> Vec<Vec<Piece>> {
 }
 
 /// The path of some pieces, for a light of strength 1.
-fn path_of(walker: &Walker<'_>, light: usize, pieces: &[Piece]) -> Option<LightPath> {
+fn path_of(walker: &LightPathWalker<'_>, light: usize, pieces: &[LitCell]) -> Option<LightPath> {
     let flux_w = pieces
         .iter()
         .fold(LinearSrgb::BLACK, |sum, piece| sum + piece.flux_w);
     let goal = walker.target.place;
-    let distance = |piece: &&Piece| piece.place.distance_squared(goal);
+    let distance = |piece: &&LitCell| piece.place.distance_squared(goal);
     let nearest = pieces.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     let way = meeting(walker, nearest)?;
     Some(LightPath {
@@ -249,7 +256,7 @@ fn path_of(walker: &Walker<'_>, light: usize, pieces: &[Piece]) -> Option<LightP
 }
 
 /// The ray of a piece that meets the point; the nearest one where none does, as beyond a bright line.
-fn meeting(walker: &Walker<'_>, piece: &Piece) -> Option<Way> {
+fn meeting(walker: &LightPathWalker<'_>, piece: &LitCell) -> Option<WalkedPath> {
     let goal = walker.target.place;
     let texel_m = walker.target.area_m2.sqrt();
     let way = |square: DVec2| walker.way(piece.face, square, piece.way);

@@ -7,7 +7,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::clip::{is_in_square, share_in_square};
-use super::walk::{Arrival, Walker};
+use super::walk::{Arrival, LightPathWalker};
 use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::item_buffer::{CELLS_PER_SIDE, ItemBuffer};
 use crate::optics::LinearSrgb;
@@ -34,7 +34,7 @@ const MARGIN: f64 = 1e-9;
 
 /// A cell that lights part of the texel.
 #[derive(Clone, Debug)]
-pub(super) struct Piece {
+pub(super) struct LitCell {
     pub(super) way: PathSignature,
     pub(super) face: usize,
     /// Corners of the cell, in steps of 2⁻³⁰.
@@ -46,7 +46,7 @@ pub(super) struct Piece {
     pub(super) flux_w: LinearSrgb,
 }
 
-impl Piece {
+impl LitCell {
     /// Side of the cell.
     pub(super) fn side(&self) -> f64 {
         square(self.corners[3]).x - square(self.corners[0]).x
@@ -55,8 +55,8 @@ impl Piece {
 
 /// All that lights the texel.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Found {
-    pub(super) pieces: Vec<Piece>,
+pub(super) struct SearchResult {
+    pub(super) pieces: Vec<LitCell>,
     pub(super) rays: u64,
     /// False where it was stopped, or took more rays than it may.
     pub(super) is_complete: bool,
@@ -109,18 +109,18 @@ fn square(point: [u64; 2]) -> DVec2 {
 }
 
 /// What one way makes of a cell.
-enum Verdict {
+enum CellVerdict {
     /// It lights nothing of the texel.
     Away,
     /// All of it is as smooth as it has to be.
-    Done(Vec<Piece>),
+    Done(Vec<LitCell>),
     /// It has to be halved.
     Halve,
 }
 
 /// A search for one wavefront.
 pub(super) struct TexelSearch<'a> {
-    pub(super) walker: Walker<'a>,
+    pub(super) walker: LightPathWalker<'a>,
     pub(super) item_buffer: &'a ItemBuffer,
     /// Flux on the texel that does not matter [W].
     pub(super) negligible_w: f64,
@@ -129,8 +129,8 @@ pub(super) struct TexelSearch<'a> {
 }
 
 impl TexelSearch<'_> {
-    pub(super) fn search(&self) -> Found {
-        let mut found = Found::default();
+    pub(super) fn search(&self) -> SearchResult {
+        let mut found = SearchResult::default();
         let mut known: HashMap<Point, Vec<Arrival>> = HashMap::new();
         let mut cells = self.first_cells();
         let first = cells.first().map_or(0, |cell| cell.level);
@@ -139,7 +139,7 @@ impl TexelSearch<'_> {
                 return found;
             }
             found.rays += self.look(&cells, &mut known);
-            let judged: Vec<(Vec<Piece>, Vec<Cell>)> = cells
+            let judged: Vec<(Vec<LitCell>, Vec<Cell>)> = cells
                 .par_iter()
                 .map(|cell| self.judge(cell, first, &known))
                 .collect();
@@ -196,7 +196,7 @@ impl TexelSearch<'_> {
         cell: &Cell,
         first: u32,
         known: &HashMap<Point, Vec<Arrival>>,
-    ) -> (Vec<Piece>, Vec<Cell>) {
+    ) -> (Vec<LitCell>, Vec<Cell>) {
         let arrivals = cell.points().map(|point| &known[&(cell.face, point)][..]);
         let mut ways: Vec<PathSignature> = arrivals.iter().copied().flatten().map(|a| a.way).collect();
         ways.sort_unstable();
@@ -208,9 +208,9 @@ impl TexelSearch<'_> {
         for way in ways {
             let at = arrivals.map(|arrivals| arrivals.iter().find(|arrival| arrival.way == way));
             match self.judge_way(cell, first, way, at) {
-                Verdict::Halve => must_halve = true,
-                Verdict::Away => done.push(way),
-                Verdict::Done(found) => {
+                CellVerdict::Halve => must_halve = true,
+                CellVerdict::Away => done.push(way),
+                CellVerdict::Done(found) => {
                     pieces.extend(found);
                     done.push(way);
                 }
@@ -222,7 +222,13 @@ impl TexelSearch<'_> {
         (pieces, halves)
     }
 
-    fn judge_way(&self, cell: &Cell, first: u32, way: PathSignature, at: [Option<&Arrival>; 5]) -> Verdict {
+    fn judge_way(
+        &self,
+        cell: &Cell,
+        first: u32,
+        way: PathSignature,
+        at: [Option<&Arrival>; 5],
+    ) -> CellVerdict {
         let there: Vec<&Arrival> = at.into_iter().flatten().collect();
         let is_whole = there.len() == at.len();
         let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
@@ -246,7 +252,7 @@ impl TexelSearch<'_> {
         let margin = DVec2::splat(2.0 * bend + 0.25 * extent);
         let is_near = (low - margin).cmplt(DVec2::ONE).all() && (high + margin).cmpgt(DVec2::ZERO).all();
         if !(is_near || extent.is_nan()) {
-            return Verdict::Away;
+            return CellVerdict::Away;
         }
         let side = cell.side() as f64 / (1_u64 << FINEST) as f64;
         let brightest = there
@@ -256,16 +262,16 @@ impl TexelSearch<'_> {
         let is_negligible = brightest * side * side <= self.negligible_w || cell.level + 2 > FINEST;
         let is_smooth = is_whole && extent <= FINE_TEXELS && bend <= STRAIGHT_TEXELS;
         if is_smooth {
-            Verdict::Done(self.whole(cell, way, at, side))
+            CellVerdict::Done(self.whole(cell, way, at, side))
         } else if is_negligible {
-            Verdict::Done(self.parts(cell, way, at, side))
+            CellVerdict::Done(self.parts(cell, way, at, side))
         } else {
-            Verdict::Halve
+            CellVerdict::Halve
         }
     }
 
     /// The light of a cell that one way fills: four triangles around its middle.
-    fn whole(&self, cell: &Cell, way: PathSignature, at: [Option<&Arrival>; 5], side: f64) -> Vec<Piece> {
+    fn whole(&self, cell: &Cell, way: PathSignature, at: [Option<&Arrival>; 5], side: f64) -> Vec<LitCell> {
         let [Some(a), Some(b), Some(c), Some(d), Some(middle)] = at else {
             return Vec::new();
         };
@@ -279,7 +285,7 @@ impl TexelSearch<'_> {
     }
 
     /// The light of a cell that a way fills in part, by its points.
-    fn parts(&self, cell: &Cell, way: PathSignature, at: [Option<&Arrival>; 5], side: f64) -> Vec<Piece> {
+    fn parts(&self, cell: &Cell, way: PathSignature, at: [Option<&Arrival>; 5], side: f64) -> Vec<LitCell> {
         let (mut flux_w, mut ray) = (LinearSrgb::BLACK, None);
         for (point, arrival) in at.into_iter().enumerate() {
             if let Some(arrival) = arrival.filter(|arrival| is_in_square(arrival.place)) {
@@ -296,10 +302,10 @@ impl TexelSearch<'_> {
         way: PathSignature,
         (point, place): (usize, DVec2),
         flux_w: LinearSrgb,
-    ) -> Vec<Piece> {
+    ) -> Vec<LitCell> {
         let points = cell.points();
         let [a, b, c, d, _] = points;
-        let piece = Piece {
+        let piece = LitCell {
             way,
             face: cell.face,
             corners: [a, b, c, d],

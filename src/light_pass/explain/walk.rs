@@ -27,7 +27,7 @@ pub(super) struct Arrival {
 
 /// A whole way.
 #[derive(Clone, Debug)]
-pub(super) struct Way {
+pub(super) struct WalkedPath {
     pub(super) start: DVec3,
     pub(super) vertices: Vec<PathVertex>,
     pub(super) end: DVec3,
@@ -35,7 +35,7 @@ pub(super) struct Way {
 }
 
 /// Follows rays of one wavefront to one target.
-pub(super) struct Walker<'a> {
+pub(super) struct LightPathWalker<'a> {
     pub(super) tracer: &'a Tracer,
     pub(super) launch: &'a Launch,
     pub(super) target: &'a Target,
@@ -61,7 +61,7 @@ struct Step {
     before: Option<usize>,
 }
 
-impl Walker<'_> {
+impl LightPathWalker<'_> {
     /// All light that arrives of a ray, brightest way first among equals of order.
     pub(super) fn arrivals(&self, face: usize, square: DVec2) -> Vec<Arrival> {
         let mut found = Vec::new();
@@ -70,7 +70,7 @@ impl Walker<'_> {
     }
 
     /// The way that the ray takes whose light arrives so.
-    pub(super) fn way(&self, face: usize, square: DVec2, wanted: PathSignature) -> Option<Way> {
+    pub(super) fn way(&self, face: usize, square: DVec2, wanted: PathSignature) -> Option<WalkedPath> {
         let mut found = None;
         self.walk(face, square, |arrival, end, last, steps| {
             if arrival.way == wanted {
@@ -82,7 +82,7 @@ impl Walker<'_> {
                     next = step.before;
                 }
                 vertices.reverse();
-                found = Some(Way {
+                found = Some(WalkedPath {
                     start: self.launch.ray(face, square).origin,
                     vertices,
                     end,

@@ -25,7 +25,7 @@ pub struct Element {
 
 /// The part of an element on one triangle.
 #[derive(Clone, Copy, Debug)]
-struct Part {
+struct ElementTriangle {
     triangle: u32,
     /// Share of the element's area up to its end.
     until: f64,
@@ -35,13 +35,13 @@ struct Part {
 #[derive(Clone, Debug)]
 pub struct Elements {
     all: Vec<Element>,
-    parts: Vec<Part>,
+    parts: Vec<ElementTriangle>,
     /// Those of texel t are `all[first[t]..first[t + 1]]`.
     first: Vec<u32>,
 }
 
 /// A triangle's share of a texel, while they are collected.
-struct Cut {
+struct TriangleShare {
     texel: u32,
     piece: u32,
     triangle: u32,
@@ -73,7 +73,7 @@ impl Elements {
         elements
     }
 
-    fn push(&mut self, group: &[Cut]) {
+    fn push(&mut self, group: &[TriangleShare]) {
         let area_m2: f64 = group.iter().map(|cut| cut.area_m2).sum();
         let middle: DVec2 = group.iter().map(|cut| cut.middle * cut.area_m2).sum();
         self.all.push(Element {
@@ -86,7 +86,7 @@ impl Elements {
         let mut sum_m2 = 0.0;
         for cut in group {
             sum_m2 += cut.area_m2;
-            self.parts.push(Part {
+            self.parts.push(ElementTriangle {
                 triangle: cut.triangle,
                 until: sum_m2 / area_m2,
             });
@@ -131,7 +131,7 @@ impl Elements {
     }
 }
 
-fn cuts(mesh: &Mesh, chart: &Chart, pieces: &[u32]) -> Vec<Cut> {
+fn cuts(mesh: &Mesh, chart: &Chart, pieces: &[u32]) -> Vec<TriangleShare> {
     let size = DVec2::new(chart.width as f64, chart.height as f64);
     let mut cuts = Vec::new();
     for (triangle, uvs) in chart.corner_uvs.iter().enumerate() {
@@ -146,7 +146,7 @@ fn cuts(mesh: &Mesh, chart: &Chart, pieces: &[u32]) -> Vec<Cut> {
             for_each_texel_in_row(corners, row, chart.width, |column, part| {
                 let area_m2 = part.area() * (twice_m2 / twice_texel2);
                 if area_m2 > 0.0 {
-                    cuts.push(Cut {
+                    cuts.push(TriangleShare {
                         texel: (row * chart.width + column) as u32,
                         piece: pieces[triangle],
                         triangle: triangle as u32,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::grid::Grid;
 use super::path::{Follower, Limits};
-use super::trace::{Batch, Link, Pass, Row, Stance, TraceCounts};
+use super::trace::{Batch, ElementPoints, GatherPass, Link, LinkRange, TraceCounts};
 use crate::geometry::enclosure;
 use crate::illumination::{Chart, Receiver, Side};
 use crate::progress::{Control, Progress};
@@ -24,12 +24,12 @@ pub const MAX_PASSES: u8 = 9;
 
 /// Which grid a surface's light comes from.
 #[derive(Clone, Debug)]
-pub struct Places {
+pub struct SurfaceGrids {
     /// Number of the grid, by receiver.
     by_receiver: Vec<Option<u32>>,
 }
 
-impl Places {
+impl SurfaceGrids {
     /// The grid that a ray meets.
     pub fn grid_of(&self, hit: &SurfaceHit, side: Side) -> Option<usize> {
         self.by_receiver[Receiver::new(hit.object, side).index()].map(|grid| grid as usize)
@@ -40,12 +40,12 @@ impl Places {
 #[derive(Clone, Debug)]
 pub struct Network {
     grids: Vec<Grid>,
-    places: Places,
-    stances: Vec<Stance>,
+    places: SurfaceGrids,
+    stances: Vec<ElementPoints>,
     closed: Vec<bool>,
     batches: Vec<Vec<Link>>,
     /// By pass, then by element: the batch that it is in, and where.
-    rows: Vec<Vec<Option<(u32, Row)>>>,
+    rows: Vec<Vec<Option<(u32, LinkRange)>>>,
     counts: TraceCounts,
 }
 
@@ -71,8 +71,8 @@ impl Network {
         };
         Self {
             grids,
-            places: Places { by_receiver },
-            stances: vec![Stance::Unknown; first],
+            places: SurfaceGrids { by_receiver },
+            stances: vec![ElementPoints::Unknown; first],
             closed: (0..scene.objects.len()).into_par_iter().map(is_closed).collect(),
             batches: Vec::new(),
             rows: Vec::new(),
@@ -93,7 +93,7 @@ impl Network {
     /// Whether an element lies within a solid, or nothing was seen from it: its light is not for others to go by.
     pub fn is_hidden(&self, element: usize) -> bool {
         let sees_nothing = |pass: u8| self.row(element, pass).is_none_or(|(_, kept)| kept == 0);
-        self.stances[element] == Stance::Inside || (0..MIN_PASSES).all(sees_nothing)
+        self.stances[element] == ElementPoints::Inside || (0..MIN_PASSES).all(sees_nothing)
     }
 
     /// Links of an element in a pass, and its rays that count; `None` where it was not traced.
@@ -154,7 +154,7 @@ impl Network {
                 continue;
             }
             let rays = if pass == 0 { 0 } else { Self::rays_after(pass) };
-            let work = Pass {
+            let work = GatherPass {
                 follower: Follower {
                     tracer,
                     limits: Limits { max_depth },

@@ -20,7 +20,7 @@ pub struct Limits {
 
 /// What a ray found.
 #[derive(Clone, Debug, Default)]
-pub struct Found {
+pub struct PathEnd {
     /// Segments that were searched.
     pub segments: u64,
     /// Share of the radiance that was given up.
@@ -46,9 +46,9 @@ impl Follower<'_> {
         mut media: MediumStack,
         choice: impl Fn(u32) -> DVec2,
         mut land: impl FnMut(&SurfaceHit, Side, LinearSrgb),
-    ) -> Found {
+    ) -> PathEnd {
         let scene = self.tracer.scene();
-        let mut found = Found::default();
+        let mut found = PathEnd::default();
         let mut weight = LinearSrgb::WHITE;
         for depth in 0..=self.limits.max_depth {
             found.segments += 1;

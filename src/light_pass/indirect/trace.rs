@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 
 use super::grid::{Grid, cosine_direction};
-use super::network::Places;
+use super::network::SurfaceGrids;
 use super::path::Follower;
 use crate::geometry::sampling::even_point;
 use crate::optics::LinearSrgb;
@@ -24,7 +24,7 @@ pub struct Link {
 
 /// Where the links of one element in one pass are.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Row {
+pub struct LinkRange {
     /// Place of the first within its batch.
     pub first: u64,
     /// Their number.
@@ -39,14 +39,14 @@ pub struct Batch {
     /// Links of all of them.
     pub links: Vec<Link>,
     /// One for each of them, in their order, with how it is looked from.
-    pub rows: Vec<(Row, Stance)>,
+    pub rows: Vec<(LinkRange, ElementPoints)>,
     /// What it took.
     pub counts: TraceCounts,
 }
 
 /// Which of an element's points send rays: parts of a surface inside a solid do not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Stance {
+pub enum ElementPoints {
     /// Nothing was looked at yet.
     #[default]
     Unknown,
@@ -85,11 +85,11 @@ const CHUNK: usize = 32;
 const MAX_HALVINGS: u32 = 3;
 
 /// All that tracing needs.
-pub struct Pass<'a> {
+pub struct GatherPass<'a> {
     pub follower: Follower<'a>,
     pub grids: &'a [Grid],
-    pub places: &'a Places,
-    pub stances: &'a [Stance],
+    pub places: &'a SurfaceGrids,
+    pub stances: &'a [ElementPoints],
     /// Whether each object's mesh encloses space.
     pub closed: &'a [bool],
     pub seed: u64,
@@ -104,7 +104,7 @@ struct RayEnd {
     within: Option<bool>,
 }
 
-impl Pass<'_> {
+impl GatherPass<'_> {
     /// Traces for some elements; `None` where it was cancelled.
     pub fn run(&self, elements: &[u32], (progress, control): (&dyn Progress, &Control)) -> Option<Batch> {
         let has_bodies = self.has_bodies();
@@ -128,9 +128,9 @@ impl Pass<'_> {
         let mut all = Batch::default();
         for part in parts? {
             let before = all.links.len() as u64;
-            let moved = |(row, stance): (Row, Stance)| {
+            let moved = |(row, stance): (LinkRange, ElementPoints)| {
                 let first = row.first + before;
-                (Row { first, ..row }, stance)
+                (LinkRange { first, ..row }, stance)
             };
             all.rows.extend(part.rows.into_iter().map(moved));
             all.links.extend(part.links);
@@ -170,11 +170,11 @@ impl Pass<'_> {
             }
         }
         let stance = match self.stances[number] {
-            Stance::Unknown => stance(&ends),
+            ElementPoints::Unknown => stance(&ends),
             known => known,
         };
         let kept = self.keep(stance, &ends, first_link, part);
-        let row = Row {
+        let row = LinkRange {
             first: first_link as u64,
             links: (part.links.len() - first_link) as u32,
             kept,
@@ -183,8 +183,8 @@ impl Pass<'_> {
     }
 
     /// Drops the links of rays that began on the wrong side; returns how many rays are left.
-    fn keep(&self, stance: Stance, ends: &[RayEnd], first_link: usize, part: &mut Batch) -> u32 {
-        let wanted = |end: &RayEnd| end.within.is_some() == (stance == Stance::Inside);
+    fn keep(&self, stance: ElementPoints, ends: &[RayEnd], first_link: usize, part: &mut Batch) -> u32 {
+        let wanted = |end: &RayEnd| end.within.is_some() == (stance == ElementPoints::Inside);
         if !ends.iter().all(wanted) {
             let links: Vec<Link> = ends
                 .iter()
@@ -259,13 +259,13 @@ impl Pass<'_> {
 }
 
 /// Outside, unless all points lie within a solid, or most do and its inside is drawn.
-fn stance(ends: &[RayEnd]) -> Stance {
+fn stance(ends: &[RayEnd]) -> ElementPoints {
     let within = ends.iter().filter(|end| end.within.is_some()).count();
     let is_drawn = ends.iter().any(|end| end.within == Some(true));
     if within > 0 && (within == ends.len() || is_drawn && 2 * within > ends.len()) {
-        Stance::Inside
+        ElementPoints::Inside
     } else {
-        Stance::Outside
+        ElementPoints::Outside
     }
 }
 

@@ -20,7 +20,7 @@ use rayon::prelude::*;
 
 use super::launch::LAMP_DIMENSION;
 use super::spectrum::{Hue, PhotonSpectrum};
-use super::survey::{MIN_PHOTONS, Survey, Surveyor};
+use super::survey::{MIN_PHOTONS, PhotonSurvey, Surveyor};
 use super::walk::WAVELENGTH_DIMENSION;
 use crate::geometry::sampling::{even_point, in_square};
 use crate::illumination::Receiver;
@@ -64,7 +64,7 @@ pub(super) struct Step {
 
 /// How far light arrives from that of the middle of its lamp and of the middle wavelength [texels].
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Moves {
+pub(super) struct BundleOffsets {
     /// From the end of either half-axis of a lamp with a size.
     pub(super) lamp: [Vec2; 2],
     /// At the first and the last wavelength of light that is parted.
@@ -80,7 +80,7 @@ pub(super) struct Origin {
     pub(super) ends: [f64; 2],
 }
 
-impl Moves {
+impl BundleOffsets {
     fn at(&self, origin: &Origin) -> DVec2 {
         let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
         let [first, last] = self.hues.map(|moved| moved.as_dvec2());
@@ -118,7 +118,7 @@ pub(super) struct Bundle {
     /// Where the light of the triangle's corners arrives [texels].
     pub(super) corners: [Vec2; 3],
     /// How far from there it arrives otherwise.
-    pub(super) moves: Moves,
+    pub(super) moves: BundleOffsets,
     /// Mean flux of a photon of the triangle [W per channel if it were the only photon].
     pub(super) flux_w: [f32; 3],
 }
@@ -200,15 +200,15 @@ impl Bundles {
         }
         let survey = |cell| surveyor.survey(cell, photons, MAX_BUNDLES / cells);
         let tried = |cell: usize| cell.is_multiple_of(TRIED).then(|| survey(cell));
-        let tried: Vec<Option<Survey>> = (0..cells).into_par_iter().map(tried).collect();
-        let of_tried = |flux_w: fn(&Survey) -> f64| tried.iter().flatten().map(flux_w).sum::<f64>();
+        let tried: Vec<Option<PhotonSurvey>> = (0..cells).into_par_iter().map(tried).collect();
+        let of_tried = |flux_w: fn(&PhotonSurvey) -> f64| tried.iter().flatten().map(flux_w).sum::<f64>();
         let is_worth_it =
             of_tried(|survey| survey.carried_w) > MIN_CARRIED * of_tried(|survey| survey.arriving_w);
         if !is_worth_it {
             return Self::default();
         }
         let surveyed = tried.into_par_iter().enumerate();
-        let surveyed: Vec<Survey> = surveyed
+        let surveyed: Vec<PhotonSurvey> = surveyed
             .map(|(cell, known)| known.unwrap_or_else(|| survey(cell)))
             .collect();
         let squares: Vec<Square> = surveyed.into_iter().flat_map(|survey| survey.squares).collect();
@@ -268,7 +268,7 @@ impl Bundles {
         mut take: impl FnMut(Option<usize>, Receiver, &[FluxTriangle]),
     ) {
         let mut drawn = 0..;
-        let mut waiting = Waiting::new();
+        let mut waiting = QueuedTriangles::new();
         let mut held = 0;
         for square in &self.squares {
             let photons = 0.25 * square.share() * photons / self.cells();
@@ -310,7 +310,7 @@ impl Bundles {
     /// Points of a lamp and wavelengths that stand for all, for so many photons of a triangle, and what either counts.
     fn parts<'a>(
         &self,
-        moves: &Moves,
+        moves: &BundleOffsets,
         photons: f64,
         on_lamp: DVec2,
         in_hue: Option<(&'a PhotonSpectrum, f64)>,
@@ -352,9 +352,9 @@ impl Bundles {
 }
 
 /// Triangles of one band and receiver.
-type Waiting = BTreeMap<(Option<usize>, Receiver), Vec<FluxTriangle>>;
+type QueuedTriangles = BTreeMap<(Option<usize>, Receiver), Vec<FluxTriangle>>;
 
-fn hand_out(waiting: &mut Waiting, take: &mut impl FnMut(Option<usize>, Receiver, &[FluxTriangle])) {
+fn hand_out(waiting: &mut QueuedTriangles, take: &mut impl FnMut(Option<usize>, Receiver, &[FluxTriangle])) {
     for ((band, receiver), triangles) in std::mem::take(waiting) {
         take(band, receiver, &triangles);
     }

@@ -87,7 +87,7 @@ fn lit(count: FluxCount, is_signed: bool) -> FluxCount {
 type Raw = [f32; 6];
 
 /// The same after the filter, channels first, and the squared bias.
-type Kept = [f32; 6];
+type FilteredCell = [f32; 6];
 
 /// Of each half.
 fn luminances(raw: &Raw) -> [f32; 2] {
@@ -102,7 +102,7 @@ fn channels(raw: &Raw) -> [f32; 3] {
 
 /// What the details of each half differ by from grey ones of the same luminance in the light around: photons of single
 /// wavelengths err by far more in it than in luminance.
-fn tints(detail: &Raw, smooth: &Kept) -> [[f32; 3]; 2] {
+fn tints(detail: &Raw, smooth: &FilteredCell) -> [[f32; 3]; 2] {
     let light = luminance(&[smooth[0], smooth[1], smooth[2]]) as f32;
     let [a, b] = luminances(detail);
     let tint = |luminance: f32, first: usize| {
@@ -152,7 +152,7 @@ impl Details {
     }
 
     /// Every texel: coarse cells as they are, finer ones with what is kept of their details.
-    fn filtered(&self) -> Vec<Kept> {
+    fn filtered(&self) -> Vec<FilteredCell> {
         let coarsest = self.raw.len() - 1;
         let mut kept: Values<6> = vec![Vec::new(); self.raw.len()];
         let as_is = |raw: &Raw| {
@@ -167,7 +167,7 @@ impl Details {
     }
 
     /// One level, of all coarser ones.
-    fn refined(&self, level: usize, kept: &Values<6>) -> Vec<Kept> {
+    fn refined(&self, level: usize, kept: &Values<6>) -> Vec<FilteredCell> {
         let mut details: Vec<Raw> = self.cells.between(level, &self.raw);
         let cells = details.par_iter_mut().zip(&self.raw[level]);
         cells.for_each(|(detail, raw)| *detail = [0, 1, 2, 3, 4, 5].map(|i| raw[i] - detail[i]));
@@ -177,7 +177,7 @@ impl Details {
             0.25 * (a - b) * (a - b)
         };
         // Noise is in proportion to light where photons bring alike.
-        let light = |smooth: &Kept| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
+        let light = |smooth: &FilteredCell| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
         let both = details
             .par_iter()
             .zip(&refined)
@@ -232,7 +232,7 @@ impl Details {
 
     /// The channels of a cell with a share of its detail's luminance and one of its tint, less where nothing would be left of
     /// its light.
-    fn channels_of(&self, smooth: &Kept, detail: &Raw, [share, of_tint]: [f32; 2]) -> [f32; 3] {
+    fn channels_of(&self, smooth: &FilteredCell, detail: &Raw, [share, of_tint]: [f32; 2]) -> [f32; 3] {
         let [first, second] = tints(detail, smooth);
         let tint = [0, 1, 2].map(|channel| 0.5 * (first[channel] + second[channel]));
         let whole = channels(detail);
@@ -255,9 +255,9 @@ impl Details {
 
     /// The squared error of each texel [W²/m⁴]: what was missed and what is left of the noise, among the texels around it as
     /// their light is.
-    fn squares(&self, of_texels: &[Kept], map: &ReceiverMap) -> Vec<f64> {
-        let expected = |[.., a, b, _]: &Kept| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
-        let square = |[.., a, b, missed]: &Kept| missed + 0.25 * (a - b) * (a - b);
+    fn squares(&self, of_texels: &[FilteredCell], map: &ReceiverMap) -> Vec<f64> {
+        let expected = |[.., a, b, _]: &FilteredCell| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
+        let square = |[.., a, b, missed]: &FilteredCell| missed + 0.25 * (a - b) * (a - b);
         let mut ratios = self.cells.densities(|texel| {
             let area_m2 = map.chart.texel_area_m2(texel) as f32;
             [
@@ -285,7 +285,7 @@ impl Details {
     }
 
     /// Puts what was kept in the place of a map's counts.
-    fn put(&self, of_texels: &[Kept], map: &mut ReceiverMap, unit: FluxUnit) -> Sums {
+    fn put(&self, of_texels: &[FilteredCell], map: &mut ReceiverMap, unit: FluxUnit) -> Sums {
         let counts_per_mean = self.mean / unit.watts();
         let chart = map.chart.clone();
         let flux = |texel: usize| {

@@ -14,7 +14,7 @@ use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
 use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
-use crate::scene::emitter::{Emitter, Places};
+use crate::scene::emitter::{Emitter, EmitterSampler};
 use crate::scene::{Light, Scene};
 use crate::transport::{MediumStack, Tracer, media_at};
 
@@ -66,7 +66,7 @@ enum Domain<'a> {
 /// A lamp with a size.
 #[derive(Debug)]
 struct Lamp<'a> {
-    places: Places<'a>,
+    places: EmitterSampler<'a>,
     tracer: &'a Tracer,
     spheres: &'a Spheres,
     /// Around all places; `None` where they lie in different media.
@@ -85,14 +85,14 @@ struct Cell {
 
 impl<'a> PhotonLaunch<'a> {
     /// The domain of a light as its item buffer sees it.
-    pub fn of_cells(aimed: &'a VisibleLight) -> Self {
+    pub fn of_cells(visible_light: &'a VisibleLight) -> Self {
         let side = CELLS_PER_SIDE;
         let marked = |face: usize| {
             let on_curve = (0..side * side).map(|place| {
                 let [column, row] = unfolded(place as u64);
                 (column as usize, row as usize)
             });
-            on_curve.filter(move |&(column, row)| aimed.item_buffer.is_marked(face, column, row))
+            on_curve.filter(move |&(column, row)| visible_light.item_buffer.is_marked(face, column, row))
         };
         let on_face = |face: usize| {
             marked(face).map(move |(column, row)| Cell {
@@ -101,11 +101,11 @@ impl<'a> PhotonLaunch<'a> {
                 row: row as u8,
             })
         };
-        let cells: Vec<Cell> = (0..aimed.launch.face_count()).flat_map(on_face).collect();
+        let cells: Vec<Cell> = (0..visible_light.launch.face_count()).flat_map(on_face).collect();
         Self {
             domain: Domain::Cells {
-                full_w: full_w(&aimed.launch, cells.len()),
-                launch: &aimed.launch,
+                full_w: full_w(&visible_light.launch, cells.len()),
+                launch: &visible_light.launch,
                 cells,
             },
         }
@@ -114,7 +114,7 @@ impl<'a> PhotonLaunch<'a> {
     /// The domain of a light with a size; `light` is of unit strength.
     pub fn of_places(tracer: &'a Tracer, light: &'a Light, spheres: &'a Spheres, seed: u64) -> Self {
         let scene: &Scene = tracer.scene();
-        let places = Places::new(light, scene);
+        let places = EmitterSampler::new(light, scene);
         let mut media = (0..MEDIUM_PROBES).filter_map(|probe| {
             let position = places
                 .sample(even_point(probe, LAMP_DIMENSION, seed))?
@@ -220,8 +220,8 @@ impl<'a> PhotonLaunch<'a> {
             } => (launch, cells, full_w),
             Domain::Spheres(of) => {
                 let emitter = of.places.sample(lamp)?;
-                let aimed = of.spheres.aim_in(&emitter, (cell, within), of.across_m)?;
-                return Some(of.start(&emitter, aimed));
+                let visible_light = of.spheres.aim_in(&emitter, (cell, within), of.across_m)?;
+                return Some(of.start(&emitter, visible_light));
             }
         };
         let count = cells.len();
@@ -250,8 +250,8 @@ impl<'a> PhotonLaunch<'a> {
             }
             Domain::Spheres(lamp) => {
                 let emitter = lamp.places.sample(self.lamp_place(index, seed))?;
-                let aimed = lamp.spheres.aim(&emitter, place, lamp.across_m)?;
-                Some(lamp.start(&emitter, aimed))
+                let visible_light = lamp.spheres.aim(&emitter, place, lamp.across_m)?;
+                Some(lamp.start(&emitter, visible_light))
             }
         }
     }

@@ -10,13 +10,13 @@ use rayon::prelude::*;
 use super::bundles::{Bundles, Carried};
 use super::launch::{PhotonLaunch, Start};
 use super::survey::Surveyor;
-use super::walk::{Hit, PhotonRules, PhotonWalk, Place};
+use super::walk::{Hit, PhotonArrival, PhotonRules, PhotonWalk};
 use crate::illumination::accumulator::FluxCount;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::caustic::pass::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::light_pass::share::Share;
+use crate::light_pass::shard_index::ShardIndex;
 use crate::light_pass::wavefront::coverage::deposit_triangles;
 use crate::progress::{Control, Stage};
 
@@ -69,7 +69,7 @@ impl PhotonPass<'_> {
     pub fn run(
         &self,
         indices: Range<u32>,
-        share: Option<Share>,
+        share: Option<ShardIndex>,
         halves: &mut [&mut [ReceiverMaps]],
         listener: &ProgressScope,
     ) -> PassReport {
@@ -211,7 +211,7 @@ impl PhotonPass<'_> {
             };
             walk.follow(index, start, carried, |hit| {
                 let count = rules.unit.count(hit.flux_w);
-                if let Place::Map(_) = hit.place {
+                if let PhotonArrival::Map(_) = hit.place {
                     placed.book(Account::Sampling, count.map(|count| -count));
                 }
                 match self.texel(&hit, charts) {
@@ -239,11 +239,11 @@ impl PhotonPass<'_> {
         let chart = self.chart(hit.receiver, charts)?;
         let size = DVec2::new(chart.width as f64, chart.height as f64);
         let place = match hit.place {
-            Place::Surface {
+            PhotonArrival::Surface {
                 triangle,
                 barycentric,
             } => chart.uv(triangle, barycentric) * size,
-            Place::Map(place) => place,
+            PhotonArrival::Map(place) => place,
         };
         let place = place.clamp(DVec2::ZERO, size - 0.5);
         let texel = chart.texel_at(place.x as usize, place.y as usize);

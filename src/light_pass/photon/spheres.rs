@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::launch::LAMP_DIMENSION;
 use crate::geometry::Ray;
 use crate::geometry::sampling::{even_code, even_point, in_square, unfolded};
-use crate::scene::emitter::{Emitter, EmitterKind, Places, in_cap, on_disc};
+use crate::scene::emitter::{Emitter, EmitterKind, EmitterSampler, in_cap, on_disc};
 use crate::scene::{Light, Scene};
 use crate::transport::Tracer;
 
@@ -31,11 +31,11 @@ const RARE: f64 = 1.0 / 16.0;
 
 /// Spheres around what is specular.
 #[derive(Clone, Debug, Default)]
-pub struct Spheres(Vec<Guided>);
+pub struct Spheres(Vec<GuidedSphere>);
 
 /// A sphere, with how its photons are shared out.
 #[derive(Clone, Debug)]
-struct Guided {
+struct GuidedSphere {
     sphere: Sphere,
     /// Photons of the cells before each along Morton's curve, over those of all cells if each had as many as the best.
     before: Vec<f64>,
@@ -45,9 +45,9 @@ impl Spheres {
     /// Around casters, for a light of unit strength.
     pub fn around(tracer: &Tracer, light: &Light, casters: &[usize]) -> Self {
         let spheres = spheres(tracer.scene(), casters, MAX_SPHERES);
-        let evenly = |sphere| Guided::new(sphere, |_| 1.0);
+        let evenly = |sphere| GuidedSphere::new(sphere, |_| 1.0);
         let even = Self(spheres.into_iter().map(evenly).collect());
-        let places = Places::new(light, tracer.scene());
+        let places = EmitterSampler::new(light, tracer.scene());
         let (low, high) = tracer.scene().bounds().unwrap_or_default();
         let across_m = (high - low).length();
         let meets = |index: u32| {
@@ -60,7 +60,7 @@ impl Spheres {
         let met: Vec<(usize, usize)> = (0..PROBES).into_par_iter().filter_map(meets).collect();
         let met: BTreeSet<(usize, [u32; 2])> = met.into_iter().flat_map(with_neighbours).collect();
         let guided = even.0.into_iter().enumerate().map(|(which, guided)| {
-            Guided::new(guided.sphere, |cell| {
+            GuidedSphere::new(guided.sphere, |cell| {
                 if met.contains(&(which, unfolded(cell as u64))) {
                     1.0
                 } else {
@@ -195,7 +195,7 @@ fn with_neighbours((which, cell): (usize, usize)) -> impl Iterator<Item = (usize
     near(column).flat_map(move |column| near(row).map(move |row| (which, [column, row])))
 }
 
-impl Guided {
+impl GuidedSphere {
     fn new(sphere: Sphere, density: impl Fn(usize) -> f64) -> Self {
         let mut before = vec![0.0; CELLS + 1];
         for cell in 0..CELLS {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::bundles::{Bundle, Moves, Square, Step};
+use super::bundles::{Bundle, BundleOffsets, Square, Step};
 use super::launch::{LAMP_MIDDLE, PhotonLaunch};
 use super::spectrum::PhotonSpectrum;
 use super::walk::PhotonRules;
@@ -89,7 +89,7 @@ struct Arrival {
 }
 
 /// Light under way.
-struct Waiting {
+struct QueuedLight {
     ray: Ray,
     media: MediumStack,
     flux_w: LinearSrgb,
@@ -116,7 +116,7 @@ struct Candidate {
 }
 
 /// What becomes of the light of a square, as parts of what starts.
-struct Outcome {
+struct LightShares {
     /// Mean flux of a photon [W, largest channel] that bundles carry.
     carried_w: f64,
     /// The same that arrives.
@@ -133,7 +133,7 @@ struct Outcome {
 
 /// Squares of a cell so far.
 #[derive(Default)]
-pub(super) struct Survey {
+pub(super) struct PhotonSurvey {
     pub(super) squares: Vec<Square>,
     /// Mean flux of a photon [W, largest channel] that bundles carry.
     pub(super) carried_w: f64,
@@ -145,10 +145,10 @@ pub(super) struct Survey {
 
 impl Surveyor<'_> {
     /// A cell in squares along its curve, for so many photons; no finer where it has `most_bundles`.
-    pub(super) fn survey(&self, cell: usize, photons: f64, most_bundles: usize) -> Survey {
-        let mut survey = Survey {
+    pub(super) fn survey(&self, cell: usize, photons: f64, most_bundles: usize) -> PhotonSurvey {
+        let mut survey = PhotonSurvey {
             bundles_left: most_bundles,
-            ..Survey::default()
+            ..PhotonSurvey::default()
         };
         let light = |x: f64, y: f64| Arc::new(self.light(self.tracer(), cell, DVec2::new(x, y), LAMP_MIDDLE));
         let whole = Candidate {
@@ -167,7 +167,7 @@ impl Surveyor<'_> {
         survey
     }
 
-    fn divide(&self, square: Candidate, survey: &mut Survey) {
+    fn divide(&self, square: Candidate, survey: &mut PhotonSurvey) {
         let (bundles, ends, outcome) = square.bundles();
         let by_photons = outcome.left * square.photons * outcome.segments;
         let is_fine = by_photons <= WORTH * POINTS_OF_DIVISION * outcome.followed
@@ -252,7 +252,7 @@ impl Surveyor<'_> {
         if !(light.start_w > 0.0 && start.flux_w.is_finite()) {
             return light;
         }
-        let mut waiting = vec![Waiting {
+        let mut waiting = vec![QueuedLight {
             ray: start.ray,
             media: start.media,
             flux_w: start.flux_w,
@@ -273,10 +273,10 @@ impl Surveyor<'_> {
     fn meet(
         &self,
         tracer: &Tracer,
-        from: Waiting,
+        from: QueuedLight,
         hit: &SurfaceHit,
         light: &mut Light,
-        waiting: &mut Vec<Waiting>,
+        waiting: &mut Vec<QueuedLight>,
     ) {
         let effects = self.rules.effects;
         let material = tracer.scene().material_of(hit.object);
@@ -326,7 +326,7 @@ impl Surveyor<'_> {
                 object: hit.object as u32,
                 is_reflected: branch.event.is_reflection(),
             });
-            waiting.push(Waiting {
+            waiting.push(QueuedLight {
                 ray: branch.ray,
                 media: branch.media,
                 flux_w,
@@ -348,7 +348,7 @@ impl Surveyor<'_> {
 
 impl Candidate {
     /// The bundles of its triangles, where those of each triangle end, and what becomes of the light.
-    fn bundles(&self) -> (Vec<Bundle>, [u8; 4], Outcome) {
+    fn bundles(&self) -> (Vec<Bundle>, [u8; 4], LightShares) {
         let (mut bundles, mut ends) = (Vec::new(), [0; 4]);
         let (mut carried_w, mut blurred_w) = (0.0, 0.0);
         let of_way = |middle| {
@@ -387,7 +387,7 @@ impl Candidate {
         (bundles, ends, self.outcome(carried_w, blurred_w))
     }
 
-    fn outcome(&self, carried_w: f64, blurred_w: f64) -> Outcome {
+    fn outcome(&self, carried_w: f64, blurred_w: f64) -> LightShares {
         let mean = |value: &dyn Fn(&Light) -> f64| {
             let points = self.corners.iter().chain([&self.middle]);
             points.map(|point| value(point)).sum::<f64>() / 5.0
@@ -404,7 +404,7 @@ impl Candidate {
             let arrivals = light.arrivals.iter();
             arrivals.map(|arrival| arrival.flux_w.max_channel()).sum()
         });
-        Outcome {
+        LightShares {
             carried_w,
             arriving_w,
             left: part(arriving_w - carried_w - blurred_w),
@@ -415,8 +415,8 @@ impl Candidate {
     }
 
     /// How far the light of the middle arrives from there otherwise; `None` where it takes another way, or its lamp is too large.
-    fn moves(&self, middle: &Arrival) -> Option<Moves> {
-        let mut moves = Moves::default();
+    fn moves(&self, middle: &Arrival) -> Option<BundleOffsets> {
+        let mut moves = BundleOffsets::default();
         let moved = |light: &Light| Some((light.find(middle.key)?.place - middle.place).as_vec2());
         if let Some([x, y]) = &self.outer {
             moves.lamp = [moved(x)? * 2.0, moved(y)? * 2.0];

@@ -26,7 +26,7 @@ pub struct Hit {
     /// Whose light it becomes.
     pub receiver: Receiver,
     /// Where.
-    pub place: Place,
+    pub place: PhotonArrival,
     /// Incident flux [W per channel of the light] if it were the only photon, before the albedo.
     pub flux_w: LinearSrgb,
     /// Band of its wavelength, where it has one.
@@ -35,7 +35,7 @@ pub struct Hit {
 
 /// Where a photon arrives.
 #[derive(Clone, Copy, Debug)]
-pub enum Place {
+pub enum PhotonArrival {
     Surface {
         /// Index into the object's triangles.
         triangle: usize,
@@ -228,7 +228,7 @@ impl<'a> PhotonWalk<'a> {
         } else if deposit_w.max_channel() > 0.0 {
             arrive(Hit {
                 receiver: Receiver::new(hit.object, Side::met(ray.direction, hit.geometric_normal)),
-                place: Place::Surface {
+                place: PhotonArrival::Surface {
                     triangle: hit.triangle,
                     barycentric: hit.barycentric,
                 },
@@ -338,7 +338,7 @@ impl Photon<'_> {
                 let flux_w = bundle.flux_w() * (-carried.scale / self.probability);
                 arrive(Hit {
                     receiver: bundle.receiver,
-                    place: Place::Map(bundle.place(&carried)),
+                    place: PhotonArrival::Map(bundle.place(&carried)),
                     flux_w: self.own_hue.map_or(flux_w, |hue| hue.channels.apply(flux_w)),
                     band: self.own_hue.and_then(|hue| hue.band),
                 });

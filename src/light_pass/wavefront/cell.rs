@@ -3,13 +3,13 @@
 use glam::DVec2;
 
 use super::band::{Corner, SampleId, Workspace};
-use super::bodies::SmallBodies;
-use super::doubt::worst_mismatch;
-use super::edge::{Edge, EdgeCutter, Reach, SUSPICION, may_bulge, mismatch};
+use super::cell_tests::worst_mismatch;
+use super::edge::{Edge, EdgeCutter, EdgeReach, SUSPICION, may_bulge, mismatch};
 use super::refine::{Refinement, RoundSet};
 use super::regions::{Outline, regions, triangles};
 use super::spectrum::{LightPart, NODES};
 use super::strand::LatticeRay;
+use super::subcell_features::SubcellFeatures;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -88,7 +88,7 @@ pub enum PatchKind {
     /// The same, by its corners alone.
     LinearTriangle,
     /// The rectangle between the second and third square, by the derivatives of a strand at the first.
-    Around,
+    SingleRay,
 }
 
 impl Patch {
@@ -98,7 +98,7 @@ impl Patch {
         match self.kind {
             PatchKind::Rectangle | PatchKind::BilinearRectangle => (c.x - a.x) * (c.y - a.y),
             PatchKind::Triangle | PatchKind::LinearTriangle => 0.5 * (b - a).perp_dot(c - a).abs(),
-            PatchKind::Around => (c.x - b.x) * (c.y - b.y),
+            PatchKind::SingleRay => (c.x - b.x) * (c.y - b.y),
         }
     }
 
@@ -107,7 +107,7 @@ impl Patch {
         match self.kind {
             PatchKind::Rectangle | PatchKind::BilinearRectangle => 4,
             PatchKind::Triangle | PatchKind::LinearTriangle => 3,
-            PatchKind::Around => 1,
+            PatchKind::SingleRay => 1,
         }
     }
 }
@@ -135,7 +135,7 @@ pub struct CellCutter<'a> {
     /// Where cells are divided, if anywhere.
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
-    pub bodies: &'a SmallBodies,
+    pub bodies: &'a SubcellFeatures,
     /// How often cells are split.
     pub splits: SubdivisionLimits,
     /// The light, before its wavelengths part.
@@ -216,7 +216,7 @@ impl CellCutter<'_> {
             None => {}
         }
         if cell.edges.iter().all(Option::is_none) {
-            return if depth.ambiguous < self.splits.ambiguous && self.is_doubtful(cell, work) {
+            return if depth.ambiguous < self.splits.ambiguous && self.needs_check_ray(cell, work) {
                 let ambiguous = depth.ambiguous + 1;
                 self.split(cell, Depth { ambiguous, ..depth }, work, out)
             } else {
@@ -499,7 +499,7 @@ impl CellCutter<'_> {
             out.patches.push(Patch {
                 corners: [(corner.sample, strand as u16); 4],
                 squares: [corner.square, low, high, high],
-                kind: PatchKind::Around,
+                kind: PatchKind::SingleRay,
                 tone: self.tone,
             });
         }
@@ -634,10 +634,10 @@ pub(super) fn reach_of(
     work: &Workspace,
     signature: PathSignature,
     backwards: bool,
-) -> Reach {
+) -> EdgeReach {
     match &cell.edges[edge] {
         Some(samples) => samples.reach(work, signature, cell.edge_step(edge), backwards),
-        None => Reach::Whole,
+        None => EdgeReach::Whole,
     }
 }
 
@@ -660,7 +660,7 @@ pub(super) fn surface_regions(cell: &Cell, signature: PathSignature, work: &Work
         cell,
         &|edge, backwards| match &cell.edges[edge] {
             Some(edge) => edge.reach_of_node(work, signature, backwards),
-            None => Reach::Whole,
+            None => EdgeReach::Whole,
         },
         &is_there,
     )

@@ -6,7 +6,7 @@ use super::patch::PatchShape;
 use super::spread::{SpreadOutput, Spreader};
 use super::virtual_vertex::{VirtualRays, VirtualVertex};
 use crate::illumination::Receiver;
-use crate::light_pass::caustic::statistics::Spot;
+use crate::light_pass::caustic::statistics::FootprintSample;
 use crate::optics::LinearSrgb;
 
 /// Deviation from straight that triangles may have [texels].
@@ -272,7 +272,7 @@ impl Spreader<'_> {
         };
         let size = DVec2::new(surface.chart.width as f64, surface.chart.height as f64);
         let (low, high) = bounds(texels);
-        out.statistics.add_spot(Spot {
+        out.statistics.add_spot(FootprintSample {
             receiver,
             bounds: (low / size, high / size),
             flux_w,

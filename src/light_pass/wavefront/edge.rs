@@ -36,7 +36,7 @@ pub struct Edge {
 
 /// How far a strand reaches along an edge from one of its ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Reach {
+pub enum EdgeReach {
     /// To the other end, on one sheet.
     Whole,
     /// Up to a cut: its place on the edge, and the last sample before it.
@@ -190,7 +190,13 @@ impl Edge {
     }
 
     /// How far a strand reaches from the first end (or, `backwards`, from the last); the strand must be there.
-    pub fn reach(&self, work: &Workspace, signature: PathSignature, step: DVec2, backwards: bool) -> Reach {
+    pub fn reach(
+        &self,
+        work: &Workspace,
+        signature: PathSignature,
+        step: DVec2,
+        backwards: bool,
+    ) -> EdgeReach {
         let narrowest = narrowest(self.share(work, signature));
         self.reach_where(
             work,
@@ -215,7 +221,7 @@ impl Edge {
     }
 
     /// How far a surface reaches that light meets.
-    pub fn reach_of_node(&self, work: &Workspace, signature: PathSignature, backwards: bool) -> Reach {
+    pub fn reach_of_node(&self, work: &Workspace, signature: PathSignature, backwards: bool) -> EdgeReach {
         self.reach_where(
             work,
             backwards,
@@ -230,7 +236,7 @@ impl Edge {
         backwards: bool,
         is_there: impl Fn(&LatticeRay) -> bool,
         is_jump: impl Fn(&LatticeRay, &LatticeRay, f64) -> bool,
-    ) -> Reach {
+    ) -> EdgeReach {
         let last = self.samples.len() - 1;
         let at = |index: usize| self.samples[if backwards { last - index } else { index }];
         for index in 0..last {
@@ -239,14 +245,14 @@ impl Edge {
             let (a, b) = (work.get(ordered.0.1), work.get(ordered.1.1));
             let next = work.get(there.1);
             if !is_there(next) || is_jump(a, b, ordered.1.0 - ordered.0.0) {
-                return Reach::Cut {
+                return EdgeReach::Cut {
                     place: 0.5 * (here.0 + there.0),
                     sample: here.1,
                     between: index.saturating_sub(1),
                 };
             }
         }
-        Reach::Whole
+        EdgeReach::Whole
     }
 
     /// So many samples after the first end (or, `backwards`, before the last), the nearest to that end first.

@@ -28,7 +28,7 @@ const MAX_CORNERS: usize = 6;
 
 /// A part of a triangle of rays on one facet.
 #[derive(Clone, Copy, Debug)]
-pub struct Piece {
+pub struct FacetPiece {
     corners: [DVec2; MAX_CORNERS],
     len: usize,
     /// Island of the chart that the facet lies on.
@@ -37,7 +37,7 @@ pub struct Piece {
     pub share: f64,
 }
 
-impl Piece {
+impl FacetPiece {
     /// The triangles that it consists of, in texels, with their shares of it.
     pub fn triangles(&self) -> impl Iterator<Item = ([DVec2; 3], f64)> + Clone {
         let corners = &self.corners[..self.len];
@@ -92,8 +92,8 @@ impl Facets<'_> {
 
     /// The parts of a triangle of rays on the facets around those that its rays meet, their shares adding up to 1, and
     /// whether they cover all of it, once: not where part of it falls beside them, or on surfaces behind each other.
-    pub fn pieces(&self, rays: [Ray; 3], triangles: [u32; 3]) -> (Vec<Piece>, bool) {
-        let mut found: Vec<Piece> = Vec::new();
+    pub fn pieces(&self, rays: [Ray; 3], triangles: [u32; 3]) -> (Vec<FacetPiece>, bool) {
+        let mut found: Vec<FacetPiece> = Vec::new();
         let mut seen: Vec<u32> = triangles.to_vec();
         seen.sort_unstable();
         seen.dedup();
@@ -128,7 +128,7 @@ impl Facets<'_> {
     }
 
     /// The part on one facet; `None` where there is none.
-    fn piece(&self, rays: &[Ray; 3], triangle: usize) -> Option<Piece> {
+    fn piece(&self, rays: &[Ray; 3], triangle: usize) -> Option<FacetPiece> {
         let chart = self.chart();
         let corners = self.mesh.corners(triangle);
         let normal = self.mesh.face_normal(triangle) * chart.receiver.side().sign();
@@ -147,7 +147,7 @@ impl Facets<'_> {
             *place = facet[0] + DVec2::new(rows[0].dot(step), rows[1].dot(step));
         }
         let whole = convex_area(&places);
-        let mut piece = Piece {
+        let mut piece = FacetPiece {
             corners: [DVec2::ZERO; MAX_CORNERS],
             len: 3,
             island: self.surface.island(triangle as u32),
@@ -163,7 +163,7 @@ impl Facets<'_> {
     }
 }
 
-impl Piece {
+impl FacetPiece {
     /// Keeps what lies on one side of a line (Sutherland and Hodgman).
     fn cut(&mut self, from: DVec2, to: DVec2, winding: f64) {
         let distance = |corner: DVec2| (to - from).perp_dot(corner - from) * winding;

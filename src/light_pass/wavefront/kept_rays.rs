@@ -84,7 +84,7 @@ pub struct RayCache {
 
 /// A kept ray, seen from the present scene.
 #[derive(Clone, Copy, Debug)]
-pub struct Known<'a> {
+pub struct CachedRay<'a> {
     ray: &'a KeptRay,
     edited: &'a [Edited],
 }
@@ -106,8 +106,8 @@ impl RayCache {
     }
 
     /// The ray of a start; `None` where it was never traced.
-    pub fn get(&self, key: &RayKey) -> Option<Known<'_>> {
-        Some(Known {
+    pub fn get(&self, key: &RayKey) -> Option<CachedRay<'_>> {
+        Some(CachedRay {
             ray: self.rays.get(key)?,
             edited: &self.edited,
         })
@@ -162,7 +162,7 @@ impl RayCache {
     }
 }
 
-impl Known<'_> {
+impl CachedRay<'_> {
     /// What the segment met that starts after `signature`, as far as it is kept.
     pub fn hit(&self, signature: PathSignature) -> Option<Option<RayHit>> {
         let hit = self.ray.hits.iter().find(|hit| hit.signature == signature)?;

@@ -4,13 +4,13 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::band::{Corner, SampleId, Samples, Workspace};
-use super::bodies::SmallBodies;
 use super::cell::{Cell, CellCutter, CellOutput, Patch, SpectralTag, SubdivisionLimits};
 use super::edge::{Edge, EdgeCutter, may_bulge};
 use super::kept_rays::{RayCache, TracedRay};
 use super::refine::Refinement;
 use super::spectrum::LightPart;
 use super::strand::LatticeRay;
+use super::subcell_features::SubcellFeatures;
 use super::trace::StrandTracer;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
@@ -24,7 +24,7 @@ const MAX_CELLS_OF_ROW: f64 = 4.0 * CELLS_PER_BAND;
 
 /// What is traced together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Band {
+pub struct LatticeBand {
     /// Half-open range of rows.
     pub rows: (usize, usize),
     /// Half-open range of columns.
@@ -45,7 +45,7 @@ pub struct WavefrontLattice<'a> {
     /// Where it is finer, if anywhere.
     pub refinement: Option<&'a Refinement<'a>>,
     /// What corners alone would miss.
-    pub bodies: &'a SmallBodies,
+    pub bodies: &'a SubcellFeatures,
     /// How often cells are split.
     pub splits: SubdivisionLimits,
     /// Of a light whose wavelengths go different ways; `tracer` is then that of its first node.
@@ -115,7 +115,7 @@ impl WavefrontLattice<'_> {
     }
 
     /// The bands of one face, which cover it.
-    pub fn bands(&self, face: usize) -> Vec<Band> {
+    pub fn bands(&self, face: usize) -> Vec<LatticeBand> {
         let mut bands = Vec::new();
         let (mut start, mut cells) = (0, 0.0);
         for row in 0..self.size.1 {
@@ -140,8 +140,8 @@ impl WavefrontLattice<'_> {
         bands
     }
 
-    fn whole_rows(&self, rows: (usize, usize)) -> Band {
-        Band {
+    fn whole_rows(&self, rows: (usize, usize)) -> LatticeBand {
+        LatticeBand {
             rows,
             columns: (0, self.size.0),
         }
@@ -160,7 +160,7 @@ impl WavefrontLattice<'_> {
     }
 
     /// A row of very many cells, in parts; `expected` cells span by span.
-    fn parts_of_row(&self, face: usize, row: usize, expected: &[f64]) -> Vec<Band> {
+    fn parts_of_row(&self, face: usize, row: usize, expected: &[f64]) -> Vec<LatticeBand> {
         let spans = self.item_buffer.lattice_spans(face, row, self.size);
         let columns = spans.into_iter().flat_map(|(start, end)| start..end);
         let mut parts = Vec::new();
@@ -173,7 +173,7 @@ impl WavefrontLattice<'_> {
             cells += expected;
         }
         parts.push((start, self.size.0));
-        let band = |columns| Band {
+        let band = |columns| LatticeBand {
             rows: (row, row + 1),
             columns,
         };
@@ -200,7 +200,7 @@ impl WavefrontLattice<'_> {
     /// Traces a band of a face and cuts its cells into patches.
     ///
     /// A row of corners between two bands is traced for each: the rays are few, and bands stay independent.
-    pub fn trace(&self, face: usize, band: Band) -> TracedBand {
+    pub fn trace(&self, face: usize, band: LatticeBand) -> TracedBand {
         let first_row = band.rows.0;
         let rows = band.rows.1 - first_row;
         let nodes = self.light.node_count();
@@ -270,7 +270,7 @@ impl WavefrontLattice<'_> {
     }
 
     /// Corners of the cells above and below a row of corners, as far as they belong to the band.
-    fn trace_corners(&self, face: usize, row: usize, band: Band) -> CornerRow {
+    fn trace_corners(&self, face: usize, row: usize, band: LatticeBand) -> CornerRow {
         let mut traced = CornerRow {
             index: vec![NONE; self.size.0 + 1],
             samples: Vec::new(),

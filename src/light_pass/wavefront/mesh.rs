@@ -3,12 +3,12 @@
 use glam::DVec2;
 
 use super::coverage::FluxTriangle;
-use super::facets::Piece;
+use super::facets::FacetPiece;
 use super::patch::PatchShape;
 use super::receivers::Receivers;
 use super::shares::{Shares, difference, mean, parted, scaled};
 use super::spread::SpreadOutput;
-use super::virtual_vertex::{Place, VirtualRays, VirtualVertex};
+use super::virtual_vertex::{LandingPoint, VirtualRays, VirtualVertex};
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::ledger_sum::Account;
@@ -191,11 +191,13 @@ impl PatchMesh<'_, '_> {
         }
         if is_one {
             match self.over_facets(&knots) {
-                Over::One => return self.place(&knots, None, flux),
-                Over::Several(pieces, is_whole) if is_whole || (budget.cuts == 0 && !pieces.is_empty()) => {
+                ReceiverHits::One => return self.place(&knots, None, flux),
+                ReceiverHits::Several(pieces, is_whole)
+                    if is_whole || (budget.cuts == 0 && !pieces.is_empty()) =>
+                {
                     return self.place(&knots, Some(&pieces), flux);
                 }
-                Over::Several(..) => {}
+                ReceiverHits::Several(..) => {}
             }
         }
         if budget.cuts == 0 {
@@ -270,11 +272,11 @@ impl PatchMesh<'_, '_> {
     }
 
     /// How the facets between rays that meet one receiver take them.
-    fn over_facets(&self, knots: &[Knot; 3]) -> Over {
+    fn over_facets(&self, knots: &[Knot; 3]) -> ReceiverHits {
         let places = knots.map(|knot| knot.vertex.place.facet());
         let facets = (knots[0].vertex.place.receiver()).and_then(|receiver| self.receivers.facets(receiver));
         let (Some(facets), [Some(a), Some(b), Some(c)]) = (facets, places) else {
-            return Over::One;
+            return ReceiverHits::One;
         };
         let triangles = [a, b, c].map(|(place, _)| place.triangle);
         let is_tiny = || {
@@ -282,10 +284,10 @@ impl PatchMesh<'_, '_> {
             reach.max_element() <= TINY_TEXELS && facets.is_even(a, b) && facets.is_even(a, c)
         };
         if triangles[1..] == [triangles[0]; 2] || is_tiny() {
-            return Over::One;
+            return ReceiverHits::One;
         }
         let (pieces, is_whole) = facets.pieces(knots.map(|knot| knot.vertex.ray), triangles);
-        Over::Several(pieces, is_whole)
+        ReceiverHits::Several(pieces, is_whole)
     }
 
     /// Where between two knots the rays stop going where the first goes: the place between them [0, 1], the last knot
@@ -311,7 +313,7 @@ impl PatchMesh<'_, '_> {
     }
 
     /// All three rays go to the same receiver, or nowhere.
-    fn place(&mut self, knots: &[Knot; 3], pieces: Option<&[Piece]>, flux: FluxCount) {
+    fn place(&mut self, knots: &[Knot; 3], pieces: Option<&[FacetPiece]>, flux: FluxCount) {
         let mut arrived = flux;
         if self.absorbs {
             let left = knots
@@ -322,12 +324,12 @@ impl PatchMesh<'_, '_> {
             self.out.ledger.book(Account::Absorbed, difference(flux, arrived));
         }
         match knots[0].vertex.place {
-            Place::Nowhere if self.goes_out => self.out.ledger.book(Account::Escaped, arrived),
+            LandingPoint::Nowhere if self.goes_out => self.out.ledger.book(Account::Escaped, arrived),
             // No traced ray of the patch left the scene: a ray that was continued too far did.
-            Place::Nowhere => self.out.ledger.book(Account::Unresolved, arrived),
-            Place::Onward => self.out.ledger.book(Account::Quadrature, arrived),
-            Place::Refused => self.out.ledger.book(Account::Unresolved, arrived),
-            Place::On { receiver, island, .. } => {
+            LandingPoint::Nowhere => self.out.ledger.book(Account::Unresolved, arrived),
+            LandingPoint::Onward => self.out.ledger.book(Account::Quadrature, arrived),
+            LandingPoint::Refused => self.out.ledger.book(Account::Unresolved, arrived),
+            LandingPoint::On { receiver, island, .. } => {
                 let share = knots.iter().map(|knot| knot.vertex.deposit).sum::<f64>() / 3.0;
                 let deposit = if share < 1.0 {
                     scaled(arrived, LinearSrgb::grey(share))
@@ -352,15 +354,15 @@ impl PatchMesh<'_, '_> {
 }
 
 /// What a triangle of rays meets of one receiver.
-enum Over {
+enum ReceiverHits {
     /// Facets that count as one.
     One,
     /// Parts on several, and whether they take all of it.
-    Several(Vec<Piece>, bool),
+    Several(Vec<FacetPiece>, bool),
 }
 
 /// The parts of a triangle's flux on several facets.
-fn flux_triangles(pieces: &[Piece], flux: FluxCount) -> impl Iterator<Item = FluxTriangle> {
+fn flux_triangles(pieces: &[FacetPiece], flux: FluxCount) -> impl Iterator<Item = FluxTriangle> {
     let triangles = pieces.iter().flat_map(|piece| {
         let triangles = piece.triangles();
         triangles.map(|(corners, share)| (corners, piece.island, share * piece.share))

@@ -2,29 +2,29 @@
 //! patches, and their light is spread exactly over the texels they cover.
 
 pub mod band;
-pub mod bodies;
 pub mod bumps;
 pub mod cell;
-pub mod closeness;
+mod cell_tests;
 pub mod coverage;
 mod division;
-mod doubt;
 pub mod edge;
+pub mod edge_search;
 mod facets;
 pub mod kept_rays;
 pub mod lattice;
 mod mesh;
-mod openings;
-pub mod overreach;
+pub mod overshoot;
 pub mod pass;
 pub mod patch;
 pub mod receivers;
 pub mod refine;
 mod regions;
 mod shares;
+mod slits;
 mod spectral_cell;
 pub mod spectrum;
 pub mod spread;
 pub mod strand;
+pub mod subcell_features;
 pub mod trace;
 pub mod virtual_vertex;

@@ -12,7 +12,7 @@ use crate::illumination::Receiver;
 use crate::light_pass::caustic::pass::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::light_pass::share::Share;
+use crate::light_pass::shard_index::ShardIndex;
 use crate::progress::{Control, Stage};
 
 /// Patches that one task spreads.
@@ -74,7 +74,7 @@ impl WavefrontDepositor<'_> {
     /// `room.bands_bytes`; what rays met is added to `rays`. A cancelled run is to be thrown away, all but its rays.
     pub fn run(
         &self,
-        share: Option<Share>,
+        share: Option<ShardIndex>,
         rays: &mut RayCache,
         maps: Option<&mut ReceiverMaps>,
         listener: &ProgressScope,
@@ -162,7 +162,7 @@ impl WavefrontDepositor<'_> {
                 report.ledger.merge(&part.ledger);
                 report.receiver_queries += part.queries;
                 report.statistics.merge(&part.statistics);
-                report.overreaches.extend_from_slice(&part.overreaches);
+                report.overshoots.extend_from_slice(&part.overshoots);
                 let flux = report.in_one_place.iter_mut().zip(part.in_one_place);
                 flux.for_each(|(sum, flux)| *sum += flux);
             }

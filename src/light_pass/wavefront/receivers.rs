@@ -191,7 +191,7 @@ impl<'a> Receivers<'a> {
 
     /// Whether a beam, by the ends of its traced rays, may meet any object but the given ones: their boxes against boxes
     /// around parts of it.
-    pub fn meets_others(&self, beam: &Beam, except: [u32; 2]) -> bool {
+    pub fn meets_others(&self, beam: &PatchBeam, except: [u32; 2]) -> bool {
         let whole = beam.bounds(0.0, 1.0);
         self.bounds.iter().enumerate().any(|(object, bounds)| {
             !except.contains(&(object as u32))
@@ -227,11 +227,11 @@ const BEAM_MARGIN: f64 = 0.25;
 
 /// The traced rays of a patch, from where they start to where they end [m].
 #[derive(Clone, Copy, Debug)]
-pub struct Beam {
+pub struct PatchBeam {
     ends: [[DVec3; 2]; 4],
 }
 
-impl Beam {
+impl PatchBeam {
     /// Of one to four rays.
     pub fn new(ends: impl Iterator<Item = [DVec3; 2]>) -> Self {
         let mut beam = Self {

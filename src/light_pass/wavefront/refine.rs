@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-use super::overreach::PatchOvershoot;
+use super::overshoot::PatchOvershoot;
 use super::receivers::Receivers;
-use super::strand::{Landing, LatticeRay, PathSegment};
+use super::strand::{LatticeRay, PathSegment, SegmentEnd};
 use crate::illumination::Receiver;
 use crate::light_pass::caustic::path::PathSignature;
 
@@ -83,12 +83,12 @@ pub struct Round {
 
 impl Round {
     /// For these tiles, after a level with these patches.
-    pub fn new(tiles: RoughTiles, overreaches: &[PatchOvershoot]) -> Self {
+    pub fn new(tiles: RoughTiles, overshoots: &[PatchOvershoot]) -> Self {
         let meets = |patch: &&PatchOvershoot| {
             let tiles = tiles.get(&patch.receiver);
             tiles.is_some_and(|tiles| tiles.meets(patch.low, patch.high))
         };
-        let mut places: Vec<(u32, DVec2)> = overreaches
+        let mut places: Vec<(u32, DVec2)> = overshoots
             .iter()
             .filter(meets)
             .map(|patch| (patch.face, patch.middle))
@@ -172,7 +172,7 @@ impl Refinement<'_> {
     fn falls_on(&self, corners: &[&PathSegment], tiles: &RoughTiles) -> bool {
         let mut lit: Vec<(Receiver, DVec2, DVec2)> = Vec::new();
         for strand in corners {
-            let Landing::Receiver {
+            let SegmentEnd::Receiver {
                 receiver,
                 triangle,
                 barycentric,

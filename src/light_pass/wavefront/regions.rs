@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::band::{Corner, SampleId};
 use super::cell::{Cell, EDGE_ENDS};
-use super::edge::Reach;
+use super::edge::EdgeReach;
 
 /// One corner of a region of a cell.
 #[derive(Clone, Copy, Debug)]
@@ -19,20 +19,21 @@ pub(super) struct Outline {
 /// end, with the cuts between.
 pub(super) fn regions(
     cell: &Cell,
-    reach: &impl Fn(usize, bool) -> Reach,
+    reach: &impl Fn(usize, bool) -> EdgeReach,
     is_there: &impl Fn(usize) -> bool,
 ) -> Vec<Vec<Outline>> {
     let there: [bool; 4] = std::array::from_fn(is_there);
     // Side i of the outline runs from corner i to corner i + 1.
     const BACKWARDS: [bool; 4] = [false, false, true, true];
-    let ahead: [Option<Reach>; 4] =
+    let ahead: [Option<EdgeReach>; 4] =
         std::array::from_fn(|side| there[side].then(|| reach(side, BACKWARDS[side])));
-    let behind: [Option<Reach>; 4] = std::array::from_fn(|corner| {
+    let behind: [Option<EdgeReach>; 4] = std::array::from_fn(|corner| {
         let side = (corner + 3) % 4;
         there[corner].then(|| reach(side, !BACKWARDS[side]))
     });
-    let joined: [bool; 4] =
-        std::array::from_fn(|side| there[side] && there[(side + 1) % 4] && ahead[side] == Some(Reach::Whole));
+    let joined: [bool; 4] = std::array::from_fn(|side| {
+        there[side] && there[(side + 1) % 4] && ahead[side] == Some(EdgeReach::Whole)
+    });
     let mut outlines = Vec::new();
     if there == [true; 4] && joined.iter().filter(|joined| **joined).count() >= 3 {
         outlines.push(cell.corners.map(outline_of).to_vec());
@@ -75,8 +76,8 @@ fn outline_of(corner: Corner) -> Outline {
 
 /// Samples along a side from a corner up to the cut, and the cut: near a silhouette the wavefront bends like a root, and
 /// bisection left samples just where they are needed.
-fn up_to_cut(cell: &Cell, side: usize, backwards: bool, reach: Reach) -> Vec<Outline> {
-    let Reach::Cut {
+fn up_to_cut(cell: &Cell, side: usize, backwards: bool, reach: EdgeReach) -> Vec<Outline> {
+    let EdgeReach::Cut {
         place,
         sample,
         between,

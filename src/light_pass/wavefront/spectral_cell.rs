@@ -2,15 +2,15 @@
 //! each traced wavelength where they do not.
 
 use super::band::{Corner, SampleId, Workspace};
-use super::bodies::SmallBodies;
 use super::cell::{
     Cell, CellCutter, CellOutput, Depth, EDGE_ENDS, Patch, SpectralTag, light_regions, reach_of, signatures,
     surface_regions,
 };
-use super::edge::{Edge, EdgeCutter, Reach, is_suspicious, same_ways};
+use super::edge::{Edge, EdgeCutter, EdgeReach, is_suspicious, same_ways};
 use super::regions::{Outline, triangles};
 use super::spectrum::{LightPart, LightSpectrum, NODES};
 use super::strand::LatticeRay;
+use super::subcell_features::SubcellFeatures;
 use crate::light_pass::caustic::path::PathSignature;
 
 /// Samples at a cell's corners, wavelength by wavelength.
@@ -39,7 +39,7 @@ impl CellCutter<'_> {
         let is_one = is_one(cell, &nodes, work);
         let is_unclear = |work: &mut Workspace| {
             if cell.edges.iter().all(Option::is_none) {
-                is_one && self.is_doubtful(cell, work)
+                is_one && self.needs_check_ray(cell, work)
             } else {
                 self.is_ambiguous(cell, work)
             }
@@ -279,7 +279,7 @@ impl CellCutter<'_> {
             tracer: &tracer,
             face: self.edges.face,
         };
-        let none = SmallBodies::default();
+        let none = SubcellFeatures::default();
         let cutter = CellCutter {
             edges,
             unit: self.unit,
@@ -296,19 +296,21 @@ impl CellCutter<'_> {
             square: cell.corners[corner].square,
             sample: corners[corner],
         });
-        let rest = Rest::of(shared, &corners, work);
+        let rest = UnsharedLight::of(shared, &corners, work);
         let edges = match rest {
-            Rest::Nothing => return,
+            UnsharedLight::Nothing => return,
             _ if node == 0 => cell.edges.clone(),
-            Rest::Dim => Default::default(),
-            Rest::Bright => EDGE_ENDS.map(|(from, to)| edges.edge([corners[from], corners[to]], false, work)),
+            UnsharedLight::Dim => Default::default(),
+            UnsharedLight::Bright => {
+                EDGE_ENDS.map(|(from, to)| edges.edge([corners[from], corners[to]], false, work))
+            }
         };
         let seen = Cell {
             corners,
             edges,
             beside: [0; 4],
         };
-        if rest == Rest::Dim {
+        if rest == UnsharedLight::Dim {
             cutter.scatter(&seen, work, out);
         } else {
             cutter.cut_at(&seen, depth, work, out);
@@ -321,13 +323,13 @@ const DIM_SHARE: f64 = 0.01;
 
 /// What corners have beside what all wavelengths share.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Rest {
+enum UnsharedLight {
     Nothing,
     Dim,
     Bright,
 }
 
-impl Rest {
+impl UnsharedLight {
     fn of(shared: &Shared, corners: &[Corner; 4], work: &Workspace) -> Self {
         let samples = corners.map(|corner| work.get(corner.sample));
         let brightest_w = samples
@@ -385,7 +387,8 @@ fn alike(cell: &Cell, nodes: &NodeCorners, work: &Workspace) -> Vec<PathSignatur
             .iter()
             .flatten()
             .all(|sample| work.get(*sample).find(*signature).is_some());
-        let is_whole = || (0..4).all(|edge| reach_of(cell, edge, work, *signature, false) == Reach::Whole);
+        let is_whole =
+            || (0..4).all(|edge| reach_of(cell, edge, work, *signature, false) == EdgeReach::Whole);
         let is_smooth = |corners: &[SampleId; 4]| {
             EDGE_ENDS.iter().enumerate().all(|(edge, &(from, to))| {
                 let ends = [from, to].map(|end| work.get(corners[end]));

@@ -6,7 +6,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::strand::{Landing, PathSegment};
+use super::strand::{PathSegment, SegmentEnd};
 use crate::geometry::Ray;
 use crate::light_pass::spectral_node::{SpectralNode, channels_within, place_of, wavelength_at};
 use crate::optics::spectrum::{Spectrum, xyz_bar};
@@ -288,7 +288,9 @@ impl Slice {
 pub fn lands_alike(nodes: [&PathSegment; NODES]) -> bool {
     let first = &nodes[0].landing;
     nodes.iter().all(|strand| match (first, &strand.landing) {
-        (Landing::Receiver { receiver, .. }, Landing::Receiver { receiver: other, .. }) => receiver == other,
+        (SegmentEnd::Receiver { receiver, .. }, SegmentEnd::Receiver { receiver: other, .. }) => {
+            receiver == other
+        }
         (a, b) => std::mem::discriminant(a) == std::mem::discriminant(b),
     })
 }

@@ -7,12 +7,12 @@ use super::band::{SampleId, Samples};
 use super::cell::{Patch, PatchKind, SpectralTag};
 use super::coverage::FluxTriangle;
 use super::mesh::{PatchMesh, even_grid};
-use super::overreach::PatchOvershoot;
+use super::overshoot::PatchOvershoot;
 use super::patch::{CoonsPatch, PatchShape};
-use super::receivers::{Beam, Receivers};
+use super::receivers::{PatchBeam, Receivers};
 use super::shares::{difference, mean, scaled};
 use super::spectrum::{LightPart, LightSpectrum, NODES, lands_alike};
-use super::strand::{Landing, PathSegment};
+use super::strand::{PathSegment, SegmentEnd};
 use super::virtual_vertex::VirtualRays;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
@@ -61,7 +61,7 @@ pub struct SpreadOutput {
     /// Sizes of lit areas.
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their rays.
-    pub overreaches: Vec<PatchOvershoot>,
+    pub overshoots: Vec<PatchOvershoot>,
     /// Luminous flux of all patches [counts], and of those that hold a part of the spectrum in one place: light of other
     /// wavelengths goes other ways there.
     pub in_one_place: [i128; 2],
@@ -89,7 +89,7 @@ impl SpreadOutput {
 
 /// What part of a light a patch is.
 #[derive(Clone, Copy)]
-struct Tint {
+struct PatchColour {
     /// From strands to the light's channels.
     channels: ColourMatrix,
     /// What factors in RGB are in those.
@@ -100,7 +100,7 @@ struct Tint {
     lands_alike: bool,
 }
 
-impl Tint {
+impl PatchColour {
     const WHITE: Self = Self {
         channels: ColourMatrix::IDENTITY,
         factors: ColourMatrix::IDENTITY,
@@ -121,7 +121,7 @@ impl Tint {
 }
 
 /// Where all of a patch goes, as its traced corners say.
-enum Course {
+enum PatchFate {
     /// On to other specular surfaces.
     Onward,
     /// Out of the scene.
@@ -146,14 +146,16 @@ impl Spreader<'_> {
             (SpectralTag::Node(node), light) => {
                 let before = out.in_one_place[0];
                 let node = light.node(usize::from(node));
-                let tint = node.map_or(Tint::WHITE, |node| Tint::of_node(node.channels, own));
+                let tint = node.map_or(PatchColour::WHITE, |node| {
+                    PatchColour::of_node(node.channels, own)
+                });
                 self.spread_strands(patch, own, tint, out);
                 if matches!(light, LightPart::Spectrum(_)) {
                     out.in_one_place[1] += out.in_one_place[0] - before;
                 }
             }
             (SpectralTag::White | SpectralTag::Spectrum { .. }, _) => {
-                self.spread_strands(patch, own, Tint::WHITE, out)
+                self.spread_strands(patch, own, PatchColour::WHITE, out)
             }
         }
     }
@@ -185,7 +187,7 @@ impl Spreader<'_> {
         for slice in spectrum.slices(apart) {
             let strands = nodes.map(|nodes| slice.strand(nodes, parted));
             let strands = strands.each_ref();
-            let tint = Tint {
+            let tint = PatchColour {
                 channels: ColourMatrix::IDENTITY,
                 factors: slice.factors(nodes[0], parted),
                 is_spectral: true,
@@ -214,7 +216,13 @@ impl Spreader<'_> {
         nodes.iter().map(of_corner).fold(0.0, f64::max)
     }
 
-    fn spread_strands(&self, patch: &Patch, strands: &[&PathSegment], tint: Tint, out: &mut SpreadOutput) {
+    fn spread_strands(
+        &self,
+        patch: &Patch,
+        strands: &[&PathSegment],
+        tint: PatchColour,
+        out: &mut SpreadOutput,
+    ) {
         let colours = strands
             .iter()
             .map(|strand| tint.channels.apply(strand.flux_w))
@@ -233,18 +241,18 @@ impl Spreader<'_> {
         let course = if tint.lands_alike {
             self.course(strands)
         } else {
-            Course::Mixed
+            PatchFate::Mixed
         };
         match course {
-            Course::Escapes => out.ledger.book(Account::Escaped, flux),
-            Course::Onward => self.onward(strands, flux, tint, out),
-            Course::Plane(receiver) => {
+            PatchFate::Escapes => out.ledger.book(Account::Escaped, flux),
+            PatchFate::Onward => self.onward(strands, flux, tint, out),
+            PatchFate::Plane(receiver) => {
                 let light = (flux, flux_w, &colours[..]);
                 self.over(patch, strands, light, tint, Some(receiver), out);
             }
-            Course::Mixed => self.over(patch, strands, (flux, flux_w, &colours), tint, None, out),
+            PatchFate::Mixed => self.over(patch, strands, (flux, flux_w, &colours), tint, None, out),
         }
-        self.note_overreach(patch, strands, &before, out);
+        self.note_overshoot(patch, strands, &before, out);
     }
 
     /// Whether the light of a strand is absorbed on its way from the surface it left.
@@ -253,7 +261,7 @@ impl Spreader<'_> {
     }
 
     /// Notes where the patch's triangles, those beyond the given counts, lie far from its traced rays.
-    fn note_overreach(
+    fn note_overshoot(
         &self,
         patch: &Patch,
         strands: &[&PathSegment],
@@ -265,7 +273,7 @@ impl Spreader<'_> {
         for (index, (receiver, list)) in out.triangles.iter().enumerate() {
             let new = &list[before.get(index).copied().unwrap_or(0)..];
             let traced = strands.iter().filter_map(|strand| match strand.landing {
-                Landing::Receiver {
+                SegmentEnd::Receiver {
                     receiver: lit,
                     triangle,
                     barycentric,
@@ -274,31 +282,35 @@ impl Spreader<'_> {
                 _ => None,
             });
             let found = PatchOvershoot::of(self.face, middle, *receiver, new, traced);
-            out.overreaches.extend(found);
+            out.overshoots.extend(found);
         }
     }
 
-    fn course(&self, strands: &[&PathSegment]) -> Course {
-        let landing = |wanted: fn(&Landing) -> bool| strands.iter().all(|strand| wanted(&strand.landing));
-        if landing(|landing| matches!(landing, Landing::Specular { .. })) {
-            return Course::Onward;
+    fn course(&self, strands: &[&PathSegment]) -> PatchFate {
+        let landing = |wanted: fn(&SegmentEnd) -> bool| strands.iter().all(|strand| wanted(&strand.landing));
+        if landing(|landing| matches!(landing, SegmentEnd::Specular { .. })) {
+            return PatchFate::Onward;
         }
         let receiver = strands.iter().find_map(|strand| strand.landing.receiver());
         let beam = self.beam(strands);
         let from = strands[0].from;
         let Some(receiver) = receiver else {
-            let escapes = landing(|landing| matches!(landing, Landing::Escaped))
+            let escapes = landing(|landing| matches!(landing, SegmentEnd::Escaped))
                 && !self.receivers.meets_others(&beam, [from; 2]);
-            return if escapes { Course::Escapes } else { Course::Mixed };
+            return if escapes {
+                PatchFate::Escapes
+            } else {
+                PatchFate::Mixed
+            };
         };
         let Some(surface) = self.receivers.get(receiver) else {
-            return Course::Mixed;
+            return PatchFate::Mixed;
         };
         let Some(plane) = surface.plane.filter(|_| surface.is_diffuse) else {
-            return Course::Mixed;
+            return PatchFate::Mixed;
         };
         let only = strands.iter().all(|strand| {
-            matches!(strand.landing, Landing::Escaped) || strand.landing.receiver() == Some(receiver)
+            matches!(strand.landing, SegmentEnd::Escaped) || strand.landing.receiver() == Some(receiver)
         });
         if only
             && (plane.fills_map || !goes_out(strands))
@@ -306,15 +318,15 @@ impl Spreader<'_> {
                 .receivers
                 .meets_others(&beam, [from, receiver.object() as u32])
         {
-            Course::Plane(receiver)
+            PatchFate::Plane(receiver)
         } else {
-            Course::Mixed
+            PatchFate::Mixed
         }
     }
 
     /// The traced rays from their origins to where they land or leave the scene.
-    fn beam(&self, strands: &[&PathSegment]) -> Beam {
-        Beam::new(strands.iter().map(|strand| {
+    fn beam(&self, strands: &[&PathSegment]) -> PatchBeam {
+        PatchBeam::new(strands.iter().map(|strand| {
             let end = strand.landing_point();
             [
                 strand.ray.origin,
@@ -324,7 +336,7 @@ impl Spreader<'_> {
     }
 
     /// All of it goes on; volumes take their share.
-    fn onward(&self, strands: &[&PathSegment], flux: FluxCount, tint: Tint, out: &mut SpreadOutput) {
+    fn onward(&self, strands: &[&PathSegment], flux: FluxCount, tint: PatchColour, out: &mut SpreadOutput) {
         let mut passed = flux;
         if self.absorbs(strands[0]) {
             let scene = self.receivers.tracer.scene();
@@ -342,7 +354,7 @@ impl Spreader<'_> {
         patch: &Patch,
         strands: &[&PathSegment],
         (flux, flux_w, colours): (FluxCount, LinearSrgb, &[LinearSrgb]),
-        tint: Tint,
+        tint: PatchColour,
         plane: Option<Receiver>,
         out: &mut SpreadOutput,
     ) {
@@ -403,7 +415,7 @@ impl Spreader<'_> {
 fn goes_out(strands: &[&PathSegment]) -> bool {
     strands
         .iter()
-        .any(|strand| matches!(strand.landing, Landing::Escaped))
+        .any(|strand| matches!(strand.landing, SegmentEnd::Escaped))
 }
 
 fn shape_of(patch: &Patch, strands: &[&PathSegment]) -> PatchShape {

@@ -27,12 +27,12 @@ pub struct PathSegment {
     /// Smoothing group of the object that it leaves.
     pub from_group: u32,
     /// Where it goes.
-    pub landing: Landing,
+    pub landing: SegmentEnd,
 }
 
 /// What an outgoing ray meets next.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Landing {
+pub enum SegmentEnd {
     /// Nothing.
     Escaped,
     /// A surface that sends all of it on or absorbs it.
@@ -55,7 +55,7 @@ pub enum Landing {
     },
 }
 
-impl Landing {
+impl SegmentEnd {
     /// Distance to what is met [m]; infinite where it is nothing.
     pub fn distance_m(&self) -> f64 {
         match *self {

@@ -3,10 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::bumps::BumpCells;
-use super::closeness::EdgeSearch;
-use super::kept_rays::{CachedHit, Known, RayCache, RayKey, TracedRay};
+use super::edge_search::EdgeSearch;
+use super::kept_rays::{CachedHit, CachedRay, RayCache, RayKey, TracedRay};
 use super::spectrum::LightPart;
-use super::strand::{Landing, LatticeRay, PathSegment, SurfaceFluxRecord};
+use super::strand::{LatticeRay, PathSegment, SegmentEnd, SurfaceFluxRecord};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::caustic::path::{PathLimits, PathSignature};
@@ -48,7 +48,7 @@ pub struct StrandTracer<'a> {
 
 /// A ray that waits to be followed.
 #[derive(Clone, Copy, Debug)]
-struct Waiting {
+struct QueuedRay {
     ray: Ray,
     differential: RayDifferential,
     flux_w: LinearSrgb,
@@ -65,7 +65,7 @@ struct Waiting {
 
 /// What a light ray meets: as it is kept, or as a search finds it.
 struct Search<'a> {
-    known: Option<Known<'a>>,
+    known: Option<CachedRay<'a>>,
     /// What the same light ray met at another wavelength.
     common: &'a [CachedHit],
     hits: Vec<CachedHit>,
@@ -148,7 +148,7 @@ impl<'a> StrandTracer<'a> {
             return sample;
         }
         let floor_w = flux_w.luminance() * self.limits.branch_threshold;
-        let mut waiting = vec![Waiting {
+        let mut waiting = vec![QueuedRay {
             ray,
             differential,
             flux_w,
@@ -181,14 +181,14 @@ impl<'a> StrandTracer<'a> {
 
     fn step(
         &self,
-        from: Waiting,
+        from: QueuedRay,
         floor_w: f64,
         search: &mut Search,
         sample: &mut LatticeRay,
-        waiting: &mut Vec<Waiting>,
+        waiting: &mut Vec<QueuedRay>,
     ) {
         let (place, is_known) = search.closest(self.tracer, &from);
-        let from = &Waiting { is_known, ..from };
+        let from = &QueuedRay { is_known, ..from };
         let Some(hit) = place.map(|place| self.tracer.surface_at(&place)) else {
             if from.strand.is_none() {
                 sample.not_emitted = from.flux_w;
@@ -227,13 +227,13 @@ impl<'a> StrandTracer<'a> {
     #[allow(clippy::too_many_arguments, reason = "one call site; a hit is made of this")]
     fn scatter(
         &self,
-        from: &Waiting,
+        from: &QueuedRay,
         hit: &SurfaceHit,
         incident: LinearSrgb,
         interaction: &Interaction,
         floor_w: f64,
         sample: &mut LatticeRay,
-        waiting: &mut Vec<Waiting>,
+        waiting: &mut Vec<QueuedRay>,
     ) {
         let moved_smooth = self
             .tracer
@@ -334,7 +334,7 @@ impl<'a> StrandTracer<'a> {
     reason = "one call site; a strand is made of this"
 )]
 fn push(
-    from: &Waiting,
+    from: &QueuedRay,
     surface: (u32, u32),
     branch: &Branch,
     flux_w: LinearSrgb,
@@ -342,9 +342,9 @@ fn push(
     signature: PathSignature,
     is_dispersive: bool,
     sample: &mut LatticeRay,
-    waiting: &mut Vec<Waiting>,
+    waiting: &mut Vec<QueuedRay>,
 ) {
-    waiting.push(Waiting {
+    waiting.push(QueuedRay {
         ray: branch.ray,
         differential,
         flux_w,
@@ -363,13 +363,13 @@ fn push(
         media: branch.media,
         from: surface.0,
         from_group: surface.1,
-        landing: Landing::Escaped,
+        landing: SegmentEnd::Escaped,
     });
 }
 
 impl Search<'_> {
     /// Where a segment ends, and whether what goes on from there is as it was when it was kept.
-    fn closest(&mut self, tracer: &Tracer, from: &Waiting) -> (Option<RayHit>, bool) {
+    fn closest(&mut self, tracer: &Tracer, from: &QueuedRay) -> (Option<RayHit>, bool) {
         let known = self.known.filter(|_| from.is_known);
         let kept = known.and_then(|known| known.hit(from.signature));
         let common = || {
@@ -381,7 +381,7 @@ impl Search<'_> {
             _ if let Some(hit) = common() => hit.place,
             _ => {
                 self.searches += 1;
-                tracer.closest_place(&from.ray)
+                tracer.intersect(&from.ray)
             }
         };
         let is_known = kept == Some(place)
@@ -394,16 +394,16 @@ impl Search<'_> {
     }
 }
 
-fn landing(hit: &SurfaceHit, direction: DVec3, is_receiver: bool) -> Landing {
+fn landing(hit: &SurfaceHit, direction: DVec3, is_receiver: bool) -> SegmentEnd {
     if is_receiver {
-        Landing::Receiver {
+        SegmentEnd::Receiver {
             receiver: Receiver::new(hit.object, Side::met(direction, hit.geometric_normal)),
             triangle: hit.triangle as u32,
             barycentric: DVec2::new(hit.barycentric[1], hit.barycentric[2]),
             distance_m: hit.distance_m,
         }
     } else {
-        Landing::Specular {
+        SegmentEnd::Specular {
             object: hit.object as u32,
             distance_m: hit.distance_m,
         }

@@ -6,7 +6,7 @@ use super::facets::FacetPlace;
 use super::patch::PatchShape;
 use super::receivers::{ReceiverSurface, Receivers};
 use super::spread::Spreader;
-use super::strand::{Landing, PathSegment};
+use super::strand::{PathSegment, SegmentEnd};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
@@ -15,7 +15,7 @@ use crate::transport::{MediumStack, SurfaceHit};
 
 /// Where a ray lands.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Place {
+pub enum LandingPoint {
     /// Outside the scene, or off the map by far.
     Nowhere,
     /// On a surface that only sends on or absorbs.
@@ -35,7 +35,7 @@ pub enum Place {
     },
 }
 
-impl Place {
+impl LandingPoint {
     /// Whether two rays land on the same receiver, or share another fate.
     pub fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
@@ -77,7 +77,7 @@ impl Place {
 #[derive(Clone, Copy, Debug)]
 pub struct VirtualVertex {
     /// Where it lands.
-    pub place: Place,
+    pub place: LandingPoint,
     /// The ray, not normalised.
     pub ray: Ray,
     /// Share of the light that is left on arrival [0, 1].
@@ -127,7 +127,7 @@ impl<'a> VirtualRays<'a> {
         let nearest_own_m = strands
             .iter()
             .filter_map(|strand| match strand.landing {
-                Landing::Specular { object, distance_m } if object == first.from => Some(distance_m),
+                SegmentEnd::Specular { object, distance_m } if object == first.from => Some(distance_m),
                 _ => None,
             })
             .fold(f64::INFINITY, f64::min);
@@ -174,7 +174,7 @@ impl<'a> VirtualRays<'a> {
             .and_then(|plane| plane.meet(ray));
         match met {
             Some((texel, distance)) => VirtualVertex {
-                place: Place::On {
+                place: LandingPoint::On {
                     receiver,
                     island: 0,
                     texel,
@@ -219,7 +219,7 @@ impl<'a> VirtualRays<'a> {
         let place = if kind.is_receiver() {
             self.place_on(&hit, direction)
         } else {
-            Place::Onward
+            LandingPoint::Onward
         };
         VirtualVertex {
             place,
@@ -246,7 +246,7 @@ impl<'a> VirtualRays<'a> {
         Some((hit, before_m + hit.distance_m))
     }
 
-    fn place_on(&self, hit: &SurfaceHit, direction: DVec3) -> Place {
+    fn place_on(&self, hit: &SurfaceHit, direction: DVec3) -> LandingPoint {
         let receiver = Receiver::new(hit.object, Side::met(direction, hit.geometric_normal));
         // Interpolated rays may start behind a plane that no traced one starts behind.
         let is_astray = |surface: &ReceiverSurface| {
@@ -256,8 +256,8 @@ impl<'a> VirtualRays<'a> {
                 .is_some_and(|plane| origins.all(|origin| plane.hides(*origin)))
         };
         match self.receivers.get(receiver) {
-            Some(surface) if is_astray(surface) => Place::Refused,
-            Some(surface) => Place::On {
+            Some(surface) if is_astray(surface) => LandingPoint::Refused,
+            Some(surface) => LandingPoint::On {
                 receiver,
                 island: surface.island(hit.triangle as u32),
                 texel: surface.texel(
@@ -266,14 +266,14 @@ impl<'a> VirtualRays<'a> {
                 ),
                 facet: Some((hit.triangle as u32, hit.point)),
             },
-            None => Place::Refused,
+            None => LandingPoint::Refused,
         }
     }
 }
 
 fn nowhere(ray: Ray) -> VirtualVertex {
     VirtualVertex {
-        place: Place::Nowhere,
+        place: LandingPoint::Nowhere,
         ray,
         transmittance: LinearSrgb::WHITE,
         deposit: 0.0,

@@ -23,7 +23,7 @@ pub struct WavelengthSampler {
 
 /// One of several wavelengths that stand for a whole spectrum.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Band {
+pub struct WavelengthBand {
     /// The wavelengths that it stands for; bands of one set meet without gap.
     pub range: RangeInclusive<Nanometres>,
     /// The one that is followed: the median of the band's importance.
@@ -109,21 +109,21 @@ impl WavelengthSampler {
     }
 
     /// `count` bands of equal importance, in order of wavelength; together they are all the light of the lamp.
-    pub fn bands(&self, count: usize) -> Vec<Band> {
+    pub fn bands(&self, count: usize) -> Vec<WavelengthBand> {
         let edge = |i: usize| i as f64 / count as f64;
         (0..count).map(|i| self.band([edge(i), edge(i + 1)])).collect()
     }
 
     /// Seven bands, one for each colour of the rainbow, violet first. One that this lamp has no light in is left out.
-    pub fn rainbow_seven(&self) -> Vec<Band> {
+    pub fn rainbow_seven(&self) -> Vec<WavelengthBand> {
         let shares = RAINBOW_NM.map(|nm| self.cumulative(Nanometres(nm)));
         let lit = shares.windows(2).filter(|edge| edge[0] < edge[1]);
         lit.map(|edge| self.band([edge[0], edge[1]])).collect()
     }
 
-    fn band(&self, [from, to]: [f64; 2]) -> Band {
+    fn band(&self, [from, to]: [f64; 2]) -> WavelengthBand {
         let [first, place, last] = [from, 0.5 * (from + to), to].map(|share| self.sample(share).0);
-        Band {
+        WavelengthBand {
             range: first..=last,
             place,
         }

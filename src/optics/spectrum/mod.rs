@@ -18,7 +18,7 @@ pub mod xyz;
 pub use error::SpectrumError;
 pub use hue::{Hue, dominant};
 pub use illuminants::illuminant;
-pub use luminous::{Band, WavelengthSampler};
+pub use luminous::{WavelengthBand, WavelengthSampler};
 pub use table::Spectrum;
 pub use upsample::{Emission, SmoothSpectrum};
 pub use xyz::Xyz;

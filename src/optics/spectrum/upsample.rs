@@ -131,13 +131,13 @@ fn sigmoid_inverse(value: f64) -> f64 {
 
 /// Wavelengths, and what a factor of 1 at each adds to the channels of linear sRGB under D65 of one luminous-equivalent
 /// watt.
-type Places = Vec<(Nanometres, DVec3)>;
+type UpsamplingBasis = Vec<(Nanometres, DVec3)>;
 
 struct Weights {
     /// For factors that are smooth: the points of the quadrature.
-    of_curves: Places,
+    of_curves: UpsamplingBasis,
     /// For light that is linear between whole nanometres: those.
-    of_tables: Places,
+    of_tables: UpsamplingBasis,
     /// Channels of D65 itself: white but for the table's last digits.
     white: DVec3,
 }
@@ -147,8 +147,9 @@ impl Weights {
         static WEIGHTS: LazyLock<Weights> = LazyLock::new(|| {
             let knots = visible_knots();
             let d65 = |wavelength| illuminants::d65().at(wavelength);
-            let mut of_curves = Places::new();
-            let mut of_tables: Places = knots.iter().map(|nm| (Nanometres(*nm), DVec3::ZERO)).collect();
+            let mut of_curves = UpsamplingBasis::new();
+            let mut of_tables: UpsamplingBasis =
+                knots.iter().map(|nm| (Nanometres(*nm), DVec3::ZERO)).collect();
             for (index, (wavelength, weight_nm)) in points(&knots).enumerate() {
                 let colour = Xyz::from(xyz_bar(wavelength)).to_linear_srgb();
                 let channels = DVec3::from_array(colour.to_array()) * weight_nm;
@@ -171,7 +172,7 @@ impl Weights {
 }
 
 /// Channels of the sigmoid with some coefficients, less those wanted, and how they change with each coefficient.
-fn residual(places: &Places, coefficients: DVec3, wanted: DVec3) -> (DVec3, DMat3) {
+fn residual(places: &UpsamplingBasis, coefficients: DVec3, wanted: DVec3) -> (DVec3, DMat3) {
     let mut residual = -wanted;
     let mut jacobian = DMat3::ZERO;
     for (place, channels) in places {
@@ -186,7 +187,7 @@ fn residual(places: &Places, coefficients: DVec3, wanted: DVec3) -> (DVec3, DMat
 
 /// Coefficients of the sigmoid whose channels under D65 are the ones wanted, by Levenberg and Marquardt from a flat
 /// grey of their mean.
-fn solve(places: &Places, wanted: DVec3) -> [f64; 3] {
+fn solve(places: &UpsamplingBasis, wanted: DVec3) -> [f64; 3] {
     let mean = wanted.element_sum() / 3.0;
     let mut coefficients = DVec3::new(0.0, 0.0, sigmoid_inverse(mean.clamp(TOLERANCE, 1.0 - TOLERANCE)));
     let (mut error, mut jacobian) = residual(places, coefficients, wanted);

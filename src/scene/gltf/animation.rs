@@ -10,7 +10,7 @@ use serde_json::Map;
 use super::accessor::{Formats, Reader};
 use super::document::Document;
 use super::names;
-use super::nodes::{self, Placed};
+use super::nodes::{self, PlacedNode};
 use super::pose::Maybe;
 use super::report::{Budget, Report};
 use crate::error::Error;
@@ -60,7 +60,7 @@ impl Animations {
     pub fn read(
         &self,
         document: &Document,
-        placed: &[Placed],
+        placed: &[PlacedNode],
         reader: Reader,
         budget: &mut Budget,
         report: &mut Report,
@@ -197,7 +197,7 @@ fn check(track: &mut Track) -> Result<(), &'static str> {
     Ok(())
 }
 
-fn clip(mut tracks: HashMap<usize, Vec<Track>>, document: &Document, placed: &[Placed]) -> Option<Clip> {
+fn clip(mut tracks: HashMap<usize, Vec<Track>>, document: &Document, placed: &[PlacedNode]) -> Option<Clip> {
     let parents: HashMap<usize, usize> = document
         .root
         .nodes

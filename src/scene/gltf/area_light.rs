@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::document::Document;
 use super::light::{Origin, left_out, light_name};
-use super::nodes::Placed;
+use super::nodes::PlacedNode;
 use super::report::Report;
 use super::spectrum;
 use crate::error::Result;
@@ -24,7 +24,7 @@ pub(super) const NAME: &str = "EXT_lights_area";
 /// A lamp as the file states it, unchecked.
 #[derive(Deserialize)]
 #[serde(default)]
-struct Source {
+struct AreaLightEntry {
     /// The draft's schema requires `shape` and then describes `type`: files have either or both.
     #[serde(rename = "type")]
     kind: Option<String>,
@@ -44,7 +44,7 @@ struct Rect {
     aspect: f64,
 }
 
-impl Default for Source {
+impl Default for AreaLightEntry {
     fn default() -> Self {
         Self {
             kind: None,
@@ -71,7 +71,7 @@ impl Default for Rect {
 pub fn add_all(
     lights: &mut Vec<(Light, Origin)>,
     document: &Document,
-    placed: &[Placed],
+    placed: &[PlacedNode],
     folder: &Path,
     report: &mut Report,
 ) -> Result<()> {
@@ -111,14 +111,15 @@ pub fn add_all(
 fn lamp(
     on_node: &Value,
     sources: &[Value],
-    placed: &Placed,
+    placed: &PlacedNode,
 ) -> std::result::Result<(usize, LinearSrgb, LightKind), String> {
     let index = on_node.get("light").and_then(Value::as_u64);
     let index = index.ok_or("does not say which area light it is")?;
     let missing = || format!("is area light {index}, which does not exist");
     let index = usize::try_from(index).map_err(|_| missing())?;
     let source = sources.get(index).ok_or_else(missing)?;
-    let source = Source::deserialize(source).map_err(|error| format!("does not follow {NAME} ({error})"))?;
+    let source =
+        AreaLightEntry::deserialize(source).map_err(|error| format!("does not follow {NAME} ({error})"))?;
     let colour = LinearSrgb::from(source.color);
     if !colour.is_finite() || source.color.iter().any(|channel| *channel < 0.0) {
         return Err("has a colour that is negative or not finite".into());
@@ -150,7 +151,7 @@ fn lamp(
 }
 
 /// From the middle of a lamp to its sides [m], across × down along the node's −z; `None` where it has no area.
-fn half_axes(placed: &Placed, size: f64, aspect: f64) -> Option<(DVec3, DVec3)> {
+fn half_axes(placed: &PlacedNode, size: f64, aspect: f64) -> Option<(DVec3, DVec3)> {
     let axes = placed.world_from_node.matrix3;
     let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis];
     let half_height_m = 0.5 * size * x.length().max(y.length()).max(z.length());

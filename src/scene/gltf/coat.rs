@@ -5,7 +5,7 @@ use gltf::json::extensions::material as extension;
 use gltf::json::texture::Info;
 use serde::Deserialize;
 
-use super::material::Reading;
+use super::material::MaterialReader;
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
@@ -20,7 +20,7 @@ const IOR: f64 = 1.5;
 /// Reflectance of the lacquer at normal incidence: ((n − 1)/(n + 1))².
 const F0: f64 = 0.04;
 
-impl Reading<'_, '_> {
+impl MaterialReader<'_, '_> {
     /// A lacquer over the surface, where the file has one.
     ///
     /// # Errors

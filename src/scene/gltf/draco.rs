@@ -18,7 +18,7 @@ pub const NAME: &str = "KHR_draco_mesh_compression";
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
-struct Stated {
+struct DracoExtension {
     buffer_view: u32,
     /// The block's own numbers of its attributes.
     attributes: BTreeMap<String, u32>,
@@ -53,7 +53,7 @@ pub fn unpack(
         let what = format!("its Draco data cannot be unpacked ({why})");
         Error::failure(owner, what, "export the file again")
     };
-    let stated = Stated::deserialize(stated).map_err(|error| damaged(&error.to_string()))?;
+    let stated = DracoExtension::deserialize(stated).map_err(|error| damaged(&error.to_string()))?;
     let data = reader.buffers.view(Index::new(stated.buffer_view), owner)?.data;
 
     // Unpacking takes several times the memory of what comes of it.

@@ -14,7 +14,7 @@ const F0: f64 = 0.04;
 
 #[derive(Deserialize)]
 #[serde(default, rename_all = "camelCase")]
-struct Stated {
+struct SpecularGlossiness {
     diffuse_factor: [f64; 4],
     diffuse_texture: Value,
     specular_factor: [f64; 3],
@@ -22,7 +22,7 @@ struct Stated {
     specular_glossiness_texture: Value,
 }
 
-impl Default for Stated {
+impl Default for SpecularGlossiness {
     fn default() -> Self {
         Self {
             diffuse_factor: [1.0; 4],
@@ -44,7 +44,7 @@ pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Repo
     let Some(stated) = extensions.and_then(|extensions| extensions.remove(NAME)) else {
         return;
     };
-    let Ok(stated) = Stated::deserialize(stated) else {
+    let Ok(stated) = SpecularGlossiness::deserialize(stated) else {
         report.warn(
             owner,
             "its specular-glossiness cannot be read",

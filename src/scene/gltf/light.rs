@@ -8,7 +8,7 @@ use gltf::json::extensions::scene::khr_lights_punctual::{Light as Source, Spot, 
 use gltf::json::validation::Checked;
 
 use super::document::Document;
-use super::nodes::Placed;
+use super::nodes::PlacedNode;
 use super::numbers::{widen, widen_all};
 use super::report::Report;
 use super::{area_light, sizes, spectrum};
@@ -23,7 +23,7 @@ use crate::units::{Irradiance, LUMENS_PER_WATT, RadiantIntensity};
 /// As [`spectrum::apply`].
 pub fn all(
     document: &Document,
-    placed: &[Placed],
+    placed: &[PlacedNode],
     folder: &Path,
     report: &mut Report,
 ) -> Result<Vec<(Light, Origin)>> {
@@ -35,7 +35,7 @@ pub fn all(
 /// The lights of the placed nodes that have some power, node by node.
 fn punctual(
     document: &Document,
-    placed: &[Placed],
+    placed: &[PlacedNode],
     folder: &Path,
     report: &mut Report,
 ) -> Result<Vec<(Light, Origin)>> {
@@ -45,7 +45,7 @@ fn punctual(
         .as_ref()
         .and_then(|extensions| extensions.khr_lights_punctual.as_ref());
     let sources = extension.map_or(&[][..], |extension| &extension.lights);
-    let on_node = |placed: &Placed| {
+    let on_node = |placed: &PlacedNode| {
         let extensions = root.nodes[placed.node].extensions.as_ref()?;
         Some(extensions.khr_lights_punctual.as_ref()?.light.value())
     };
@@ -94,7 +94,7 @@ pub struct Origin {
 pub(super) const NAME: &str = "KHR_lights_punctual";
 
 /// The node's name; `lightN` where the file gives none.
-pub(super) fn light_name(placed: &Placed, index: usize) -> String {
+pub(super) fn light_name(placed: &PlacedNode, index: usize) -> String {
     let unnamed = placed.name == format!("node{}", placed.node);
     if unnamed {
         format!("light{index}")
@@ -114,7 +114,7 @@ pub(super) fn left_out(report: &mut Report, owner: &str, why: &str) {
 
 fn read(
     source: &Source,
-    placed: &Placed,
+    placed: &PlacedNode,
     owner: &str,
     report: &mut Report,
 ) -> std::result::Result<LightKind, String> {

@@ -13,7 +13,7 @@ use super::document::Document;
 use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
-use super::substance::{self, Substance};
+use super::substance::{self, Composition};
 use super::{coat, extras, names, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
@@ -89,7 +89,7 @@ pub fn read_all(
         .map(|(index, source)| {
             let name = names::name(source.name.as_ref(), "material", index);
             let stated = |key: &str| extras::stated(&document.extras.materials, index, key);
-            let mut reading = Reading {
+            let mut reading = MaterialReader {
                 owner: format!("material `{name}`"),
                 source,
                 waves: stated(waves::KEY),
@@ -112,7 +112,7 @@ pub(super) fn linear([r, g, b, _]: [u8; 4]) -> LinearSrgb {
 }
 
 /// A material while it is read.
-pub struct Reading<'a, 'b> {
+pub struct MaterialReader<'a, 'b> {
     pub owner: String,
     pub source: &'a Source,
     /// As its extras state them.
@@ -127,7 +127,7 @@ pub struct Reading<'a, 'b> {
     pub report: &'a mut Report,
 }
 
-impl Reading<'_, '_> {
+impl MaterialReader<'_, '_> {
     fn read(&mut self, name: String) -> Result<Material> {
         let none = extension::Material::default();
         let extensions = self.source.extensions.as_ref().unwrap_or(&none);
@@ -353,8 +353,8 @@ impl Reading<'_, '_> {
     /// What it is made of: as its extras say, else by KHR_materials_dispersion.
     fn substance(&mut self, material: &mut Material, extensions: &extension::Material) -> Result<()> {
         match substance::read(self.glass, self.metal, &self.owner)? {
-            Some(Substance::Glass(glass)) => material.set_glass(Arc::new(glass)),
-            Some(Substance::Metal(metal)) => {
+            Some(Composition::Glass(glass)) => material.set_glass(Arc::new(glass)),
+            Some(Composition::Metal(metal)) => {
                 if let Some(factor) = material.set_metal(metal) {
                     self.warn(
                         format!(

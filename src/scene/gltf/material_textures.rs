@@ -12,7 +12,7 @@ use gltf::json::validation::Checked;
 use serde::Deserialize;
 
 use super::factors::{FactorImage, Factors};
-use super::material::{Reading, linear};
+use super::material::{MaterialReader, linear};
 use super::numbers::widen;
 use crate::error::Result;
 use crate::optics::LinearSrgb;
@@ -27,7 +27,7 @@ const MAX_BETWEEN: f64 = 0.02;
 /// Alpha from which on nothing is seen through a surface [codes].
 const OPAQUE: u8 = 254;
 
-impl Reading<'_, '_> {
+impl MaterialReader<'_, '_> {
     /// The image of what it emits, or its mean where that has a spectrum.
     pub(super) fn glow(&mut self, material: &mut Material) -> Result<()> {
         let source = self.source;

@@ -149,7 +149,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     };
     surface::add_objects(
         &mut scene,
-        primitive::Source {
+        primitive::PrimitiveSource {
             reader,
             poses: &document.poses,
             stands: &stands,
@@ -290,7 +290,7 @@ struct File {
     folder: PathBuf,
     glb: Glb,
     document: document::Document,
-    placed: Vec<nodes::Placed>,
+    placed: Vec<nodes::PlacedNode>,
 }
 
 impl File {

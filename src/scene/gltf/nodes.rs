@@ -16,7 +16,7 @@ use crate::scene::Camera;
 
 /// A node of the scene.
 #[derive(Clone, Debug)]
-pub struct Placed {
+pub struct PlacedNode {
     /// glTF index.
     pub node: usize,
     /// The file's name for it, or `nodeN`.
@@ -29,7 +29,7 @@ pub struct Placed {
 ///
 /// # Errors
 /// A reference to a node that does not exist; a transform that is not finite.
-pub fn place(document: &Document, report: &mut Report) -> Result<Vec<Placed>> {
+pub fn place(document: &Document, report: &mut Report) -> Result<Vec<PlacedNode>> {
     let root = &document.root;
     let mut reached = vec![false; root.nodes.len()];
     let mut placed = Vec::new();
@@ -68,7 +68,7 @@ pub fn place(document: &Document, report: &mut Report) -> Result<Vec<Placed>> {
                 .map(|child| (child.value(), world_from_node, is_hidden)),
         );
         if !is_hidden {
-            placed.push(Placed {
+            placed.push(PlacedNode {
                 node: index,
                 name,
                 world_from_node,
@@ -212,7 +212,7 @@ fn not_finite(name: &str) -> Error {
 
 /// All perspective cameras of the placed nodes, with the glTF indices of these. What cannot be read is left out with a
 /// warning.
-pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> (Vec<Camera>, Vec<usize>) {
+pub fn read_all(root: &Root, placed: &[PlacedNode], report: &mut Report) -> (Vec<Camera>, Vec<usize>) {
     let mut nodes = Vec::new();
     let mut cameras = Vec::new();
     for placed in placed {
@@ -242,7 +242,7 @@ pub fn read_all(root: &Root, placed: &[Placed], report: &mut Report) -> (Vec<Cam
     (cameras, nodes)
 }
 
-fn read_one(source: &Source, placed: &Placed) -> std::result::Result<Camera, String> {
+fn read_one(source: &Source, placed: &PlacedNode) -> std::result::Result<Camera, String> {
     let perspective = match (&source.type_, &source.perspective) {
         (Checked::Valid(Type::Perspective), Some(perspective)) => perspective,
         (Checked::Valid(Type::Orthographic), _) => {

@@ -67,11 +67,11 @@ struct Skin {
 }
 
 /// For each vertex four joints of its skin, and their weights.
-pub type Influences = (Vec<[f64; 4]>, Vec<[f64; 4]>);
+pub type SkinWeights = (Vec<[f64; 4]>, Vec<[f64; 4]>);
 
 /// A primitive of a mesh at a node.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct PrimitiveInstance {
     pub node: usize,
     pub mesh: usize,
     pub primitive: usize,
@@ -95,7 +95,7 @@ impl Poses {
     }
 
     /// Whether a primitive is bent.
-    pub fn bend(&self, place: Place) -> bool {
+    pub fn bend(&self, place: PrimitiveInstance) -> bool {
         let mesh = self.meshes.get(place.mesh).and_then(Maybe::get);
         let part = mesh.and_then(|mesh| mesh.primitives.get(place.primitive));
         self.has_skin(place.node) || part.is_some_and(|part| !part.targets.is_empty())
@@ -111,7 +111,7 @@ impl Poses {
     /// Targets that do not fit the mesh.
     pub fn morph(
         &self,
-        place: Place,
+        place: PrimitiveInstance,
         mesh: &mut Mesh,
         reader: Reader,
         owner: &str,
@@ -183,7 +183,7 @@ impl Poses {
 ///
 /// # Errors
 /// Vertices that hang on joints which do not exist, or on nothing.
-pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[Influences], owner: &str) -> Result<()> {
+pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[SkinWeights], owner: &str) -> Result<()> {
     let mut sums = vec![DMat4::ZERO; mesh.positions.len()];
     for (indices, weights) in influences {
         if indices.len() != sums.len() || weights.len() != sums.len() {

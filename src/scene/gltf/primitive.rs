@@ -11,7 +11,7 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::accessor::{Formats, Reader};
-use super::pose::{Place, Poses};
+use super::pose::{Poses, PrimitiveInstance};
 use super::report::{Budget, Report};
 use super::{draco, pose, triangles};
 use crate::error::{Error, Result};
@@ -42,14 +42,14 @@ pub fn take_copy(mesh: &Mesh, owner: &str, budget: &mut Budget) -> Result<()> {
 #[derive(Debug, Default)]
 pub struct Primitives {
     /// By the indices of mesh and primitive, and of the node that bends it, if one does.
-    known: HashMap<(usize, usize, Option<usize>), Known>,
+    known: HashMap<(usize, usize, Option<usize>), KnownPrimitive>,
     /// Triangles without an area.
     pub degenerate: usize,
 }
 
 /// A primitive of the file.
 #[derive(Debug)]
-struct Known {
+struct KnownPrimitive {
     /// `None` where it has no triangles.
     source: Option<Local>,
     /// What objects were made of it. Which triangles have an area depends on the transform by what it rounds.
@@ -69,7 +69,7 @@ struct Local {
 
 /// What primitives are read from.
 #[derive(Clone, Copy, Debug)]
-pub struct Source<'a> {
+pub struct PrimitiveSource<'a> {
     /// The file's data.
     pub reader: Reader<'a>,
     /// What bends meshes.
@@ -113,8 +113,8 @@ impl Primitives {
     /// Positions that are not finite or too far, indices of vertices that do not exist, broken accessors.
     pub fn read(
         &mut self,
-        source: Source,
-        (place, primitive, has_colours): (Place, &Primitive, bool),
+        source: PrimitiveSource,
+        (place, primitive, has_colours): (PrimitiveInstance, &Primitive, bool),
         world_from_node: &DAffine3,
         owner: &str,
         budget: &mut Budget,
@@ -125,7 +125,7 @@ impl Primitives {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(entry) => {
                 let local = read_local(source, (place, primitive, has_colours), owner, budget, report)?;
-                entry.insert(Known {
+                entry.insert(KnownPrimitive {
                     source: local,
                     made: Vec::new(),
                 })
@@ -224,8 +224,14 @@ impl Vertices<'_> {
     }
 
     /// The mesh as its file has it at rest.
-    fn bent(&self, source: Source, place: Place, mesh: &Mesh, budget: &mut Budget) -> Result<Mesh> {
-        let Source {
+    fn bent(
+        &self,
+        source: PrimitiveSource,
+        place: PrimitiveInstance,
+        mesh: &Mesh,
+        budget: &mut Budget,
+    ) -> Result<Mesh> {
+        let PrimitiveSource {
             reader,
             poses,
             stands,
@@ -331,8 +337,8 @@ const COLOUR_STEP: f64 = 1.0 / 1_048_576.0;
 
 /// The primitive in its node's coordinates.
 fn read_local(
-    source: Source,
-    (place, primitive, has_colours): (Place, &Primitive, bool),
+    source: PrimitiveSource,
+    (place, primitive, has_colours): (PrimitiveInstance, &Primitive, bool),
     owner: &str,
     budget: &mut Budget,
     report: &mut Report,

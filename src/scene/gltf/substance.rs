@@ -21,7 +21,7 @@ pub const METAL_KEY: &str = "metal";
 
 /// What a material says that it is made of.
 #[derive(Debug)]
-pub enum Substance {
+pub enum Composition {
     /// A glass by number, name or formula.
     Glass(Glass),
     /// A metal by name.
@@ -32,16 +32,16 @@ pub enum Substance {
 ///
 /// # Errors
 /// A glass or metal that does not exist, or both at once. `owner` says whose they are.
-pub fn read(glass: Option<&Value>, metal: Option<&Value>, owner: &str) -> Result<Option<Substance>> {
+pub fn read(glass: Option<&Value>, metal: Option<&Value>, owner: &str) -> Result<Option<Composition>> {
     let substance = match (glass, metal) {
         (None, None) => return Ok(None),
         (Some(glass), None) => {
             let glass = Glass::parse(text(glass, GLASS_KEY, owner)?);
-            Substance::Glass(glass.map_err(|error| of_file(error.at(owner)))?)
+            Composition::Glass(glass.map_err(|error| of_file(error.at(owner)))?)
         }
         (None, Some(metal)) => {
             let metal = Metal::by_name(text(metal, METAL_KEY, owner)?);
-            Substance::Metal(metal.map_err(|error| of_file(error.at(owner)))?)
+            Composition::Metal(metal.map_err(|error| of_file(error.at(owner)))?)
         }
         (Some(_), Some(_)) => {
             let what = format!("is said to be both `{GLASS_KEY}` and `{METAL_KEY}`");
@@ -53,7 +53,7 @@ pub fn read(glass: Option<&Value>, metal: Option<&Value>, owner: &str) -> Result
 
 /// How a file states a glass beside its index at 587.56 nm.
 #[derive(Debug)]
-pub enum Stated<'a> {
+pub enum GlassStatement<'a> {
     /// In the extras, under [`GLASS_KEY`].
     Name(&'a str),
     /// By the extension [`NAME`]: 20/V_d.
@@ -63,12 +63,12 @@ pub enum Stated<'a> {
 }
 
 /// How to state a glass; `None` where a file cannot.
-pub fn stated(glass: &Glass) -> Option<Stated<'_>> {
+pub fn stated(glass: &Glass) -> Option<GlassStatement<'_>> {
     let is_named = Glass::parse(&glass.name).is_ok_and(|found| found.dispersion == glass.dispersion);
     match glass.dispersion {
-        _ if is_named => Some(Stated::Name(&glass.name)),
-        Dispersion::Abbe { v_d, .. } => Some(Stated::Dispersion(20.0 / v_d)),
-        Dispersion::Constant(_) => Some(Stated::Nothing),
+        _ if is_named => Some(GlassStatement::Name(&glass.name)),
+        Dispersion::Abbe { v_d, .. } => Some(GlassStatement::Dispersion(20.0 / v_d)),
+        Dispersion::Constant(_) => Some(GlassStatement::Nothing),
         _ => None,
     }
 }

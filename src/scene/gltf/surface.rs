@@ -6,14 +6,14 @@ use std::sync::Arc;
 use glam::DAffine3;
 use gltf::json::mesh;
 
-use super::nodes::Placed;
-use super::pose::Place;
+use super::nodes::PlacedNode;
+use super::pose::PrimitiveInstance;
 use super::primitive::{self, Primitives};
 use super::report::{Budget, Report};
 use super::{material, names};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
-use crate::scene::closed::{has_volume, is_closed};
+use crate::scene::watertight::{has_volume, is_closed};
 use crate::scene::{Material, Mesh, Object, Scene, instances};
 
 /// Adds all objects, and to `materials` (in file order so far) those that the file only implies. `solid_glass` reads thin
@@ -23,8 +23,8 @@ use crate::scene::{Material, Mesh, Object, Scene, instances};
 /// A mesh that does not exist, or as [`Primitives::read`].
 pub fn add_objects(
     scene: &mut Scene,
-    source: primitive::Source,
-    placed: &[Placed],
+    source: primitive::PrimitiveSource,
+    placed: &[PlacedNode],
     solid_glass: bool,
     materials: &mut Materials,
     budget: &mut Budget,
@@ -58,7 +58,7 @@ pub fn add_objects(
         };
         for (index, part) in mesh.primitives.iter().enumerate() {
             let owner = owner(mesh, mesh_index.value(), index);
-            let place = Place {
+            let place = PrimitiveInstance {
                 node: placed.node,
                 mesh: mesh_index.value(),
                 primitive: index,

@@ -17,7 +17,7 @@ pub const KEY: &str = "nephroid_waves";
 /// A wave as the file states it.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Stated {
+struct WaveEntry {
     amplitude_m: f64,
     wavelength_m: f64,
     direction: Vec<f64>,
@@ -31,7 +31,7 @@ struct Stated {
 
 /// The waves that a material states; those that cannot be are left out with a warning.
 pub fn read(stated: &Value, owner: &str, report: &mut Report) -> Option<Waves> {
-    let waves = Vec::<Stated>::deserialize(stated)
+    let waves = Vec::<WaveEntry>::deserialize(stated)
         .map_err(|error| format!("its `{KEY}` cannot be read ({error})"))
         .and_then(|list| list.iter().map(wave).collect())
         .and_then(|waves| Waves::new(waves).map_err(|why| format!("of its `{KEY}`, {why}")));
@@ -47,7 +47,7 @@ pub fn read(stated: &Value, owner: &str, report: &mut Report) -> Option<Waves> {
         .ok()
 }
 
-fn wave(stated: &Stated) -> Result<Wave, String> {
+fn wave(stated: &WaveEntry) -> Result<Wave, String> {
     let direction = match stated.direction[..] {
         [x, z] => DVec3::new(x, 0.0, z),
         [x, y, z] => DVec3::new(x, y, z),

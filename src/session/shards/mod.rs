@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::pass::Stopwatch;
-use crate::light_pass::share::Share;
+use crate::light_pass::shard_index::ShardIndex;
 use crate::plan;
 use crate::progress::{Control, Progress};
 use crate::session::clock::Clock;
@@ -100,7 +100,7 @@ impl Baker {
     pub fn bake_shard(
         &mut self,
         settings: &BakeSettings,
-        share: Share,
+        share: ShardIndex,
         progress: &dyn Progress,
         control: &Control,
     ) -> Result<ShardSums> {

@@ -7,8 +7,8 @@ use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::light_pass::caustic::pass::{PassReport, Seconds};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::light_pass::share::Share;
-use crate::session::part_maps::PartMaps;
+use crate::light_pass::shard_index::ShardIndex;
+use crate::session::band_maps::BandMaps;
 
 /// No texel counts more: units are chosen so that all flux of a light stays below 2⁶⁰.
 const MOST_OF_A_TEXEL: i64 = 1 << 61;
@@ -28,14 +28,14 @@ const COMPRESSION: i32 = 1;
 #[derive(Debug)]
 pub(in crate::session) struct PassSums {
     /// One, or those of two half sets.
-    pub(in crate::session) maps: Vec<PartMaps>,
+    pub(in crate::session) maps: Vec<BandMaps>,
     /// Accounts, counts and times.
     pub(in crate::session) report: PassReport,
 }
 
 impl PassSums {
     /// Nothing yet.
-    pub(in crate::session) fn new(maps: Vec<PartMaps>) -> Self {
+    pub(in crate::session) fn new(maps: Vec<BandMaps>) -> Self {
         Self {
             maps,
             report: PassReport::default(),
@@ -43,12 +43,12 @@ impl PassSums {
     }
 
     /// As a shard's file holds them, with the number of the pass: numbers with their least byte first, compressed.
-    pub(super) fn encode(&self, share: Share, number: usize) -> io::Result<Vec<u8>> {
+    pub(super) fn encode(&self, share: ShardIndex, number: usize) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         write_whole(&mut bytes, [number as u64]);
         write_whole(&mut bytes, [share.number(), share.count()].map(u64::from));
         write_report(&mut bytes, &self.report);
-        for set in self.maps.iter().flat_map(PartMaps::sets) {
+        for set in self.maps.iter().flat_map(BandMaps::sets) {
             write_maps(&mut bytes, set);
         }
         let mut encoder = zstd::stream::Encoder::new(Vec::new(), COMPRESSION)?;
@@ -72,7 +72,7 @@ impl PassSums {
         let small = |value: u64| u32::try_from(value).map_err(|_| damaged("there are not so many shards"));
         let share = (small(whole(&mut reader)?)?, small(whole(&mut reader)?)?);
         read_report(&mut reader, &mut self.report)?;
-        for set in self.maps.iter_mut().flat_map(PartMaps::sets_mut) {
+        for set in self.maps.iter_mut().flat_map(BandMaps::sets_mut) {
             read_maps(&mut reader, set, chart_for)?;
         }
         match reader.read(&mut [0])? {

@@ -6,14 +6,14 @@ use super::ShardSource;
 use super::pass_sums::PassSums;
 use crate::error::{Error, Result};
 use crate::light_pass::receiver_maps::ChartFor;
-use crate::light_pass::share::Share;
+use crate::light_pass::shard_index::ShardIndex;
 
 /// Where a pass is computed.
 pub(in crate::session) enum ShardRole {
     /// This bake alone.
     Alone,
     /// This bake, its share.
-    Shard { share: Share, passes: Vec<Vec<u8>> },
+    Shard { share: ShardIndex, passes: Vec<Vec<u8>> },
     /// Others have done it.
     Merge(Merging),
 }
@@ -26,7 +26,7 @@ pub(in crate::session) struct Merging {
 }
 
 impl ShardRole {
-    pub(super) fn shard(share: Share) -> Self {
+    pub(super) fn shard(share: ShardIndex) -> Self {
         Self::Shard {
             share,
             passes: Vec::new(),
@@ -48,7 +48,7 @@ impl ShardRole {
     }
 
     /// The shard of the next pass; `None` if it is not divided.
-    pub(in crate::session) fn share(&self) -> Option<Share> {
+    pub(in crate::session) fn share(&self) -> Option<ShardIndex> {
         match self {
             Self::Shard { share, passes } => Some(share.shifted(passes.len() as u64)),
             Self::Alone | Self::Merge(_) => None,

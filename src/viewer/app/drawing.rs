@@ -18,7 +18,7 @@ use crate::scene::Scene;
 use crate::viewer::background::{Background, Wake};
 use crate::viewer::graphics::{FORMAT, RenderOptions, SAMPLES, texture};
 use crate::viewer::panel::{Display, Quantity};
-use crate::viewer::timing::Made;
+use crate::viewer::timing::FrameStats;
 
 impl App {
     /// Draws what changed of the picture: maps, exposure, view.
@@ -217,15 +217,15 @@ impl App {
         let Some(graphics) = &self.graphics else { return };
         let (counts, quality) = (graphics.counts(), graphics.quality());
         if let Some(times) = &mut self.model.picture.frame_times {
-            times.set_made(Made {
+            times.set_made(FrameStats {
                 traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
                 samples: counts.samples,
             });
         }
         let refusal = graphics.chain_refusal().map(ToString::to_string);
-        if refusal.is_some() && refusal != self.told_refusal {
+        if refusal.is_some() && refusal != self.shown_refusal {
             self.notice.clone_from(&refusal);
-            self.told_refusal = refusal;
+            self.shown_refusal = refusal;
         }
     }
 

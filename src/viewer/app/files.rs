@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 use crate::scene::load::{skies_beside, was_dark};
 use crate::viewer::exporting;
 use crate::viewer::exposure::AutoExposure;
-use crate::viewer::files::{Choice, NO_DIALOG, Purpose, free_names, working_folder};
+use crate::viewer::files::{Choice, LoadPurpose, NO_DIALOG, free_names, working_folder};
 use crate::viewer::model::Model;
 use crate::viewer::panel::Quantity;
 
@@ -99,8 +99,8 @@ impl App {
     }
 
     /// The window shows another scene than before, or the same read again.
-    fn begin_scene(&mut self, purpose: Purpose) {
-        if purpose == Purpose::Open {
+    fn begin_scene(&mut self, purpose: LoadPurpose) {
+        if purpose == LoadPurpose::Open {
             self.notice = dark_notice(&self.model);
             self.exposure = AutoExposure::new(!self.model.exposure_is_kept);
         }

@@ -63,7 +63,7 @@ impl ConfigFolder {
     }
 
     /// What was kept of a scene.
-    pub fn read_scene(&self, source: &str) -> ReadBack<Kept> {
+    pub fn read_scene(&self, source: &str) -> ReadBack<SavedState> {
         read(&self.scene_file(source))
     }
 
@@ -71,7 +71,7 @@ impl ConfigFolder {
     ///
     /// # Errors
     /// A place that cannot be written.
-    pub fn write_scene(&self, kept: &Kept) -> Result<PathBuf> {
+    pub fn write_scene(&self, kept: &SavedState) -> Result<PathBuf> {
         let path = self.scene_file(&kept.source);
         write(&path, kept)?;
         Ok(path)
@@ -163,7 +163,7 @@ pub struct KeptViews {
 /// All that is kept of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Kept {
+pub struct SavedState {
     /// The file by its full path, or `builtin:NAME`: for who reads the folder.
     pub source: String,
     /// Camera and bookmarks.
@@ -191,7 +191,7 @@ fn known<'a, D: Deserializer<'a>>(source: D) -> std::result::Result<Vec<Change>,
         .collect())
 }
 
-impl Kept {
+impl SavedState {
     /// Settings as they were kept; those that this version does not know, or that are outside their ranges, are left as
     /// `otherwise` has them.
     pub fn settings_or(&self, otherwise: &BakeSettings) -> BakeSettings {

@@ -7,18 +7,18 @@ use std::time::{Duration, Instant};
 use rfd::FileDialog;
 use winit::window::Window;
 
-use self::config::{ConfigFolder, Kept, ReadBack};
-use self::keeper::{Autosaver, Stamps, changed};
+use self::autosaver::{Autosaver, Stamps, changed};
+use self::config::{ConfigFolder, ReadBack, SavedState};
 use crate::error::{Error, Result};
 use crate::scene::{LoadOptions, Scene, load};
 use crate::viewer::background::{Background, Task, Wake};
 
+pub mod autosaver;
 pub mod config;
-pub mod keeper;
 
 /// What a scene is read for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Purpose {
+pub enum LoadPurpose {
     /// To take the place of the one in the window.
     Open,
     /// Its files have changed.
@@ -45,7 +45,7 @@ pub struct FilesOptions {
 pub struct Files {
     /// How scenes are read.
     pub load: LoadOptions,
-    loader: Background<(String, Purpose), Result<Scene>>,
+    loader: Background<(String, LoadPurpose), Result<Scene>>,
     saver: Background<PathBuf, Result<()>>,
     /// What was opened before.
     pub recent: Recent,
@@ -56,7 +56,7 @@ pub struct Files {
     /// Watches the files of the scene in the window.
     watch: Background<(), Stamps>,
     /// Keeps what the user does.
-    pub keeper: Option<Autosaver>,
+    pub autosaver: Option<Autosaver>,
     config: Option<ConfigFolder>,
 }
 
@@ -73,7 +73,7 @@ impl Files {
             refusal: None,
             warning,
             watch: Background::new("watch", wake),
-            keeper: options.config.clone().map(Autosaver::new),
+            autosaver: options.config.clone().map(Autosaver::new),
             config: options.config.clone(),
         }
     }
@@ -81,8 +81,8 @@ impl Files {
     /// A scene was opened.
     pub fn opened(&mut self, source: &str) {
         self.recent.opened(source);
-        if let Some(keeper) = &mut self.keeper {
-            keeper.keep_recent(&self.recent);
+        if let Some(autosaver) = &mut self.autosaver {
+            autosaver.keep_recent(&self.recent);
         }
     }
 
@@ -90,7 +90,7 @@ impl Files {
     ///
     /// # Errors
     /// The system gives no thread.
-    pub fn read(&mut self, source: &str, purpose: Purpose) -> Result<()> {
+    pub fn read(&mut self, source: &str, purpose: LoadPurpose) -> Result<()> {
         let (named, options) = (source.to_owned(), self.load.clone());
         self.loader.start((source.to_owned(), purpose), move |_| {
             Scene::load(&named, &options)
@@ -98,7 +98,7 @@ impl Files {
     }
 
     /// The scene that was read, once, with where it comes from and what it was read for.
-    pub fn take_read(&mut self) -> Option<((String, Purpose), Result<Scene>)> {
+    pub fn take_read(&mut self) -> Option<((String, LoadPurpose), Result<Scene>)> {
         let (of, outcome) = self.loader.take()?;
         let broken = || {
             Error::failure(
@@ -139,7 +139,7 @@ impl Files {
     }
 
     /// What was kept of a scene by its full path, and a sentence where that cannot be understood.
-    pub fn read_back(&self, full_source: &str) -> ReadBack<Kept> {
+    pub fn read_back(&self, full_source: &str) -> ReadBack<SavedState> {
         let config = self.config.as_ref();
         config.map_or((None, None), |config| config.read_scene(full_source))
     }

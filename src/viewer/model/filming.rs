@@ -6,7 +6,7 @@ use crate::eye_pass::View;
 use crate::scene::{PathPlan, turntable};
 use crate::viewer::command::FilmCommand;
 use crate::viewer::files::working_folder;
-use crate::viewer::filming::{Player, Shooting};
+use crate::viewer::filming::{FilmJob, Player};
 use serde_json::{Value, json};
 
 impl Model {
@@ -125,7 +125,7 @@ impl Model {
         } else {
             (film.path()?.cameras(scene.origin_world), "frames")
         };
-        let shooting = Shooting {
+        let shooting = FilmJob {
             maps: self.lit_maps().into_owned(),
             cameras,
             view: View {

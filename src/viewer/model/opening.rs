@@ -4,17 +4,17 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::Model;
-use super::keeping::Restored;
-use super::picking::Placing;
-use super::seeking::PendingSearch;
+use super::pending_search::PendingSearch;
+use super::picking::DraggedLight;
+use super::saved_state::RestoredParts;
 use crate::error::Result;
 use crate::scene::changes::Change;
 use crate::scene::{Scene, load};
 use crate::viewer::ViewerOptions;
 use crate::viewer::edits::EditedScene;
 use crate::viewer::files;
-use crate::viewer::files::Purpose;
-use crate::viewer::files::keeper::Stamps;
+use crate::viewer::files::LoadPurpose;
+use crate::viewer::files::autosaver::Stamps;
 use crate::viewer::filming::Film;
 use crate::viewer::navigation::Navigator;
 use crate::viewer::panel::Selection;
@@ -26,7 +26,7 @@ impl Model {
     /// Takes over what was kept of the first scene; what the command line says goes first.
     pub(super) fn begin(&mut self, options: &ViewerOptions) {
         self.choices.watches |= options.files.watch;
-        let what = Restored {
+        let what = RestoredParts {
             settings: options.maps.is_none() && !options.files.settings_given,
             camera: options.camera.is_none(),
             exposure: options.exposure_stops.is_none(),
@@ -42,7 +42,7 @@ impl Model {
     pub fn open(&mut self, source: &str) {
         let source = files::typed(source);
         if !source.is_empty() {
-            self.read(&source, Purpose::Open);
+            self.read(&source, LoadPurpose::Open);
         }
     }
 
@@ -63,7 +63,7 @@ impl Model {
         level.serial == self.first_request
     }
 
-    fn read(&mut self, source: &str, purpose: Purpose) {
+    fn read(&mut self, source: &str, purpose: LoadPurpose) {
         self.files.refusal = None;
         self.log.write("opening", json!({"source": source}));
         if let Err(error) = self.files.read(source, purpose) {
@@ -79,10 +79,10 @@ impl Model {
 
     /// Shows the scene that was being read once it is there; tells whether another scene is shown. One that cannot be
     /// read leaves everything as it was.
-    pub fn poll_files(&mut self) -> Option<Purpose> {
+    pub fn poll_files(&mut self) -> Option<LoadPurpose> {
         if self.files.have_changed() {
             let source = self.edits.loaded().source.clone();
-            self.read(&source, Purpose::Reload);
+            self.read(&source, LoadPurpose::Reload);
         }
         let ((source, purpose), outcome) = self.files.take_read()?;
         let scene = match outcome {
@@ -92,12 +92,12 @@ impl Model {
                 return None;
             }
         };
-        let again = purpose == Purpose::Reload;
+        let again = purpose == LoadPurpose::Reload;
         let more = json!({"scene": scene.name, "source": source, "again": again});
         self.log.write("opened", more);
         match purpose {
-            Purpose::Open => self.show(scene),
-            Purpose::Reload => self.show_again(scene),
+            LoadPurpose::Open => self.show(scene),
+            LoadPurpose::Reload => self.show_again(scene),
         }
         Some(purpose)
     }
@@ -105,8 +105,8 @@ impl Model {
     /// Puts a scene in the place of the present one: of its maps, edits and views nothing is left.
     fn show(&mut self, scene: Scene) {
         let scene = Arc::new(scene);
-        if let Some(keeper) = &mut self.files.keeper {
-            keeper.settle();
+        if let Some(autosaver) = &mut self.files.autosaver {
+            autosaver.settle();
         }
         self.files.opened(&scene.source);
         self.files.stop_watch();
@@ -115,12 +115,12 @@ impl Model {
         self.choices.film = Film::default();
         self.player = None;
         self.picking = None;
-        self.placing = Placing::default();
-        self.sought = PendingSearch::default();
+        self.placing = DraggedLight::default();
+        self.pending_search = PendingSearch::default();
         self.choices.watches = false;
         self.edits = EditedScene::new(scene);
         self.playback = Playback::default();
-        self.exposure_is_kept = self.find_again(Some(Restored::ALL));
+        self.exposure_is_kept = self.find_again(Some(RestoredParts::ALL));
         self.forget_maps();
         self.bake_first();
     }

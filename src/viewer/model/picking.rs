@@ -9,7 +9,7 @@ use crate::geometry::Ray;
 use crate::scene::{Edit, LightEdit};
 use crate::transport::Tracer;
 use crate::viewer::gizmo::GizmoTarget;
-use crate::viewer::panel::Placed;
+use crate::viewer::panel::PlaceTool;
 use serde_json::json;
 
 /// A light at a surface has no place before it: it is put there as far off as this, in scene radii.
@@ -21,25 +21,25 @@ const AT: f64 = 0.01;
 
 /// A light that the mouse drags over surfaces.
 #[derive(Debug, Default)]
-pub(super) struct Placing {
+pub(super) struct DraggedLight {
     /// Whether the button is down.
     is_down: bool,
     /// Where the mouse pointed last, until the light is there.
     gaze: Option<Ray>,
     /// Until the button is up.
-    hand: Option<Hand>,
+    hand: Option<DragTool>,
 }
 
 #[derive(Debug)]
-struct Hand {
+struct DragTool {
     /// As they were when the drag began: lights are no surfaces.
     surfaces: Arc<Tracer>,
-    does: Deed,
+    does: DragAction,
 }
 
 /// What becomes of a light.
 #[derive(Clone, Copy, Debug)]
-enum Deed {
+enum DragAction {
     /// It is put so far before surfaces [m].
     Put(usize, f64),
     /// It is turned to them from there [m].
@@ -48,32 +48,32 @@ enum Deed {
     TurnSun(usize),
 }
 
-impl Hand {
+impl DragTool {
     /// What a gaze asks for; `None` where it meets nothing that it could be put before.
     fn edit(&self, gaze: &Ray) -> Option<Edit> {
         let met = met(&self.surfaces, gaze);
         match (self.does, met) {
-            (Deed::Put(light, distance_m), Some((point, normal))) => {
+            (DragAction::Put(light, distance_m), Some((point, normal))) => {
                 let position = point + normal * distance_m;
                 Some(Edit::Light(light, LightEdit::Position(position)))
             }
-            (Deed::Turn(light, from), Some((point, _))) => {
+            (DragAction::Turn(light, from), Some((point, _))) => {
                 let direction = (point - from).try_normalize()?;
                 Some(Edit::Light(light, LightEdit::Direction(direction)))
             }
-            (Deed::TurnSun(light), met) => {
+            (DragAction::TurnSun(light), met) => {
                 let seen = met.map_or(gaze.direction, |(_, normal)| gaze.direction.reflect(normal));
                 let direction = -seen.try_normalize()?;
                 Some(Edit::Light(light, LightEdit::Direction(direction)))
             }
-            (Deed::Put(..) | Deed::Turn(..), None) => None,
+            (DragAction::Put(..) | DragAction::Turn(..), None) => None,
         }
     }
 }
 
 /// Where a gaze ends, and the surface's unit normal towards the eye.
 fn met(surfaces: &Tracer, gaze: &Ray) -> Option<(DVec3, DVec3)> {
-    let place = surfaces.closest_place(gaze)?;
+    let place = surfaces.intersect(gaze)?;
     let normal = surfaces.surface_at(&place).geometric_normal;
     let point = gaze.origin + gaze.direction * place.distance_m;
     Some((point, normal * -normal.dot(gaze.direction).signum()))
@@ -128,7 +128,7 @@ impl Model {
             return;
         };
         self.picking = None;
-        match surfaces.closest_place(&gaze) {
+        match surfaces.intersect(&gaze) {
             Some(place) => self.hold(GizmoTarget::Object(place.object as usize)),
             None => self.choices.selection.hold(None),
         }
@@ -168,17 +168,17 @@ impl Model {
     }
 
     /// Takes the panel's light in the hand: as far before surfaces as it is now before that at which a gaze ends.
-    fn take_light(&mut self, gaze: &Ray) -> Option<Hand> {
+    fn take_light(&mut self, gaze: &Ray) -> Option<DragTool> {
         let placed = self.choices.selection.placed()?;
-        let (Placed::At(light) | Placed::Towards(light)) = placed;
+        let (PlaceTool::At(light) | PlaceTool::Towards(light)) = placed;
         let position = self.scene().lights.get(light)?.kind.position();
         let surfaces = self.surfaces()?;
         let (light, position) = match (placed, position) {
-            (Placed::At(light), Some(position)) => (light, position),
-            (Placed::At(_), None) => return None,
-            (Placed::Towards(light), from) => {
-                let does = from.map_or(Deed::TurnSun(light), |from| Deed::Turn(light, from));
-                return Some(Hand { surfaces, does });
+            (PlaceTool::At(light), Some(position)) => (light, position),
+            (PlaceTool::At(_), None) => return None,
+            (PlaceTool::Towards(light), from) => {
+                let does = from.map_or(DragAction::TurnSun(light), |from| DragAction::Turn(light, from));
+                return Some(DragTool { surfaces, does });
             }
         };
         let radius_m = self.navigator.radius_m();
@@ -186,7 +186,7 @@ impl Model {
         let distance_m = distance_m
             .filter(|distance_m| *distance_m > AT * radius_m)
             .unwrap_or(OFF * radius_m);
-        let does = Deed::Put(light, distance_m);
-        Some(Hand { surfaces, does })
+        let does = DragAction::Put(light, distance_m);
+        Some(DragTool { surfaces, does })
     }
 }

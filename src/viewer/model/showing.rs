@@ -12,13 +12,13 @@ use crate::illumination::IlluminationMap;
 use crate::illumination::difference::Difference;
 use crate::scene::Scene;
 use crate::settings::LayerKind;
-use crate::viewer::beside::Reference;
 use crate::viewer::command::CompareCommand;
+use crate::viewer::comparison_view::SavedMaps;
 use crate::viewer::event_log;
 use crate::viewer::false_colours;
 use crate::viewer::panel::{LayerShown, Quantity};
 use crate::viewer::views::MapSurvey;
-use crate::viewer::worker::{BakedLevel, Worth};
+use crate::viewer::worker::{BakedLevel, EffectDifference};
 
 /// Which maps the picture shows, and how.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -180,8 +180,8 @@ impl Model {
     pub(super) fn compare_with(&mut self, command: &CompareCommand) {
         let scene = self.edits.scene();
         let reference = match command {
-            CompareCommand::Keep => Reference::kept(scene, self.maps()).map(Some),
-            CompareCommand::Load(folder) => Reference::of_folder(folder, scene).map(Some),
+            CompareCommand::Keep => SavedMaps::kept(scene, self.maps()).map(Some),
+            CompareCommand::Load(folder) => SavedMaps::of_folder(folder, scene).map(Some),
             CompareCommand::End => Ok(None),
         };
         match reference {
@@ -206,7 +206,7 @@ impl Model {
     }
 
     /// Shows what an effect is worth; tells whether there is anything new to be shown.
-    pub(super) fn take_worth(&mut self, worth: Worth) -> bool {
+    pub(super) fn take_worth(&mut self, worth: EffectDifference) -> bool {
         let is_of_shown = |last: &Arc<BakedLevel>| Arc::ptr_eq(last, &worth.with);
         if !self.last.as_ref().is_some_and(is_of_shown) {
             return false;

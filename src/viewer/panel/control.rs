@@ -25,7 +25,7 @@ const SLIDER_WIDTH: f32 = 112.0;
 
 /// What a control is for, in the user's terms.
 #[derive(Clone, Copy, Debug, Deserialize)]
-pub struct About {
+pub struct ControlHelp {
     /// What it sets.
     pub what: &'static str,
     /// Its values.
@@ -38,7 +38,7 @@ pub struct About {
     cost: &'static str,
 }
 
-impl About {
+impl ControlHelp {
     fn text(&self) -> String {
         format!(
             "{}\n\nRange: {}\nDefault: {}\nAccuracy: {}\nCost: {}",
@@ -47,7 +47,7 @@ impl About {
     }
 }
 
-impl From<&OptionInfo> for About {
+impl From<&OptionInfo> for ControlHelp {
     fn from(option: &OptionInfo) -> Self {
         Self {
             what: option.what,
@@ -65,7 +65,7 @@ impl From<&OptionInfo> for About {
 #[derive(Deserialize)]
 struct Texts {
     #[serde(borrow)]
-    rows: HashMap<&'static str, About>,
+    rows: HashMap<&'static str, ControlHelp>,
     #[serde(borrow)]
     buttons: HashMap<&'static str, &'static str>,
 }
@@ -73,14 +73,16 @@ struct Texts {
 static TEXTS: LazyLock<Texts> = LazyLock::new(|| {
     let texts = include_str!("about.json");
     let mut texts: Texts = serde_json::from_str(texts).expect("the file is part of the program");
-    texts
-        .rows
-        .extend(OPTIONS.iter().map(|option| (option.label, About::from(option))));
+    texts.rows.extend(
+        OPTIONS
+            .iter()
+            .map(|option| (option.label, ControlHelp::from(option))),
+    );
     texts
 });
 
 /// The help of a label's control.
-pub fn about(label: &str) -> &'static About {
+pub fn about(label: &str) -> &'static ControlHelp {
     TEXTS
         .rows
         .get(label)

@@ -11,7 +11,7 @@ use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::illumination::difference::Difference;
 use crate::plan::{self, EffectLine};
 use crate::session::BakeCounts;
-use crate::viewer::worker::{BakeState, Worth};
+use crate::viewer::worker::{BakeState, EffectDifference};
 
 /// Width of the three switches of an effect [points].
 const SWITCHES_WIDTH: f32 = 128.0;
@@ -46,7 +46,7 @@ pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, model: &Model, commands:
     for effect in Effect::ALL {
         let mut switch = switches.get(effect);
         if entry(ui, effect, &mut switch, model) {
-            commands.push(Command::Worth(effect));
+            commands.push(Command::EffectDifference(effect));
         }
         switches.set(effect, switch);
     }
@@ -197,7 +197,7 @@ fn line(ui: &mut Ui, effect: Effect, model: &Model) {
     }
 }
 
-fn found(effect: Effect, model: &Model) -> Option<&Worth> {
+fn found(effect: Effect, model: &Model) -> Option<&EffectDifference> {
     model.worth.as_ref().filter(|worth| worth.effect == effect)
 }
 

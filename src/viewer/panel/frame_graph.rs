@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo,
 
 use super::effects::COUNTER;
 use crate::eye_pass::renderer::GpuMs;
-use crate::viewer::timing::{FrameTimes, Latencies, Made, PICTURES, Percentiles, sum_ms};
+use crate::viewer::timing::{FrameStats, FrameTimes, Latencies, PICTURES, Percentiles, sum_ms};
 
 /// Height of the graph [points].
 const HEIGHT: f32 = 64.0;
@@ -109,7 +109,7 @@ fn coarseness(times: &FrameTimes) -> Option<String> {
     (scale < 1.0).then(|| format!("mirrors and glass at 1/{:.0}", 1.0 / scale))
 }
 
-fn made_how(made: Made) -> String {
+fn made_how(made: FrameStats) -> String {
     let traced = match made.traced_scale {
         None => "nothing traced".to_string(),
         Some(scale) if scale < 1.0 => format!("traced at 1/{:.0} of the resolution", 1.0 / scale),

@@ -16,7 +16,7 @@ use super::{Command, CompareCommand, Model, export};
 use crate::illumination::{IlluminationMap, Side};
 use crate::session::BYTES_PER_TEXEL;
 use crate::viewer::exporting::Export;
-use crate::viewer::flat_map::{self, Shown};
+use crate::viewer::flat_map::{self, ShownPixels};
 
 /// Side of a thumbnail [points].
 const THUMBNAIL: f32 = 40.0;
@@ -30,13 +30,13 @@ const ONE: &str = "Writes this map to an .exr file of its own in the working fol
                    [W/m²].";
 
 /// Which maps thumbnails were made of: number of the bake, and its level.
-type Made = Option<(u64, u32)>;
+type ThumbnailKey = Option<(u64, u32)>;
 
 /// What the section keeps between frames.
 #[derive(Clone, Default)]
 pub struct Browser {
     thumbnails: HashMap<usize, TextureHandle>,
-    made_of: Made,
+    made_of: ThumbnailKey,
     large: Option<large::Large>,
 }
 
@@ -179,7 +179,7 @@ fn thumbnail(
 }
 
 /// Takes pixels to the device, in place of those of an older texture.
-fn texture(ui: &Ui, name: &str, shown: &Shown, old: Option<TextureHandle>) -> TextureHandle {
+fn texture(ui: &Ui, name: &str, shown: &ShownPixels, old: Option<TextureHandle>) -> TextureHandle {
     let image = ColorImage::from_rgba_unmultiplied(shown.size, &shown.rgba);
     match old {
         Some(mut texture) => {

@@ -23,7 +23,7 @@ use egui::{Align, CollapsingHeader, Color32, Frame, Grid, Margin, RichText, Scro
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-pub use self::scene::{Placed, Selection};
+pub use self::scene::{PlaceTool, Selection};
 use super::command::{Choices, Command, CompareCommand, FilmCommand};
 use super::model::Model;
 use super::navigation::{NavigationMode, Navigator};

@@ -31,14 +31,14 @@ const NO_TURN: &str = "It is tilted.";
 pub struct Selection {
     light: usize,
     object: usize,
-    hand: Hand,
+    hand: MouseTool,
     /// How often something was picked in the picture: each time the section opens.
     pub picks: u32,
 }
 
 /// What clicks in the picture do to a light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Placed {
+pub enum PlaceTool {
     /// Put it before the surface.
     At(usize),
     /// Turn it to the surface; a sun goes where it is seen, or would be in a mirror there.
@@ -47,7 +47,7 @@ pub enum Placed {
 
 /// What the mouse does in the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Hand {
+enum MouseTool {
     #[default]
     Nothing,
     /// Pulls the light by handles.
@@ -64,32 +64,32 @@ impl Selection {
     /// What has handles in the picture.
     pub fn held(&self) -> Option<GizmoTarget> {
         match self.hand {
-            Hand::Nothing => None,
-            Hand::Light | Hand::Place | Hand::Aim => Some(GizmoTarget::Light(self.light)),
-            Hand::Object => Some(GizmoTarget::Object(self.object)),
+            MouseTool::Nothing => None,
+            MouseTool::Light | MouseTool::Place | MouseTool::Aim => Some(GizmoTarget::Light(self.light)),
+            MouseTool::Object => Some(GizmoTarget::Object(self.object)),
         }
     }
 
     /// The light that clicks in the picture put elsewhere, or turn.
-    pub fn placed(&self) -> Option<Placed> {
+    pub fn placed(&self) -> Option<PlaceTool> {
         match self.hand {
-            Hand::Place => Some(Placed::At(self.light)),
-            Hand::Aim => Some(Placed::Towards(self.light)),
-            Hand::Nothing | Hand::Light | Hand::Object => None,
+            MouseTool::Place => Some(PlaceTool::At(self.light)),
+            MouseTool::Aim => Some(PlaceTool::Towards(self.light)),
+            MouseTool::Nothing | MouseTool::Light | MouseTool::Object => None,
         }
     }
 
     /// Something was picked in the picture, or let go.
     pub fn hold(&mut self, held: Option<GizmoTarget>) {
         self.hand = match held {
-            None => Hand::Nothing,
+            None => MouseTool::Nothing,
             Some(GizmoTarget::Light(light)) => {
                 self.light = light;
-                Hand::Light
+                MouseTool::Light
             }
             Some(GizmoTarget::Object(object)) => {
                 self.object = object;
-                Hand::Object
+                MouseTool::Object
             }
         };
         self.picks += u32::from(held.is_some());
@@ -144,7 +144,7 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mu
                     hand(
                         ui,
                         &mut selection.hand,
-                        Hand::Object,
+                        MouseTool::Object,
                         ("Move object", "Move object"),
                         about("Handles").what,
                     );
@@ -371,14 +371,14 @@ fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Comman
 }
 
 /// A switch for what the mouse does in the picture.
-fn hand(ui: &mut Ui, present: &mut Hand, own: Hand, (text, name): (&str, &str), what: &str) {
+fn hand(ui: &mut Ui, present: &mut MouseTool, own: MouseTool, (text, name): (&str, &str), what: &str) {
     let mut is_on = *present == own;
     let switch = ui.toggle_value(&mut is_on, text).accessible_name(name);
     let switch = switch
         .on_hover_text(what)
         .on_disabled_hover_text(format!("{what} {NO_HAND}"));
     if switch.changed() {
-        *present = if is_on { own } else { Hand::Nothing };
+        *present = if is_on { own } else { MouseTool::Nothing };
     }
 }
 
@@ -391,17 +391,23 @@ fn light_hand(ui: &mut Ui, selection: &mut Selection, model: &Model) {
             let what = about("By mouse").what;
             ui.spacing_mut().item_spacing.x = 3.0;
             ui.add_enabled_ui(has_place, |ui| {
-                hand(ui, &mut selection.hand, Hand::Light, ("Move", "Move light"), what);
                 hand(
                     ui,
                     &mut selection.hand,
-                    Hand::Place,
+                    MouseTool::Light,
+                    ("Move", "Move light"),
+                    what,
+                );
+                hand(
+                    ui,
+                    &mut selection.hand,
+                    MouseTool::Place,
                     ("Place", "Place light"),
                     what,
                 );
             });
             ui.add_enabled_ui(has_direction, |ui| {
-                hand(ui, &mut selection.hand, Hand::Aim, ("Aim", "Aim light"), AIM);
+                hand(ui, &mut selection.hand, MouseTool::Aim, ("Aim", "Aim light"), AIM);
             });
         })
         .response

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use nephroid::error::Result;
-use nephroid::light_pass::share::Share;
+use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::builtin::{parts, shapes};
@@ -465,7 +465,7 @@ impl ShardSource for Shards {
 fn shards(scene: &Scene, settings: &BakeSettings, count: u32) -> Vec<ShardSums> {
     let mut session = session(scene);
     let shard = |number| {
-        let share = Share::new(number, count).expect("a share");
+        let share = ShardIndex::new(number, count).expect("a share");
         let shard = session.bake_shard(settings, share, &(), &Control::default());
         shard.expect("a shard")
     };
@@ -557,7 +557,7 @@ fn what_the_light_decides_is_refused() {
     for (option, change) in cases {
         let mut settings = at(1000.0, 512);
         change(&mut settings);
-        let share = Share::new(1, 2).expect("a share");
+        let share = ShardIndex::new(1, 2).expect("a share");
         let refused = session(&scene).bake_shard(&settings, share, &(), &Control::default());
         assert_eq!(refused.expect_err(option).location, option);
         let refused = merge(&scene, &settings, Vec::new()).expect_err(option);

@@ -91,10 +91,10 @@ fn a_small_caustic_looks_the_same_in_tiles() {
 fn a_tenth_of_the_memory_costs_what_it_says() {
     let scene = builtin_scene("ball");
     let ample = auto(6e3);
-    let wished = bake(scene.clone(), &ample);
-    assert_eq!(wished.warnings, []);
-    let size = floor_size(&scene, &wished);
-    let (taken, dense) = memory(&wished);
+    let requested = bake(scene.clone(), &ample);
+    assert_eq!(requested.warnings, []);
+    let size = floor_size(&scene, &requested);
+    let (taken, dense) = memory(&requested);
     let truth = dense_floor(&scene, &bake(scene.clone(), &sized(auto(2.4e4), size)));
     for (case, settings, memory_bytes) in [
         ("automatic", ample.clone(), taken / 10),

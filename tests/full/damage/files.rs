@@ -14,7 +14,7 @@ use nephroid::export::map_folder::MapFolder;
 use nephroid::export::map_set::MapSet;
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest, ShardSet};
 use nephroid::illumination::IlluminationMap;
-use nephroid::light_pass::share::Share;
+use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::spectrum::csv::read_lamp;
 use nephroid::progress::Control;
 use nephroid::scene::{Camera, CameraPath, LoadOptions, Scene, environment};
@@ -324,14 +324,14 @@ struct Shards {
     scene: Arc<Scene>,
     settings: BakeSettings,
     around: tempfile::TempDir,
-    sums: Vec<(Share, ShardSums)>,
+    sums: Vec<(ShardIndex, ShardSums)>,
 }
 
 impl Shards {
     fn bake() -> Self {
         let (scene, settings) = (Arc::new(builtin_scene("mirror")), at(1000.0, 16));
         let shard = |number| {
-            let share = Share::new(number, 2).expect("one of two");
+            let share = ShardIndex::new(number, 2).expect("one of two");
             let mut session = Baker::new(scene.clone()).expect("a session");
             let sums = session.bake_shard(&settings, share, &(), &Control::default());
             (share, sums.expect("a shard"))
@@ -351,12 +351,12 @@ impl Shards {
         shards
     }
 
-    fn folder(&self, share: Share) -> PathBuf {
+    fn folder(&self, share: ShardIndex) -> PathBuf {
         self.around.path().join(share.number().to_string())
     }
 
     /// With checksums that are right, whatever the sums are.
-    fn write(&self, share: Share, sums: &ShardSums) {
+    fn write(&self, share: ShardIndex, sums: &ShardSums) {
         let origin = SceneOrigin {
             source: self.scene.source.clone(),
             default_light: false,

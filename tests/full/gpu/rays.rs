@@ -309,7 +309,7 @@ impl Judge {
 
     /// The CPU's answer.
     fn exact(&self, ray: &Ray) -> Met {
-        let hit = self.tracer.closest_place(ray)?;
+        let hit = self.tracer.intersect(ray)?;
         let triangle = self.firsts[hit.object as usize] + hit.triangle as usize;
         Some((triangle, hit.distance_m * self.scale))
     }

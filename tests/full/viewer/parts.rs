@@ -25,8 +25,8 @@ use nephroid::viewer::background::Wake;
 use nephroid::viewer::command::Command;
 use nephroid::viewer::exporting::{ExportState, Exporter};
 use nephroid::viewer::files::FilesOptions;
-use nephroid::viewer::filming::Shooting;
-use nephroid::viewer::new_light::{Aim, NewLight};
+use nephroid::viewer::filming::FilmJob;
+use nephroid::viewer::new_light::{NewLight, ViewTarget};
 use serde_json::Value;
 
 use super::fixtures::{
@@ -35,10 +35,10 @@ use super::fixtures::{
 use super::headless::{Headless, SCREEN, splats};
 use super::scene_file;
 
-fn shooting(frames: usize) -> Shooting {
+fn shooting(frames: usize) -> FilmJob {
     let scene = Arc::new(scene());
     let first = Camera::framing("all", scene.bounds().expect("it has surfaces"), 1.5);
-    Shooting {
+    FilmJob {
         maps: Vec::new(),
         cameras: turntable::around(&scene, &first, frames),
         view: View {
@@ -183,7 +183,7 @@ fn new_lights_have_room_and_suit_the_exposure() {
                 origin: middle + from * radius_m,
                 direction: -from.normalize(),
             };
-            let aim = Aim::of(&tracer, &gaze, middle);
+            let aim = ViewTarget::of(&tracer, &gaze, middle);
             for stops in [0.0, -3.0] {
                 for kind in NewLight::ALL {
                     let light = kind.make((&tracer, radius_m), &aim, stops, &scene);
@@ -198,7 +198,7 @@ fn new_lights_have_room_and_suit_the_exposure() {
 }
 
 /// Nothing stands between a light and what it is for, which faces it, and its irradiance across the way is that.
-fn suits(tracer: &Tracer, light: &Light, aim: &Aim, irradiance_w_m2: f64) {
+fn suits(tracer: &Tracer, light: &Light, aim: &ViewTarget, irradiance_w_m2: f64) {
     let strength = light.kind.strength();
     if let LightKind::Sun { direction, .. } = light.kind {
         assert_eq!(strength, irradiance_w_m2);
@@ -212,7 +212,7 @@ fn suits(tracer: &Tracer, light: &Light, aim: &Aim, irradiance_w_m2: f64) {
         origin: position,
         direction: way.normalize(),
     };
-    let met = tracer.closest_place(&ray).expect("it is aimed at a surface");
+    let met = tracer.intersect(&ray).expect("it is aimed at a surface");
     let share = met.distance_m / way.length();
     assert!((share - 1.0).abs() < 1e-3, "{light:?} is hidden from {aim:?}");
     let per_m2 = way.length_squared().recip();

@@ -13,7 +13,7 @@ use nephroid::export::textures::TextureFolder;
 use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::tiles::TileLayout;
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Parametrisation, parametrise};
-use nephroid::light_pass::share::Share;
+use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::glass::Glass;
 use nephroid::session::{Baker, ShardSource as _};
 use nephroid::settings::Wavelengths;
@@ -270,7 +270,7 @@ const KINDS: [(&str, Open); 3] = [
         TextureFolder::open(path, force).map(drop)
     }),
     ("this shard", |path, force| {
-        let share = Share::new(1, 2).expect("a share");
+        let share = ShardIndex::new(1, 2).expect("a share");
         ShardFolder::open(path, share, force).map(drop)
     }),
 ];
@@ -355,7 +355,7 @@ impl Shards {
 
     /// Bakes shard `number` of `count` to a folder of that name.
     fn bake(&self, name: &str, scene: &Scene, settings: &BakeSettings, (number, count): (u32, u32)) {
-        let share = Share::new(number, count).expect("a share");
+        let share = ShardIndex::new(number, count).expect("a share");
         let folder = ShardFolder::open(&self.path(name), share, false).expect("writable");
         let mut session = Baker::new(Arc::new(scene.clone())).expect("a session");
         let sums = session.bake_shard(settings, share, &(), &Control::default());
@@ -461,7 +461,7 @@ fn shards_do_not_take_each_others_folders() {
     shards.bake("a", &scene, &settings, (1, 2));
     let first = std::fs::read(shards.path("a/sums.bin")).expect("written");
     let open = |number, force| {
-        let share = Share::new(number, 2).expect("a share");
+        let share = ShardIndex::new(number, 2).expect("a share");
         ShardFolder::open(&shards.path("a"), share, force)
     };
     let refused = open(2, false).expect_err("it is shard 1's");

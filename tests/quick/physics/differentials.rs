@@ -1,8 +1,8 @@
 //! Ray differentials against finite differences of traced rays.
 
 use nephroid::light_pass::caustic::path::PathLimits;
-use nephroid::light_pass::caustic::setup::{Aim, CullMode};
-use nephroid::light_pass::wavefront::strand::{Landing, PathSegment};
+use nephroid::light_pass::caustic::setup::{CullMode, LightVisibility};
+use nephroid::light_pass::wavefront::strand::{PathSegment, SegmentEnd};
 use nephroid::light_pass::wavefront::trace::StrandTracer;
 use nephroid::settings::ItemBufferKind;
 use nephroid::transport::EffectSet;
@@ -14,7 +14,7 @@ use support::effect_scenes::by_image;
 /// step of the unit square; returns the root mean square of the relative difference and how many places there were.
 fn mismatch(scene: Scene, step: f64) -> (f64, usize) {
     let tracer = Tracer::new(Arc::new(scene));
-    let aim = Aim::take(&tracer, ItemBufferKind::Equal, CullMode::Everything, true);
+    let aim = LightVisibility::take(&tracer, ItemBufferKind::Equal, CullMode::Everything, true);
     let launch = &aim.lights[0].launch;
     let limits = PathLimits {
         max_depth: 4,
@@ -30,7 +30,7 @@ fn mismatch(scene: Scene, step: f64) -> (f64, usize) {
             let square = (DVec2::new((index % 30) as f64, (index / 30) as f64) + 0.47) / 30.0;
             let strand = |offset: DVec2| -> Option<PathSegment> {
                 let sample = rays.trace(face, square + offset);
-                let lands = |strand: &&PathSegment| matches!(strand.landing, Landing::Receiver { .. });
+                let lands = |strand: &&PathSegment| matches!(strand.landing, SegmentEnd::Receiver { .. });
                 sample.strands.iter().find(lands).copied()
             };
             for (axis, along) in [(0, DVec2::X), (1, DVec2::Y)] {

@@ -1,18 +1,18 @@
 //! What is kept of scenes from one window to the next.
 
+use nephroid::viewer::files::autosaver::SOON;
 use nephroid::viewer::files::config::ConfigFolder;
-use nephroid::viewer::files::keeper::SOON;
 
 use super::fixtures::model;
 use super::*;
 
 /// A window on `ring` that keeps what is set in a folder of its own.
-struct Kept {
+struct SavedState {
     folder: tempfile::TempDir,
     options: ViewerOptions,
 }
 
-impl Kept {
+impl SavedState {
     fn new() -> Self {
         let folder = folder();
         let mut options = options("ring");
@@ -53,7 +53,7 @@ fn undoable(model: &Model) -> usize {
 
 #[test]
 fn what_was_set_is_found_again() {
-    let kept = Kept::new();
+    let kept = SavedState::new();
     let mut first = kept.model();
     use_it(&mut first);
     let changes = Change::between(first.edits().loaded(), first.edits().scene());
@@ -84,7 +84,7 @@ fn what_was_set_is_found_again() {
 
 #[test]
 fn what_is_asked_for_comes_first() {
-    let kept = Kept::new();
+    let kept = SavedState::new();
     use_it(&mut kept.model());
     let mut asked = kept.other(|options| {
         options.exposure_stops = Some(-2.0);
@@ -124,7 +124,7 @@ fn what_is_asked_for_comes_first() {
 
 #[test]
 fn changes_are_written_within_a_second() {
-    let kept = Kept::new();
+    let kept = SavedState::new();
     let (mut model, file) = (kept.model(), kept.file());
     let now = Instant::now();
     model.act(Vec::new(), now);
@@ -146,7 +146,7 @@ fn changes_are_written_within_a_second() {
 
 #[test]
 fn broken_files_are_set_aside() {
-    let kept = Kept::new();
+    let kept = SavedState::new();
     let file = kept.file();
     let scenes = file.parent().expect("a folder");
     fs::create_dir_all(scenes).expect("it is made");
@@ -166,7 +166,7 @@ fn broken_files_are_set_aside() {
 
 #[test]
 fn settings_of_other_versions_are_taken() {
-    let kept = Kept::new();
+    let kept = SavedState::new();
     use_it(&mut kept.model());
     let text = fs::read_to_string(kept.file()).expect("it is there");
     let mut value: Value = serde_json::from_str(&text).expect("it is whole");
@@ -184,7 +184,7 @@ fn settings_of_other_versions_are_taken() {
 
 #[test]
 fn a_scene_that_is_left_is_kept() {
-    let kept = Kept::new();
+    let kept = SavedState::new();
     let mut model = kept.model();
     use_it(&mut model);
     for (name, edits) in [("slab", 0), ("ring", 1)] {

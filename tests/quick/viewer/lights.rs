@@ -9,7 +9,7 @@ use nephroid::scene::load::save;
 use nephroid::units::Flux;
 use nephroid::viewer::background::Wake;
 use nephroid::viewer::brightest;
-use nephroid::viewer::new_light::Aim;
+use nephroid::viewer::new_light::ViewTarget;
 use nephroid::viewer::sketching::PreviewTask;
 
 use super::fixtures::added;
@@ -108,7 +108,7 @@ fn lights_come_into_files_and_go_from_them() {
     let folder = folder();
     let loaded = read(&scene_file::glb(folder.path(), "a", "300"), false);
     let tracer = Tracer::new(Arc::new(loaded.clone()));
-    let aim = Aim {
+    let aim = ViewTarget {
         point: dvec3(0.2, 0.0, 0.4),
         normal: DVec3::Y,
         to_eye: dvec3(0.6, 0.8, 0.0),

@@ -6,7 +6,7 @@ use egui_kittest::kittest::Queryable as _;
 use nephroid::viewer::gizmo::{Gizmo, Handle, light_at};
 use nephroid::viewer::lens::Viewport;
 use nephroid::viewer::navigation::{BOOKMARKS, HeldKeys, Navigator};
-use nephroid::viewer::walking::{EYE_M, SPEED_M_PER_S, Solid};
+use nephroid::viewer::walking::{Collider, EYE_M, SPEED_M_PER_S};
 
 use super::fixtures::scene;
 use super::*;
@@ -236,7 +236,7 @@ fn narrow_pictures_show_what_wide_ones_do() {
 /// Axis-aligned boxes, from low to high corner [m].
 struct Boxes(Vec<[DVec3; 2]>);
 
-impl Solid for Boxes {
+impl Collider for Boxes {
     fn meets(&self, from: DVec3, direction: DVec3, within_m: f64) -> Option<(f64, DVec3)> {
         let of_box = |[low, high]: &[DVec3; 2]| {
             let (mut near, mut far, mut normal) = (f64::NEG_INFINITY, f64::INFINITY, DVec3::ZERO);

@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use nephroid::scene::PanelShape;
 use nephroid::units::Radiance;
-use nephroid::viewer::panel::Placed;
+use nephroid::viewer::panel::PlaceTool;
 
 use super::fixtures::chosen;
 use super::headless::Gesture::{Choose, Drag, Press, Type};
@@ -240,7 +240,7 @@ fn mouse_holds_one_thing_and_looking_edits_nothing() {
     assert_eq!(panel.model.choices.selection.held(), None);
     for (button, held, placed) in [
         ("Move object", Some(GizmoTarget::Object(1)), None),
-        ("Place light", Some(GizmoTarget::Light(0)), Some(Placed::At(0))),
+        ("Place light", Some(GizmoTarget::Light(0)), Some(PlaceTool::At(0))),
         ("Move light", Some(GizmoTarget::Light(0)), None),
         ("Move light", None, None),
     ] {

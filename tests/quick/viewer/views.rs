@@ -4,13 +4,13 @@
 use nephroid::illumination::difference::SignedMap;
 use nephroid::illumination::difference_colours;
 use nephroid::optics::spectrum::{Hue, Xyz, dominant, xyz_bar};
-use nephroid::viewer::beside::Reference;
+use nephroid::viewer::comparison_view::SavedMaps;
 use nephroid::viewer::exposure::AutoExposure;
 use nephroid::viewer::false_colours::{
     ERROR_RANGE, RANGE_NM, difference_maps, error_colour, error_maps, has_errors, wavelength_colour,
     wavelength_maps,
 };
-use nephroid::viewer::flat_map::{Part, Shown, read, show, thumbnail};
+use nephroid::viewer::flat_map::{MapCrop, ShownPixels, read, show, thumbnail};
 use nephroid::viewer::views::{IrradianceUnit, MapSurvey, ScaleChoice};
 
 use super::fixtures::map;
@@ -87,7 +87,7 @@ fn irradiance_has_a_unit_and_counts_faults() {
 fn reference_tells_its_relative_rmse() {
     let panel = panel();
     let before = [two_texels(0, [[2.0; 3], [2.0; 3]])];
-    let mut reference = Reference::kept(panel.model.scene(), &before).expect("there are maps");
+    let mut reference = SavedMaps::kept(panel.model.scene(), &before).expect("there are maps");
     reference.compare(&before);
     assert_eq!(reference.relative_rmse, Ok(0.0));
     // Off by 1 W/m² on a quarter of the area: √(1/4) over a mean of 2.
@@ -99,7 +99,7 @@ fn reference_tells_its_relative_rmse() {
         "RMSE",
     );
     says(reference.told(), " 25 %");
-    assert!(Reference::kept(panel.model.scene(), &[]).is_err());
+    assert!(SavedMaps::kept(panel.model.scene(), &[]).is_err());
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn comparison_begins_and_ends_by_buttons() {
     assert_eq!(panel.asked(), [Command::Compare(CompareCommand::Keep)]);
     assert!(panel.is_disabled(Role::Button, "End comparison"));
     let maps = [two_texels(0, [[1.0; 3], [1.0; 3]])];
-    let mut reference = Reference::kept(panel.model.scene(), &maps).expect("there are maps");
+    let mut reference = SavedMaps::kept(panel.model.scene(), &maps).expect("there are maps");
     reference.compare(&maps);
     panel.tell(|model| model.reference = Some(reference));
     panel.assert_says(&["differs from before by 0 %"]);
@@ -226,7 +226,7 @@ fn texels_show_their_wavelength() {
 }
 
 /// Brightness [0, 255] and opacity of a pixel.
-fn pixel(shown: &Shown, x: usize, y: usize) -> (u8, u8) {
+fn pixel(shown: &ShownPixels, x: usize, y: usize) -> (u8, u8) {
     let at = 4 * (y * shown.size[0] + x);
     (shown.rgba[at + 1], shown.rgba[at + 3])
 }
@@ -250,7 +250,7 @@ fn thumbnail_keeps_shape_and_brightness() {
 
 #[test]
 fn nothing_is_beside_a_map() {
-    let part = Part {
+    let part = MapCrop {
         left: -2.0,
         top: -1.0,
         texels_per_pixel: 1.0,
@@ -267,7 +267,7 @@ fn nothing_is_beside_a_map() {
 
 #[test]
 fn a_pixel_of_many_texels_is_their_mean() {
-    let part = |texels_per_pixel| Part {
+    let part = |texels_per_pixel| MapCrop {
         left: 0.0,
         top: 0.0,
         texels_per_pixel,

@@ -1,7 +1,7 @@
 //! The panel's section *Effects*, and what an effect is worth: a second bake that leaves the first one alone.
 
 use nephroid::plan::{EffectLine, EffectPlan, LightLine};
-use nephroid::viewer::worker::Worth;
+use nephroid::viewer::worker::EffectDifference;
 
 use super::worker::{AT_ONCE, Bench, ENDLESS, FAILING, PANICKING, STUBBORN, asked, bench};
 use super::*;
@@ -23,7 +23,7 @@ fn sessions(bench: &Bench) -> (usize, usize) {
     (count(&bench.alive), count(&bench.made))
 }
 
-fn found(bench: &Bench) -> Worth {
+fn found(bench: &Bench) -> EffectDifference {
     let mut found = None;
     wait_for("the comparison", || {
         found = bench.worker.take_worth();
@@ -106,7 +106,7 @@ fn failures_spoil_nothing_and_bakes_come_first() {
 #[test]
 fn shown_until_other_maps_come() {
     let mut model = fixtures::model(&options("ring"));
-    let asked = || vec![Command::Worth(Effect::Reflection)];
+    let asked = || vec![Command::EffectDifference(Effect::Reflection)];
     act(&mut model, asked());
     // Nothing is compared before there are maps.
     assert!(model.state.is_baking());
@@ -167,7 +167,7 @@ fn asked_for_and_told_in_watts() {
     assert!(panel.is_disabled(Role::Button, "refraction: worth"));
     panel.tell(|model| model.state = BakeState::Done);
     panel.press("refraction: worth");
-    assert_eq!(panel.asked(), [Command::Worth(Effect::Refraction)]);
+    assert_eq!(panel.asked(), [Command::EffectDifference(Effect::Refraction)]);
 
     panel.tell(|model| {
         model.state = BakeState::Comparing {
@@ -199,7 +199,7 @@ fn asked_for_and_told_in_watts() {
         (Err(failed.into()), failed),
     ] {
         let has_maps = difference.is_ok();
-        let worth = Worth {
+        let worth = EffectDifference {
             effect: Effect::Refraction,
             with: Arc::new(finished(panel.model.scene(), panel.settings())),
             difference,

@@ -151,10 +151,10 @@ impl Case {
                     if open.is_none() {
                         first = described(&scene);
                     }
-                    open = Some(books_open(&result).max(open.unwrap_or(0.0)));
+                    open = Some(energy_residual(&result).max(open.unwrap_or(0.0)));
                     carried = if is_carried { by_carriers(&scene, &settings) } else { Vec::new() };
                     for (_, baked) in carried.iter().filter(|_| !self.is_without_books) {
-                        open = Some(books_open(&baked.result).max(open.unwrap_or(0.0)));
+                        open = Some(energy_residual(&baked.result).max(open.unwrap_or(0.0)));
                     }
                     bakes.push(Baked { scene, result });
                 }
@@ -202,7 +202,7 @@ fn described(scene: &Scene) -> String {
 
 /// What ledgers leave open at worst, of what was emitted, or maps of what was deposited; infinite where a value is not
 /// finite, or below zero though no light is traced by wavelength, which knows colours beyond sRGB.
-pub fn books_open(result: &Bake) -> f64 {
+pub fn energy_residual(result: &Bake) -> f64 {
     let is_spectral = result.ledgers.iter().any(|ledger| ledger.emitted_radiant_w.is_some());
     let is_value = |e: f32| e.is_finite() && (e >= 0.0 || is_spectral);
     let mut is_sound = result.maps.iter().flat_map(values).all(is_value);

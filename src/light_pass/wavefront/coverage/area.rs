@@ -6,7 +6,7 @@ use glam::DVec2;
 
 use super::row::{RowShares, Sink, Span};
 use super::shape::{cells, least, most};
-use super::sides::{Cut, Sides};
+use super::sides::{SideCut, Sides};
 
 /// The order of the corners from top to bottom, by which of a > b, b > c, a > c hold of their heights (1, 2, 4).
 const ORDERS: [[usize; 3]; 8] = [
@@ -101,7 +101,7 @@ impl Area {
 
     /// The row between two cuts, on those texels only that it reaches.
     #[inline(always)]
-    fn wide_span<'a>(&self, from: &Cut, to: &Cut, shares: &'a mut RowShares) -> Option<Span<'a>> {
+    fn wide_span<'a>(&self, from: &SideCut, to: &SideCut, shares: &'a mut RowShares) -> Option<Span<'a>> {
         let pieces = self.sides.between(from, to);
         let (left, right) = pieces.extent();
         let width = self.columns as f64;

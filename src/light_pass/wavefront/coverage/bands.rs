@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::bins::{Bins, split_rows};
 use super::report::book;
-use super::row::{Divided, RowShares, Sink, Span};
+use super::row::{PreparedTriangle, RowShares, Sink, Span};
 use super::shape::{Shape, is_finite};
 use super::{CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
@@ -21,12 +21,12 @@ const MIN_TRIANGLES: usize = 1024;
 const BANDS_PER_THREAD: usize = 4;
 
 /// Where flux may go.
-pub trait Ground: Sync {
+pub trait TexelAccess: Sync {
     /// Adds a span of a triangle's flux to the texels of its row, where that may be; returns what was added, and
     /// whether it was all.
     fn add(
         &self,
-        flux: &Divided,
+        flux: &PreparedTriangle,
         island: u32,
         row: usize,
         span: Span,
@@ -35,13 +35,13 @@ pub trait Ground: Sync {
 }
 
 /// All texels may grow.
-pub struct Everywhere;
+pub struct AllTexels;
 
-impl Ground for Everywhere {
+impl TexelAccess for AllTexels {
     #[inline(always)]
     fn add(
         &self,
-        flux: &Divided,
+        flux: &PreparedTriangle,
         _: u32,
         _: usize,
         span: Span,
@@ -53,7 +53,7 @@ impl Ground for Everywhere {
 
 /// What one task did.
 #[derive(Debug, Default)]
-struct Done {
+struct TaskOutput {
     added: [i128; 3],
     /// Triangles of which not all could be added.
     incomplete: Vec<usize>,
@@ -65,10 +65,10 @@ pub fn deposit(
     triangles: &[FluxTriangle],
     size: (usize, usize),
     texels: &mut [FluxCount],
-    ground: &impl Ground,
+    ground: &impl TexelAccess,
 ) -> (CoverageReport, Vec<usize>) {
     let mut report = CoverageReport::default();
-    let mut done = Done::default();
+    let mut done = TaskOutput::default();
     if triangles.len() < MIN_TRIANGLES || rayon::current_num_threads() == 1 {
         book_outside(triangles, &mut report);
         done = add(triangles.iter().enumerate(), size, 0..size.1, texels, ground);
@@ -99,9 +99,9 @@ fn add_in_bands(
     triangles: &[FluxTriangle],
     size: (usize, usize),
     texels: &mut [FluxCount],
-    ground: &impl Ground,
+    ground: &impl TexelAccess,
     report: &mut CoverageReport,
-    done: &mut Done,
+    done: &mut TaskOutput,
 ) {
     let chunks: Vec<&[FluxTriangle]> = triangles.chunks(TRIANGLES_PER_CHUNK).collect();
     let prepare = |chunk: &&[FluxTriangle]| {
@@ -115,7 +115,7 @@ fn add_in_bands(
     bins.iter().for_each(|part| part.add_work(&mut work));
     let bands = split_rows(&work, BANDS_PER_THREAD * rayon::current_num_threads());
     bins.par_iter_mut().for_each(|part| part.sort(&bands));
-    let parts: Vec<Done> = split_texels(texels, size.0, &bands)
+    let parts: Vec<TaskOutput> = split_texels(texels, size.0, &bands)
         .into_par_iter()
         .zip(bands)
         .enumerate()
@@ -159,9 +159,9 @@ fn add<'a>(
     size: (usize, usize),
     rows: Range<usize>,
     texels: &mut [FluxCount],
-    ground: &impl Ground,
-) -> Done {
-    let mut done = Done::default();
+    ground: &impl TexelAccess,
+) -> TaskOutput {
+    let mut done = TaskOutput::default();
     let mut shares = RowShares::new(size.0);
     for (index, triangle) in triangles {
         let shape = Shape::new(&triangle.corners, size);
@@ -172,7 +172,7 @@ fn add<'a>(
             first: rows.start,
             texels,
             ground,
-            flux: Divided::new(triangle.flux),
+            flux: PreparedTriangle::new(triangle.flux),
             island: triangle.island,
             added: [0; 3],
             complete: true,
@@ -193,13 +193,13 @@ struct Rows<'a, G> {
     first: usize,
     texels: &'a mut [FluxCount],
     ground: &'a G,
-    flux: Divided,
+    flux: PreparedTriangle,
     island: u32,
     added: FluxCount,
     complete: bool,
 }
 
-impl<G: Ground> Sink for Rows<'_, G> {
+impl<G: TexelAccess> Sink for Rows<'_, G> {
     #[inline(always)]
     fn add(&mut self, row: usize, span: Span) {
         let begin = (row - self.first) * self.width;

@@ -4,9 +4,9 @@ use std::collections::VecDeque;
 
 use rayon::prelude::*;
 
-use super::bands::{self, Ground};
+use super::bands::{self, TexelAccess};
 use super::report::book;
-use super::row::{Divided, RowShares, Sink, Span};
+use super::row::{PreparedTriangle, RowShares, Sink, Span};
 use super::shape::Shape;
 use super::{Coverage, CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
@@ -15,12 +15,12 @@ use crate::illumination::accumulator::FluxCount;
 const REACH: usize = 2;
 
 /// Texels of a chart may grow where the triangle's island covers them.
-struct Covered<'a, C>(&'a C);
+struct CoveredOnly<'a, C>(&'a C);
 
-impl<C: Coverage> Ground for Covered<'_, C> {
+impl<C: Coverage> TexelAccess for CoveredOnly<'_, C> {
     fn add(
         &self,
-        flux: &Divided,
+        flux: &PreparedTriangle,
         island: u32,
         row: usize,
         span: Span,
@@ -50,7 +50,7 @@ pub fn deposit(
     texels: &mut [FluxCount],
 ) -> CoverageReport {
     let size = coverage.size();
-    let (mut report, incomplete) = bands::deposit(triangles, size, texels, &Covered(coverage));
+    let (mut report, incomplete) = bands::deposit(triangles, size, texels, &CoveredOnly(coverage));
     let moves: Vec<Vec<Move>> = incomplete
         .into_par_iter()
         .map(|index| moves(&triangles[index], coverage))
@@ -119,7 +119,7 @@ fn nearest(texel: usize, coverage: &impl Coverage, island: u32) -> Option<usize>
 /// All texels that a triangle touches.
 struct Touched {
     width: usize,
-    flux: Divided,
+    flux: PreparedTriangle,
     /// The map's row that is the first.
     first: usize,
     rows: Vec<TouchedRow>,
@@ -154,7 +154,7 @@ impl Touched {
         let rows = shape.rows();
         let mut touched = Self {
             width: size.0,
-            flux: Divided::new(triangle.flux),
+            flux: PreparedTriangle::new(triangle.flux),
             first: rows.start,
             rows: Vec::new(),
         };

@@ -62,7 +62,7 @@ pub fn deposit_covered(
     let size = (flux.width(), flux.height());
     assert_eq!(size, coverage.size(), "one coverage for every texel");
     if coverage.is_full() {
-        bands::deposit(triangles, size, flux.texels_mut(), &bands::Everywhere).0
+        bands::deposit(triangles, size, flux.texels_mut(), &bands::AllTexels).0
     } else {
         gaps::deposit(triangles, coverage, flux.texels_mut())
     }

@@ -39,14 +39,14 @@ impl RowShares {
 
 /// A triangle's flux, made ready to be divided.
 #[derive(Clone, Copy, Debug)]
-pub struct Divided {
+pub struct PreparedTriangle {
     flux: FluxCount,
     counts: [f64; 3],
-    way: Way,
+    way: RowMethod,
 }
 
 #[derive(Clone, Copy, Debug)]
-enum Way {
+enum RowMethod {
     /// All channels alike.
     Grey,
     Colour,
@@ -78,7 +78,7 @@ fn careful_round(flux: i64, share: f64) -> i64 {
     }
 }
 
-impl Divided {
+impl PreparedTriangle {
     /// Any flux.
     #[inline(always)]
     pub fn new(flux: FluxCount) -> Self {
@@ -88,9 +88,9 @@ impl Divided {
             flux,
             counts: flux.map(|channel| channel as f64),
             way: match (quick, grey) {
-                (true, true) => Way::Grey,
-                (true, false) => Way::Colour,
-                (false, _) => Way::Careful,
+                (true, true) => RowMethod::Grey,
+                (true, false) => RowMethod::Colour,
+                (false, _) => RowMethod::Careful,
             },
         }
     }
@@ -103,9 +103,9 @@ impl Divided {
     pub fn add(&self, span: Span, row: &mut [FluxCount]) -> FluxCount {
         let texels = &mut row[span.first..span.first + span.ends.len()];
         match self.way {
-            Way::Grey => [self.add_grey(span, texels); 3],
-            Way::Colour => self.add_colour(span, texels),
-            Way::Careful => self.add_carefully(span, texels),
+            RowMethod::Grey => [self.add_grey(span, texels); 3],
+            RowMethod::Colour => self.add_colour(span, texels),
+            RowMethod::Careful => self.add_carefully(span, texels),
         }
     }
 

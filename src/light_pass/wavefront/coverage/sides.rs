@@ -30,7 +30,7 @@ pub struct Sides {
 
 /// The triangle cut at one height.
 #[derive(Clone, Copy, Debug)]
-pub struct Cut {
+pub struct SideCut {
     /// Height of the cut on each side, held within the side.
     y: [f64; 4],
     x: [f64; 4],
@@ -51,7 +51,7 @@ pub struct Pieces {
 
 /// One of them.
 #[derive(Clone, Copy, Debug)]
-pub struct Piece {
+pub struct CutPiece {
     low: f64,
     run: f64,
     height: f64,
@@ -98,11 +98,11 @@ impl Sides {
 
     /// Cuts at a height, or at the end that is nearest to it.
     #[inline(always)]
-    pub fn cut(&self, y: f64) -> Cut {
+    pub fn cut(&self, y: f64) -> SideCut {
         let y = most(self.top, least(self.bottom, y));
         let y = [y, least(y, self.middle), most(y, self.middle), y];
         let (down, up) = (y[1] - self.top, self.bottom - y[2]);
-        Cut {
+        SideCut {
             y,
             x: four(|side| self.start_x[side] + (y[side] - self.start_y[side]) * self.slope[side]),
             above: down * down * self.upper_square + (self.lower_share - up * up * self.lower_square),
@@ -111,7 +111,7 @@ impl Sides {
 
     /// The sides between two cuts.
     #[inline(always)]
-    pub fn between(&self, from: &Cut, to: &Cut) -> Pieces {
+    pub fn between(&self, from: &SideCut, to: &SideCut) -> Pieces {
         let low = four(|side| least(from.x[side], to.x[side]));
         let high = four(|side| most(from.x[side], to.x[side]));
         let run = four(|side| high[side] - low[side]);
@@ -130,8 +130,8 @@ impl Sides {
 impl Pieces {
     /// One piece.
     #[inline(always)]
-    pub fn piece(&self, index: usize) -> Piece {
-        Piece {
+    pub fn piece(&self, index: usize) -> CutPiece {
+        CutPiece {
             low: self.low[index],
             run: self.run[index],
             height: self.height[index],
@@ -169,7 +169,7 @@ impl Pieces {
     }
 }
 
-impl Piece {
+impl CutPiece {
     /// What it adds to the share to the left of `x`.
     #[inline(always)]
     pub fn share_up_to(&self, x: f64) -> f64 {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::bands::book_outside;
 use super::report::book;
-use super::row::{Divided, RowShares, Sink, Span};
+use super::row::{PreparedTriangle, RowShares, Sink, Span};
 use super::shape::{Shape, rows_and_columns};
 use super::{CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
@@ -31,7 +31,7 @@ struct Visit {
 }
 
 /// What a triangle that lies on several tiles, or past the map's border, left on a band.
-struct Part {
+struct PartialDeposit {
     triangle: u32,
     added: FluxCount,
     /// The largest share that one texel took, and the texel.
@@ -51,7 +51,7 @@ pub fn deposit(triangles: &[FluxTriangle], layout: &TileLayout, texels: &mut [Fl
     visits.par_sort_unstable();
     let bands: Vec<&[Visit]> = visits.chunk_by(|a, b| a.band == b.band).collect();
     let slices = split_texels(texels, layout, &bands);
-    let done: Vec<([i128; 3], Vec<Part>)> = bands
+    let done: Vec<([i128; 3], Vec<PartialDeposit>)> = bands
         .into_par_iter()
         .zip(slices)
         .map(|(visits, (tile, rows, texels))| add(visits, triangles, &tile, rows, texels))
@@ -137,7 +137,7 @@ fn add(
     tile: &Tile,
     rows: Range<usize>,
     texels: &mut [FluxCount],
-) -> ([i128; 3], Vec<Part>) {
+) -> ([i128; 3], Vec<PartialDeposit>) {
     let mut added = [0; 3];
     let mut parts = Vec::new();
     let mut shares = RowShares::new(tile.size.0);
@@ -159,7 +159,7 @@ fn add(
             first: rows.start,
             texels,
             flux: triangle.flux,
-            divided: Divided::new(triangle.flux),
+            divided: PreparedTriangle::new(triangle.flux),
             added: [0; 3],
             is_whole: is_on_tile(triangle, tile),
             largest: (0.0, 0),
@@ -167,7 +167,7 @@ fn add(
         shape.for_each_row(ours, &mut shares, &mut target);
         book(&mut added, target.added);
         if !target.is_whole {
-            parts.push(Part {
+            parts.push(PartialDeposit {
                 triangle: visit.triangle,
                 added: target.added,
                 largest: (target.largest.0, first_texel + target.largest.1),
@@ -199,7 +199,7 @@ fn is_inside(triangle: &FluxTriangle, layout: &TileLayout) -> bool {
 /// Gives what rounding down left of a triangle to its largest share, the first of equals.
 fn place_rest(
     triangle: &FluxTriangle,
-    parts: &[Part],
+    parts: &[PartialDeposit],
     texels: &mut [FluxCount],
     report: &mut CoverageReport,
 ) {
@@ -226,7 +226,7 @@ struct Rows<'a> {
     first: usize,
     texels: &'a mut [FluxCount],
     flux: FluxCount,
-    divided: Divided,
+    divided: PreparedTriangle,
     added: FluxCount,
     /// Whether all of the triangle lies on this tile.
     is_whole: bool,

@@ -4,7 +4,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use gltf::json::Value;
 use serde_json::json;
 
-use super::placing::Placing;
+use super::placing::NodePlacement;
 use crate::error::{Error, Result};
 use crate::scene::gltf::glb::Glb;
 use crate::scene::gltf::light::Origin;
@@ -37,7 +37,7 @@ impl Edited<'_> {
         &self,
         origin: &Origin,
         shift: DVec3,
-        placing: &mut Placing<'_>,
+        placing: &mut NodePlacement<'_>,
         glb: &mut Glb,
     ) -> Result<()> {
         let (was, is) = (self.was, self.is);
@@ -70,7 +70,7 @@ impl Edited<'_> {
     }
 
     /// Turns and moves its node, as little as the light itself was.
-    fn place(&self, origin: &Origin, shift: DVec3, placing: &mut Placing<'_>) -> Result<()> {
+    fn place(&self, origin: &Origin, shift: DVec3, placing: &mut NodePlacement<'_>) -> Result<()> {
         let (was, is) = (&self.was.kind, &self.is.kind);
         let turn = match (was.direction(), is.direction()) {
             (Some(was), Some(is)) if was != is => DQuat::from_rotation_arc(was.normalize(), is.normalize()),

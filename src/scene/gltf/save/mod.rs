@@ -7,11 +7,11 @@ use std::path::Path;
 use glam::DVec3;
 
 use self::lights::Edited;
-use self::placing::Placing;
+use self::placing::NodePlacement;
 use super::document::Document;
 use super::glb::{self, Glb};
 use super::light::{self, Origin};
-use super::nodes::Placed;
+use super::nodes::PlacedNode;
 use super::report::Report;
 use super::{File, substance, write};
 use crate::error::{Error, Result, Warning};
@@ -46,7 +46,7 @@ pub fn save(
         loaded,
         edited,
         document: &file.document,
-        placing: Placing::new(&file.placed),
+        placing: NodePlacement::new(&file.placed),
         glb: &mut file.glb,
     };
     patch.check_original(&file.placed, &origins, original)?;
@@ -67,13 +67,13 @@ struct Patch<'a> {
     loaded: &'a Scene,
     edited: &'a Scene,
     document: &'a Document,
-    placing: Placing<'a>,
+    placing: NodePlacement<'a>,
     glb: &'a mut Glb,
 }
 
 impl Patch<'_> {
     /// Another program may have written the file since.
-    fn check_original(&self, placed: &[Placed], origins: &[Origin], path: &Path) -> Result<()> {
+    fn check_original(&self, placed: &[PlacedNode], origins: &[Origin], path: &Path) -> Result<()> {
         let has_nodes = self.loaded.objects.iter().all(|object| {
             let mut placed = placed.iter();
             placed.any(|placed| placed.node == object.node && placed.name == object.name)

@@ -9,21 +9,21 @@ use serde_json::json;
 use crate::error::{Error, Result};
 use crate::scene::gltf::document::Document;
 use crate::scene::gltf::glb::Glb;
-use crate::scene::gltf::nodes::Placed;
+use crate::scene::gltf::nodes::PlacedNode;
 
 /// Largest difference of two transforms that are the same, as a share of their size [1].
 const SAME: f64 = 1e-12;
 
 /// Nodes with where they stand and where they are to stand.
-pub struct Placing<'a> {
-    placed: &'a [Placed],
+pub struct NodePlacement<'a> {
+    placed: &'a [PlacedNode],
     /// By the node's index.
     wanted: BTreeMap<usize, DAffine3>,
 }
 
-impl<'a> Placing<'a> {
+impl<'a> NodePlacement<'a> {
     /// Nothing is moved yet.
-    pub fn new(placed: &'a [Placed]) -> Self {
+    pub fn new(placed: &'a [PlacedNode]) -> Self {
         Self {
             placed,
             wanted: BTreeMap::new(),
@@ -82,8 +82,8 @@ fn is_same(a: &DAffine3, b: &DAffine3) -> bool {
 }
 
 /// The node that a placed one hangs on.
-fn parent_of(root: &Root, node: usize, placed: &[Placed]) -> Option<usize> {
-    let is_parent = |candidate: &&Placed| {
+fn parent_of(root: &Root, node: usize, placed: &[PlacedNode]) -> Option<usize> {
+    let is_parent = |candidate: &&PlacedNode| {
         let children = root.nodes[candidate.node].children.as_deref();
         children
             .unwrap_or_default()

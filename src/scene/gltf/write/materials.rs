@@ -99,11 +99,11 @@ fn write_substance(material: &Material, written: &mut Value, warnings: &mut Vec<
         return;
     };
     match substance::stated(glass) {
-        Some(substance::Stated::Name(name)) => written["extras"][substance::GLASS_KEY] = json!(name),
-        Some(substance::Stated::Dispersion(dispersion)) => {
+        Some(substance::GlassStatement::Name(name)) => written["extras"][substance::GLASS_KEY] = json!(name),
+        Some(substance::GlassStatement::Dispersion(dispersion)) => {
             written["extensions"][substance::NAME] = json!({ "dispersion": dispersion });
         }
-        Some(substance::Stated::Nothing) => {}
+        Some(substance::GlassStatement::Nothing) => {}
         None => warnings.push(Warning::new(
             format!("material `{}`", material.name),
             format!(

@@ -4,7 +4,7 @@ use egui::{Color32, EventFilter, Key, Rect, Response, RichText, Sense, TextureHa
 
 use super::texture;
 use crate::illumination::IlluminationMap;
-use crate::viewer::flat_map::{self, Part, Reading};
+use crate::viewer::flat_map::{self, MapCrop, MapReading};
 use crate::viewer::panel::WIDTH;
 use crate::viewer::panel::control::significant;
 use crate::viewer::panel::effects::COUNTER;
@@ -31,7 +31,7 @@ pub struct Large {
     place: Option<([f64; 2], f64)>,
     texture: Option<TextureHandle>,
     /// What the texture shows.
-    shown: Option<(Part, [usize; 2])>,
+    shown: Option<(MapCrop, [usize; 2])>,
     exposure_stops: Option<f64>,
 }
 
@@ -77,7 +77,7 @@ impl Large {
         let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         let (middle, zoom) = self.place.unwrap_or_else(|| fit(map, rect));
         let (middle, zoom) = self.moved(ui, &response, (middle, zoom));
-        let part = Part {
+        let part = MapCrop {
             left: middle[0] - 0.5 * f64::from(rect.width()) / zoom,
             top: middle[1] - 0.5 * f64::from(rect.height()) / zoom,
             texels_per_pixel: 1.0 / zoom,
@@ -168,7 +168,7 @@ impl Large {
         (middle, zoom)
     }
 
-    fn paint(&mut self, ui: &Ui, map: &IlluminationMap, rect: Rect, part: Part) {
+    fn paint(&mut self, ui: &Ui, map: &IlluminationMap, rect: Rect, part: MapCrop) {
         let size = [rect.width() as usize, rect.height() as usize].map(|side| side.max(1));
         if self.shown != Some((part, size)) {
             let stops = *self
@@ -195,7 +195,7 @@ fn fit(map: &IlluminationMap, rect: Rect) -> ([f64; 2], f64) {
 }
 
 /// "texel 12, 34: caustic 1.23, direct 0.45 W/m², error ±0.02".
-fn sentence(reading: &Reading) -> String {
+fn sentence(reading: &MapReading) -> String {
     let [column, row] = reading.texel;
     let layers = reading.layers_w_per_m2.iter();
     let layers: Vec<String> = layers

@@ -27,14 +27,14 @@ fn is_grey(arrival: &Arrival) -> bool {
 /// Arrivals of one row, in their order.
 #[derive(Debug)]
 struct KeptRow {
-    arrivals: Box<[Kept]>,
+    arrivals: Box<[StoredArrival]>,
     /// Second and third channel of each arrival's flux [W]; empty where all are grey.
     colours: Box<[[f64; 2]]>,
 }
 
 /// An arrival without what follows from the rest: 56 bytes.
 #[derive(Clone, Copy, Debug)]
-struct Kept {
+struct StoredArrival {
     signature: u64,
     barycentric: [f64; 2],
     path_m: f64,
@@ -96,7 +96,7 @@ impl ArrivalCache {
 
 impl KeptRow {
     fn pack(row: &TracedRow) -> Self {
-        let pack = |(&column, arrival): (&u32, &Arrival)| Kept {
+        let pack = |(&column, arrival): (&u32, &Arrival)| StoredArrival {
             signature: arrival.signature.0,
             barycentric: arrival.barycentric.to_array(),
             path_m: arrival.path_m,

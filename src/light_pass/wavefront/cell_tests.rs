@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::band::{SampleId, Workspace};
 use super::cell::{CHECK_MISMATCH, Cell, CellCutter, EDGE_ENDS, reach_of};
-use super::edge::{Reach, mismatch};
+use super::edge::{EdgeReach, mismatch};
 use super::patch::PatchShape;
 use super::strand::LatticeRay;
 use crate::geometry::Ray;
@@ -42,7 +42,7 @@ impl CellCutter<'_> {
     }
 
     /// Whether no patch over a cell says where the bright light in its middle goes.
-    pub(super) fn is_doubtful(&self, cell: &Cell, work: &mut Workspace) -> bool {
+    pub(super) fn needs_check_ray(&self, cell: &Cell, work: &mut Workspace) -> bool {
         let ids = cell.corners.map(|corner| corner.sample);
         let brightest_w = ids.iter().map(|id| work.get(*id).brightest_w).fold(0.0, f64::max);
         (0..work.get(ids[0]).strands.len()).any(|strand| {
@@ -140,7 +140,7 @@ impl CellCutter<'_> {
                 .flatten()
                 .any(|edge| edge.changes(work, signature) > 1);
             let torn = there == [true; 4]
-                && (0..4).any(|edge| reach_of(cell, edge, work, signature, false) != Reach::Whole);
+                && (0..4).any(|edge| reach_of(cell, edge, work, signature, false) != EdgeReach::Whole);
             diagonal || crossed_twice || torn
         })
     }

@@ -6,9 +6,9 @@ use crate::light_pass::receiver_maps::ReceiverMaps;
 
 /// One set of maps, or one for each band that is kept.
 #[derive(Clone, Debug)]
-pub(super) struct PartMaps(Vec<ReceiverMaps>);
+pub(super) struct BandMaps(Vec<ReceiverMaps>);
 
-impl PartMaps {
+impl BandMaps {
     /// No light yet; `kept_bands`: how many bands have maps of their own.
     pub(super) fn new(objects: usize, kept_bands: usize) -> Self {
         Self(vec![ReceiverMaps::new(objects); kept_bands.max(1)])

@@ -12,7 +12,7 @@ const STRONG: f64 = 0.9;
 
 /// The distribution of a pair of correlated normal variables for all borders of a row.
 #[derive(Debug, Default)]
-pub(super) struct Joint {
+pub(super) struct BivariateNormal {
     correlation: f64,
     nodes: [Node; 8],
     /// Of the nodes.
@@ -38,7 +38,7 @@ pub(super) struct Borders<'a> {
     pub(super) below: &'a [f64],
 }
 
-impl Joint {
+impl BivariateNormal {
     /// For a correlation below 1 in magnitude, with the borders of one axis.
     pub(super) fn set(&mut self, borders: &[f64], correlation: f64) {
         self.correlation = correlation;
@@ -105,7 +105,7 @@ impl Joint {
     }
 }
 
-/// See [`Joint::strong`]; `square` is 1 − r², `root` its square root.
+/// See [`BivariateNormal::strong`]; `square` is 1 − r², `root` its square root.
 fn missing(u: f64, v: f64, square: f64, root: f64) -> f64 {
     let distance = (u - v).abs();
     let x = distance / root;

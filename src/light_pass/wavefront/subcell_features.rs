@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use glam::{DVec2, DVec3};
 
-use super::closeness::EdgeSearch;
-use super::openings::{Slit, narrow_openings};
+use super::edge_search::EdgeSearch;
+use super::slits::{Slit, narrow_openings};
 use crate::geometry::Ray;
 use crate::geometry::enclosure::Bounds;
 use crate::light_pass::item_buffer::{self, CELLS_PER_SIDE, ItemBuffer};
@@ -73,7 +73,7 @@ type Bins<T> = HashMap<(u32, u32, u32), Vec<T>>;
 
 /// Small bodies and openings as one light sees them.
 #[derive(Clone, Debug, Default)]
-pub struct SmallBodies {
+pub struct SubcellFeatures {
     bodies: Bins<Body>,
     /// Sharp corners [m].
     corners: Bins<DVec3>,
@@ -83,7 +83,7 @@ pub struct SmallBodies {
     casters: usize,
 }
 
-impl SmallBodies {
+impl SubcellFeatures {
     /// The objects that are small beside cells of the given size in the unit square, and sharp corners of those that
     /// the light sees: both only where they can bend light or stand in its way, as `visible` tells.
     pub fn find(
@@ -183,7 +183,7 @@ impl SmallBodies {
         if level >= DEEPEST_BODY_LEVEL || self.is_empty() {
             return false;
         }
-        let beam = Beam::new(launch, face, (low, high));
+        let beam = CellBeam::new(launch, face, (low, high));
         // A little farther than the cell: bodies reach beyond what they are booked under.
         let margin = (high - low) * 0.5;
         let (low, high) = (low - margin, high + margin);
@@ -206,7 +206,7 @@ impl SmallBodies {
         if self.bodies.is_empty() {
             return 1.0;
         }
-        let beam = Beam::new(launch, face, (low, high));
+        let beam = CellBeam::new(launch, face, (low, high));
         let mut cells = 1.0;
         for_each(&self.bodies, face, (low, high), |body| {
             if let Some(reach_m) = beam.reach_at_m(body, f64::INFINITY) {
@@ -221,12 +221,12 @@ impl SmallBodies {
 }
 
 /// What a cell of a lattice sees: its middle ray and those through its corners.
-struct Beam {
+struct CellBeam {
     middle: Ray,
     corners: [Ray; 4],
 }
 
-impl Beam {
+impl CellBeam {
     fn new(launch: &Launch, face: usize, (low, high): (DVec2, DVec2)) -> Self {
         Self {
             middle: launch.ray(face, (low + high) * 0.5),

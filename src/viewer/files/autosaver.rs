@@ -6,7 +6,7 @@ use std::thread;
 use std::time::{Duration, Instant, SystemTime};
 
 use super::Recent;
-use super::config::{ConfigFolder, Kept};
+use super::config::{ConfigFolder, SavedState};
 use crate::scene::Scene;
 use crate::scene::changes::Change;
 use crate::viewer::background::{Background, Task, Wake};
@@ -18,7 +18,7 @@ pub const SOON: Duration = Duration::from_secs(1);
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     /// All but the edits; of those, what was kept before and not taken over.
-    pub kept: Kept,
+    pub kept: SavedState,
     /// As it was loaded.
     pub loaded: Arc<Scene>,
     pub edited: Arc<Scene>,

@@ -3,7 +3,7 @@
 
 /// One share of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Share {
+pub struct ShardIndex {
     /// Below `count`.
     index: u32,
     count: u32,
@@ -11,7 +11,7 @@ pub struct Share {
     shift: u64,
 }
 
-impl Share {
+impl ShardIndex {
     /// Share `number` of `count`, from 1 on; `None` where there is no such share.
     pub fn new(number: u32, count: u32) -> Option<Self> {
         (1..=count).contains(&number).then(|| Self {
@@ -60,14 +60,14 @@ mod tests {
         for count in 1..9 {
             for shift in [0, 1, 7] {
                 for piece in 0..40 {
-                    let shares = (1..=count).filter_map(|number| Share::new(number, count));
+                    let shares = (1..=count).filter_map(|number| ShardIndex::new(number, count));
                     let owners = shares.filter(|share| share.shifted(shift).has(piece)).count();
                     assert_eq!(owners, 1, "piece {piece} of {count} shares");
                 }
             }
         }
-        assert_eq!(Share::new(0, 3), None);
-        assert_eq!(Share::new(4, 3), None);
-        assert_eq!(Share::new(1, 0), None);
+        assert_eq!(ShardIndex::new(0, 3), None);
+        assert_eq!(ShardIndex::new(4, 3), None);
+        assert_eq!(ShardIndex::new(1, 0), None);
     }
 }

@@ -12,13 +12,13 @@ const MAX_TRIANGLES: usize = 200_000;
 const WINDING_TOLERANCE: f64 = 1e-6;
 
 /// The opaque closed objects around something, ascending; `None` where that cannot be told.
-type Around = Option<Vec<usize>>;
+type EnclosedBy = Option<Vec<usize>>;
 
 /// Which closed opaque objects everything lies inside of.
 #[derive(Debug)]
 pub(super) struct Compartments {
-    objects: Vec<Around>,
-    lights: Vec<Around>,
+    objects: Vec<EnclosedBy>,
+    lights: Vec<EnclosedBy>,
     /// Whether the object is such a surface itself: it has to do with its outside and its inside.
     encloses: Vec<bool>,
 }
@@ -90,7 +90,7 @@ impl Compartments {
     }
 
     /// Whether an object borders the space within `around`.
-    fn borders(&self, object: usize, around: &Around) -> bool {
+    fn borders(&self, object: usize, around: &EnclosedBy) -> bool {
         let (Some(own), Some(around)) = (&self.objects[object], around) else {
             return true;
         };
@@ -144,7 +144,7 @@ fn is_inside(mesh: &Mesh, (low, high): Bounds) -> Option<bool> {
 }
 
 /// Adds a container to what is around something.
-fn book(around: &mut Around, container: usize, is_inside: Option<bool>) {
+fn book(around: &mut EnclosedBy, container: usize, is_inside: Option<bool>) {
     match (around.as_mut(), is_inside) {
         (Some(list), Some(true)) => list.push(container),
         (_, None) => *around = None,

@@ -15,7 +15,7 @@ use crate::scene::Scene;
 
 /// The maps to compare with.
 #[derive(Clone, Debug)]
-pub struct Reference {
+pub struct SavedMaps {
     /// What it is called in the window.
     pub name: String,
     /// The scene as it is shown with it.
@@ -26,7 +26,7 @@ pub struct Reference {
     pub relative_rmse: std::result::Result<f64, String>,
 }
 
-impl Reference {
+impl SavedMaps {
     /// The present maps, kept.
     ///
     /// # Errors
@@ -98,7 +98,7 @@ pub fn show(
     ui: &mut Ui,
     picture: Rect,
     divider: &mut f32,
-    (beside, reference): (egui::TextureId, &Reference),
+    (beside, reference): (egui::TextureId, &SavedMaps),
 ) {
     let line = |share: f32| picture.left() + share * picture.width();
     let grip = Rect::from_center_size(

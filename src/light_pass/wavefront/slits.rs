@@ -228,7 +228,7 @@ impl Search<'_> {
     /// Whether the first thing that a ray meets is a caster, and farther away than that.
     fn meets_caster(&self, ray: &Ray, beyond_m: f64) -> bool {
         let scene = self.tracer.scene();
-        self.tracer.closest_place(ray).is_some_and(|place| {
+        self.tracer.intersect(ray).is_some_and(|place| {
             let material = scene.material_of(place.object as usize);
             place.distance_m > beyond_m && material.surface.is_specular()
         })

@@ -8,9 +8,9 @@ use super::Model;
 use crate::geometry::Ray;
 use crate::scene::Edit;
 use crate::transport::Tracer;
-use crate::viewer::brightest::{self, Spot};
+use crate::viewer::brightest::{self, BrightSpot};
 use crate::viewer::gizmo::GizmoTarget;
-use crate::viewer::new_light::{Aim, NewLight};
+use crate::viewer::new_light::{NewLight, ViewTarget};
 use crate::viewer::probe;
 
 /// From how far the brightest spot is looked at, in scene radii.
@@ -34,21 +34,21 @@ pub(super) struct PendingSearch {
 impl Model {
     /// Does something as soon as the surfaces of the scene are known.
     pub(super) fn seek(&mut self, what: impl FnOnce(&mut PendingSearch)) {
-        what(&mut self.sought);
+        what(&mut self.pending_search);
         self.poll_sought();
     }
 
     /// Does what waited, as soon as the surfaces of the scene are known.
     pub(super) fn poll_sought(&mut self) {
-        if self.sought.light.is_none() && !self.sought.brightest {
+        if self.pending_search.light.is_none() && !self.pending_search.brightest {
             return;
         }
         let Some(surfaces) = self.surfaces() else { return };
-        let sought = std::mem::take(&mut self.sought);
-        if let Some(light) = sought.light {
+        let pending_search = std::mem::take(&mut self.pending_search);
+        if let Some(light) = pending_search.light {
             self.add_light(light, &surfaces);
         }
-        if sought.brightest {
+        if pending_search.brightest {
             self.show_brightest(&surfaces);
         }
     }
@@ -62,7 +62,7 @@ impl Model {
         };
         let scene = Arc::clone(self.edits.scene());
         let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
-        let aim = Aim::of(surfaces, &gaze, 0.5 * (low + high));
+        let aim = ViewTarget::of(surfaces, &gaze, 0.5 * (low + high));
         let stops = self.choices.display.exposure_stops;
         let added = light.make((surfaces, radius_m), &aim, stops, &scene);
         let is_added = self.edit(&Edit::AddLight(Arc::new(added)));
@@ -88,7 +88,7 @@ impl Model {
     }
 
     /// From where a spot is seen: the way the camera looks now if it can be, else as near as it must be.
-    fn view_of(&self, spot: &Spot, surfaces: &Tracer) -> DVec3 {
+    fn view_of(&self, spot: &BrightSpot, surfaces: &Tracer) -> DVec3 {
         let radius_m = self.navigator.radius_m();
         let back = -self.navigator.camera().forward;
         let level = DVec3::new(back.x, 0.0, back.z).normalize_or(DVec3::X);

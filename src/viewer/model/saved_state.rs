@@ -8,14 +8,14 @@ use serde_json::Value;
 use super::Model;
 use crate::scene::changes::Change;
 use crate::settings::BakeSettings;
-use crate::viewer::files::config::Kept;
+use crate::viewer::files::autosaver::Snapshot;
+use crate::viewer::files::config::SavedState;
 use crate::viewer::files::config::full_source;
-use crate::viewer::files::keeper::Snapshot;
 use serde_json::json;
 
 /// What of a kept scene is taken over.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Restored {
+pub(super) struct RestoredParts {
     /// Settings of the bake.
     pub settings: bool,
     /// The camera; bookmarks always are.
@@ -32,7 +32,7 @@ pub(super) struct IgnoredState {
     settings: Option<(BakeSettings, Value)>,
 }
 
-impl Restored {
+impl RestoredParts {
     /// Everything.
     pub(super) const ALL: Self = Self {
         settings: true,
@@ -46,7 +46,7 @@ impl Model {
     /// What there is to be kept.
     fn snapshot(&self) -> Snapshot {
         Snapshot {
-            kept: Kept {
+            kept: SavedState {
                 source: self.full_source.clone(),
                 views: self.navigator.views(),
                 settings: self.settings_to_keep(),
@@ -71,16 +71,16 @@ impl Model {
 
     /// Keeps what changed.
     pub(super) fn keep(&mut self, now: Instant) {
-        if self.files.keeper.is_some() {
+        if self.files.autosaver.is_some() {
             let snapshot = self.snapshot();
-            if let Some(keeper) = &mut self.files.keeper {
-                keeper.look(snapshot, now);
+            if let Some(autosaver) = &mut self.files.autosaver {
+                autosaver.look(snapshot, now);
             }
         }
     }
 
     /// Makes the scene in the window what it was last time, as far as that is wanted; tells whether there was such a time.
-    pub(super) fn find_again(&mut self, what: Option<Restored>) -> bool {
+    pub(super) fn find_again(&mut self, what: Option<RestoredParts>) -> bool {
         self.full_source = full_source(&self.edits.loaded().source);
         let (kept, warning) = match what {
             Some(_) => self.files.read_back(&self.full_source),
@@ -102,13 +102,13 @@ impl Model {
             self.log.write("found_again", json!({"source": self.full_source}));
         }
         let snapshot = self.snapshot();
-        if let Some(keeper) = &mut self.files.keeper {
-            keeper.begin(snapshot);
+        if let Some(autosaver) = &mut self.files.autosaver {
+            autosaver.begin(snapshot);
         }
         kept.is_some()
     }
 
-    fn restore(&mut self, kept: &Kept, what: Restored) {
+    fn restore(&mut self, kept: &SavedState, what: RestoredParts) {
         if what.settings {
             self.choices.settings = kept.settings_or(&self.choices.settings);
             self.choices.automatic = kept.automatic.unwrap_or(true);
