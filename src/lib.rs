@@ -32,6 +32,7 @@
 // Units stand in brackets, as in `area [m²]`, which are no links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
+pub use bake::{Bake, Baker, StopReason};
 pub use error::{Error, ErrorKind, Result, Warning};
 pub use export::glb::{Carrier, GlbOptions, write as write_glb};
 pub use export::map_folder::MapFolder;
@@ -41,7 +42,6 @@ pub use eye_pass::{Picture, ToneMap, View, render};
 pub use illumination::IlluminationMap;
 pub use progress::{Control, Progress, Stage};
 pub use scene::{Camera, LoadOptions, Scene};
-pub use session::{Bake, Baker, StopReason};
 pub use settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
 pub mod guide;
@@ -49,6 +49,8 @@ pub mod settings;
 
 // Internals, which the crate's own program and tests reach: what is here may change without notice. A module imports only
 // from modules above it.
+#[doc(hidden)]
+pub mod bake;
 #[doc(hidden)]
 pub mod effect;
 #[doc(hidden)]
@@ -76,8 +78,6 @@ pub mod plan;
 pub mod progress;
 #[doc(hidden)]
 pub mod scene;
-#[doc(hidden)]
-pub mod session;
 #[doc(hidden)]
 pub mod study;
 #[doc(hidden)]

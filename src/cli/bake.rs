@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use clap::Args;
+use nephroid::bake::forecast::forecast;
+use nephroid::bake::{self, Bake, Forecast, ForecastReport, StopReason};
 use nephroid::error::{Error, Result};
 use nephroid::export::manifest::{Manifest, MapEntry};
 use nephroid::export::map_folder::MapFolder;
@@ -12,8 +14,6 @@ use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest};
 use nephroid::light_pass::ledger::CarriedFlux;
 use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::scene::LoadOptions;
-use nephroid::session::forecast::forecast;
-use nephroid::session::{self, Bake, Forecast, ForecastReport, StopReason};
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
 use super::bake_options::BakeOptions;
@@ -57,7 +57,7 @@ impl BakeArguments {
     pub fn run(&self, console: &Console) -> Result<()> {
         let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads()?)?;
         if self.shard.is_some() {
-            session::shards::check(&settings)?;
+            bake::shards::check(&settings)?;
         }
         let options = self.scene_options.load_options(false);
         let times = self.moment.sequence();

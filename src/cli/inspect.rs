@@ -1,6 +1,7 @@
 //! `inspect`: contents of a scene, the effects that it needs and why, and the expected cost of a bake.
 
 use clap::Args;
+use nephroid::bake::{BYTES_PER_TEXEL, Baker, Forecast, Survey};
 use nephroid::effect::Effect;
 use nephroid::error::Result;
 use nephroid::illumination::IlluminationMap;
@@ -12,7 +13,6 @@ use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{Glass, Metal};
 use nephroid::plan::{self, EffectPlan};
 use nephroid::scene::{Light, LightKind, LightSize, Material, Scene, SurfaceKind};
-use nephroid::session::{BYTES_PER_TEXEL, Baker, Forecast, Survey};
 use nephroid::settings::LayerKind;
 use serde_json::{Value, json};
 

@@ -6,12 +6,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use cpu_time::ProcessTime;
+use nephroid::bake::{Bake, Baker, Timings};
 use nephroid::effect::EffectSwitches;
 use nephroid::error::{Error, Result, Warning};
 use nephroid::files;
 use nephroid::progress::Control;
 use nephroid::scene::{LoadOptions, Scene};
-use nephroid::session::{Bake, Baker, Timings};
 use nephroid::settings::BakeSettings;
 
 use super::console::{Console, StageBar, bytes};

@@ -3,16 +3,16 @@
 use serde::{Deserialize, Serialize};
 
 use super::sequence::FrameTimes;
+use crate::bake::{
+    BYTES_PER_TEXEL, Bake, BakeCounts, CostPoint, ForecastReport, ItemBufferReport, SpectralBand, StopReason,
+    Timings,
+};
 use crate::error::Warning;
 use crate::files::cache::ContentHash;
 use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::light_pass::ledger::{EnergyLedger, LightLedger};
 use crate::plan::EffectLine;
 use crate::scene::Scene;
-use crate::session::{
-    BYTES_PER_TEXEL, Bake, BakeCounts, CostPoint, ForecastReport, ItemBufferReport, SpectralBand, StopReason,
-    Timings,
-};
 use crate::settings::{BakeSettings, LayerKind};
 
 /// Version of the format.

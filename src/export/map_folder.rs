@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use super::manifest::{self, BandChannel, LightChannels, Manifest, MapEntry};
 use super::{exr, map_set, uv_file};
+use crate::bake::Bake;
 use crate::error::Result;
 use crate::files::{self, OutputFolder};
 use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::scene::{Light, Scene};
-use crate::session::Bake;
 use crate::settings::{BakeSettings, MapResolution};
 
 /// Folder of the map files within ours.

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use super::manifest::{ErrorEstimate, FrameEntry, Manifest, SceneSummary, Sequence};
 use super::map_folder::MapFolder;
+use crate::bake::Bake;
 use crate::error::Result;
 use crate::scene::Scene;
-use crate::session::Bake;
 use crate::settings::BakeSettings;
 
 /// Moments at equal distances.

@@ -12,11 +12,11 @@ use super::sweep::{
     Variant, WALL_S, column, number, share,
 };
 use super::table::Cell;
+use crate::bake::forecast::{forecast, stood_at};
+use crate::bake::{CostPoint, Forecast, StopReason};
 use crate::error::Result;
 use crate::scene::builtin::{self, shapes};
 use crate::scene::{Light, Scene};
-use crate::session::forecast::{forecast, stood_at};
-use crate::session::{CostPoint, Forecast, StopReason};
 use crate::settings::{BakeSettings, ErrorMetric};
 
 /// What a bake that got to its target was expected to take when its error was first at most five times that, and where it

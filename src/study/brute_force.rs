@@ -13,6 +13,7 @@ use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
+use crate::bake::{Bake, BakeCounts, StopReason, Timings};
 use crate::error::{Error, Result};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::illumination::gutter::fill_gutter;
@@ -27,7 +28,6 @@ use crate::optics::LinearSrgb;
 use crate::plan::{self, Effect, EffectPlan, EffectSwitch};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Material, Scene};
-use crate::session::{Bake, BakeCounts, StopReason, Timings};
 use crate::settings::{BakeSettings, ItemBufferKind, LayerKind, MapResolution};
 use crate::transport::{EffectSet, Microfacets, Tracer};
 

@@ -10,11 +10,11 @@ use super::sweep::{
     RELATIVE_RMSE, SPLATS, Sweep, Variant, column, number, share,
 };
 use super::table::Cell;
+use crate::bake::Baker;
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, Scene};
-use crate::session::Baker;
 use crate::settings::{BakeSettings, Estimator, LayerKind, SpectralSampling, Wavelengths};
 
 /// Name and one line of each.

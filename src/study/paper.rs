@@ -12,6 +12,7 @@ use super::sweep::{
     Variant, column,
 };
 use super::table::Cell;
+use crate::bake::Bake;
 use crate::error::{Error, Result};
 use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
@@ -19,7 +20,6 @@ use crate::light_pass::caustic::path::{PathLimits, PathTracer};
 use crate::optics::LinearSrgb;
 use crate::scene::builtin::{self, parts, pool, shapes};
 use crate::scene::{Camera, LightKind, Mesh, Scene};
-use crate::session::Bake;
 use crate::settings::{
     BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement, Sigma,
 };

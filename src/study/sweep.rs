@@ -7,13 +7,13 @@ use super::picture::{self, Image, Picture};
 use super::plot::{Curve, Plot};
 use super::references::{Reference, Truth, lit_side};
 use super::table::{Cell, Table};
+use crate::bake::{Bake, Baker};
 use crate::error::{Error, Result};
 use crate::export::picture::encode;
 use crate::illumination::compare::{Agreement, TexelPair};
 use crate::illumination::difference::{self, Difference};
 use crate::progress::{Control, Progress};
 use crate::scene::{Camera, Scene};
-use crate::session::{Bake, Baker};
 use crate::settings::{BakeSettings, MapResolution};
 
 /// A bake is no reference where it stopped before it was known as well as this.

@@ -6,10 +6,10 @@ use std::time::Instant;
 
 use glam::DVec2;
 
+use crate::bake::Bake;
 use crate::illumination::lookup::in_chart;
 use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
 use crate::scene::Scene;
-use crate::session::Bake;
 use crate::settings::{BakeSettings, LayerKind, MapResolution};
 
 /// Maps a second that moving light is to have.

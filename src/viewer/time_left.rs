@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 use super::worker::{BakeRequest, BakeState, BakedLevel};
+use crate::bake::forecast::forecast;
 use crate::plan::is_wanted;
 use crate::progress::Stage;
-use crate::session::forecast::forecast;
 use crate::settings::LayerKind;
 
 /// A forecast that may be wrong by more than this is not told [1].

@@ -6,12 +6,12 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use super::background::{Wake, no_thread};
+use crate::bake::{Bake, Baker, StopReason};
 use crate::effect::{Effect, EffectSwitch};
 use crate::error::Result;
 use crate::illumination::difference::{Difference, difference};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
-use crate::session::{Bake, Baker, StopReason};
 use crate::settings::BakeSettings;
 
 /// What the worker bakes with.

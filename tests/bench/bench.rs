@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use cpu_time::ProcessTime;
 use glam::{DVec2, DVec3};
+use nephroid::bake::{Bake, Baker};
 use nephroid::geometry::Ray;
 use nephroid::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use nephroid::light_pass::wavefront::coverage::{FluxTriangle, deposit_triangles};
@@ -16,7 +17,6 @@ use nephroid::progress::Control;
 use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::edit::{Edit, LightEdit};
 use nephroid::scene::{LightKind, Scene};
-use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, Estimator, MapResolution, Sigma};
 use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::Flux;

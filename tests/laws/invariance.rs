@@ -1,11 +1,11 @@
 //! What must not change a map or its ledgers, or must change them just so.
 
 use glam::{DMat3, DVec3};
+use nephroid::bake::Bake;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::{LightKind, LightSize, PanelShape, Scene, Volume};
-use nephroid::session::Bake;
 use nephroid::settings::{
     BakeSettings, Footprint, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement, Sigma,
 };

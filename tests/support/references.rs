@@ -2,7 +2,7 @@
 
 use nephroid::illumination::compare::{average_relative_difference, relative_rmse};
 use nephroid::scene::Scene;
-use nephroid::session::Bake;
+use nephroid::bake::Bake;
 
 use crate::tools::{caustic, energy_fault, map_of};
 use crate::{assert_close, reference_map};

@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 use nephroid::illumination::IlluminationMap;
 use nephroid::progress::Control;
 use nephroid::scene::{Camera, LightKind, Scene, builtin};
-use nephroid::session::{Bake, Baker};
+use nephroid::bake::{Bake, Baker};
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, MapResolution};
 use nephroid::study::brute_force::brute_force;
 use nephroid::transport::Tracer;

@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::bake::{ShardSums, Timings};
 use crate::error::{Error, Result};
 use crate::files;
 use crate::files::cache::ContentHash;
 use crate::light_pass::shard_index::ShardIndex;
 use crate::scene::Scene;
-use crate::session::{ShardSums, Timings};
 use crate::settings::BakeSettings;
 
 /// Version of the format of both files.

@@ -4,11 +4,11 @@ use std::cmp::Ordering;
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, ShardManifest, ShardNumber, StoredPass, hash_of};
+use crate::bake::{ShardSource, ShardSums, Timings};
 use crate::error::{Error, Result};
 use crate::files::{self, OutputFolder, StagedFolder};
 use crate::light_pass::shard_index::ShardIndex;
 use crate::scene::Scene;
-use crate::session::{ShardSource, ShardSums, Timings};
 
 /// Shards that are named one by one where they are missing.
 const MAX_NAMED: usize = 8;

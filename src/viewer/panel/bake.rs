@@ -7,9 +7,9 @@ use egui::{Align, Button, Color32, Grid, Label, Layout, ProgressBar, RichText, U
 
 use super::control::{ask, counted, grouped};
 use super::{Choices, Command, Model, file};
+use crate::bake::{BYTES_PER_TEXEL, StopReason};
 use crate::illumination::IlluminationMap;
 use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
-use crate::session::{BYTES_PER_TEXEL, StopReason};
 use crate::viewer::time_left::{in_words, time_left_s};
 use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 

@@ -7,10 +7,10 @@ use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 use super::bake::{FAILED, two_digits};
 use super::control::{grouped, reset_to, significant};
 use super::{Command, Model};
+use crate::bake::BakeCounts;
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::illumination::difference::Difference;
 use crate::plan::{self, EffectLine};
-use crate::session::BakeCounts;
 use crate::viewer::worker::{BakeState, EffectDifference};
 
 /// Width of the three switches of an effect [points].

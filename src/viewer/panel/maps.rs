@@ -13,8 +13,8 @@ use super::bake::two_digits;
 use super::control::{about_button, ask, button, bytes, counted};
 use super::effects::COUNTER;
 use super::{Command, CompareCommand, Model, export};
+use crate::bake::BYTES_PER_TEXEL;
 use crate::illumination::{IlluminationMap, Side};
-use crate::session::BYTES_PER_TEXEL;
 use crate::viewer::exporting::Export;
 use crate::viewer::flat_map::{self, ShownPixels};
 

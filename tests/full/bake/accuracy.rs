@@ -1,11 +1,11 @@
 //! Errors without a reference, against errors against one: a bake of the same mesh with many times the rays.
 
 use glam::{DQuat, DVec3};
+use nephroid::bake::forecast::{forecast, stood_at};
+use nephroid::bake::{Bake, StopReason};
 use nephroid::illumination::visible::visible_error;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Mesh, Scene};
-use nephroid::session::forecast::{forecast, stood_at};
-use nephroid::session::{Bake, StopReason};
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, RayPlacement};
 use nephroid::units::{Flux, Irradiance};
 use rand_pcg::Pcg64Mcg;

@@ -3,12 +3,12 @@
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
+use nephroid::bake::{Bake, Baker};
 use nephroid::illumination::IlluminationMap;
 use nephroid::illumination::compare::relative_rmse;
 use nephroid::progress::Control;
 use nephroid::scene::builtin::shapes;
 use nephroid::scene::{Edit, Mesh, Scene};
-use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
 use support::tools::{at, bits, brute, caustic, map_of, set, settings};

@@ -4,13 +4,13 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 use glam::DVec3;
+use nephroid::bake::{Bake, Baker};
 use nephroid::illumination::{Chart, IlluminationMap, Receiver};
 use nephroid::light_pass::indirect::{MIN_PASSES, Network};
 use nephroid::optics::LinearSrgb;
 use nephroid::plan::Effect;
 use nephroid::progress::Control;
 use nephroid::scene::{Light, LightKind, Material, Mesh, Scene, SurfaceKind, Volume};
-use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::transport::Tracer;
 use nephroid::units::Radiance;

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use nephroid::bake::{Bake, Baker, ShardSource, ShardSums, StopReason};
 use nephroid::error::Result;
 use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::LinearSrgb;
@@ -11,7 +12,6 @@ use nephroid::progress::Control;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::edit::{Edit, LightEdit, MaterialEdit};
 use nephroid::scene::{LightKind, LightSize, Motion, Scene};
-use nephroid::session::{Bake, Baker, ShardSource, ShardSums, StopReason};
 use nephroid::settings::{
     BakeSettings, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement,
     Sigma, Wavelengths,

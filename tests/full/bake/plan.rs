@@ -1,12 +1,12 @@
 //! What can send no light to a diffuse surface costs nothing after the plan, and changes not a bit.
 
 use glam::DVec3;
+use nephroid::bake::{Bake, StopReason};
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Light, LightKind, LightSize, Mesh, Scene};
-use nephroid::session::{Bake, StopReason};
 use nephroid::settings::{BakeSettings, Estimator};
 use nephroid::units::{Flux, RadiantIntensity};
 

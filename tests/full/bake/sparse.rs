@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
+use nephroid::bake::{BYTES_PER_TEXEL, Bake};
 use nephroid::export::exr::decode;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::illumination::IlluminationMap;
@@ -11,7 +12,6 @@ use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
-use nephroid::session::{BYTES_PER_TEXEL, Bake};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::{Flux, Irradiance};
 

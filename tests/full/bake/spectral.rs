@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
+use nephroid::bake::Bake;
 use nephroid::geometry::Ray;
 use nephroid::illumination::Side;
 use nephroid::optics::fresnel::dielectric_reflectance;
@@ -12,7 +13,6 @@ use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{LinearSrgb, Metal, Nanometres};
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{LoadOptions, Scene};
-use nephroid::session::Bake;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, Wavelengths};
 use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::{Flux, Irradiance};

@@ -5,6 +5,7 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::{DMat3, DVec2, DVec3};
+use nephroid::bake::Bake;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::geometry::Ray;
 use nephroid::illumination::lookup::bilinear;
@@ -18,7 +19,6 @@ use nephroid::scene::{
     Adjacency, AlphaMask, Edit, LightKind, Material, MaterialEdit, Mesh, Scene, Texture, TextureRef, Wave,
     Waves,
 };
-use nephroid::session::Bake;
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::transport::Tracer;
 use nephroid::units::Flux;

@@ -2,11 +2,11 @@
 //! (`../shared/scenes`, where it is there), baked without a fault.
 
 use glam::{DMat3, DVec3};
+use nephroid::bake::Bake;
 use nephroid::effect::Effect;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{LoadOptions, Scene};
-use nephroid::session::Bake;
 
 use crate::bake::common::{floor, rmse, towards};
 use support::references::references;

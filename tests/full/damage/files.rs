@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use image::ImageFormat;
+use nephroid::bake::{Bake, Baker, ShardSums};
 use nephroid::error::Result;
 use nephroid::export::float_image::{Channel, FloatImage};
 use nephroid::export::map_folder::MapFolder;
@@ -18,7 +19,6 @@ use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::spectrum::csv::read_lamp;
 use nephroid::progress::Control;
 use nephroid::scene::{Camera, CameraPath, LoadOptions, Scene, environment};
-use nephroid::session::{Bake, Baker, ShardSums};
 use nephroid::settings::{BakeSettings, LayerKind};
 use serde_json::json;
 

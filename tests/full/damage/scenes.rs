@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use glam::DVec3;
+use nephroid::bake::{Bake, Baker};
 use nephroid::error::Result;
 use nephroid::progress::Control;
 use nephroid::scene::{LightKind, LoadOptions, Scene};
-use nephroid::session::{Bake, Baker};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::RadiantIntensity;
 use serde_json::json;

@@ -6,9 +6,9 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use glam::DVec3;
+use nephroid::bake::CostPoint;
 use nephroid::progress::Stage;
 use nephroid::scene::CameraPath;
-use nephroid::session::CostPoint;
 use nephroid::settings::BakeSettings;
 use nephroid::viewer::files::config::ConfigFolder;
 use nephroid::viewer::time_left::{in_words, time_left_s};

@@ -1,10 +1,10 @@
 //! Photons against brute force, against the law of energy, and against themselves.
 
+use nephroid::bake::Bake;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::luminance;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::session::Bake;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
 use support::hard_scenes::{cut_glass, roughened, under_square_lamp, under_the_suns_disc};

@@ -1,9 +1,9 @@
 //! The built-in scenes against maps of an independent solver (`assets/reference`), bits that nothing may change, and
 //! effects: simulated where a scene calls for them; left out, they change nothing; switched off, they are missing.
 
+use nephroid::bake::Bake;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::illumination::lookup::bilinear;
-use nephroid::session::Bake;
 
 use crate::prelude::*;
 use support::effect_scenes::{EffectScene, all};

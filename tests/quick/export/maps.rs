@@ -3,6 +3,7 @@
 
 use std::path::{Path, PathBuf};
 
+use nephroid::bake::{Baker, ShardSource as _};
 use nephroid::error::Result;
 use nephroid::export::exr::{MapValue, decode, encode_map, rgb_values};
 use nephroid::export::frame_folder::FrameFolder;
@@ -15,7 +16,6 @@ use nephroid::illumination::tiles::TileLayout;
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Parametrisation, parametrise};
 use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::glass::Glass;
-use nephroid::session::{Baker, ShardSource as _};
 use nephroid::settings::Wavelengths;
 
 use super::{Baked, names, two_lamps};

@@ -6,12 +6,12 @@ mod textures;
 
 use std::path::PathBuf;
 
+use nephroid::bake::Bake;
 use nephroid::error::Error;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::export::map_set::MapSet;
 use nephroid::export::textures::{Content, Encoding, Exposure, TextureFolder, TextureOptions, TextureReport};
 use nephroid::export::{FloatImage, Quantity};
-use nephroid::session::Bake;
 
 use crate::prelude::*;
 use support::program::{names, read_json};

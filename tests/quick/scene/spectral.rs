@@ -1,5 +1,6 @@
 //! Glass, metals and spectra of lamps, as files state them.
 
+use nephroid::bake::Baker;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::error::Result;
 use nephroid::optics::Metal;
@@ -7,7 +8,6 @@ use nephroid::optics::glass::{Dispersion, catalogue};
 use nephroid::optics::spectrum::{Spectrum, illuminant};
 use nephroid::optics::wavelength::{C_LINE, D_LINE, F_LINE};
 use nephroid::plan::EffectLine;
-use nephroid::session::Baker;
 
 use crate::prelude::*;
 use support::glb::load_path;

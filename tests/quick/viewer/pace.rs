@@ -1,9 +1,9 @@
 //! How well pictures are made by how long those before took, how long events wait, the graph of device times, and the plot
 //! of error against time.
 
+use nephroid::bake::CostPoint;
+use nephroid::bake::forecast::forecast;
 use nephroid::eye_pass::renderer::EyeQuality;
-use nephroid::session::CostPoint;
-use nephroid::session::forecast::forecast;
 use nephroid::viewer::pace::Pace;
 use nephroid::viewer::panel::accuracy::course::{Curve, Frame};
 use nephroid::viewer::panel::frame_graph::{columns, scale_ms};

@@ -3,9 +3,9 @@
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
+use nephroid::bake::Bake;
 use nephroid::error::{Error, Result};
 use nephroid::progress::Progress;
-use nephroid::session::Bake;
 use nephroid::viewer::background::Wake;
 use nephroid::viewer::worker::{BakeRequest, LevelBaker, Worker, baking_threads};
 

@@ -9,7 +9,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::Scene;
-use nephroid::session::Bake;
+use nephroid::bake::Bake;
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
 
 use crate::tools::{at, bake, photons, settings};

@@ -8,8 +8,8 @@ use egui::{
 
 use super::super::bake::two_digits;
 use super::target::{self, Target};
-use crate::session::forecast::forecast;
-use crate::session::{CostPoint, Forecast};
+use crate::bake::forecast::forecast;
+use crate::bake::{CostPoint, Forecast};
 use crate::settings::{BakeSettings, Preset};
 use crate::viewer::worker::BakedLevel;
 

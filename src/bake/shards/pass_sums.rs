@@ -3,12 +3,12 @@
 
 use std::io::{self, BufReader, Read};
 
+use crate::bake::band_maps::BandMaps;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::light_pass::caustic::pass::{PassReport, Seconds};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::shard_index::ShardIndex;
-use crate::session::band_maps::BandMaps;
 
 /// No texel counts more: units are chosen so that all flux of a light stays below 2⁶⁰.
 const MOST_OF_A_TEXEL: i64 = 1 << 61;
@@ -26,16 +26,16 @@ const MAX_SECONDS: f64 = 1e12;
 const COMPRESSION: i32 = 1;
 
 #[derive(Debug)]
-pub(in crate::session) struct PassSums {
+pub(in crate::bake) struct PassSums {
     /// One, or those of two half sets.
-    pub(in crate::session) maps: Vec<BandMaps>,
+    pub(in crate::bake) maps: Vec<BandMaps>,
     /// Accounts, counts and times.
-    pub(in crate::session) report: PassReport,
+    pub(in crate::bake) report: PassReport,
 }
 
 impl PassSums {
     /// Nothing yet.
-    pub(in crate::session) fn new(maps: Vec<BandMaps>) -> Self {
+    pub(in crate::bake) fn new(maps: Vec<BandMaps>) -> Self {
         Self {
             maps,
             report: PassReport::default(),

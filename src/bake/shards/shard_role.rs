@@ -9,7 +9,7 @@ use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::shard_index::ShardIndex;
 
 /// Where a pass is computed.
-pub(in crate::session) enum ShardRole {
+pub(in crate::bake) enum ShardRole {
     /// This bake alone.
     Alone,
     /// This bake, its share.
@@ -19,7 +19,7 @@ pub(in crate::session) enum ShardRole {
 }
 
 /// Sums of shards, pass by pass.
-pub(in crate::session) struct Merging {
+pub(in crate::bake) struct Merging {
     shards: Box<dyn ShardSource>,
     /// Number of the next pass.
     next: usize,
@@ -38,17 +38,17 @@ impl ShardRole {
     }
 
     /// Whether a bake is cut.
-    pub(in crate::session) fn is_cut(&self) -> bool {
+    pub(in crate::bake) fn is_cut(&self) -> bool {
         !matches!(self, Self::Alone)
     }
 
     /// Whether maps are only a part of what they will be.
-    pub(in crate::session) fn is_shard(&self) -> bool {
+    pub(in crate::bake) fn is_shard(&self) -> bool {
         matches!(self, Self::Shard { .. })
     }
 
     /// The shard of the next pass; `None` if it is not divided.
-    pub(in crate::session) fn share(&self) -> Option<ShardIndex> {
+    pub(in crate::bake) fn share(&self) -> Option<ShardIndex> {
         match self {
             Self::Shard { share, passes } => Some(share.shifted(passes.len() as u64)),
             Self::Alone | Self::Merge(_) => None,
@@ -56,7 +56,7 @@ impl ShardRole {
     }
 
     /// Writes down what a shard did.
-    pub(in crate::session) fn note(&mut self, sums: &PassSums) -> Result<()> {
+    pub(in crate::bake) fn note(&mut self, sums: &PassSums) -> Result<()> {
         if let Self::Shard { share, passes } = self
             && !sums.report.cancelled
         {
@@ -99,7 +99,7 @@ impl Merging {
     ///
     /// # Errors
     /// A shard that has no such pass, or whose sums are damaged.
-    pub(in crate::session) fn pass(&mut self, chart_for: &ChartFor, mut sums: PassSums) -> Result<PassSums> {
+    pub(in crate::bake) fn pass(&mut self, chart_for: &ChartFor, mut sums: PassSums) -> Result<PassSums> {
         let number = self.next;
         self.next += 1;
         let mut shares = Vec::new();

@@ -10,14 +10,14 @@ mod shard_role;
 
 use std::time::Instant;
 
+use crate::bake::clock::Clock;
+use crate::bake::light_level::LightStates;
+use crate::bake::{Bake, Baker, Timings};
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::shard_index::ShardIndex;
 use crate::plan;
 use crate::progress::{Control, Progress};
-use crate::session::clock::Clock;
-use crate::session::light_level::LightStates;
-use crate::session::{Bake, Baker, Timings};
 use crate::settings::{BakeSettings, MapResolution};
 pub(super) use pass_sums::PassSums;
 pub(super) use shard_role::ShardRole;
