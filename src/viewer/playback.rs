@@ -27,8 +27,6 @@ const SPARE: f64 = 0.5;
 const ENOUGH: f64 = 3.0;
 /// Weight of the newest map in what is told of the rate [1].
 const NEWEST: f64 = 0.2;
-/// A scene plays by itself where its first maps took no longer [s].
-pub const PLAYS_WITHIN_S: f64 = 5.0;
 /// What the slider of a scene whose waves never end spans [s].
 const WAVES_SPAN_S: f64 = 10.0;
 

@@ -7,9 +7,8 @@ use serde_json::json;
 
 use super::Model;
 use crate::effect::{Effect, EffectSwitch};
-use crate::scene::Scene;
 use crate::viewer::command::PlayCommand;
-use crate::viewer::playback::{PLAYS_WITHIN_S, Playback};
+use crate::viewer::playback::Playback;
 use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
 /// Nobody looks at maps on the way to those of a moment.
@@ -80,8 +79,7 @@ impl Model {
         self.state = self.worker.state();
     }
 
-    /// Takes note of maps that came: those of a moment get the layers that were not baked, and begin the play of a scene
-    /// whose maps come quickly.
+    /// Takes note of maps that came: those of a moment get the layers that were not baked.
     pub(super) fn take_moment(&mut self, level: &mut BakedLevel) {
         if self.playback.is_playing {
             self.playback.complete(&mut level.result);
@@ -90,15 +88,7 @@ impl Model {
             }
         } else if level.is_final {
             self.playback.keep(&level.result.maps);
-            let is_light = self.is_first(level) && level.result.timings_s.total < PLAYS_WITHIN_S;
-            if is_light && is_built_in(self.edits.loaded()) && self.can_play() {
-                self.set_time(PlayCommand::Play(true));
-            }
         }
         self.playback.show(&level.request.scene);
     }
-}
-
-fn is_built_in(scene: &Scene) -> bool {
-    scene.source.starts_with("builtin:")
 }
