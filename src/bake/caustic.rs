@@ -302,7 +302,7 @@ impl CausticLayer<'_> {
                 .zip(&mut all_progress)
                 .filter(|(_, light_progress)| !light_progress.done)
             {
-                self.light_progress(
+                self.advance(
                     light,
                     &sizes,
                     states.of_mut(light.light),
@@ -323,7 +323,7 @@ impl CausticLayer<'_> {
                     ..LightProgress::default()
                 };
                 let state = states.of_mut(lights[index].light);
-                self.light_progress(
+                self.advance(
                     lights[index],
                     &sizes,
                     state,
@@ -460,7 +460,7 @@ impl CausticLayer<'_> {
     }
 
     /// One level more of a light.
-    fn light_progress(
+    fn advance(
         &self,
         light: &VisibleLight,
         sizes: &Sizes,

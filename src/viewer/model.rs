@@ -347,7 +347,10 @@ impl Model {
         if std::mem::discriminant(&state) != std::mem::discriminant(&self.state) {
             match &state {
                 BakeState::Cancelled => self.log.write("cancelled", Value::Null),
-                BakeState::Failed(sentence) => self.log.write("failed", json!({"sentence": sentence})),
+                BakeState::Failed(sentence) => {
+                    self.playback.stop();
+                    self.log.write("failed", json!({"sentence": sentence}));
+                }
                 BakeState::Idle
                 | BakeState::Baking { .. }
                 | BakeState::Comparing { .. }

@@ -9,7 +9,7 @@ use super::Model;
 use crate::effect::{Effect, EffectSwitch};
 use crate::viewer::command::PlayCommand;
 use crate::viewer::playback::Playback;
-use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
+use crate::viewer::worker::{BakeRequest, BakedLevel};
 
 /// Nobody looks at maps on the way to those of a moment.
 const NO_LEVELS: Duration = Duration::from_secs(3600);
@@ -61,9 +61,6 @@ impl Model {
 
     /// Asks for the maps of the present moment as soon as those before are there.
     pub(super) fn play_moment(&mut self) {
-        if matches!(self.state, BakeState::Failed(_) | BakeState::Cancelled) {
-            self.playback.stop();
-        }
         if !self.playback.is_playing || self.state.is_baking() {
             return;
         }
