@@ -68,10 +68,13 @@ impl MomentOptions {
                 "leave --time and --frames out, or give it waves or an animation",
             ));
         }
-        let scene = self.times().map_or(scene.clone(), |times| times.scene(&scene));
-        Ok(match self.time {
+        let (scene, time_s) = match self.times() {
+            None => (scene, self.time),
+            Some(times) => (times.scene(&scene), self.time.map(|time_s| times.within(time_s))),
+        };
+        Ok(match time_s {
             None => scene,
-            Some(time_s) => scene.at(self.times().map_or(time_s, |times| times.within(time_s))),
+            Some(time_s) => scene.at(time_s),
         })
     }
 }

@@ -55,7 +55,8 @@ impl FrameTimes {
 pub struct SequenceFolder {
     folder: MapFolder,
     first: Option<Manifest>,
-    sequence: Sequence,
+    times: FrameTimes,
+    frames: Vec<FrameEntry>,
 }
 
 impl SequenceFolder {
@@ -67,11 +68,8 @@ impl SequenceFolder {
         Ok(Self {
             folder: MapFolder::open(path, force)?,
             first: None,
-            sequence: Sequence {
-                fps: times.fps,
-                is_loop: times.is_loop,
-                frames: Vec::new(),
-            },
+            times,
+            frames: Vec::new(),
         })
     }
 
@@ -89,10 +87,9 @@ impl SequenceFolder {
         let maps = self.folder.write_maps(scene, settings, result, Some(frame + 1))?;
         self.first
             .get_or_insert_with(|| Manifest::new(scene, settings, result, maps.clone()));
-        let frames = &mut self.sequence.frames;
-        frames.push(FrameEntry {
+        self.frames.push(FrameEntry {
             frame: frame + 1,
-            time_s: frame as f64 / self.sequence.fps,
+            time_s: self.times.time_s(frame),
             geometry_hash: SceneSummary::of(scene).geometry_hash,
             stop_reason: result.stop_reason,
             error: ErrorEstimate {
@@ -104,7 +101,7 @@ impl SequenceFolder {
             cpu_s: result.cpu_s.total,
             maps,
         });
-        Ok(&frames[frames.len() - 1])
+        Ok(&self.frames[self.frames.len() - 1])
     }
 
     /// Writes the manifest; `None` where there was no frame.
@@ -115,7 +112,11 @@ impl SequenceFolder {
         let Some(mut manifest) = self.first else {
             return Ok(None);
         };
-        manifest.sequence = Some(self.sequence);
+        manifest.sequence = Some(Sequence {
+            fps: self.times.fps,
+            is_loop: self.times.is_loop,
+            frames: self.frames,
+        });
         self.folder.finish(manifest).map(Some)
     }
 }
