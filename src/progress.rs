@@ -1,4 +1,4 @@
-//! What a running bake tells, and how it is stopped.
+//! Progress reports of a running bake, and its cancellation.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -1,4 +1,4 @@
-//! Everything that a user can set about a bake.
+//! The settings of a bake.
 
 pub mod options;
 

@@ -1,4 +1,5 @@
-//! The caustic layer of all lights, level by level: complete coarse maps first, then finer ones, each with its error.
+//! Bakes the caustic layer of all lights level by level: complete coarse maps first, then finer ones, each with its
+//! error.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! Wall and CPU time of a bake, stage by stage.
+//! Wall and CPU time of a bake, by stage.
 
 use super::result::Timings;
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};

@@ -1,4 +1,4 @@
-//! Direct light during a bake: beside the levels of the caustic layer, and timed apart.
+//! Schedules direct light beside the levels of the caustic layer, timed separately.
 
 use super::caustic::CausticOutcome;
 use super::clock::Clock;

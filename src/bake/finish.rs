@@ -1,4 +1,4 @@
-//! Assembles finished maps from the lights' levels, which are of unit strength.
+//! Assembles the finished maps from the levels of the lights, which are stored at unit strength.
 
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -1,4 +1,4 @@
-//! A coarse first picture: direct light, and what surfaces send each other of it, until both are finished.
+//! A coarse preview of direct and indirect light, shown until the final layers are finished.
 //!
 //! Before there are caustics, light goes straight through clear bodies: where it comes to lie is wrong, but not how much
 //! of it there is.

@@ -1,4 +1,4 @@
-//! Predicts the cost of a target from the bake so far, and compares the prediction with what happened.
+//! Predicts the cost of an error target from the levels baked so far, and records how well earlier predictions did.
 //!
 //! Error falls with a power of the work, once the lattice that refinement begins from is through. The exponent is measured
 //! over the levels since then and drawn towards the usual one, since two levels alone say little.

@@ -1,5 +1,5 @@
-//! The error target of each light, by what it can still gain: light adds up on the maps, and so do the squares of its
-//! errors. Lights whose error hardly shows beside the others' stay coarse.
+//! Splits the error target of a bake into one target per light. Light adds up on the maps, and so do squared errors:
+//! lights whose error hardly shows beside the others stay coarse.
 
 use std::collections::BTreeMap;
 

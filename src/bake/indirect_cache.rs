@@ -1,4 +1,4 @@
-//! Cache of the rays between diffuse surfaces: lights may change without a new one.
+//! Cache of the rays between diffuse surfaces. They depend on geometry alone, so edits of lights reuse them.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Indirect light during a bake: after the layers that it is gathered from.
+//! Schedules indirect light after the layers that it is gathered from.
 
 use super::caustic::CausticOutcome;
 use super::clock::Clock;

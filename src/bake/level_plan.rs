@@ -1,4 +1,4 @@
-//! The lattices and map sizes that a bake goes through.
+//! The sequence of lattices and map sizes that a bake runs through.
 
 use std::collections::BTreeMap;
 

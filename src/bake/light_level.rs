@@ -1,4 +1,4 @@
-//! What a session caches of one light: rays, and the maps of the last bake's levels.
+//! What a baker caches for one light: rays, and the maps of the last bake's levels.
 
 use std::collections::BTreeMap;
 

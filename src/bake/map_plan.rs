@@ -1,4 +1,4 @@
-//! Chooses each surface's map from the light that a coarse lattice found on it.
+//! Chooses the size of each surface's map from the light that a coarse lattice deposited on it.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

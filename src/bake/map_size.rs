@@ -1,4 +1,4 @@
-//! How large and how fine each map is: as its light needs, within the memory limit.
+//! Chooses size and tile refinement of each map: as fine as its light needs, within the memory limit.
 //!
 //! A tile's texels are to be no larger than the footprints that fall on it (section 3.1.1 of the paper). Where memory is
 //! short, all texels grow alike beside their footprints: those that are far finer than their light are spared first.

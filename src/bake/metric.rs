@@ -1,4 +1,4 @@
-//! How errors of texels add up to the error that a bake refines towards.
+//! Combines the errors of texels into the error that a bake refines towards.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

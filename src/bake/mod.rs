@@ -1,4 +1,4 @@
-//! A bake as a session: scene and settings in, maps out. The command line's `bake` is a session that runs once.
+//! A bake: scene and settings in, maps out. A [`Baker`] keeps its caches between bakes; the command line bakes once.
 
 mod band_layers;
 mod band_maps;

@@ -1,4 +1,4 @@
-//! One level of one light by photons: at least twice as many as before, earlier ones included.
+//! One level of one light by photons: at least twice as many as the level before, whose photons are reused.
 
 use std::borrow::Cow;
 use std::time::Instant;

@@ -1,4 +1,4 @@
-//! Intermediate maps: each level of the caustics, with the other layers as far as they are known.
+//! Intermediate maps: each level of the caustic layer, with the other layers as far as they are finished.
 
 use std::sync::Arc;
 

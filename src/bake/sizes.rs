@@ -1,4 +1,4 @@
-//! The size of each surface's map, and its chart.
+//! The chart of each surface and the size of its map.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};

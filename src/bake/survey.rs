@@ -1,4 +1,4 @@
-//! Predicts the cost of a bake: the first moments of one, and what its course says.
+//! Predicts the cost of a bake from the first second of one.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;

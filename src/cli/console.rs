@@ -1,4 +1,4 @@
-//! The terminal: results on stdout, everything else on stderr, and signals.
+//! The terminal: results on stdout, messages on stderr, and signals.
 
 use std::io::{ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;

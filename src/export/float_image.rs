@@ -1,4 +1,4 @@
-//! Float images as files hold them, whatever their channels.
+//! Float images as read from files, with any number of channels.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! A folder of maps, read back. Nothing in it is trusted: it may be damaged, edited or of another scene.
+//! Reads a folder of maps. Nothing in it is trusted: it may be damaged, edited, or of another scene.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! Portable float maps. The rows are taken as they are stored: the first is row 0, v = 0 (the format's own
-//! documentation stores pictures upside down; irradiance references are written unflipped).
+//! Portable float maps. Rows are kept in file order: the first is row 0, v = 0. (The format's documentation stores
+//! pictures upside down; irradiance references are written unflipped.)
 
 use super::float_image::{Channel, FloatImage, check_size};
 use crate::error::{Error, Result};

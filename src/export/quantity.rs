@@ -1,4 +1,4 @@
-//! What the numbers of an exported map mean.
+//! The physical quantity that an exported map holds.
 
 use serde::{Deserialize, Serialize};
 

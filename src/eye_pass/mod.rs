@@ -1,4 +1,4 @@
-//! From the diffuse surfaces through specular ones into the eye (DS*E).
+//! The eye pass: from diffuse surfaces through specular ones into the eye (DS*E).
 
 #[cfg(feature = "gpu")]
 pub mod frame_times;

@@ -1,5 +1,4 @@
-//! From radiance to what a display shows: exposure, tone mapping, sRGB encoding. The twin of
-//! `shaders/shared/tone_map.wgsl`.
+//! From radiance to display colours: exposure, tone mapping, sRGB encoding. The twin of `shaders/shared/tone_map.wgsl`.
 
 use super::{Picture, ToneMap};
 use crate::optics::{LinearSrgb, luminance};

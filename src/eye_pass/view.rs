@@ -1,4 +1,4 @@
-//! What is asked of an eye pass and what it gives, the same for GPU and CPU.
+//! Input and output of an eye pass, the same for GPU and CPU.
 
 use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, IntoStaticStr, VariantArray};

@@ -1,4 +1,4 @@
-//! Which wavelengths the eye follows light at through glass that parts them, and what each shows of a colour.
+//! The wavelengths at which chains are traced through dispersive glass, and the colour that each contributes.
 //!
 //! Radiance in linear sRGB stands for a spectrum: daylight (D65) times what the colour is of each wavelength
 //! ([`ColourBasis`]). What the eye sees of that at one wavelength is again a colour, so that a wavelength is a matrix on

@@ -1,4 +1,4 @@
-//! Which light the display shows as white.
+//! White balance: the light that the display shows as white.
 
 use std::fmt;
 use std::str::FromStr;

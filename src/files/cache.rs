@@ -1,5 +1,5 @@
-//! What takes long to make and is made of files alone is kept in the user's cache folder, by what it was made of.
-//! Nothing is kept unless the program asks for it once, at its start.
+//! Cache of results that take long to compute and depend on files alone, in the user's cache folder, keyed by their
+//! inputs. Off unless the program enables it at its start.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;

@@ -1,4 +1,4 @@
-//! Places to write to, tried before the long work.
+//! Output folders, tested for writing before any long work.
 
 use std::path::{Path, PathBuf};
 use std::{fs, io};

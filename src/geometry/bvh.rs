@@ -1,4 +1,4 @@
-//! What rays may meet among many triangles: obvhs builds the hierarchy in single precision.
+//! The triangle hierarchy for rays, built by obvhs in single precision.
 
 use glam::{DVec3, Vec3A};
 use obvhs::{

@@ -1,5 +1,4 @@
-//! The faces of a cube around a point, mapped from the unit square: either so that equal areas become equal solid
-//! angles, or plainly.
+//! The faces of a cube around a point, mapped from the unit square with equal solid angles or by plain projection.
 //!
 //! A face is the rectangle |x| ≤ 1, |y| ≤ 1 of the plane z = 1 as seen from the origin.
 

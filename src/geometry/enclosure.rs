@@ -1,4 +1,4 @@
-//! Closed surfaces, and what lies inside them.
+//! Closed surfaces, and which points they contain.
 
 use std::collections::HashMap;
 

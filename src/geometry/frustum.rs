@@ -1,4 +1,4 @@
-//! What a perspective camera can see.
+//! The view frustum of a perspective camera.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! Rays, triangles and what finds them; knows nothing of materials or light.
+//! Rays, triangles and hierarchies. Knows nothing of materials or light.
 
 pub mod bvh;
 pub mod cube_face;

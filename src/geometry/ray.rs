@@ -1,4 +1,4 @@
-//! Rays, and robust starting points that do not meet the surface they leave.
+//! Rays, and robust origins that do not hit the surface they leave.
 
 use glam::DVec3;
 

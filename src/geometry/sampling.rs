@@ -1,4 +1,4 @@
-//! Points that fill the unit square evenly, for places on lamps and micro-normals.
+//! Low-discrepancy points in the unit square, for positions on lamps and micro-normals.
 //!
 //! Sobol's (0, 2)-sequence with nested uniform scrambling by hashes, its order shuffled the same way, so that any number
 //! of pairs may be drawn at one index (Burley, "Practical Hash-based Owen Scrambling", JCGT 9(4), 2020). The first 2ᵏ

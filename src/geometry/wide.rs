@@ -1,4 +1,4 @@
-//! Four boxes and four triangles at a time, in single precision: which triangles a ray may meet.
+//! Intersects a ray with four boxes or four triangles at a time in single precision, conservatively.
 //!
 //! The hierarchy of two children a node is folded into one of four (Wald, Benthin and Boulos, "Getting Rid of Packets",
 //! 2008), so that one operation serves four boxes; so do the triangles of its leaves.

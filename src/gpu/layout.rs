@@ -1,4 +1,4 @@
-//! Structs that Rust and WGSL share: one declaration gives the bytes and the offsets that tests hold against the
+//! Structs that Rust and WGSL share: one declaration gives the bytes and the offsets, which tests compare with the
 //! shader's.
 
 /// Where one field of a shared struct lies.

@@ -1,4 +1,4 @@
-//! The graphics device: adapter, shaders, struct layouts, read-back. Knows no scene and no pass.
+//! The graphics device: adapter, shaders, struct layouts, readback. Knows no scene and no pass.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

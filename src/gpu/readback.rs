@@ -1,4 +1,4 @@
-//! From the device back to the processor.
+//! Copies buffers and textures from the device to the CPU.
 
 use super::Gpu;
 use crate::error::Result;

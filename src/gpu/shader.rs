@@ -1,4 +1,4 @@
-//! Shaders: WGSL files that are put together by name.
+//! Assembles WGSL modules from files by name.
 
 /// One WGSL file, built into the program.
 #[derive(Clone, Copy, Debug)]

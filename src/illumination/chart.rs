@@ -1,5 +1,5 @@
-//! Where a surface lies in its map: the contract between the light pass (deposits), the eye pass (looks up) and the
-//! exporters.
+//! Maps a surface into its illumination map: the contract between the light pass (deposits), the eye pass (looks up)
+//! and the exporters.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Differences of two maps: error measures over texels of equal area, for any quantity.
+//! Error measures between two maps, over texels of equal area, for any quantity.
 
 /// Share of the reference's mean from which on a texel counts in the average relative difference.
 const SIGNIFICANT_SHARE_OF_MEAN: f64 = 0.01;

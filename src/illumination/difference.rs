@@ -1,4 +1,4 @@
-//! Two bakes of one scene, texel by texel: where one brings more light than the other, and how much.
+//! Compares two bakes of one scene texel by texel: where one brings more light than the other, and how much.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! Quantities in false colours: viridis, which grows evenly in brightness to every eye, that of the colour-blind
-//! included (Smith and van der Walt, "A Better Default Colormap for Matplotlib", SciPy 2015).
+//! False colours by viridis, which is perceptually uniform, also for the colour-blind (Smith and van der Walt, "A
+//! Better Default Colormap for Matplotlib", SciPy 2015).
 
 /// Coefficients of t⁰ … t⁶ for red, green and blue: a fit to the table of viridis by Matt Zucker, see
 /// `assets/SOURCES.md`.

@@ -1,5 +1,5 @@
-//! The islands of a chart: pieces of a surface that touch in the map only by chance. A kernel of flux must not run
-//! over from one to the next.
+//! The islands of a chart. Islands that touch in the map need not touch on the surface, so a kernel of flux must not
+//! cross from one to the next.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Reads a map between its texels.
+//! Bilinear look-up in a map.
 
 use glam::DVec2;
 

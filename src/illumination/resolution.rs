@@ -1,4 +1,5 @@
-//! The error of texels that are larger than requested: the variation within them, extrapolated from that between them.
+//! Estimates the error of texels that are larger than requested: the variation within a texel, extrapolated from that
+//! between texels.
 
 use super::Chart;
 

@@ -1,5 +1,5 @@
-//! Where a chart ends but the surface goes on, in another chart or elsewhere in the same: texels beyond the border stand
-//! for what lies there, so that a look-up at the border reads the same light on both sides.
+//! Seams of charts: texels beyond the border of a chart take the light of the place where the surface continues, so
+//! that look-ups agree on both sides of the seam.
 
 use glam::{DMat2, DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! Smoothing of a map's flux: a gaussian that moves counts between texels and loses none.
+//! Gaussian smoothing of a map's flux that moves integer counts between texels and loses none.
 //!
 //! A wide gaussian works on a coarser map: 2ⁿ × 2ⁿ texels are summed, the sums are smoothed and spread again by linear
 //! interpolation. Sums and interpolation together add a variance of a quarter of a coarse texel's squared side.

@@ -1,4 +1,4 @@
-//! A map in square tiles, each as fine as its light: memory goes where the caustic is.
+//! A map in square tiles, each as fine as its light needs, so that memory goes where the caustic is.
 //!
 //! The map has a finest size, in which places are given and files are written. Every tile of [`SIDE`]² of its texels
 //! has a level: its own texels are 2^level times as long. Texels are kept tile after tile, row by row within each.

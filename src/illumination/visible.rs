@@ -1,5 +1,5 @@
-//! The error as an eye sees it: relative to how bright a place is, and in the dark to what exposure lifts out of it. A focus
-//! cannot rule a room by it, nor can what nobody sees.
+//! The visible error: relative to local brightness, and in the dark to what the exposure reveals. A bright focus does
+//! not dominate a room by it, and invisible errors do not count.
 //!
 //! Over blocks of 8×8 texels of all maps it is √(Σ w (ΔE/n)² / Σ w): E is the luminance of all layers, C that of caustic and
 //! indirect light together, whose error is ΔE; n is E in the light, √(E·white) in the dark and white/16 in the night; w is the

@@ -1,4 +1,5 @@
-//! Which directions of a light see a specular surface (section 3.1.2 of the paper; Weghorst et al. 1984).
+//! The item buffer of a light: the directions in which it sees a specular surface (section 3.1.2 of the paper; Weghorst
+//! et al. 1984).
 //!
 //! Cells are marked by projecting the scene's hierarchy onto the faces of the launch domain, and the triangles of
 //! specular objects below it where a box does not decide; triangles are tested against the cells exactly: one that is

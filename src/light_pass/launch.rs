@@ -1,4 +1,4 @@
-//! Where the rays of a light start: a domain of one or six unit squares, mapped so that flux per area is known.
+//! The launch domain of a light: one or six unit squares, mapped so that the flux per unit area is known.
 
 use glam::{DMat3, DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! Every watt accounted for.
+//! The energy ledger: emitted = deposited + absorbed + escaped + truncated, for each light.
 
 use std::iter::Sum;
 use std::ops::AddAssign;

@@ -1,4 +1,4 @@
-//! The ledger while it is being summed: exact counts per channel and account.
+//! Accumulates the ledger: exact integer counts per channel and account.
 
 use super::ledger::{CarriedFlux, EnergyLedger, LightLedger, Truncated};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};

@@ -1,4 +1,4 @@
-//! From the lights through specular surfaces onto diffuse ones.
+//! The light pass: from the lights through specular surfaces onto diffuse ones.
 
 pub mod accuracy;
 pub mod caustic;

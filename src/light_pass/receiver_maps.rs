@@ -1,4 +1,4 @@
-//! Maps while flux is added to them: allocated when a surface first receives some.
+//! Accumulating maps, allocated when a surface first receives flux.
 
 use rayon::prelude::*;
 use std::borrow::Cow;

@@ -1,5 +1,5 @@
-//! A part of a light pass: of the numbered pieces that it is made of, every so many-th one. Which pieces those are
-//! depends on their numbers alone, so that shares that are worked on apart add up to the whole.
+//! Selects a shard of a light pass: every n-th of its numbered tasks. Tasks depend on their numbers alone, so the
+//! shards add up to the whole.
 
 /// One share of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -1,5 +1,5 @@
-//! Where light lands, sketched: a thin lattice of light rays is followed over specular surfaces to matte ones, and four
-//! neighbours that went the same way span a patch of the wavefront. Shows how light runs, and measures nothing.
+//! A sketch of where light lands: a sparse lattice of rays is traced to matte surfaces, and four neighbours on the same
+//! path span a patch of the wavefront. For display only; it measures nothing.
 
 use std::collections::{BTreeMap, BTreeSet};
 

@@ -1,4 +1,4 @@
-//! Light of one traced wavelength, and what it stands for.
+//! One traced wavelength and its weight.
 
 use std::ops::RangeInclusive;
 

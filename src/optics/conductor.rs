@@ -1,4 +1,4 @@
-//! What a metal sends back: Fresnel's equations with a complex index.
+//! Reflectance of metals: Fresnel's equations with a complex index.
 
 /// Reflectances [s-polarised, p-polarised] of a smooth interface with a medium of complex index (n + ik) relative to
 /// the one that the light comes in.

@@ -1,4 +1,4 @@
-//! How much of the light an interface sends back.
+//! Reflectance of dielectric interfaces: Fresnel's equations.
 
 use super::LinearSrgb;
 use super::refraction::cos_transmitted;

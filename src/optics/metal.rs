@@ -1,4 +1,4 @@
-//! Metals by name: their complex refractive index and what colour they are.
+//! The catalogue of metals: complex refractive index and colour.
 
 use std::sync::LazyLock;
 

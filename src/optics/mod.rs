@@ -1,4 +1,4 @@
-//! What light does at an interface, and what colour it has.
+//! Light at an interface, and its colour.
 
 pub mod colour;
 pub mod conductor;

@@ -1,4 +1,4 @@
-//! Directions after an interface.
+//! Directions of reflected and refracted rays.
 
 use glam::DVec3;
 

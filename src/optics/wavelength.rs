@@ -1,4 +1,4 @@
-//! Wavelengths as a type, the visible range, and the spectral lines that glasses are named by.
+//! The wavelength type, the visible range, and the spectral lines by which glasses are specified.
 
 use std::ops::RangeInclusive;
 

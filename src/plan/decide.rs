@@ -1,4 +1,4 @@
-//! The decision, once per scene and settings.
+//! Decides the plan, once per scene and settings.
 
 use super::{Effect, EffectLine, EffectPlan, EffectSwitch, LightLine};
 use crate::scene::{Material, Scene, SurfaceKind};

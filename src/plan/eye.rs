@@ -1,4 +1,4 @@
-//! Whether the eye needs its specular chains, and wavelengths for them.
+//! Whether the eye pass needs specular chains, and dispersion in them.
 
 use super::{Effect, EffectLine, EffectSwitch};
 use crate::scene::{Camera, Material, Scene};

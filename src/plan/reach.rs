@@ -1,5 +1,5 @@
-//! Which specular surfaces a light can meet, and from which of them its light can go on to a diffuse one: by bounds
-//! alone, and never too few.
+//! Which specular surfaces a light can reach, and from which of them its light can go on to a diffuse surface. Works on
+//! bounding boxes and is conservative.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! Parts of the scene that opaque closed surfaces seal from each other.
+//! Regions of the scene that opaque closed surfaces separate.
 
 use glam::DVec3;
 

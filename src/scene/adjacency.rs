@@ -1,4 +1,4 @@
-//! Which triangles of a mesh go on into each other.
+//! Adjacency of the triangles of a mesh.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! A scene at a moment: waves that run, water that they lift, and keyframes of nodes.
+//! The scene at a moment: running waves, water surfaces that they lift, and keyframed nodes.
 
 use std::sync::Arc;
 

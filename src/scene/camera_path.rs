@@ -1,4 +1,4 @@
-//! A way for a camera through a scene, from a file: straight lines between keys, which are equally long in time.
+//! A camera path from a file: straight lines between keys at equal intervals of time.
 //!
 //! The file is JSON: `{"frames": N, "vertical_fov_deg": F, "keys": [{"position_m": [x, y, z], "target_m": [x, y, z],
 //! "roll_deg": R}, ...]}`, positions in the coordinates of the scene's file; `roll_deg` may be left out. Nothing else may

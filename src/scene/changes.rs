@@ -1,4 +1,4 @@
-//! What edits made of a scene, found by comparing it with what was loaded: to be kept, and done again.
+//! The difference between an edited scene and its file, as edits that can be saved and applied again.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Bodies of glass that touch in a face of both: light cannot leave one and enter the other at the same place.
+//! Bodies of glass that share a face: light cannot leave one and enter the other at the same place.
 
 use std::collections::BTreeMap;
 

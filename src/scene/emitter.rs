@@ -1,4 +1,4 @@
-//! Where one wavefront comes from: a single point, or a single direction, of a light that may be larger.
+//! The origin of one wavefront: a single point or direction of a light that may be larger.
 
 use glam::{DVec2, DVec3};
 

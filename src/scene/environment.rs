@@ -1,4 +1,4 @@
-//! Light from all around: an equirectangular image of radiance.
+//! Environment light: an equirectangular image of radiance.
 
 mod clear_sky;
 mod file;

@@ -1,4 +1,4 @@
-//! What an object that glows by an image sends from each of its triangles.
+//! The emission of each triangle of an object with an emission texture.
 
 use glam::DVec2;
 use rayon::prelude::*;

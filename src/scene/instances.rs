@@ -1,4 +1,4 @@
-//! Which objects are instances: objects of one mesh whose copies would take too much memory.
+//! Selects the objects that stay instances of one mesh because copies would take too much memory.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! A scene from what the user named: a file or a built-in.
+//! Loads a scene from a file or a built-in name.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Surfaces that are not the same everywhere: what a place of one is made of.
+//! Materials that vary over a surface: the mixture of surface kinds at a point.
 
 use super::material::{METAL_ROUGHNESS_LIMIT, Material, SPECULAR_ROUGHNESS_LIMIT, SurfaceKind};
 use super::texture::TextureRef;

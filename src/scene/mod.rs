@@ -1,5 +1,5 @@
-//! What is lit: surfaces, materials, lights, cameras. All coordinates are scene coordinates in metres, y up:
-//! world coordinates less [`Scene::origin_world`], which is zero unless the scene lies far from the world's origin.
+//! The scene: surfaces, materials, lights, cameras. All coordinates are scene coordinates in metres, y up: world
+//! coordinates less [`Scene::origin_world`], which is zero unless the scene lies far from the world's origin.
 
 use std::collections::BTreeMap;
 use std::fmt::{self, Write as _};

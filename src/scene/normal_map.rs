@@ -1,4 +1,4 @@
-//! Normal textures as slopes: what an image of normals says of the height that it stands for.
+//! Normal textures as slopes of the height field that they represent.
 
 use glam::DVec2;
 

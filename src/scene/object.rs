@@ -1,4 +1,4 @@
-//! What stands in a scene: a mesh and where it is.
+//! Objects: a mesh with a transform and a material.
 
 use std::fmt;
 use std::sync::{Arc, OnceLock};

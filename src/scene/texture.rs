@@ -1,4 +1,4 @@
-//! Images on surfaces.
+//! Textures: images with coordinates, wrapping and filtering.
 
 use glam::{DMat3, DVec2};
 

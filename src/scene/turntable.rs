@@ -1,4 +1,4 @@
-//! A camera that goes once around what it looks at, as if that stood on a turntable.
+//! A camera path once around the object it looks at.
 
 use std::f64::consts::TAU;
 

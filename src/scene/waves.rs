@@ -1,5 +1,6 @@
-//! Overlapping waves on a surface: a height h(P, t) = Σ A·cos(K·P + φ − 2πt/T) that bends the normal as a surface of that
-//! height would. The surface itself stays where it is, unless the scene [lifts](super::Scene::swells) its vertices too.
+//! Superposed waves on a surface: a height h(P, t) = Σ A·cos(K·P + φ − 2πt/T) that bends the normal as a surface of
+//! that height would. The surface itself stays where it is, unless the scene [displaces](super::Scene::swells) its
+//! vertices too.
 //!
 //! Waves are a solid texture in the scene's coordinates: K is a vector in space, and each surface takes the part of
 //! ∇h along itself. They are smooth over any mesh, need no texture coordinates, and go on across its triangles. An

@@ -1,5 +1,5 @@
-//! The options of a bake, a row each: what the command line and the panel say of them, their limits, and how their
-//! values are written.
+//! The table of bake options, one row each: name, unit, limits, description and formatting, for the command line and
+//! the panel.
 
 use std::str::FromStr;
 

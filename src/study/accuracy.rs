@@ -1,4 +1,4 @@
-//! What accuracy costs on the built-in scenes, what was expected, and how cost grows.
+//! The study of accuracy against cost on the built-in scenes: measured, forecast, and how cost grows.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! How far maps are from their references, over all surfaces at once, each texel weighted by its area.
+//! The difference between maps and their references over all surfaces at once, each texel weighted by its area.
 
 use crate::illumination::IlluminationMap;
 use crate::illumination::compare::TexelPair;

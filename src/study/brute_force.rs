@@ -1,5 +1,5 @@
-//! Light tracing into texels, as a reference for the estimators: random rays, each arrival's whole flux into the texel
-//! that it hits. Nothing but transport and aiming is shared with what it judges.
+//! Brute-force light tracing, the reference for the estimators: random rays, each hit's whole flux into the texel it
+//! falls in. It shares only transport and aiming with the code it judges.
 //!
 //! Rays are stratified, one at a random place in each cell of a lattice. Two such lattices, each with half of the
 //! rays, tell the noise: each carries half of the flux, so that their sum is the map, and their difference A − B has

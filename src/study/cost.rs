@@ -1,4 +1,4 @@
-//! What an error costs, read off a curve of measurements.
+//! Interpolates a measured curve to find the cost of an error.
 
 use super::table::three_digits;
 

@@ -1,5 +1,5 @@
-//! Accuracy against cost: references by brute force, agreement of maps, and studies, which are sweeps: bakes of several
-//! variants, a row for each.
+//! Accuracy against cost: brute-force references, comparison of maps, and studies, which bake several variants and
+//! tabulate them.
 
 mod accuracy;
 pub mod agreement;

@@ -1,4 +1,4 @@
-//! What maps are measured against: a file, the analytic maps of the built-in scenes, or a finer bake.
+//! References for maps: a file, the analytic maps of the built-in scenes, or a finer bake.
 
 use super::agreement::{caustic_luminance, pair_maps};
 use crate::error::{Error, Result};

@@ -1,4 +1,4 @@
-//! A study as data, and the one runner: bakes, what they are measured against, a table, plots and pictures.
+//! A study as data, and its runner: bakes, references, a table, plots and pictures.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Tables: CSV for programs, Markdown for people.
+//! Tables as CSV and Markdown.
 
 use serde::Serialize;
 

@@ -1,5 +1,5 @@
-//! Normals bent by a height over the surface (Blinn, "Simulation of Wrinkled Surfaces", SIGGRAPH 1978): the normal of
-//! the surface n and the gradient ∇h of the height give n' ∝ n − (∇h − n·(n·∇h)). The surface stays where it is.
+//! Bump mapping (Blinn, "Simulation of Wrinkled Surfaces", SIGGRAPH 1978): the normal n and the gradient ∇h of a height
+//! give n' ∝ n − (∇h − n·(n·∇h)). The surface itself stays where it is.
 
 use glam::DVec3;
 

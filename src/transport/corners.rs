@@ -1,5 +1,5 @@
-//! Sharp edges of a mesh, its border and the creases between its sides, and sharp corners, where these turn: a silhouette
-//! lies along the ones and bends at once at the others.
+//! Sharp edges of a mesh (borders and creases), and its sharp corners, where they turn. A silhouette follows the edges
+//! and kinks at the corners.
 
 use std::collections::{BTreeMap, HashMap};
 

@@ -1,4 +1,4 @@
-//! How normals turn along surfaces: the shape operator, per vertex, interpolated like the normals.
+//! The shape operator of surfaces, per vertex, interpolated like the normals.
 //!
 //! Within one triangle the interpolated normal has a derivative that is wrong by O(edge length) against the surface
 //! that the mesh stands for; averaged over the triangles around a vertex it is right to second order on regular

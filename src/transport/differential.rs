@@ -1,5 +1,5 @@
-//! Ray differentials: how a ray changes as its start in the light's domain does (Igehy, "Tracing Ray Differentials",
-//! SIGGRAPH 1999), through every reflection and refraction.
+//! Ray differentials: the derivatives of a ray with respect to its start in the launch domain (Igehy, "Tracing Ray
+//! Differentials", SIGGRAPH 1999), through every reflection and refraction.
 
 use glam::DVec3;
 

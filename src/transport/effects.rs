@@ -1,4 +1,4 @@
-//! Which effects the paths of a light pass may need.
+//! The effects that the paths of a light pass need.
 
 use crate::plan::{Effect, EffectPlan};
 

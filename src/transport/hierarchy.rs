@@ -1,6 +1,6 @@
-//! What finds the triangles of a scene: one hierarchy over those of most objects, and for each mesh with many instances one
-//! in its own coordinates, below a hierarchy over these objects. An object that is moved becomes an instance: no hierarchy
-//! of triangles is built again for it.
+//! The hierarchy of a scene: one over the triangles of most objects, and for each mesh with many instances one in
+//! object space, below a hierarchy over these instances. An object that is moved becomes an instance, so no triangle
+//! hierarchy is rebuilt.
 //!
 //! An instance's triangles are found by the mesh's hierarchy and met as placed in the scene, so that every hit is the one
 //! that a copy of the mesh would give, to the last bit.

@@ -1,5 +1,5 @@
-//! What becomes of light that meets a surface. The shares of reflection, transmission, deposit and absorption add up
-//! to one in every channel.
+//! Scattering of light at a surface. The shares of reflection, transmission, deposit and absorption add up to one in
+//! every channel.
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! Which bodies a path is inside of.
+//! The stack of media that a path is inside of.
 
 use crate::optics::LinearSrgb;
 use crate::scene::{Scene, Volume};

@@ -1,4 +1,4 @@
-//! Rough surfaces: light turns about a micro-normal, not about the normal (Walter et al., "Microfacet Models for
+//! Rough surfaces: light reflects and refracts about a sampled micro-normal (Walter et al., "Microfacet Models for
 //! Refraction through Rough Surfaces", EGSR 2007).
 //!
 //! Micro-normals are those of the GGX distribution that are visible to the incoming light, drawn by a point of the unit

@@ -1,4 +1,4 @@
-//! One step of light at a surface: shared by the light pass, the direct layer and the CPU eye pass.
+//! Light transport at a surface, shared by the light pass, the direct layer and the CPU eye pass.
 
 pub mod bend;
 pub mod corners;

@@ -1,6 +1,5 @@
-//! Normal textures on meshes: the gradient of the height that their slopes stand for, by the texture coordinates of each
-//! triangle. On planes the frame is MikkTSpace's, as glTF wants it; elsewhere it is that to first order in the
-//! triangle's size.
+//! Normal textures on meshes: the gradient of their height field, in the texture coordinates of each triangle. On
+//! planes the frame is MikkTSpace's, as glTF requires; elsewhere it agrees to first order in the triangle's size.
 
 use glam::{DVec2, DVec3};
 

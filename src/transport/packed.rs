@@ -1,5 +1,5 @@
-//! The hierarchies of a scene as devices traverse them: in single precision, each mesh by itself, below one over all that
-//! stands in the scene. What devices see in them does not tell how objects came to where they are.
+//! Packs the hierarchies of a scene for devices: in single precision, one per mesh, below one over all instances. The
+//! result depends on where objects stand, not on how they came there.
 
 use std::sync::Arc;
 

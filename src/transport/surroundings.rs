@@ -1,4 +1,4 @@
-//! Which bodies a point is inside of.
+//! The media that a point lies in.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! Finds the next surface of a scene.
+//! Finds the next hit in a scene.
 
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};

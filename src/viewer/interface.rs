@@ -1,4 +1,4 @@
-//! egui on a window: events in, triangles out.
+//! Connects egui to the window: events in, triangles out.
 
 use std::time::Duration;
 

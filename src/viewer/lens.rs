@@ -1,4 +1,4 @@
-//! Maps points of the scene to points of the picture, and back to view rays.
+//! Projects points of the scene to the picture, and pixels back to view rays.
 
 use egui::{Pos2, Rect, vec2};
 use glam::DVec3;

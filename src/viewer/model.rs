@@ -1,4 +1,4 @@
-//! The state of the window and everything that it does, apart from the window itself.
+//! The state of the window and its logic, independent of the window itself.
 
 mod filming;
 mod opening;

@@ -1,4 +1,4 @@
-//! Time in a scene that moves: which moment is asked for, which one is shown, and how exact maps are that follow it.
+//! Playback of a moving scene: the requested moment, the moment shown, and the accuracy of the maps that follow.
 
 use std::collections::HashMap;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! What the picture shows in place of light, and on which scale.
+//! What the picture shows instead of light, and on which scale.
 
 use serde::{Deserialize, Serialize};
 use strum::{EnumMessage, IntoStaticStr, VariantArray};

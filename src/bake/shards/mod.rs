@@ -1,5 +1,5 @@
-//! A bake cut into shards: each traces and deposits its share of every pass and gives raw sums; whoever has the sums of
-//! all shards goes through the same passes without a ray and comes to the maps of the whole bake, bit for bit.
+//! Bakes in shards. Each shard traces and deposits its share of every pass and writes raw sums. The merge runs the same
+//! passes on the sums of all shards without tracing a ray, and ends with the maps of the whole bake, bit for bit.
 //!
 //! What goes on from the sums (smoothing, gutters, errors, maps) and what is no light pass (direct and indirect light) is
 //! done there, once. All decisions on the way have to be the same in every shard: what depends on what the light did is

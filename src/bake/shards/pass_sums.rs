@@ -1,5 +1,5 @@
-//! What a pass over the lattice of a light gives before anything is made of it: whole numbers, which add up exactly over
-//! the shards of the pass whatever their order.
+//! Raw sums of one pass over the lattice of a light. They are integers, so the shards of a pass add up exactly in any
+//! order.
 
 use std::io::{self, BufReader, Read};
 

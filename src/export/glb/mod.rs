@@ -1,6 +1,6 @@
-//! A scene with its illumination maps as one `.glb`: light-map coordinates as TEXCOORD_1 (generated ones included) and
-//! the maps as images, for programs that know light maps (MOZ_lightmap), for those that know none (emissive), and for
-//! those that shall not light at all (unlit).
+//! Writes a scene with its illumination maps as one `.glb`: light-map coordinates as TEXCOORD_1 (generated ones
+//! included) and the maps as images, for programs that support light maps (MOZ_lightmap), for those that do not
+//! (emissive), and for viewing without any lighting (unlit).
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

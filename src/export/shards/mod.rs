@@ -1,5 +1,5 @@
-//! Shards of a bake as folders: `shard.json`, which says what it is a shard of, and `sums.bin`, which holds its raw sums:
-//! those of one pass after the other, each a Zstandard frame with a checksum. Their lengths and hashes stand in `shard.json`.
+//! Shards of a bake as folders: `shard.json` identifies the bake, and `sums.bin` holds the raw sums, one checksummed
+//! Zstandard frame per pass. `shard.json` has their lengths and hashes.
 
 mod manifest;
 mod set;

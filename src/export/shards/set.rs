@@ -1,4 +1,4 @@
-//! All shards of a bake, read back. Nothing in them is trusted: they may be torn, of different bakes, or not all.
+//! Reads all shards of a bake. Nothing in them is trusted: they may be torn, of different bakes, or incomplete.
 
 use std::cmp::Ordering;
 use std::path::{Path, PathBuf};

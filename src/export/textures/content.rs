@@ -1,4 +1,4 @@
-//! Which light of a map its textures hold.
+//! Which light of a map a texture holds.
 
 use crate::error::{Error, Result, Warning};
 use crate::export::map_set::{MapSet, StoredLight, StoredMap};

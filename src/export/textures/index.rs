@@ -1,4 +1,4 @@
-//! `index.json`: what each texture of an export is.
+//! `index.json`: describes each texture of an export.
 
 use serde::{Deserialize, Serialize};
 

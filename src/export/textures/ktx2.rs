@@ -1,4 +1,4 @@
-//! KTX 2.0 with zstd: what graphics cards sample as it is.
+//! KTX 2.0 with Zstandard: textures in formats that graphics cards sample directly.
 //!
 //! Khronos, "KTX File Format Specification" 2.0.
 

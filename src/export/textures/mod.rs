@@ -1,4 +1,4 @@
-//! Maps as textures of other programs: one file each or many maps in one, and an index that says what each file is.
+//! Maps as textures for other programs: one file per map or an atlas, and an index that describes each file.
 
 use std::collections::BTreeMap;
 use std::path::Path;

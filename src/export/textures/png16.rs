@@ -1,4 +1,4 @@
-//! PNG of 16 bits a channel.
+//! PNG with 16 bits per channel.
 
 use png::{BitDepth, ColorType, ScaledFloat, SrgbRenderingIntent};
 

@@ -1,5 +1,5 @@
-//! The eye pass on the CPU: a ray tracer that follows every chain of mirrors and glass, the measure for the GPU's.
-//! Chains are one path in RGB until they meet glass that parts wavelengths, and from there one for each of several.
+//! The eye pass on the CPU: a ray tracer that follows every chain of mirrors and glass, and the reference for the GPU.
+//! A chain is one path in RGB until it meets dispersive glass, and several paths of single wavelengths from there.
 
 mod radiance;
 

@@ -1,5 +1,4 @@
-//! The mean of several pictures of the same view: edges of what is seen in mirrors and through glass become as smooth
-//! as all others.
+//! Averages pictures of the same view, which antialiases what is seen in mirrors and through glass.
 
 use super::bindings::{bind_group, bind_group_layout, cover_pipeline, texture, uniform};
 use super::shaders::ACCUMULATED;

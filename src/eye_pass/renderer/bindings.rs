@@ -1,4 +1,4 @@
-//! Bind groups, numbered in order.
+//! Bind groups and their layouts.
 
 use bytemuck::Pod;
 

@@ -1,5 +1,5 @@
-//! What chains are traced through: the scene's triangles in hierarchies of their meshes, and where these stand; made when
-//! something specular first comes into view.
+//! Buffers that chains are traced through: the triangle hierarchy of each mesh, and the instances above them. Created
+//! when a specular surface first comes into view.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What a picture draws: the objects in view, each by the pipelines that it calls for.
+//! The draw list of a picture: visible objects, each with the pipelines that it needs.
 
 use super::MapStyle;
 use super::objects::{Appearance, Objects};

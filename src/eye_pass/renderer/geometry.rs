@@ -1,5 +1,5 @@
-//! The scene's triangles on the device: few large vertex buffers, each below the device's limit. They have the coordinates
-//! of their meshes; each object's record says where it stands.
+//! The scene's triangles on the device, in a few large vertex buffers, each below the device's limit. Vertices are in
+//! object space; each object's record holds its transform.
 
 use std::collections::HashMap;
 use std::mem::offset_of;

@@ -1,4 +1,4 @@
-//! All images of a scene on the device: illumination maps and textures, and the table that says where their tiles are.
+//! All images of a scene on the device: illumination maps, textures, and the table of their tiles.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Illumination maps on the device, as half floats with a scale of their own.
+//! Illumination maps on the device: half floats, with one scale per map.
 
 use std::borrow::Cow;
 use std::sync::Arc;

@@ -1,5 +1,5 @@
-//! Coarser levels of a map: means of irradiance by area, as far as no texel mixes light of two places that only the map
-//! puts side by side.
+//! Coarser levels of a map: area-weighted means of irradiance that never mix texels of places that are adjacent only in
+//! the map.
 
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 

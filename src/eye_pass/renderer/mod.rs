@@ -1,5 +1,5 @@
-//! The eye pass on the device: triangles with radiance from the illumination maps, chains traced where something
-//! specular is nearest, then tone mapping.
+//! The eye pass on the device: rasterised triangles with radiance from the illumination maps, chains traced where a
+//! specular surface is nearest, then tone mapping.
 //!
 //! Diffuse surfaces show L = ρE/π. Where a mirror, polish, glass or water is the nearest surface of a pixel, its chain
 //! is followed through the scene's hierarchy as the CPU eye pass follows it, in single precision. Two things are

@@ -1,4 +1,4 @@
-//! Appearance of objects on the device, in one buffer for all.
+//! Material records of all objects, in one buffer.
 
 use glam::DVec3;
 

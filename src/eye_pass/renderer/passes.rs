@@ -1,4 +1,4 @@
-//! The passes of one picture: what is traced, then all surfaces.
+//! The passes of one picture: chains first, then all surfaces.
 
 use std::ops::Range;
 

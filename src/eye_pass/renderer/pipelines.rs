@@ -1,4 +1,4 @@
-//! Render pipelines of surfaces: one for each kind of drawing that was called for, made when it first is.
+//! Render pipelines of surfaces, one per variant, created on first use.
 
 use std::collections::HashMap;
 

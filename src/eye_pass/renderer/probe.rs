@@ -1,4 +1,4 @@
-//! Rays for their own sake: the device's search for the nearest triangle, to be held against the processor's.
+//! Traces single rays on the device, so that tests can compare its hits with the CPU's.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! The eye pass's shader modules and what they share with Rust.
+//! The shader modules of the eye pass, and the constants they share with Rust.
 
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
 use super::pipelines::{Faces, PipelineFlags, PipelineKey, RenderTarget};

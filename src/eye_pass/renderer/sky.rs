@@ -1,5 +1,5 @@
-//! The environment on the device: drawn behind all surfaces, and met at the ends of chains. Exists only for scenes that
-//! have one.
+//! The environment on the device: drawn behind all surfaces and sampled where chains escape. Only for scenes that have
+//! one.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! What is drawn into, remade when the size changes.
+//! Render targets, recreated when the size changes.
 
 use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
 use crate::error::Result;

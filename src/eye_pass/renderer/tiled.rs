@@ -1,4 +1,4 @@
-//! Levels of a map in tiles: each tile of the map comes with the level that it is as fine as, and with coarser ones.
+//! The mip levels of a tiled map: each tile is uploaded from its own resolution downwards.
 
 use glam::DVec2;
 use rayon::prelude::*;

@@ -1,4 +1,4 @@
-//! How long the device takes for a picture: marks in the command stream, read back when they are there.
+//! GPU time of a picture: timestamps in the command stream, read back when they are ready.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};

@@ -1,4 +1,4 @@
-//! The last pass: from exposed radiance, white-balanced, to the target's colours, by one pipeline for each tone map in use.
+//! The last pass: from exposed, white-balanced radiance to the colours of the target, with one pipeline per tone map.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! What is handed to the shaders; names and order are those of `shaders/eye_pass/`.
+//! Uniforms of the shaders; names and order are those of `shaders/eye_pass/`.
 
 use crate::eye_pass::wavelengths::SeenWavelength;
 use crate::gpu::layout::shader_struct;

@@ -1,4 +1,4 @@
-//! Gives every point of a surface a place in its map, at any map size.
+//! Parametrises surfaces: every point of a surface has a place in its map, at any map size.
 
 pub mod coverage;
 mod given;

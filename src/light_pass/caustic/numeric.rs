@@ -1,4 +1,4 @@
-//! Elementary functions for inner loops, without a call into the mathematics library.
+//! Elementary functions for inner loops, without a call into libm.
 
 /// The greatest whole number not above `x`, without a call into the mathematics library.
 pub(super) fn floor(x: f64) -> i64 {

@@ -1,4 +1,4 @@
-//! Where light ends within little, its texels are divided, so that shadows are as sharp on the map as they are.
+//! Subdivides texels at shadow borders, so that they are as sharp on the map as on the surface.
 
 use glam::DVec2;
 

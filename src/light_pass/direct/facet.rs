@@ -1,4 +1,4 @@
-//! A triangle as it lies on the surface and in the map.
+//! A triangle in the scene and in the map.
 
 use glam::{DVec2, DVec3};
 

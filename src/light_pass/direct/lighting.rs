@@ -1,4 +1,4 @@
-//! What a light sends to a point.
+//! Irradiance of a point from one light.
 
 use glam::DVec3;
 

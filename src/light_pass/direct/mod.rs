@@ -1,4 +1,4 @@
-//! Light straight from the lamps (LD), as irradiance of every texel.
+//! Direct light (LD): irradiance of every texel straight from the lamps.
 //!
 //! E = I cos θ/r² for points and spots, E⊥ cos θ for suns, θ by the interpolated normal, stopped by every surface,
 //! clear glass included: what comes through that is caustic light (LS+D). Surfaces that are there in part let the rest of

@@ -1,4 +1,4 @@
-//! Irradiance from a flat polygon of even radiance, exactly.
+//! Exact irradiance from a flat polygon of uniform radiance.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! Lights as texels look for them: single points and directions, and what has extent, by samples of it.
+//! Lights as texels sample them: points and directions once, extended lights by samples of their area.
 //!
 //! What has extent is a sequence of places, the same for all texels: each run of 2ᵏ of them that begins at a multiple of
 //! 2ᵏ is evenly spread. A texel takes a run by a hash of itself, and shares it out among its own places, so that both

@@ -1,4 +1,4 @@
-//! What a lamp stands in: light straight from it crosses no surface, and so stays within that.
+//! The medium that a lamp lies in. Direct light crosses no surface, and so stays within it.
 
 use glam::DVec3;
 

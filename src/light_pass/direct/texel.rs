@@ -1,4 +1,4 @@
-//! What is known of a texel while its direct light is gathered.
+//! The state of a texel while its direct light is gathered.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! How much of a triangle lies in the unit square.
+//! The area of a triangle within the unit square.
 
 use glam::DVec2;
 

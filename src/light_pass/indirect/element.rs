@@ -1,4 +1,4 @@
-//! The part of one smooth piece of a surface under one texel of a grid: what light is sent from and to.
+//! An element: the part of one smooth piece of a surface under one texel of a grid. Elements exchange indirect light.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! Which triangles of a map continue each other smoothly: light is not interpolated across a crease or a cut.
+//! Groups triangles of a map that continue each other smoothly: light is not interpolated across a crease or a cut.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Light that diffuse surfaces send each other (LD+D, LS+D+D), any number of times.
+//! Indirect light between diffuse surfaces (LD+D, LS+D+D), with any number of bounces.
 //!
 //! Each receiver has a grid of elements, coarser than its map, since this light is smooth. Rays leave every element by the
 //! cosine, are followed through glass and off mirrors as radiance is, and end on elements of diffuse surfaces. What

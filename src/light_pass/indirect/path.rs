@@ -1,4 +1,4 @@
-//! A ray from a diffuse surface to those that light it.
+//! A ray from a diffuse surface to the surfaces that light it.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! From maps to grids, keeping flux, and back, without crossing creases or the borders of solids.
+//! Resamples maps to grids and back, conserving flux, without crossing creases or the borders of solids.
 
 use std::ops::Range;
 

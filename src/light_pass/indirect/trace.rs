@@ -1,4 +1,4 @@
-//! Rays from every element, and where they ended, as rows of a sparse matrix.
+//! Traces rays from every element. Their ends are rows of a sparse matrix.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -1,4 +1,4 @@
-//! Marks the cells of an item buffer, and finds those whose casters are hidden.
+//! Marks the cells of an item buffer, and finds those whose casters are occluded.
 
 use std::cmp::Reverse;
 use std::sync::atomic::{AtomicU64, Ordering};

@@ -1,4 +1,4 @@
-//! Where the borders of the cells lie on a face.
+//! The borders of the cells on a face.
 
 use std::sync::LazyLock;
 

@@ -1,4 +1,4 @@
-//! Cells whose casters lie behind opaque faces.
+//! Cells whose casters are occluded by opaque faces.
 //!
 //! A cell is dropped only where its whole frustum is covered by opaque faces that are nearer to the light than every
 //! caster in it: each ray that could start there ends on an opaque face first. Mirrors are opaque too, and hide what is

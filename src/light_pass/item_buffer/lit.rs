@@ -1,4 +1,4 @@
-//! Which cells a light sends anything to.
+//! Cells into which a light emits.
 
 use glam::{DVec2, DVec3};
 

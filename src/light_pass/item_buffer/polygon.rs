@@ -1,4 +1,4 @@
-//! A triangle as a face of the launch domain sees it, clipped to the face.
+//! A triangle projected onto a face of the launch domain and clipped to it.
 
 use glam::{DVec2, DVec3};
 

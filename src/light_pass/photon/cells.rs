@@ -1,4 +1,4 @@
-//! A map's texels and what they add up to, four to a cell from level to level: one grid for maps in tiles and for others.
+//! A hierarchy of sums over a map's texels, four to a cell from level to level, for tiled and untiled maps alike.
 //!
 //! Cells of level l are 2^l finest texels long. Where a tile is coarser than that, there are none.
 

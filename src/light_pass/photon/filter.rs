@@ -1,4 +1,4 @@
-//! Noise of photons, taken out where the light is smooth.
+//! Filters the noise of photons where the light is smooth.
 //!
 //! A map is taken apart into a coarse picture and, level by level, what finer cells differ by from what lies between
 //! coarser ones. Of two independent halves A and B, such details have the mean product S = ⟨d_A d_B⟩, which noise adds

@@ -1,4 +1,4 @@
-//! Where photons start: aimed at what is specular, and stratified as finely as there are photons.
+//! Starts of photons: aimed at specular surfaces, and stratified as finely as there are photons.
 //!
 //! A photon's index, scrambled, is a place along a curve through the whole launch domain (Morton's, cell by cell of the
 //! item buffer). The first n indices divide the curve into n strata with one photon each, for every power of two; more of

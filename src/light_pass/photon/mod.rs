@@ -1,4 +1,4 @@
-//! Photons: paths sampled from a light, one branch an event, each hit counted into its texel.
+//! Photons: paths sampled from a light, one branch at each event, each hit counted in its texel.
 //!
 //! Where patches of a wavefront shatter (cut glass, rough glass, many inner reflections) or would have to be averaged
 //! over a lamp, photons cost what a path costs. Lamp, micro-normals and wavelength are dimensions of the path. Bundles carry

@@ -1,5 +1,5 @@
-//! Many photons: blocks of them are followed side by side, and their hits counted into texels as whole numbers, so that
-//! neither order nor threads change a bit.
+//! Traces many photons in parallel blocks and counts hits as integers, so that neither order nor thread count changes a
+//! bit.
 
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};

@@ -1,4 +1,4 @@
-//! Wavelengths of photons: all at once until a surface parts them, then one.
+//! Wavelengths of photons: a photon carries all of them until it meets a dispersive surface, and one from there.
 
 use crate::light_pass::spectral_node::{SpectralNode, place_of};
 use crate::optics::ColourMatrix;

@@ -1,5 +1,5 @@
-//! What a light with a size aims its photons at: spheres around what is specular, as each of its places sees them, and
-//! there where a few photons met something.
+//! Targets of photons from an extended light: bounding spheres of specular surfaces as seen from each point of the
+//! light, narrowed by where pilot photons hit.
 
 use std::collections::BTreeSet;
 

@@ -1,5 +1,5 @@
-//! Looks where light stays together: follows the light of points of the launch domain on all its ways, and divides the
-//! domain as finely as the number of photons is worth.
+//! Finds bundles: follows sample points of the launch domain along all their paths, and subdivides the domain as finely
+//! as the number of photons is worth.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! One photon's path: at every surface it goes one way, drawn by the share of light that goes there.
+//! The path of one photon: at every surface one branch, drawn in proportion to its share of the light.
 
 use glam::DVec2;
 

@@ -1,5 +1,5 @@
-//! How fine cells are where they fall on waves or other detail of normals that no mesh shows: the corners of a cell
-//! longer than the detail agree or disagree by chance, and the patch between them says nothing.
+//! Cell sizes for waves and other normals that are finer than the mesh. The corners of a cell longer than that detail
+//! agree or disagree by chance, and its patch is meaningless.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! Cells of the lattice: their corners' light cut into patches along the lines where its way changes.
+//! Cells of the lattice: the segments at their corners, cut into patches along the lines where the light path changes.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! Where a cell's corners and edges do not tell what lies between them.
+//! Tests for cells whose interior differs from what their corners and edges show.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! How finely a patch is divided into triangles, from nine rays between its traced ones.
+//! How finely a patch is tessellated, from nine interpolated rays.
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! How closely borders and small things are looked for.
+//! How closely the wavefront is searched for borders and small features.
 
 /// How closely a wavefront is looked at where its light changes its way.
 #[derive(Clone, Copy, Debug, PartialEq)]

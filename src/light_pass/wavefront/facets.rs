@@ -1,5 +1,5 @@
-//! A triangle of rays over the facets of a mesh: charts may end, turn and stretch from one facet to the next. Each facet
-//! gets the part of the triangle that lies on it, in its own map coordinates.
+//! Splits a triangle of rays over the facets of a mesh: each facet gets the part that lies on it, in its own map
+//! coordinates. Charts may end, turn and stretch between facets.
 
 use glam::{DVec2, DVec3};
 

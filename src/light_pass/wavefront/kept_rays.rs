@@ -1,5 +1,5 @@
-//! What the light rays of one light met, kept: rays of nested lattices, and rays that an edit of the scene does not
-//! touch, are followed again without a search.
+//! Cached hits of a light's rays. Rays of nested lattices, and rays that an edit does not touch, are followed again
+//! without a search.
 //!
 //! Only hits are kept. Everything that follows from them (directions, derivatives, flux) is worked out anew, so that a
 //! ray followed from here is the ray that a search would give, bit for bit.

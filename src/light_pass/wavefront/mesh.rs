@@ -1,4 +1,4 @@
-//! The triangles between the rays of a patch, and where their flux goes.
+//! Tessellates a patch, and deposits the flux of its triangles.
 
 use glam::DVec2;
 

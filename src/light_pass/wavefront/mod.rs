@@ -1,5 +1,5 @@
-//! The caustic layer by pieces of the wavefront: cells of neighbouring light rays that went the same way become smooth
-//! patches, and their light is spread exactly over the texels they cover.
+//! The caustic layer by wavefront patches: cells of neighbouring rays that took the same path become smooth patches,
+//! whose flux is spread exactly over the texels they cover.
 
 pub mod band;
 pub mod bumps;

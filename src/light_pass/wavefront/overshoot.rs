@@ -1,4 +1,4 @@
-//! Patches that land where none of their traced rays did: near silhouettes and foci a smooth patch may overshoot.
+//! Patches that land where none of their traced rays did: near silhouettes and foci, cubic interpolation may overshoot.
 //! Refinement of those places divides the cells of these patches.
 
 use crate::illumination::Receiver;

@@ -1,4 +1,4 @@
-//! Receivers as the wavefront meets them: planes by one equation, others by the hierarchy.
+//! Intersection of wavefront patches with receivers: planes by one equation, others by the hierarchy.
 
 use std::sync::{Arc, OnceLock};
 

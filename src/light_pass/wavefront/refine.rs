@@ -1,4 +1,4 @@
-//! Which cells are divided: those whose light falls on tiles of maps that were found to be too rough.
+//! Selects the cells to divide: those whose light falls on map tiles with too large an error.
 //!
 //! Each round divides cells once more. A round's tiles come from the difference between the maps of two rounds before
 //! it, so that refinement goes where the error was measured, not where it was foreseen.

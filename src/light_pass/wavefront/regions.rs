@@ -1,4 +1,4 @@
-//! Regions of a cell with one light path: its corners, the samples along its edges, and the cuts between.
+//! Regions of a cell with one light path, bounded by corners, edge samples and cuts.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! Divides counts of flux without losing one to rounding.
+//! Divides integer counts of flux without losing one to rounding.
 
 use crate::illumination::accumulator::FluxCount;
 use crate::optics::LinearSrgb;

@@ -1,5 +1,5 @@
-//! Slits and pinholes narrower than a lattice cell: rays beside the sharp edges in front of casters find them, since the
-//! cell's corners meet only what surrounds them.
+//! Slits and pinholes narrower than a lattice cell. The cell's corners hit only what surrounds them, so extra rays are
+//! traced beside the sharp edges in front of casters.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;

@@ -1,5 +1,5 @@
-//! Cells of a spectral light: patches for all wavelengths where they go the same ways, up to the same borders; one for
-//! each traced wavelength where they do not.
+//! Cells of a spectral light: one patch for all wavelengths where their paths and borders agree, and one per traced
+//! wavelength elsewhere.
 
 use super::band::{Corner, SampleId, Workspace};
 use super::cell::{

@@ -1,5 +1,5 @@
-//! Wavelength as one more smooth dimension of the wavefront: a ray is traced at three wavelengths, and where all three go
-//! the same ways the light between them is interpolated along 1/λ².
+//! Wavelength as one more smooth dimension of the wavefront: a ray is traced at three wavelengths, and where their
+//! paths agree the light between them is interpolated in 1/λ².
 //!
 //! Paths carry factors in RGB whatever their wavelength; what those are at a wavelength is asked where light becomes
 //! colour. So a light without dispersion on its way is the same in RGB and by wavelength.

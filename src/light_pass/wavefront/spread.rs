@@ -1,5 +1,5 @@
-//! Spreads a patch over the surfaces it lights: rays between the traced ones meet the receivers, and the triangles
-//! between them carry the patch's flux.
+//! Spreads a patch over the surfaces it lights: interpolated rays hit the receivers, and the triangles between them
+//! carry the patch's flux.
 
 use glam::DVec2;
 

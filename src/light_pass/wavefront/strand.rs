@@ -1,4 +1,5 @@
-//! What one light ray found: the segments that leave specular surfaces along its tree of paths, with their derivatives.
+//! The result of one light ray: the segments that leave specular surfaces along its tree of paths, with their
+//! derivatives.
 
 use glam::{DVec2, DVec3};
 

@@ -1,5 +1,4 @@
-//! Bodies and openings that are smaller than the cells of a lattice, and sharp corners of larger bodies: the cells' own
-//! corners alone would miss them.
+//! Bodies, openings and sharp corners smaller than the cells of a lattice, which the corners of the cells would miss.
 
 use std::collections::HashMap;
 

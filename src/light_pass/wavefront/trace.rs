@@ -1,4 +1,4 @@
-//! Traces one light ray with its derivatives through every specular surface that matters.
+//! Traces one light ray with its derivatives through every relevant specular surface.
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! Interpolated rays between the traced ones, and where they land.
+//! Interpolated rays between the traced ones, and their hits.
 
 use glam::{DVec2, DVec3};
 

@@ -1,4 +1,4 @@
-//! Glasses by name.
+//! The catalogue of glasses, by name.
 
 use std::sync::LazyLock;
 

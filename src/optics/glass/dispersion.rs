@@ -1,4 +1,4 @@
-//! Formulas for the refractive index by wavelength.
+//! Dispersion formulas: the refractive index by wavelength.
 
 use std::ops::RangeInclusive;
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a glass.
+//! Errors in the description of a glass.
 
 use crate::error::Error;
 

@@ -1,4 +1,4 @@
-//! Spectra as two columns of text: wavelength [nm], value.
+//! Spectra as CSV with two columns: wavelength [nm], value.
 
 use super::{Spectrum, SpectrumError};
 use crate::optics::Nanometres;

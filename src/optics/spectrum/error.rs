@@ -1,4 +1,4 @@
-//! What can be wrong with a spectrum.
+//! Errors in the description of a spectrum.
 
 use crate::error::Error;
 

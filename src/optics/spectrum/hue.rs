@@ -1,4 +1,4 @@
-//! Which single wavelength a colour looks most like.
+//! The dominant wavelength of a colour.
 
 use std::sync::LazyLock;
 

@@ -1,4 +1,4 @@
-//! Lamps by name.
+//! Standard illuminants and lamps by name.
 
 use std::sync::LazyLock;
 

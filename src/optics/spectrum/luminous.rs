@@ -1,4 +1,4 @@
-//! Which wavelengths to follow: as many of each as the eye gets out of them.
+//! Importance sampling of wavelengths by their luminance.
 
 use std::ops::RangeInclusive;
 use std::sync::LazyLock;

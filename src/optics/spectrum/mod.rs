@@ -1,4 +1,4 @@
-//! Spectra: how much light at each wavelength, what colour that is, and which wavelengths to follow.
+//! Spectra: their power by wavelength, their colour, and the wavelengths to trace.
 //!
 //! ```text
 //!  CSV, name, colour ─► Spectrum ─► Xyz ─► LinearSrgb ─► display

@@ -1,4 +1,4 @@
-//! A spectrum as a table, linear between its rows.
+//! A tabulated spectrum, linear between its rows.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Black bodies, and the temperature of the one whose colour is nearest to a lamp's.
+//! Black-body spectra, and correlated colour temperature.
 
 use super::luminous::{integrate, visible_knots};
 use super::{Xyz, xyz_bar};

@@ -1,4 +1,4 @@
-//! From a colour to a smooth spectrum that has it.
+//! Upsamples a colour to a smooth spectrum of that colour.
 //!
 //! W. Jakob and J. Hanika, A Low-Dimensional Function Space for Efficient Spectral Upsampling (2019): a sigmoid of a
 //! parabola in wavelength. Its three coefficients are solved for here, to rounding, by damped Gauss–Newton.

@@ -1,4 +1,4 @@
-//! CIE 1931 XYZ, and its way to linear sRGB and back.
+//! CIE 1931 XYZ, to and from linear sRGB.
 
 use std::sync::LazyLock;
 

@@ -1,4 +1,4 @@
-//! A basin of water on a floor, as several scenes have one.
+//! A basin of water on a floor, shared by several scenes.
 
 use glam::DVec3;
 

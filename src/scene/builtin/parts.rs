@@ -1,4 +1,4 @@
-//! What the built-in scenes have in common.
+//! Parts that built-in scenes share.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! `pool`: the sun through a wavy water surface that waves lift and bend, and (`pool-bump`) as one quad whose normals alone
+//! `pool`: the sun through a wavy water surface, displaced by its waves; `pool-bump` is one quad whose normals alone
 //! have the waves.
 
 use std::sync::Arc;

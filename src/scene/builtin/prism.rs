@@ -1,4 +1,5 @@
-//! `prism`: a glass prism at minimum deviation behind a slit; where each wavelength goes has a closed form.
+//! `prism`: a glass prism at minimum deviation behind a slit. The position of each wavelength on the screen has a
+//! closed form.
 
 use glam::DVec3;
 

@@ -1,4 +1,4 @@
-//! `ring` and `nephroid`: a mirror cylinder around the floor's centre, lit by a lamp and by a grazing sun.
+//! `ring` and `nephroid`: a mirror cylinder around the centre of the floor, lit by a lamp and by a grazing sun.
 
 use glam::DVec3;
 

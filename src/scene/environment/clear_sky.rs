@@ -1,4 +1,4 @@
-//! The sky and the ground of a clear day, for scenes without light.
+//! A clear sky with its sun and the ground below, for scenes without light.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 

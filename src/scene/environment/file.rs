@@ -1,4 +1,4 @@
-//! An environment from a Radiance (.hdr) or OpenEXR file.
+//! Reads an environment from a Radiance (.hdr) or OpenEXR file.
 
 use std::io::Cursor;
 use std::path::Path;

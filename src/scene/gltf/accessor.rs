@@ -1,4 +1,4 @@
-//! Arrays of numbers, each checked against its buffer before memory is taken.
+//! Accessors, checked against their buffers before any memory is allocated.
 
 use gltf::json::accessor::{Accessor, ComponentType, Type, sparse::Sparse};
 use gltf::json::validation::Checked;

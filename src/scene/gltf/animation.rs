@@ -1,4 +1,4 @@
-//! Keyframes of nodes: translation, rotation and scale of every animation of the file together.
+//! Keyframes of nodes: translation, rotation and scale, with all animations of the file merged.
 
 use std::collections::HashMap;
 

@@ -1,4 +1,4 @@
-//! Flat lamps of EXT_lights_area, by its draft of 2025 (KhronosGroup/glTF, pull request 2525).
+//! Area lights of EXT_lights_area, by its draft of 2025 (KhronosGroup/glTF, pull request 2525).
 //!
 //! A lamp lies in the node's xy plane around its origin and shines along −z. Its size is scaled by the largest scale of
 //! the node, the same way in all directions.

@@ -1,4 +1,4 @@
-//! KHR_materials_clearcoat: a lacquer over a surface.
+//! KHR_materials_clearcoat: a clear coat over a surface.
 
 use gltf::json::Value;
 use gltf::json::extensions::material as extension;

@@ -1,4 +1,4 @@
-//! A file's JSON and binary parts.
+//! Splits a file into its JSON and binary parts.
 
 use super::report::Report;
 use crate::error::{Error, Result};

@@ -1,4 +1,4 @@
-//! KHR_draco_mesh_compression: the vertices and triangles of a primitive in one compressed block.
+//! KHR_draco_mesh_compression: decodes the vertices and triangles of a primitive.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Which glTF extensions are read, which are passed over, which stop the loading.
+//! Which glTF extensions are read, which are ignored, and which stop the loading.
 
 use super::report::Report;
 use super::{draco, glossiness, instancing, meshopt, nodes};

@@ -1,4 +1,4 @@
-//! What stands in `extras`, as the file has it: to be picked out before extras are thrown away.
+//! The `extras` of a file, read from the raw JSON before the typed document drops them.
 
 use gltf::json::Value;
 

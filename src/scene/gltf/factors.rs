@@ -1,4 +1,4 @@
-//! Textures of factors: transmission, roughness and metallic from place to place, in one image.
+//! Textures of transmission, roughness and metallic factors, combined into one image.
 
 use std::collections::BTreeMap;
 use std::rc::Rc;

@@ -1,5 +1,5 @@
-//! Breaches of glTF's rules that the crate's own validation finds, as warnings: those that matter to what is read
-//! are met again, and stop the loading, where it needs the faulty thing.
+//! Violations of the glTF specification, reported as warnings. Those that affect what is read stop the loading where
+//! the faulty part is needed.
 
 use gltf::json::Root;
 use gltf::json::path::Path;

@@ -1,4 +1,4 @@
-//! A `.glb` in the making: its document, in which anything may be changed, and its binary chunk.
+//! An editable `.glb`: its JSON document and its binary chunk.
 
 use std::path::Path;
 

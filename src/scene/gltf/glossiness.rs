@@ -1,4 +1,4 @@
-//! KHR_materials_pbrSpecularGlossiness, which glTF's first years had: turned into what came of it.
+//! KHR_materials_pbrSpecularGlossiness, converted to metallic-roughness.
 
 use gltf::json::Value;
 use serde::Deserialize;

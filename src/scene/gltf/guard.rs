@@ -1,4 +1,4 @@
-//! A panic in a library, turned into `None`.
+//! Turns a panic in a library into `None`.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};

@@ -1,4 +1,4 @@
-//! Images: decoded by ourselves, so that one bad image costs one texture and not the scene.
+//! Decodes images one by one, so that a bad image costs one texture and not the scene.
 
 use std::collections::HashMap;
 use std::io::Cursor;

@@ -1,4 +1,4 @@
-//! EXT_mesh_gpu_instancing: one node whose mesh stands at many places, taken apart into a node for each.
+//! EXT_mesh_gpu_instancing, expanded into one node per instance.
 
 use glam::DVec4;
 use gltf::json::{Index, Node, Root, Value};

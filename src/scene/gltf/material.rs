@@ -1,4 +1,4 @@
-//! Materials: glTF's factors and extensions, checked, and the class that transport treats each as.
+//! Materials: glTF's factors and extensions, validated, and the surface kind of each.
 
 use std::path::Path;
 use std::sync::Arc;

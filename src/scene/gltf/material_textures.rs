@@ -1,4 +1,4 @@
-//! Textures of materials: where they lie, and what they do to the surface.
+//! Textures of materials: their coordinates, and what they vary.
 
 use std::ops::RangeInclusive;
 

@@ -1,5 +1,5 @@
-//! EXT_meshopt_compression and KHR_meshopt_compression: buffer views as they are stored, unpacked. Words in backticks are
-//! those of the extensions' text.
+//! EXT_meshopt_compression and KHR_meshopt_compression: decodes compressed buffer views. Words in backticks are those
+//! of the extensions' text.
 
 use std::array;
 

@@ -1,4 +1,4 @@
-//! glTF 2.0 from a file that is not trusted: every index, count and number is checked before it is used.
+//! Reads glTF 2.0 from untrusted files: every index, count and number is checked before it is used.
 //!
 //! The `gltf` crate gives the typed JSON; its accessors are not used, since they panic on what its own validation
 //! lets pass.

@@ -1,4 +1,4 @@
-//! Names of things in a file, made safe to print.
+//! Names from a file, sanitised for printing.
 
 /// The file's name for a thing, else `kind` and its index. Control characters could steer a terminal: they are
 /// replaced.

@@ -1,4 +1,4 @@
-//! Where each node stands: transforms composed in double precision, every node reached once.
+//! World transforms of nodes, composed in double precision. Every node is visited once.
 
 use std::f64::consts::PI;
 

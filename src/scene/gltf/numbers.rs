@@ -1,4 +1,4 @@
-//! 32-bit numbers of the JSON in double precision.
+//! Single-precision numbers of the JSON, converted to double precision.
 
 /// The shortest decimal that rounds to this number: what the file says, as long as it says no more than seven digits.
 /// So an index of 1.33 is read as 1.33 and not as 1.330000043.

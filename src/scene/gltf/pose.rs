@@ -1,4 +1,4 @@
-//! Morph targets and skins at rest: meshes bent as their file's first look has them.
+//! Morph targets and skins in the file's rest pose.
 
 use std::collections::HashMap;
 

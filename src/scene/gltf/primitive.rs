@@ -1,4 +1,4 @@
-//! The primitives of meshes, as triangles.
+//! Primitives of meshes, as triangles.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;

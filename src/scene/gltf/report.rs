@@ -1,4 +1,4 @@
-//! What loading has to tell, and what it may take.
+//! Warnings of a load, and its memory limits.
 
 use crate::error::{Error, Result, Warning};
 

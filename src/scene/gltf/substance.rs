@@ -1,4 +1,4 @@
-//! What a material is made of: KHR_materials_dispersion, and `glass` or `metal` in its `extras`.
+//! Glass and metal of a material: KHR_materials_dispersion, and `glass` or `metal` in its `extras`.
 
 use std::ops::RangeInclusive;
 

@@ -1,4 +1,4 @@
-//! The objects of a scene: every primitive of every placed node.
+//! The objects of a scene: every primitive of every node that has a mesh.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;

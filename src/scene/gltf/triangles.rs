@@ -1,4 +1,4 @@
-//! Triangles of a primitive from its vertex order and mode.
+//! Converts indices and primitive modes to triangles.
 
 use gltf::json::mesh::Mode;
 

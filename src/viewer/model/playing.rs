@@ -1,4 +1,4 @@
-//! Playing: time goes on in a scene that moves, and its maps follow.
+//! Playing: time advances in a scene that moves, and its maps follow.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};

@@ -1,4 +1,4 @@
-//! An image in tiles: what of it the device holds, and where.
+//! A tiled image, and which of its tiles are resident on the device.
 
 use bytemuck::Pod;
 

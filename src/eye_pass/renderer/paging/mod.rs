@@ -1,5 +1,5 @@
-//! Images in tiles through a page table: all maps and all textures of a scene in two bindings, sent to the device tile
-//! by tile, and dropped from it level by level where memory is short.
+//! Tiled images behind a page table: all maps and textures of a scene in two bindings, uploaded tile by tile, and
+//! evicted level by level where memory is short.
 
 use bytemuck::Pod;
 

@@ -1,4 +1,4 @@
-//! Triangles that have area: their part in each texel of a row, from the areas beside their sides.
+//! Triangles with area: their coverage of each texel of a row, from the areas beside their sides.
 
 use std::ops::Range;
 

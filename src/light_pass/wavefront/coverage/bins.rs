@@ -1,4 +1,4 @@
-//! Which triangles reach which bands of rows.
+//! Bins triangles by the bands of rows they reach.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! Maps with texels that the surface does not cover: their shares go to covered ones nearby.
+//! Moves flux from texels that the surface does not cover to covered ones nearby.
 
 use std::collections::VecDeque;
 

@@ -1,4 +1,4 @@
-//! Triangles without area: their flux lies along a line, as a tent.
+//! Degenerate triangles: their flux lies along a line, as a tent.
 
 use glam::DVec2;
 

@@ -1,4 +1,4 @@
-//! Flux-carrying triangles on a map, each texel getting exactly the part that covers it.
+//! Deposits flux-carrying triangles into a map by exact area coverage.
 //!
 //! Texels are taken row by row, from left to right. Each gets the difference of two rounded cumulative shares of the
 //! triangle's flux, so that the whole is exact to the last count; as the share above a row has a closed form, any

@@ -1,4 +1,4 @@
-//! What became of the flux.
+//! Totals of a deposit: flux on texels, past the edge of the map, beyond the chart, and of invalid triangles.
 
 use crate::illumination::accumulator::FluxCount;
 

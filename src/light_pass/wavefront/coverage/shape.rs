@@ -1,4 +1,4 @@
-//! How a triangle meets the map.
+//! The shape of a triangle in texel space: with area, a line, or a point.
 
 use std::ops::Range;
 

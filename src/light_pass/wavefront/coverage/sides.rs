@@ -1,4 +1,4 @@
-//! The sides of a triangle, and what lies beside them within a row.
+//! The sides of a triangle, and the areas beside them within a row.
 //!
 //! Numbers come in fours: the long side from the top to the bottom corner, the upper and the lower of the others, and
 //! nothing. Each step is then the same for all of them, and the processor takes several at once.

@@ -1,4 +1,4 @@
-//! Maps in tiles: each tile is a small map of its own, in its own texels.
+//! Deposits into tiled maps: each tile is a small map in its own texels.
 //!
 //! Bands of rows of tiles are what threads divide among themselves. On one tile a triangle's shares are exact to the last
 //! count; where it lies on several they are rounded down, and its largest share takes the few counts that are left.

@@ -1,4 +1,4 @@
-//! What is shown along the back wall: water in a basin of stone, a prism in a beam, a block that throws a picture.
+//! The exhibits along the back wall: water in a stone basin, a prism in a beam, and a block that projects a picture.
 
 use glam::DVec3;
 

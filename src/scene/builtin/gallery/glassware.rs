@@ -1,4 +1,4 @@
-//! What is turned on a lathe: wine glass and wine.
+//! Glassware turned on a lathe: the goblet and its wine.
 
 use std::f64::consts::TAU;
 

@@ -1,5 +1,5 @@
-//! `gallery`: a room to walk through, with low sun on a table of glass, and along the wall what water, a prism and a lens
-//! that was solved for a picture make of a lamp.
+//! `gallery`: a room to walk through, with low sun on a table of glass, and along the wall the caustics of water, a
+//! prism, and a lens that was designed to project a picture.
 
 mod exhibits;
 mod glassware;

@@ -1,4 +1,4 @@
-//! Textures of what the gallery is built of, from noise alone: deterministic, and periodic where they tile.
+//! The gallery's procedural textures: noise-based, deterministic, and periodic where they tile.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -1,4 +1,4 @@
-//! Lights as their file is to have them.
+//! Writes edited lights back into their file.
 
 use glam::{DAffine3, DQuat, DVec3};
 use gltf::json::Value;

@@ -1,5 +1,5 @@
-//! An edited scene as a `.glb`: the file that it was loaded from, with nothing changed but what was edited. What the
-//! program does not know survives, in its order.
+//! Saves an edited scene as a `.glb`: the original file with only the edited parts changed. Unknown content survives,
+//! in its order.
 
 use std::mem::discriminant;
 use std::path::Path;

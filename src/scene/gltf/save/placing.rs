@@ -1,4 +1,4 @@
-//! Where nodes are to stand, and what their own transforms are then.
+//! Writes edited world transforms back as local transforms of nodes.
 
 use std::collections::BTreeMap;
 

@@ -1,4 +1,4 @@
-//! Lights as glTF states them: KHR_lights_punctual and EXT_lights_area, at nodes of their own.
+//! Writes lights as KHR_lights_punctual and EXT_lights_area, each on its own node.
 
 use glam::{DMat3, DQuat, DVec3};
 use gltf::json::Value;

@@ -1,4 +1,4 @@
-//! Materials as glTF states them.
+//! Writes materials as glTF.
 
 use glam::DVec3;
 use gltf::json::Value;

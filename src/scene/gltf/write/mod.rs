@@ -1,4 +1,4 @@
-//! A scene of our own as glTF: every object a node, every light a node, every camera a node.
+//! Writes a built-in scene as glTF: one node per object, light and camera.
 
 pub(super) mod lights;
 pub(super) mod materials;
