@@ -132,7 +132,7 @@ fn dark_file_is_lit_and_its_spot_explained() {
     viewer.click("Button", "Aim light");
     let (x, y) = ((WIDTH as i32 + SIZE.0 as i32) / 2, SIZE.1 as i32 / 2);
     viewer.pull(&[(x, y), (x, y + 40)]);
-    viewer.wait_for("edit", is_edit_of("LightDirection(1)"));
+    viewer.wait_for("edit", is_edit_of("LightDirection(2)"));
     viewer.let_go();
     viewer.wait_for("done", |_| true);
 
