@@ -1,9 +1,9 @@
 //! Error estimates without a reference, from the differences between maps of nested lattices.
 //!
 //! Let I be the map of a lattice, I₂ that of the lattice with twice the step, I₄ the next. The errors of successive
-//! levels turn out to be independent (they depend on where cuts and cells happen to lie), so that ⟨(I − I₂)²⟩ = e²(1 +
-//! R²) with R = e₂/e. Light that is cut off along lines converges at first order, R = 2. R is also measured as √(⟨(I₂ −
-//! I₄)²⟩/⟨(I − I₂)²⟩). A single measurement is noisy, so R is the geometric mean of both.
+//! levels turn out to be independent (they depend on where cuts and cells happen to lie), so that
+//! ⟨(I − I₂)²⟩ = e²(1 + R²) with R = e₂/e. Light that is cut off along lines converges at first order, R = 2. R is also
+//! measured as √(⟨(I₂ − I₄)²⟩/⟨(I − I₂)²⟩). A single measurement is noisy, so R is the geometric mean of both.
 //!
 //! A difference does not show what all levels miss: truncated light (threshold, depth, unresolved) is added by its
 //! watts.
@@ -55,7 +55,7 @@ pub type Images = BTreeMap<Receiver, Image>;
 /// Error estimate of one map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapError {
-    /// Of the map [texels].
+    /// Size of the map [texels].
     pub size: (usize, usize),
     /// Expected error of each texel's luminance, the root of variance and squared bias [W/m², for a light of unit
     /// strength].
@@ -232,7 +232,7 @@ impl Image {
     }
 }
 
-/// Likewise, for one row of an image.
+/// Means over a square window around each texel of one row of an image.
 fn window(squares: &[f64], (width, height): (usize, usize), row: usize, line: &mut [f64]) {
     let near = |index: usize, count: usize| {
         index.saturating_sub(WINDOW_TEXELS)..(index + WINDOW_TEXELS + 1).min(count)
@@ -371,9 +371,9 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
 /// Noise of a map's difference from the map of every fourth ray, relative to the map's own noise.
 const NOISE_OF_DIFFERENCE: f64 = 1.5;
 
-/// The error of splats. Half sets give the noise. Whatever the difference D from `thinner`, the map of every fourth
-/// ray, holds beyond that is taken as half blur, which levels share (e = D/(R − 1)), and half the pattern of the
-/// lattice, which they do not (e = D/√(1 + R²)), both of first order. `None` if no light arrived.
+/// The error of splats. Half sets give the noise. The rest of the difference D from `thinner`, the map of every fourth
+/// ray, is attributed half to blur, which levels share (e = D/(R − 1)), and half to the pattern of the lattice, which
+/// they do not (e = D/√(1 + R²)), both of first order. `None` if no light arrived.
 pub fn estimate_splats(
     fine: &Images,
     thinner: &Images,

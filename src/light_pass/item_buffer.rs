@@ -4,7 +4,7 @@
 //! Cells are marked by projecting the scene's hierarchy onto the faces of the launch domain and, where a box does not
 //! decide, the triangles of specular objects below it. Triangles are tested exactly against the cells: one that is
 //! smaller than a cell, edge-on or on a cube edge is never missed. Cells whose whole frustum is covered by opaque faces
-//! before every caster are dropped ([`hidden`]); all other occlusion is left to the rays.
+//! in front of every caster are dropped ([`hidden`]); all other occlusion is left to the rays.
 
 mod bits;
 mod builder;
@@ -28,7 +28,7 @@ use crate::transport::Tracer;
 /// Cells along each side of a face.
 pub const CELLS_PER_SIDE: usize = 128;
 
-/// Most boxes that each node is compared with; more objects share a single box.
+/// Maximum number of boxes that each node is compared with; more objects share a single box.
 const MAX_BOXES: usize = 16;
 
 /// Marked cells of all faces of one light.
@@ -37,7 +37,7 @@ pub struct ItemBuffer {
     faces: Vec<CellBits>,
     /// Specular objects that mark at least one cell, ascending.
     pub casters: Vec<usize>,
-    /// Cells that were dropped because opaque faces cover them before every caster.
+    /// Cells that were dropped because opaque faces cover them in front of every caster.
     pub hidden_cells: u64,
     /// Nodes, triangles and cells that were tested, as a measure of the work.
     pub tests: u64,
@@ -93,7 +93,7 @@ impl ItemBuffer {
             HiddenCellPolicy::Drop => builder.hidden(&faces),
         };
         let mut hidden_cells = 0;
-        // Cells in which no caster is hidden; all lit cells under [`HiddenCellPolicy::Keep`].
+        // Cells in which no caster is hidden; all lit cells under `HiddenCellPolicy::Keep`.
         let mut clear = lit;
         for (face, (doubtful, found)) in hidden.iter().enumerate() {
             clear[face] = faces[face].without(doubtful);

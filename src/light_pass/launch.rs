@@ -100,8 +100,8 @@ impl Launch {
         }
     }
 
-    /// Lattice cells across and down each face at a density [1/sr]. Suns take density/D² rays per m², where D =
-    /// `reach_m` is the distance from the casters' centre to their farthest receiver.
+    /// Lattice cells across and down each face at a density [1/sr]. Suns take density/D² rays per m²: D, `reach_m`, is
+    /// the distance from the casters' centre to their farthest receiver.
     ///
     /// Sides are rounded up to multiples of powers of two, by a thirtieth at most, so that the lattice of a quarter of
     /// the density consists of every second ray of this one.
@@ -277,7 +277,7 @@ impl Launch {
     }
 }
 
-/// Two unit vectors perpendicular to `direction` and to each other, which depend on nothing else.
+/// Orthonormal frame with `direction` as its z axis, which depends on nothing else.
 fn frame_across(direction: DVec3) -> DMat3 {
     let (across, down) = direction.any_orthonormal_pair();
     DMat3::from_cols(across, down, direction)

@@ -42,8 +42,8 @@ pub struct EnergyLedger {
     /// Given up; serialised by cause and as a sum.
     #[serde(flatten, serialize_with = "with_total")]
     pub truncated: Truncated,
-    /// Flux conserved only in expectation, of either sign: lost with photons that were ended at random, less what the
-    /// others gained.
+    /// Flux conserved only in expectation, of either sign: lost with photons that were ended at random, less gained by
+    /// those that go on.
     pub sampling: f64,
 }
 
@@ -92,7 +92,7 @@ impl<'a> Sum<&'a EnergyLedger> for EnergyLedger {
 }
 
 impl EnergyLedger {
-    /// emitted − Σ| / emitted; 0 if nothing was emitted.
+    /// |emitted − Σ| / emitted; 0 if nothing was emitted.
     pub fn relative_imbalance(&self) -> f64 {
         if self.emitted == 0.0 {
             return 0.0;
@@ -161,8 +161,8 @@ pub struct LightLedger {
 }
 
 impl LightLedger {
-    /// Adds radiant flux: `radiant` is the light's radiant over its luminous-equivalent watts, the other what its bands
-    /// deposited [W].
+    /// Adds radiant flux. `radiant`: the light's radiant over its luminous-equivalent watts; `deposited_radiant_w`:
+    /// what its bands deposited [W].
     #[must_use]
     pub fn with_radiant(self, radiant: Option<f64>, deposited_radiant_w: Option<f64>) -> Self {
         Self {

@@ -41,7 +41,7 @@ enum Slot {
 }
 
 impl ReceiverMaps {
-    /// Without maps, for a scene of so many objects.
+    /// No maps yet, for a scene with this number of objects.
     pub fn new(objects: usize) -> Self {
         Self {
             slots: Receiver::all(objects).map(|_| Slot::Untouched).collect(),
@@ -155,11 +155,11 @@ impl ReceiverMaps {
 /// Brightness of a map relative to that of all maps, below which its light is stray.
 const STRAY_SHARE: f64 = 1e-6;
 
-/// Least spread of a kernel at a level [texels of the level]: linear interpolation between texels then adds less than
+/// Minimum spread of a kernel at a level [texels of the level]: linear interpolation between texels then adds less than
 /// one per cent to its variance.
 const MIN_SPREAD_TEXELS: f64 = 6.0;
 
-/// Least side of a level [texels].
+/// Minimum side of a level [texels].
 const MIN_LEVEL_SIDE: usize = 16;
 
 impl ReceiverMap {

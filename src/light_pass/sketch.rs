@@ -17,17 +17,17 @@ use crate::transport::{EffectSet, Tracer};
 
 /// Inset of rays from the border of the domain, which may coincide with the border of a surface.
 const MARGIN: f64 = 1e-9;
-/// Largest subdivision of the domain's side, as a power of two.
+/// Maximum number of subdivisions of the domain's side.
 const FINEST: u32 = 14;
 
 /// Limits of a sketch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SketchLimits {
-    /// Most specular surfaces on a path.
+    /// Maximum number of specular surfaces on a path.
     pub max_depth: u32,
-    /// Least fraction of a ray's flux (luminance) with which a branch is followed.
+    /// Fraction of a ray's flux (luminance) below which a branch is not followed.
     pub branch_threshold: f64,
-    /// Most cells of the lattice for each light, > 0.
+    /// Maximum number of lattice cells per light, > 0.
     pub cells: usize,
 }
 

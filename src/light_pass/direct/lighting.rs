@@ -14,7 +14,7 @@ pub struct IncidentLight {
     pub to_light: DVec3,
     /// Infinite for a sun.
     pub distance_m: f64,
-    /// E at unit strength across the beam.
+    /// E at unit strength on a surface that faces the light.
     pub across_beam: f64,
     pub strength: LinearSrgb,
 }
@@ -61,8 +61,8 @@ pub struct UnshadowedLight {
 }
 
 impl UnshadowedLight {
-    /// `None` if light comes from behind the surface or none of it is left. All of its way lies in the medium around
-    /// its source.
+    /// `None` if the light comes from behind the surface or none of it is left. Its whole path lies in the medium
+    /// around the source.
     pub fn from_beam(
         beam: &IncidentLight,
         point: &SurfacePoint,

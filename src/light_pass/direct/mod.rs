@@ -1,9 +1,9 @@
 //! Direct light (LD): irradiance of every texel straight from the lamps.
 //!
 //! E = I cos θ/r² for points and spots and E⊥ cos θ for suns, with θ from the interpolated normal. Every surface casts
-//! shadows, clear glass included: what passes through that is caustic light (LS+D). Partly transparent coverage lets
-//! its share pass. The medium around a lamp absorbs on the way. Each side of a surface has its own map. Extended lights
-//! are averaged over samples.
+//! shadows, clear glass included: what passes through it is caustic light (LS+D). A surface of partial coverage lets
+//! the rest of the light pass. The medium around a lamp absorbs on the way. Each side of a surface has its own map.
+//! Extended lights are averaged over samples.
 
 pub mod border;
 pub(super) mod facet;
@@ -39,7 +39,7 @@ const OFF_THE_DIAGONALS: DVec2 = DVec2::new(0.6e-6, 1.1e-6);
 pub struct DirectLayer {
     /// Mean E over the covered part of each texel [W/m²], gutter filled.
     pub irradiance: Vec<[f32; 3]>,
-    /// Likewise in the small texels at shadow borders.
+    /// Mean E over each small texel at shadow borders [W/m²].
     pub divided: Option<SubdividedTexels<[f32; 3]>>,
     pub shadow_rays: u64,
     /// False if cancelled: missing rows are black.
@@ -47,8 +47,8 @@ pub struct DirectLayer {
 }
 
 /// Bakes the direct light of some lights, one layer per chart. A chart's companion, if there is one, maps the same
-/// surface with small texels, into which texels at shadow borders are subdivided. Deterministic for any number of
-/// threads. Progress counts rows over all charts.
+/// surface with small texels, into which texels at shadow borders are subdivided. The result does not depend on the
+/// number of threads. Progress counts rows over all charts.
 pub fn bake_direct(
     tracer: &Tracer,
     lights: &[Light],
@@ -72,7 +72,7 @@ pub fn bake_direct(
 }
 
 /// Marks the texels at the shadow borders of a light, and counts the shadow rays traced to find them; `None` if
-/// cancelled. Deterministic for any number of threads.
+/// cancelled. The result does not depend on the number of threads.
 pub fn find_borders(
     tracer: &Tracer,
     light: &Light,
@@ -115,7 +115,7 @@ fn begins_with_glance(sources: &[Option<DirectSource>]) -> bool {
     !even.is_empty() && even.iter().all(|is_even| *is_even)
 }
 
-/// What is known of a chart so far.
+/// Results for a chart so far.
 struct ChartStatistics {
     width: usize,
     texels: Vec<Texel>,

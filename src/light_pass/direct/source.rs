@@ -21,9 +21,9 @@ use crate::scene::emitter::{Emitter, EmitterSampler};
 use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
 use crate::transport::{DiffuseResponse, Tracer};
 
-/// Samples that are prepared of a light: a power of 2.
+/// Number of samples that are prepared for a light: a power of 2.
 const READY: usize = 1 << 13;
-/// Likewise of a sky, of which texels need more.
+/// Number of directions that are prepared for a sky, of which texels need more.
 const READY_OF_SKY: usize = 1 << 14;
 /// Angular diameter of a sun [rad] up to which irradiance hardly varies over its disc.
 const NARROW_RAD: f64 = 0.03;
@@ -83,7 +83,7 @@ struct Shape {
     area_m2: f64,
 }
 
-/// Light from an extended light at a point.
+/// Irradiance at a point from an extended light.
 #[derive(Clone, Copy, Default)]
 pub struct Gathered {
     /// E [W/m²].
@@ -216,7 +216,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
 }
 
 impl Soft {
-    /// The samples of the light for sample point `place` of a texel, out of so many `places`.
+    /// The light's samples for sample point `place` of a texel, which has `places` sample points.
     pub fn run(&self, texel: u64, place: usize, (places, look): (usize, SamplingDetail)) -> Range<usize> {
         let (ready, of_texel) = match self.places {
             ManyPlaces::Sky { .. } => (2 * READY_OF_SKY, look.samples_of_sky),
@@ -268,7 +268,7 @@ impl Soft {
         }
     }
 
-    /// Light of one sample of a run, as if all light came from there.
+    /// One sample of a run, weighted as if all light came from it.
     fn beam(
         &self,
         index: usize,

@@ -11,7 +11,7 @@ pub struct SamplingDetail {
     pub side: usize,
     /// Samples of an extended light, over all sample points.
     pub samples_of_lamp: usize,
-    /// Likewise of a sky.
+    /// Samples of a sky, over all sample points.
     pub samples_of_sky: usize,
 }
 
@@ -77,14 +77,14 @@ pub struct TexelSum {
     /// Σ A [m²].
     pub area_m2: f64,
     pub lit: LightsOfTexel,
-    /// Likewise for extended lights; mixed if one is partly occluded.
+    /// The extended lights that reach the texel; mixed if one is partly occluded.
     pub soft_lit: LightsOfTexel,
     pub largest: Option<LargestOverlap>,
     /// Luminance of extended lights.
     pub soft: Spread,
 }
 
-/// Sums for the variance of values.
+/// Running sums for a mean and its standard error.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Spread {
     count: f64,
@@ -164,14 +164,14 @@ pub struct Sample {
     pub irradiance: LinearSrgb,
     /// XOR of the marks ([`mark_of`]) of the point lights and suns that reach the point.
     pub mask: u64,
-    /// Likewise of the extended lights that are fully visible; `None` if one is partly occluded.
+    /// XOR of the marks of the extended lights that are fully visible; `None` if one is partly occluded.
     pub soft_mask: Option<u64>,
     /// Luminance of the irradiance from extended lights [W/m²].
     pub soft: f64,
     pub shadow_rays: u64,
 }
 
-/// A texel after a pass.
+/// State of a texel after a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Texel {
     pub irradiance: [f32; 3],
@@ -182,7 +182,7 @@ pub struct Texel {
 }
 
 impl Texel {
-    /// Not sampled.
+    /// A texel that was not sampled.
     pub const DARK: Self = Self {
         irradiance: [0.0; 3],
         lit: LightsOfTexel::EMPTY,

@@ -33,7 +33,8 @@ const PLACES: u32 = 16;
 const PLACES_SEED: u64 = 0;
 /// Light that may be neglected, relative to the irradiance of the texel.
 const NEGLIGIBLE: f64 = 1e-5;
-/// Distance from the requested point at which a path counts as meeting it [m], and most Newton steps towards that.
+/// Distance from the requested point at which a path counts as meeting it [m], and maximum number of Newton steps
+/// towards that.
 const MEETS_M: f64 = 1e-9;
 const MAX_STEPS: u32 = 40;
 
@@ -104,11 +105,11 @@ impl Explanation {
 /// Limits of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Most specular surfaces on a path.
+    /// Maximum number of specular surfaces on a path.
     pub max_depth: u32,
-    /// Least fraction of a ray's flux (luminance) with which a branch is followed.
+    /// Fraction of a ray's flux (luminance) below which a branch is not followed.
     pub branch_threshold: f64,
-    /// Most rays for each sample point of a light.
+    /// Maximum number of rays for each sample point of a light.
     pub most_rays: u64,
 }
 

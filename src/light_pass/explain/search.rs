@@ -17,12 +17,12 @@ use crate::progress::Control;
 const FINEST: u32 = 30;
 /// Subdivisions to the item buffer's cells.
 const BUFFER: u32 = CELLS_PER_SIDE.trailing_zeros();
-/// Most cells at the start of the search.
+/// Maximum number of cells at the start of the search.
 const FIRST_CELLS: u64 = 60_000;
-/// Most subdivisions of the domain's side for these.
+/// Maximum number of subdivisions of the domain's side for these.
 const MAX_FIRST: u32 = 16;
-/// A path that fills a cell is resolved if it lights no more than this extent [texels], and the arrival from the cell's
-/// centre lies this close to the mean of those from its corners.
+/// A path that fills a cell is resolved if it lights no more than `FINE_TEXELS` across, and the arrival from the cell's
+/// centre lies within `STRAIGHT_TEXELS` of the mean of those from its corners.
 const FINE_TEXELS: f64 = 0.25;
 const STRAIGHT_TEXELS: f64 = 0.002;
 /// Where the extent of a path is unknown: part of the map by which it may exceed its known arrivals, in cells of the

@@ -11,7 +11,7 @@ use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
 use crate::transport::{Event, MediumStack, Tracer};
 
-/// Most segments of one light ray that may be queued.
+/// Maximum number of queued segments of one light ray.
 const MAX_WAITING: usize = 512;
 
 /// Light that reaches the receiver over at least one specular surface.

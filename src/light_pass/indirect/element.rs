@@ -175,7 +175,7 @@ pub fn point_in(polygon: &Polygon, square: DVec2) -> DVec2 {
                 0.5
             };
             let [a, b, c] = fan(index);
-            // Uniform over the triangle: the distance from its first corner goes with the square root.
+            // Uniform over the triangle: the distance from its first corner grows with the square root.
             let root = across.sqrt();
             return a * (1.0 - root) + b * (root * (1.0 - square.y)) + c * (root * square.y);
         }

@@ -15,7 +15,7 @@ const MIN_COSINE: f64 = 0.866;
 type Side = [(u64, u64); 2];
 
 /// The smooth piece of each triangle, counted from 0. Triangles of a piece are connected by edges that they share in
-/// the map and that are no creases of the surface.
+/// the map and that are not creases of the surface.
 pub fn smooth_pieces(mesh: &Mesh, chart: &Chart) -> Vec<u32> {
     let count = chart.corner_uvs.len();
     let mut parent: Vec<u32> = (0..count as u32).collect();

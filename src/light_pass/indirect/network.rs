@@ -16,10 +16,10 @@ use crate::transport::{SurfaceHit, Tracer};
 /// Rays per element in the first pass. The second has as many, and each further one as many as all before it.
 const FIRST_RAYS: u32 = 16;
 
-/// Passes that every element needs, 64 rays: fewer may miss a small bright spot and then see no error either.
+/// Minimum number of passes per element, 64 rays: fewer may miss a small bright spot and then see no error either.
 pub const MIN_PASSES: u8 = 3;
 
-/// Most passes of an element: 4,096 rays.
+/// Maximum number of passes per element: 4,096 rays.
 pub const MAX_PASSES: u8 = 9;
 
 /// The grid of each receiver.
@@ -102,7 +102,7 @@ impl Network {
         Some((links, row.kept))
     }
 
-    /// Rays of a typical element after so many passes.
+    /// Rays of a typical element after this number of passes.
     pub fn rays_after(passes: u8) -> u32 {
         FIRST_RAYS << passes.saturating_sub(1)
     }
@@ -117,7 +117,7 @@ impl Network {
         self.grids.iter().map(Grid::bytes).sum::<u64>() + rows.sum::<u64>() + links.sum::<u64>()
     }
 
-    /// Approximate memory once every element has so many passes.
+    /// Approximate memory once every element has its number of passes.
     pub fn bytes_after(&self, passes: &[u8]) -> u64 {
         let missing: u64 = (0..MAX_PASSES)
             .map(|pass| {
@@ -135,8 +135,8 @@ impl Network {
             .collect()
     }
 
-    /// Traces whatever is missing for every element to have so many passes. False if cancelled; complete passes are
-    /// kept. Deterministic for any number of threads, and independent of what was traced before.
+    /// Traces whatever is missing for every element to have its number of passes. False if cancelled; complete passes
+    /// are kept. The result depends neither on the number of threads nor on what was traced before.
     pub fn trace(
         &mut self,
         tracer: &Tracer,

@@ -13,7 +13,7 @@ const MIN_WEIGHT: f64 = 1e-4;
 
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Most specular surfaces on a path.
+    /// Maximum number of specular surfaces on a path.
     pub max_depth: u32,
 }
 

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::network::{MAX_PASSES, Network};
 use crate::optics::LinearSrgb;
 
-/// Most bounces of light.
+/// Maximum number of bounces.
 pub const MAX_BOUNCES: u32 = 1000;
 
 /// Remaining light, relative to the mean, at which the iteration ends.
@@ -29,7 +29,7 @@ pub struct Solution {
 }
 
 impl Network {
-    /// Solves E = K (S + E) for the sources S [W/m²] of all elements, from the first so many passes of each element, at
+    /// Solves E = K (S + E) for the sources S [W/m²] of all elements, using the first `passes` of each element, at
     /// least [`MIN_PASSES`](super::MIN_PASSES).
     pub fn solve(&self, sources: &[LinearSrgb], passes: &[u8]) -> Solution {
         let count = self.element_count();

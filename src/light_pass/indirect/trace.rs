@@ -43,7 +43,7 @@ pub struct Batch {
     pub counts: TraceCounts,
 }
 
-/// Which points of an element send rays. Part of a surface may lie inside a solid.
+/// Which points of an element send rays: its surface may lie partly inside a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ElementPoints {
     /// Not traced yet.
@@ -80,7 +80,7 @@ impl std::ops::AddAssign for TraceCounts {
 /// Elements per task.
 const CHUNK: usize = 32;
 
-/// Halvings of the number of rays, at most, of an element that is smaller than usual on its grid.
+/// Maximum number of times that the rays of an element smaller than usual on its grid are halved.
 const MAX_HALVINGS: u32 = 3;
 
 /// Inputs of a pass.

@@ -18,9 +18,9 @@ const TRIED_FIRST: usize = 16;
 pub(super) struct Builder<'a> {
     pub(super) launch: &'a Launch,
     pub(super) tracer: &'a Tracer,
-    /// Of every object; `None` if it has no vertices.
+    /// Box of each object; `None` if it has no vertices.
     pub(super) bounds: &'a [Option<Bounds>],
-    /// Of the wanted objects.
+    /// Boxes of the wanted objects.
     pub(super) boxes: Vec<Bounds>,
     /// Whether an object is a caster.
     pub(super) wanted: &'a [bool],

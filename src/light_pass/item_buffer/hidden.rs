@@ -16,7 +16,7 @@ use super::grid::Grid;
 use super::polygon::Polygon;
 use crate::light_pass::launch::Launch;
 
-/// Widths below this are rounding [half sides of a face].
+/// Widths below this are rounding error [half sides of a face].
 const SLIVER: f64 = 1e-11;
 
 /// Relative distance by which a face has to be nearer than a caster.
@@ -26,7 +26,7 @@ const NEARER: f64 = 1e-7;
 /// may tilt the triangle's plane.
 const MIN_VOLUME: f64 = 1e-6;
 
-/// Most faces that are subtracted from a cell; later ones are ignored.
+/// Maximum number of faces that are subtracted from a cell; later ones are ignored.
 const MAX_FACES: usize = 64;
 
 /// A cell that falls into more pieces counts as visible.
@@ -109,7 +109,7 @@ pub(super) struct HiddenCells<'a> {
     casters: BTreeMap<((usize, usize), usize), f64>,
 }
 
-/// What is hidden in the doubtful cells of one face.
+/// Hidden cells and visible casters among the doubtful cells of one face.
 #[derive(Debug)]
 pub(super) struct Hidden {
     /// Cells in which every caster is hidden.
@@ -228,7 +228,7 @@ impl<'a> HiddenCells<'a> {
     }
 }
 
-/// What is left of a convex polygon in the plane z = 1 outside of a triangle, as convex pieces.
+/// The part of a convex polygon in the plane z = 1 outside of a triangle, as convex pieces.
 fn without(piece: Vec<DVec3>, facet: &Facet) -> Vec<Vec<DVec3>> {
     let mut left = Vec::new();
     let mut inside = piece.clone();

@@ -36,7 +36,7 @@ pub(super) struct Search<'a> {
 enum Projection {
     /// Outside of the face.
     Outside,
-    /// Around the light, or beside it.
+    /// Not entirely in front of the light: the projection has no bounds.
     Unbounded,
     /// Within these cells; `inside` if no part of it leaves the face.
     Cells { cells: CellRange, inside: bool },

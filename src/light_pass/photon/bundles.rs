@@ -29,16 +29,16 @@ use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::wavefront::coverage::FluxTriangle;
 use crate::optics::LinearSrgb;
 
-/// More photons than this make bundles no finer.
+/// Number of photons beyond which bundles become no finer.
 const MAX_PHOTONS: f64 = 8e6;
 
-/// One in so many cells is surveyed first, to predict how much bundles would carry.
+/// One in this many cells is surveyed first, to predict how much bundles would carry.
 const TRIED: usize = 16;
 
 /// Fraction of the arriving flux below which bundles are not worth their cost.
 const MIN_CARRIED: f64 = 0.25;
 
-/// Approximate limit on the bundles of a light, of 100 bytes each.
+/// Approximate limit on the bundles of a light, each of 100 bytes.
 const MAX_BUNDLES: usize = 1 << 21;
 
 /// Approximate number of triangles deposited at once.
@@ -47,13 +47,13 @@ const TRIANGLES_AT_ONCE: usize = 1 << 17;
 /// Extent of the light from one part of a lamp on the map [texels], unless that takes too many parts.
 const PART_TEXELS: f64 = 0.1;
 
-/// Most parts of a lamp along each axis, for a single photon.
+/// Maximum number of parts of a lamp along each axis, for a single photon.
 const MAX_LAMP_PARTS: f64 = 8.0;
 
-/// Likewise for dispersed light.
+/// [`MAX_LAMP_PARTS`] for dispersed light.
 const FEW_LAMP_PARTS: f64 = 2.0;
 
-/// Least and most parts of a spectrum. Fewer would leave colour noise.
+/// Minimum and maximum number of parts of a spectrum. Fewer would leave colour noise.
 const HUE_PARTS: (f64, f64) = (8.0, 64.0);
 
 /// A specular event on a bundle's path.
@@ -89,7 +89,7 @@ impl BundleOffsets {
     }
 
     /// Parts of a lamp for which a bundle is deposited, along both axes: enough that their sampling error stays below
-    /// the noise of so many photons, but no more than `most` along an axis.
+    /// the noise of this number of photons, but at most `most` along an axis.
     fn lamp_parts(&self, photons: f64, most: f64) -> DVec2 {
         let finer = (photons.sqrt() / MAX_LAMP_PARTS).max(1.0);
         let parts = |moved: Vec2| (2.0 * finer * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
@@ -155,7 +155,7 @@ pub(super) struct Square {
     pub(super) cell: usize,
     /// Its start on the cell's curve.
     pub(super) begin: u64,
-    /// Number of subdivisions that lead from the cell to it.
+    /// Subdivision depth below the cell.
     pub(super) divisions: u32,
     /// Bundles of its four triangles around the centre: top, right, bottom, left.
     pub(super) bundles: Vec<Bundle>,
@@ -189,7 +189,8 @@ pub(super) struct Carried<'a> {
 }
 
 impl Bundles {
-    /// Bundles as fine as so many photons warrant; none if the photons are too few or bundles would carry too little.
+    /// Bundles as fine as this number of photons warrants; none if there are too few photons or bundles would carry too
+    /// little.
     pub(super) fn new(surveyor: &Surveyor, photons: f64) -> Self {
         let cells = surveyor.launch.cell_count();
         let photons = photons.min(MAX_PHOTONS) / cells as f64;
@@ -257,9 +258,9 @@ impl Bundles {
         Some((square.cell, within, carried))
     }
 
-    /// Passes the flux of all bundles to `take` in batches of one band and receiver, for so many photons. `count`
-    /// converts flux [W per channel] to counts. Each part of an extended light or a spectrum is sampled at one point,
-    /// by the seed.
+    /// Passes the flux of all bundles, for this number of photons, to `take` in batches of one band and receiver.
+    /// `count` converts flux [W per channel] to counts. Each part of an extended light and of a spectrum is represented
+    /// by one point, which depends on the seed.
     pub(super) fn deposit(
         &self,
         (photons, seed): (f64, u64),
@@ -307,7 +308,7 @@ impl Bundles {
         hand_out(&mut waiting, &mut take);
     }
 
-    /// Samples of lamp and wavelength for so many photons of a triangle, with their weights.
+    /// Samples of lamp and wavelength for this number of photons of a triangle, with their weights.
     fn parts<'a>(
         &self,
         moves: &BundleOffsets,

@@ -1,6 +1,6 @@
 //! A hierarchy of sums over a map's texels, four to a cell from level to level, for tiled and untiled maps alike.
 //!
-//! A cell of level l is 2^l finest texels long. Tiles with coarser texels than that have no cells of the level.
+//! A cell of level l is 2^l finest texels long. Tiles with coarser texels than that have no cells at that level.
 
 use rayon::prelude::*;
 
@@ -10,10 +10,10 @@ use crate::illumination::tiles::{COARSEST, SIDE};
 /// No cell, or no texel.
 const NONE: u32 = u32::MAX;
 
-/// The last level has at most so many cells along each axis.
+/// The last level has at most this many cells along each axis.
 const FEWEST_ACROSS: usize = 4;
 
-/// The surroundings of a cell are averaged over cells so many levels coarser.
+/// The surroundings of a cell are averaged over cells this many levels coarser.
 const STEPS_AROUND: usize = 2;
 
 /// Weight of a cell along one axis in the mean over coarser cells that is interpolated at its own centre: 5/8 or 3/4 of
@@ -170,7 +170,7 @@ impl Cells {
         sums
     }
 
-    /// Likewise per area [1/m²]; 0 where there is no surface.
+    /// Sum of a value of texels over every cell, per area [1/m²]; 0 where there is no surface.
     pub fn densities<const N: usize>(&self, value: impl Fn(usize) -> [f32; N] + Sync) -> Values<N> {
         let mut densities = self.sums(value);
         for (values, level) in densities.iter_mut().zip(&self.levels) {
@@ -235,7 +235,7 @@ impl Cells {
         sums
     }
 
-    /// Likewise without a cell's own contribution; exact where the surface covers the coarser cells completely.
+    /// [`Self::pooled`] without a cell's own contribution; exact where the surface covers the coarser cells completely.
     pub fn around<const N: usize>(&self, level: usize, values: &[[f32; N]]) -> Vec<[f32; N]> {
         let mut means = self.pooled(level, values.to_vec(), STEPS_AROUND);
         if level + STEPS_AROUND < self.levels.len() {

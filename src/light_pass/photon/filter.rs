@@ -15,16 +15,16 @@ use crate::light_pass::accuracy::Noise;
 use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use crate::optics::{LinearSrgb, luminance};
 
-/// The noise per photon is averaged over cells so many levels coarser.
+/// The noise per photon is averaged over cells this many levels coarser.
 const PHOTONS_POOLED: usize = 5;
 
-/// Products of details up to that of so many pairs of photons are attributed to chance: two photons in one texel.
+/// Products of details up to that of this many pairs of photons are attributed to chance: two photons in one texel.
 const CHANCE_PAIRS: f32 = 2.0;
 
 /// Among neighbouring texels, error is taken as proportional to this power of irradiance.
 const ERROR_BY_LIGHT: f32 = 1.5;
 
-/// Part of a cell's luminance that details leave at least, where channels may be negative.
+/// Minimum fraction of a cell's luminance that its details leave, where channels may be negative.
 const MIN_LEFT: f32 = 1e-5;
 
 /// Floor of irradiance relative to the map's mean.

@@ -18,7 +18,7 @@ use crate::scene::emitter::{Emitter, EmitterSampler};
 use crate::scene::{Light, Scene};
 use crate::transport::{MediumStack, Tracer, media_at};
 
-/// Points of a lamp that are probed for whether it lies within one medium.
+/// Points of a lamp that are probed to tell whether all of it lies within one medium.
 const MEDIUM_PROBES: u32 = 16;
 
 /// Photons from which the mean flux is estimated.
@@ -84,7 +84,7 @@ struct Cell {
 }
 
 impl<'a> PhotonLaunch<'a> {
-    /// The domain of a light from one point or direction: what its item buffer marks.
+    /// The domain of a light from one point or direction: the cells that its item buffer marks.
     pub fn of_cells(visible_light: &'a VisibleLight) -> Self {
         let side = CELLS_PER_SIDE;
         let marked = |face: usize| {
@@ -111,7 +111,7 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// The domain of an extended light, which is of unit strength.
+    /// The domain of an extended light; `light` has unit strength.
     pub fn of_places(tracer: &'a Tracer, light: &'a Light, spheres: &'a Spheres, seed: u64) -> Self {
         let scene: &Scene = tracer.scene();
         let places = EmitterSampler::new(light, scene);
@@ -186,8 +186,8 @@ impl<'a> PhotonLaunch<'a> {
         even_code(index, seed)
     }
 
-    /// Number of cells, each with as many photons, in which neighbouring photons take much the same path; 0 for an
-    /// extended light whose points have no [`Self::lamp_offsets`].
+    /// Number of cells. All get equally many photons, and neighbours within one take much the same path. 0 for an
+    /// extended light without [`Self::lamp_offsets`].
     pub(super) fn cell_count(&self) -> usize {
         match &self.domain {
             Domain::Cells { cells, .. } => cells.len(),
@@ -274,7 +274,7 @@ impl Lamp<'_> {
     }
 }
 
-/// Fraction of a face that so many cells cover.
+/// Fraction of a face that this number of cells covers.
 fn cell_share(cells: usize) -> f64 {
     cells as f64 / (CELLS_PER_SIDE * CELLS_PER_SIDE) as f64
 }
@@ -285,7 +285,7 @@ fn full_w(launch: &Launch, cells: usize) -> Option<LinearSrgb> {
     is_even.then(|| launch.emitter().strength * measure)
 }
 
-/// Which of so many equal parts of the curve a place lies in, and where in that part, [0, 2⁶⁴).
+/// Which of `parts` equal parts of the curve a place lies in, and where in that part, [0, 2⁶⁴).
 fn chosen(place: u64, parts: usize) -> (usize, u64) {
     let product = u128::from(place) * parts as u128;
     ((product >> 64) as usize, product as u64)

@@ -33,7 +33,7 @@ pub const HALVES: usize = 2;
 /// The photons of one light.
 pub struct PhotonPass<'a> {
     pub launch: &'a PhotonLaunch<'a>,
-    /// The halves derive their seeds from its seed.
+    /// Both halves derive their seeds from the one here.
     pub rules: PhotonRules<'a>,
     /// Whether bundles serve as a control variate.
     pub has_bundles: bool,
@@ -122,7 +122,7 @@ impl PhotonPass<'_> {
         report
     }
 
-    /// Bundles for so many photons in each half.
+    /// Bundles for this number of photons in each half.
     fn bundles(&self, charts: &KnownCharts, photons: f64, control: &Control) -> Bundles {
         if !self.has_bundles {
             return Bundles::default();

@@ -12,7 +12,7 @@ pub struct PhotonSpectrum {
     /// From RGB to CIE XYZ.
     channels: ColourMatrix,
     nodes: Vec<WeightedNode>,
-    /// Whether a photon has a single wavelength from its start, as bands with maps of their own need it.
+    /// Whether photons have a single wavelength from their start, as separate maps for each band require.
     starts_parted: bool,
 }
 
@@ -36,8 +36,8 @@ pub struct Hue<'a> {
     pub channels: ColourMatrix,
     /// `None` for all wavelengths.
     pub band: Option<usize>,
-    /// Weights of a value's change from the middle to the first and to the last wavelength, which interpolate its
-    /// change from the middle to this one by a parabola. Refractive indices are smooth along that.
+    /// Weights that interpolate how a value differs at this wavelength from the middle one, given its differences at
+    /// the first and at the last: by a parabola in a variable in which refractive indices are smooth.
     pub ends: [f64; 2],
 }
 

@@ -13,7 +13,7 @@ use crate::scene::emitter::{Emitter, EmitterKind, EmitterSampler, in_cap, on_dis
 use crate::scene::{Light, Scene};
 use crate::transport::Tracer;
 
-/// Most spheres of a light.
+/// Maximum number of spheres per light.
 const MAX_SPHERES: usize = 16;
 
 /// Cells along each side of the square from which directions towards a sphere, or points on its disc, are drawn: a
@@ -83,7 +83,7 @@ impl Spheres {
     }
 
     /// A ray from a point of a lamp towards one of the spheres, and the measure [sr or m²] that it represents. `None`
-    /// for a ray towards an earlier sphere as well: it belongs to that one.
+    /// also if the ray could have been aimed at an earlier sphere, to which it then belongs.
     pub fn aim(&self, emitter: &Emitter, place: u64, across_m: f64) -> Option<(Ray, f64)> {
         let (ray, choice) = self.choose(emitter, place, across_m)?;
         Some((ray, choice.measure))
@@ -177,7 +177,7 @@ impl Spheres {
     }
 }
 
-/// What a place along the curve of all spheres selects.
+/// The sample that a place along the curve of all spheres selects.
 struct Choice {
     /// Index of the sphere.
     which: usize,

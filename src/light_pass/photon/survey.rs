@@ -22,7 +22,7 @@ const MIN_SHARE: f64 = 0.01;
 /// Longer paths are left to photons.
 const MAX_STEPS: usize = 12;
 
-/// Paths of a point; further ones are left to photons.
+/// Maximum number of paths of a point; further ones are left to photons.
 const MAX_WAYS: usize = 16;
 
 /// Photons per cell below which bundles are not worth a survey: for light from one point or direction, and for an
@@ -35,14 +35,14 @@ const WORTH: f64 = 1.0;
 /// Points that are followed for a subdivision.
 const POINTS_OF_DIVISION: f64 = 8.0;
 
-/// Most subdivisions that lead from a cell to a square.
+/// Maximum subdivision depth of a cell.
 const MAX_DIVISIONS: u32 = 10;
 
 /// A bundle is of use while the light of its square's centre arrives no farther than this from the mean of two opposite
 /// corners [texels]. Within its triangles its error is a quarter of that or less.
 const MAX_BENT_TEXELS: f64 = 1.0;
 
-/// Largest distance between the arrivals from neighbouring parts of a lamp [texels].
+/// Maximum distance between the arrivals from neighbouring parts of a lamp [texels].
 const MAX_STEP_TEXELS: f64 = 0.5;
 
 /// Approximate segments of a photon on a path without bundles.
@@ -144,7 +144,8 @@ pub(super) struct PhotonSurvey {
 }
 
 impl Surveyor<'_> {
-    /// Divides a cell into squares along its curve, for so many photons; no further once there are `most_bundles`.
+    /// Divides a cell into squares along its curve, for this number of photons; no further once there are
+    /// `most_bundles`.
     pub(super) fn survey(&self, cell: usize, photons: f64, most_bundles: usize) -> PhotonSurvey {
         let mut survey = PhotonSurvey {
             bundles_left: most_bundles,
@@ -174,7 +175,7 @@ impl Surveyor<'_> {
             || square.divisions == MAX_DIVISIONS
             || survey.bundles_left == 0;
         if is_fine || self.control.is_cancelled() {
-            // Least noise for the cost: the root of a photon's variance over its cost.
+            // The density with the least noise for its cost: the root of a photon's variance over its cost.
             let left = (outcome.left + outcome.lost).clamp(MIN_LEFT, 1.0);
             let share = 0.25_f64.powi(square.divisions as i32);
             survey.carried_w += share * outcome.carried_w;
@@ -428,8 +429,7 @@ impl Candidate {
         (moves.lamp_step_texels() < MAX_STEP_TEXELS).then_some(moves)
     }
 
-    /// Deviation of the centre's arrival from the mean of opposite corners [texels], as far as these have the same
-    /// path.
+    /// Deviation of the centre's arrival from the mean of opposite corners on the same path [texels].
     fn bent_texels(&self, middle: &Arrival) -> f64 {
         let bends = [[0, 3], [1, 2]].map(|opposite| {
             let [a, b] = opposite.map(|corner| self.corners[corner].find(middle.key));

@@ -49,9 +49,9 @@ pub struct PhotonRules<'a> {
     /// Of dispersed light.
     pub spectrum: Option<&'a PhotonSpectrum>,
     pub effects: EffectSet,
-    /// Most specular events of a path.
+    /// Maximum number of specular events on a path.
     pub max_depth: u32,
-    /// Unit of the flux in the ledger, as if each photon were the only one.
+    /// Unit of the ledger's counts, for flux as if each photon were the only one.
     pub unit: FluxUnit,
     pub seed: u64,
 }
@@ -65,7 +65,7 @@ pub struct PhotonWalk<'a> {
     pub segments: u64,
 }
 
-/// A photon under way.
+/// The photon that is being traced.
 struct Photon<'a> {
     hue: Hue<'a>,
     /// Its single wavelength, once the light is dispersed.
@@ -108,7 +108,7 @@ impl<'a> PhotonWalk<'a> {
     }
 
     /// Traces the photon of an index to its end; without a `start` it only removes its bundles' flux. Hits on diffuse
-    /// surfaces after at least one specular event go to `arrive`, whose caller also books them as `Deposited`.
+    /// surfaces after at least one specular event go to `arrive`. Whoever places their flux books it as `Deposited`.
     pub(super) fn follow(
         &mut self,
         index: u32,
@@ -319,7 +319,7 @@ impl Photon<'_> {
         }
     }
 
-    /// Separates the photon from some of the bundles that it has followed: their flux is removed at its predicted
+    /// Separates the photon from some of the bundles that it has followed: their flux is removed at their predicted
     /// arrival.
     fn leave_where(&mut self, is_left: impl Fn(&Bundle) -> bool, arrive: &mut impl FnMut(Hit)) {
         let carried = self.carried;
@@ -374,7 +374,7 @@ const MIN_WIDTH: f64 = 1e-7;
 /// selects, the number is uniform again and serves the next decision.
 struct Choice {
     number: f64,
-    /// Width of what is left of the first interval.
+    /// Width of the remaining part of the first interval.
     width: f64,
     random: Random,
 }
