@@ -1,12 +1,12 @@
 //! Error estimates without a reference, from the differences between maps of nested lattices.
 //!
-//! Let I be the map of a lattice, I₂ that of the lattice with steps of twice the length, I₄ the next. The errors of
-//! neighbouring levels turn out to be independent (they come from where cuts and cells happen to lie), so that
-//! ⟨(I − I₂)²⟩ = e²(1 + R²), R = e₂/e. R = 2 is what light cut along lines gives (first order); it is also measured, as
-//! √(⟨(I₂ − I₄)²⟩/⟨(I − I₂)²⟩). One measurement of a ratio is noisy: R is the geometric mean of both.
+//! Let I be the map of a lattice, I₂ that of the lattice with twice the step, I₄ the next. The errors of successive
+//! levels turn out to be independent (they depend on where cuts and cells happen to lie), so that
+//! ⟨(I − I₂)²⟩ = e²(1 + R²) with R = e₂/e. Light that is cut off along lines converges at first order, R = 2. R is also
+//! measured as √(⟨(I₂ − I₄)²⟩/⟨(I − I₂)²⟩). A single measurement is noisy, so R is the geometric mean of both.
 //!
-//! Neither level can see what both miss, and a difference does not see what all levels share: what was given up on
-//! the way (threshold, depth, no place) is added by its watts.
+//! A difference does not show what all levels miss: truncated light (threshold, depth, unresolved) is added by its
+//! watts.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -20,64 +20,64 @@ use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::tiles::TileLayout;
 use crate::illumination::{Chart, Receiver};
 
-/// Error ratio of neighbouring levels before it is measured: first order.
+/// Error ratio of successive levels before it is measured: first order.
 const PRIOR_RATIO: f64 = 2.0;
 
-/// Measured ratios are taken to lie between these.
+/// Measured ratios are clamped to this range.
 const RATIO_RANGE: (f64, f64) = (1.5, 6.0);
 
-/// No level is taken to have a smaller part of the squared error of the one before it.
+/// Lower bound on a level's squared error, relative to that of the level before.
 const MIN_GAIN: f64 = 1.0 / (RATIO_RANGE.1 * RATIO_RANGE.1);
 
-/// A tile's squared error is taken to be at least this part of that of the tiles around it.
+/// Lower bound on a tile's squared error, relative to the mean of the tiles around it.
 const MIN_SHARE_OF_NEIGHBOURS: f64 = 0.25;
 
-/// A texel's error is that of the texels around it up to this many texels away.
+/// Squared errors of texels are averaged up to this many texels away.
 const WINDOW_TEXELS: usize = 2;
 
-/// Irradiance of one map, for estimates.
+/// Irradiance of one map, for error estimates.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Image {
-    /// Texels across; in tiles: of the finest size.
+    /// Texels across; in a tiled map, of the finest size.
     pub width: usize,
-    /// Texels down.
     pub height: usize,
-    /// Luminance of E, texel by texel of the chart [W/m², of a light of unit strength].
+    /// Luminance of E per texel [W/m², for a light of unit strength].
     pub luminance: Vec<f64>,
-    /// Area under each texel [m²]; a single value where all are alike.
+    /// Area under each texel [m²]; a single value if all are equal.
     pub texel_areas_m2: Vec<f64>,
-    /// Where the chart is in tiles.
+    /// `None` for an untiled map.
     pub layout: Option<Arc<TileLayout>>,
 }
 
-/// Maps of one level.
+/// Images of one level, by receiver.
 pub type Images = BTreeMap<Receiver, Image>;
 
-/// What is known of the error of one map.
+/// Error estimate of one map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapError {
-    /// Of the map [texels].
+    /// Size of the map [texels].
     pub size: (usize, usize),
-    /// Expected error of each texel's luminance [W/m², of a light of unit strength]: root of variance and squared bias.
+    /// Expected error of each texel's luminance, the root of variance and squared bias [W/m², for a light of unit
+    /// strength].
     pub texels: Vec<f64>,
     /// Squared error times area, summed over each tile [W²/m²].
     pub tiles: Vec<f64>,
 }
 
-/// What is known of the error of all maps of one light.
+/// Error estimate of all maps of one light.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightError {
     pub maps: BTreeMap<Receiver, MapError>,
-    /// Root mean square of the error over the mean irradiance, over all texels by their area.
+    /// Root mean square error over all texels, weighted by area, relative to the mean irradiance.
     pub relative_rmse: f64,
-    /// How many times smaller the error became with the last level.
+    /// Error of the level before over that of the last level.
     pub ratio: f64,
-    /// Whether an audit found more than differences between levels show.
+    /// Whether an audit found a larger error than the differences between levels show.
     pub is_raised: bool,
 }
 
 impl LightError {
-    /// Raises the error everywhere alike where its square is found to be larger.
+    /// Scales all errors up if the relative squared error is found to be larger.
     pub fn raise_to(&mut self, relative_square: f64) {
         let factor = relative_square.sqrt() / self.relative_rmse;
         if !(factor > 1.0 && factor.is_finite()) {
@@ -92,12 +92,10 @@ impl LightError {
     }
 }
 
-/// Luminance of all maps.
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
     images_of(maps.iter(), unit)
 }
 
-/// Luminance of some maps.
 pub fn images_of<'a>(maps: impl Iterator<Item = (Receiver, &'a ReceiverMap)>, unit: FluxUnit) -> Images {
     maps.map(|(receiver, map)| {
         let chart = &map.chart;
@@ -131,7 +129,6 @@ impl Image {
         }
     }
 
-    /// Of a texel's surface [m²].
     pub fn area_m2(&self, texel: usize) -> f64 {
         if self.texel_areas_m2.len() == 1 {
             self.texel_areas_m2[0]
@@ -140,7 +137,7 @@ impl Image {
         }
     }
 
-    /// The tile of [`TILE_SIDE`] that each texel lies in, or the first of several.
+    /// The tile of [`TILE_SIDE`] in which each texel lies, or the first of several.
     fn tiles(&self) -> TileOf {
         match &self.layout {
             Some(layout) => TileOf::Listed(layout.blocks(TILE_SIDE)),
@@ -159,7 +156,7 @@ impl Image {
         })
     }
 
-    /// Squared differences from another map of the same surface, texel by texel; from black where there is none.
+    /// Squared difference of each texel from another map of the same surface; from black if there is none.
     fn squared_difference(&self, other: Option<&Self>) -> Vec<f64> {
         let square = |(texel, value): (usize, &f64)| {
             let before = other.map_or(0.0, |other| other.luminance[texel]);
@@ -168,7 +165,7 @@ impl Image {
         self.luminance.par_iter().enumerate().map(square).collect()
     }
 
-    /// Sums over tiles, each texel by its area.
+    /// Sums over tiles, weighted by texel area.
     pub fn tile_sums(&self, squares: &[f64]) -> Vec<f64> {
         let (columns, rows) = tile_counts(self.width, self.height);
         let mut sums = vec![0.0; columns * rows];
@@ -180,7 +177,7 @@ impl Image {
             return sums;
         };
         for tile in layout.tiles() {
-            // A large texel lies on several.
+            // A large texel covers several tiles.
             let side = (1_usize << tile.level).div_ceil(TILE_SIDE);
             let share = 1.0 / (side * side) as f64;
             for texel in tile.texels {
@@ -195,7 +192,7 @@ impl Image {
         sums
     }
 
-    /// At least a part of the mean of the tiles around: two levels may agree in a tile by chance.
+    /// Raises each tile to at least a part of the mean around it: two levels may agree in a tile by chance.
     fn pooled(&self, tiles: &[f64]) -> Vec<f64> {
         let (columns, rows) = tile_counts(self.width, self.height);
         let around = |tile: usize| {
@@ -209,7 +206,7 @@ impl Image {
         tiles.iter().enumerate().map(least).collect()
     }
 
-    /// Means over a square window around each texel, as far as the map, or its tile, reaches.
+    /// Means over a square window around each texel, clipped to the map or to the texel's tile.
     fn windowed(&self, squares: &[f64]) -> Vec<f64> {
         let mut means = vec![0.0; squares.len()];
         let Some(layout) = &self.layout else {
@@ -254,11 +251,11 @@ fn window(squares: &[f64], (width, height): (usize, usize), row: usize, line: &m
     }
 }
 
-/// Finds the tile of a texel.
+/// Maps texels to tiles.
 enum TileOf {
-    /// Row by row.
+    /// An untiled map.
     Counted { width: usize, columns: usize },
-    /// As a layout says.
+    /// A tiled map: the tile of each texel.
     Listed(Vec<u32>),
 }
 
@@ -273,16 +270,16 @@ impl TileOf {
     }
 }
 
-/// What the round before this one knew, where this one refined only some tiles.
+/// The estimate of the round before this one, which refined only some tiles.
 #[derive(Clone, Copy, Debug)]
 pub struct PreviousRound<'a> {
     pub error: &'a LightError,
-    /// Where this round is finer.
+    /// Tiles that this round refined.
     pub refined: &'a RoughTiles,
 }
 
-/// The error of `fine` by the two coarser levels before it (`coarser[0]` the nearer one; the other may be missing).
-/// Tiles that were not refined keep their error of before. `None` where no light arrived.
+/// The error of `fine`, from the two levels before it (`coarser[0]` is the finer one; the other may be missing). Tiles
+/// that were not refined keep their former error. `None` without `coarser[0]`, or if no light arrived.
 pub fn estimate(
     fine: &Images,
     coarser: [Option<&Images>; 2],
@@ -306,7 +303,7 @@ pub fn estimate(
         .collect();
     let ratio = match (coarser[1], before) {
         (Some(coarse), None) => measured_ratio(middle, coarse, &differences),
-        // Later rounds go on as the first ones did: their tiles differ from round to round.
+        // Later rounds keep the ratio of the first ones, since each refines different tiles.
         (_, Some(before)) => before.error.ratio,
         (None, None) => PRIOR_RATIO,
     };
@@ -329,7 +326,7 @@ pub fn estimate(
         let tiles: Vec<f64> = (0..tile_sums.len())
             .map(|tile| match old {
                 Some(old) if !is_refined(receiver, tile) => old.tiles[tile],
-                // A difference may vanish by chance, or because both levels miss the same.
+                // A difference may vanish by chance, or because both levels miss the same light.
                 Some(old) => (tile_sums[tile] * share).max(old.tiles[tile] * MIN_GAIN),
                 None => {
                     let older = older_tiles.as_ref().map_or(0.0, |tiles| tiles[tile]);
@@ -350,16 +347,16 @@ pub fn estimate(
     (flux_w > 0.0).then_some(error)
 }
 
-/// Squared differences of the two coarser levels, tile by tile.
+/// Squared differences between the two coarser levels, by tile.
 fn older_differences(receiver: Receiver, middle: &Images, coarse: Option<&Images>) -> Option<Vec<f64>> {
     let image = middle.get(&receiver)?;
     Some(image.tile_sums(&image.squared_difference(coarse?.get(&receiver))))
 }
 
-/// Squared difference of half sets of rays, around each texel, by receiver [W²/m⁴ of a light of unit strength].
+/// Squared difference between half sets of rays, around each texel, by receiver [W²/m⁴, for a light of unit strength].
 pub type Noise = BTreeMap<Receiver, Vec<f64>>;
 
-/// The noise of the sum of two half sets: their difference has the same variance.
+/// The noise of the sum of two half sets, whose difference has the same variance.
 pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
     let of = |(&receiver, image): (&Receiver, &Image), other: &Images| {
         let squares = image.squared_difference(other.get(&receiver));
@@ -371,12 +368,12 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
     noise
 }
 
-/// Share of the noise of a map that its difference from one of every fourth of its rays has, beside that one's own.
+/// Noise of a map's difference from the map of every fourth ray, relative to the map's own noise.
 const NOISE_OF_DIFFERENCE: f64 = 1.5;
 
-/// The error of splats: noise by half sets; what the difference from `thinner`, the map of every fourth ray, holds beyond
-/// noise is half blur, which levels share (e = D/(R − 1)), and half the pattern of the lattice, which they do not
-/// (e = D/√(1 + R²)), both of first order. `None` where no light arrived.
+/// The error of splats. Half sets give the noise. The rest of the difference D from `thinner`, the map of every fourth
+/// ray, is attributed half to blur, which levels share (e = D/(R − 1)), and half to the pattern of the lattice, which
+/// they do not (e = D/√(1 + R²)), both of first order. `None` if no light arrived.
 pub fn estimate_splats(
     fine: &Images,
     thinner: &Images,
@@ -395,12 +392,12 @@ pub fn estimate_splats(
     })
 }
 
-/// The error of photons: noise by half sets. `None` where no light arrived.
+/// The error of photons: half sets give the noise. `None` if no light arrived.
 pub fn by_noise(fine: &Images, mut noise: Noise, ledger: &EnergyLedger) -> Option<LightError> {
     by_squares(fine, ledger, |receiver, _| noise.remove(&receiver))
 }
 
-/// The error of `fine`, of whose squared difference from `other` it has a share of its own. `None` where no light arrived.
+/// The error of `fine`, whose square is a share of the squared difference from `other`. `None` if no light arrived.
 pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyLedger) -> Option<LightError> {
     by_squares(fine, ledger, |receiver, image| {
         let squares = image.windowed(&image.squared_difference(other.get(&receiver)));
@@ -408,7 +405,7 @@ pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyL
     })
 }
 
-/// The error whose square around each texel is given map by map.
+/// The error from its square around each texel, map by map.
 fn by_squares(
     fine: &Images,
     ledger: &EnergyLedger,
@@ -439,7 +436,7 @@ fn by_squares(
     (flux_w > 0.0).then_some(error)
 }
 
-/// R = e₂/e from three levels, half-way to the first-order ratio.
+/// R = e₂/e from three levels: the geometric mean of the measured and the first-order ratio.
 fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<Receiver, (Vec<f64>, Vec<f64>)>) -> f64 {
     let newer: f64 = fine.values().flat_map(|(_, tiles)| tiles).sum();
     let older: f64 = middle
@@ -457,8 +454,8 @@ fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<Receiver, (V
     }
 }
 
-/// Share of the light that no map shows though it should: what ended by depth or threshold is taken to go where the rest
-/// of it went, to maps, into surfaces and out of the scene; what could not be resolved, to maps.
+/// Share of the light that is missing from the maps. Light that ended by depth or threshold is assumed to divide like
+/// the rest between maps, absorption and escape; all that could not be resolved, to be missing from the maps.
 pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
     let truncated = &ledger.truncated;
     let arrived = ledger.deposited + ledger.absorbed + ledger.escaped;
@@ -471,11 +468,11 @@ pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
     }
 }
 
-/// Standard deviations by which a mean square has to exceed zero to be more than noise.
+/// Standard deviations by which a mean square has to exceed zero to be significant.
 const SIGNIFICANT: f64 = 4.0;
 
-/// Relative mean square error of `maps` against two independent noisy maps of the same light: the noise of a product of
-/// both differences has no mean. `None` where it may be noise all the same.
+/// Relative mean square error of `maps`, from the product of their differences to two independent noisy maps of the
+/// same light, whose noise cancels in the mean. `None` if it is not significant.
 pub fn audited_square(maps: &Images, halves: [&Images; 2]) -> Option<f64> {
     let noise = half_set_noise(halves[0], halves[1]);
     let (mut sum, mut variance, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0, 0.0);
@@ -488,7 +485,7 @@ pub fn audited_square(maps: &Images, halves: [&Images; 2]) -> Option<f64> {
         for texel in 0..image.luminance.len() {
             let (own, texel_m2) = (value(own, texel), image.area_m2(texel));
             sum += (own - value(first, texel)) * (own - value(second, texel)) * texel_m2;
-            // Each half has a half of the variance of their difference.
+            // Each half has half the variance of their difference.
             variance += (0.5 * noise.map_or(0.0, |noise| noise[texel]) * texel_m2).powi(2);
             flux_w += own * texel_m2;
             area_m2 += texel_m2;
@@ -498,9 +495,9 @@ pub fn audited_square(maps: &Images, halves: [&Images; 2]) -> Option<f64> {
     is_bias.then(|| sum * area_m2 / (flux_w * flux_w))
 }
 
-/// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`: refining divides their error by the
-/// ratio of the levels. All that have some error, where that is not enough. `counted`: squared errors of tiles, where they
-/// do not all count alike.
+/// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`, if refinement divides their error
+/// by the ratio of the levels; all tiles with an error if that is not enough. `counted`: squared errors of tiles to be
+/// used instead, where tiles do not all count alike.
 pub fn rough_tiles(
     error: &LightError,
     goal: f64,
@@ -514,7 +511,7 @@ pub fn rough_tiles(
         let with_error = squares.iter().enumerate().filter(|(_, square)| **square > 0.0);
         tiles.extend(with_error.map(|(tile, &square)| (square, receiver, tile)));
     }
-    // The roughest first; equals by their place.
+    // Roughest first, ties by position.
     tiles.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     let total: f64 = tiles.iter().map(|(square, ..)| square).sum();
     let wanted = total * (goal / error.relative_rmse) * (goal / error.relative_rmse);

@@ -1,10 +1,10 @@
 //! The item buffer of a light: the directions in which it sees a specular surface (section 3.1.2 of the paper; Weghorst
 //! et al. 1984).
 //!
-//! Cells are marked by projecting the scene's hierarchy onto the faces of the launch domain, and the triangles of
-//! specular objects below it where a box does not decide; triangles are tested against the cells exactly: one that is
-//! smaller than a cell, edge-on or on a cube edge is never missed. Cells whose whole frustum opaque faces cover before
-//! every caster are dropped ([`hidden`]); all other occlusion is left to the rays.
+//! Cells are marked by projecting the scene's hierarchy onto the faces of the launch domain and, where a box does not
+//! decide, the triangles of specular objects below it. Triangles are tested exactly against the cells: one that is
+//! smaller than a cell, edge-on or on a cube edge is never missed. Cells whose whole frustum is covered by opaque faces
+//! in front of every caster are dropped ([`hidden`]); all other occlusion is left to the rays.
 
 mod bits;
 mod builder;
@@ -25,10 +25,10 @@ use self::search::{Bounds, Search};
 use super::launch::Launch;
 use crate::transport::Tracer;
 
-/// Cells across and down each face.
+/// Cells along each side of a face.
 pub const CELLS_PER_SIDE: usize = 128;
 
-/// Boxes that every node is compared with; of more objects than these, one box around all is.
+/// Maximum number of boxes that each node is compared with; more objects share a single box.
 const MAX_BOXES: usize = 16;
 
 /// Marked cells of all faces of one light.
@@ -37,16 +37,15 @@ pub struct ItemBuffer {
     faces: Vec<CellBits>,
     /// Specular objects that mark at least one cell, ascending.
     pub casters: Vec<usize>,
-    /// Cells that opaque faces cover before every caster.
+    /// Cells that were dropped because opaque faces cover them in front of every caster.
     pub hidden_cells: u64,
-    /// Nodes, triangles and cells that were tested: the work that it took.
+    /// Nodes, triangles and cells that were tested, as a measure of the work.
     pub tests: u64,
 }
 
-/// A box around everything.
 const EVERYWHERE: [Bounds; 1] = [(DVec3::NEG_INFINITY, DVec3::INFINITY)];
 
-/// First and last column and row of the cells of a face that a box may touch; `None` where it touches none.
+/// First and last column, first and last row of the cells of a face that a box may touch; `None` if it touches none.
 pub fn cells_towards(
     launch: &Launch,
     face: usize,
@@ -56,12 +55,12 @@ pub fn cells_towards(
     Some((cells.columns, cells.rows))
 }
 
-/// What becomes of cells whose casters lie behind opaque faces.
+/// What to do with cells whose casters lie behind opaque faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HiddenCellPolicy {
-    /// They are marked like all others.
+    /// Mark them like all others.
     Keep,
-    /// They are dropped.
+    /// Drop them.
     Drop,
 }
 
@@ -94,7 +93,7 @@ impl ItemBuffer {
             HiddenCellPolicy::Drop => builder.hidden(&faces),
         };
         let mut hidden_cells = 0;
-        // Where no caster is hidden; all that the light shines on, where that is known to be everywhere.
+        // Cells in which no caster is hidden; all lit cells under `HiddenCellPolicy::Keep`.
         let mut clear = lit;
         for (face, (doubtful, found)) in hidden.iter().enumerate() {
             clear[face] = faces[face].without(doubtful);
@@ -121,12 +120,11 @@ impl ItemBuffer {
         }
     }
 
-    /// Whether a cell is marked.
     pub fn is_marked(&self, face: usize, column: usize, row: usize) -> bool {
         self.faces[face].get(column, row)
     }
 
-    /// Whether any cell that a box [m] may lie in is marked.
+    /// Whether a box [m] may touch a marked cell.
     pub fn is_marked_towards(&self, launch: &Launch, bounds: (DVec3, DVec3)) -> bool {
         let none = |_: usize| false;
         self.faces.iter().enumerate().any(|(face, marked)| {
@@ -135,7 +133,7 @@ impl ItemBuffer {
         })
     }
 
-    /// Whether an object may bend light, or stand in its way to a caster.
+    /// Whether an object may bend the light, or occlude a caster.
     pub fn may_concern(&self, launch: &Launch, tracer: &Tracer, object: usize) -> bool {
         let Some(bounds) = tracer.scene().objects[object].bounds() else {
             return false;
@@ -155,18 +153,17 @@ impl ItemBuffer {
         })
     }
 
-    /// Number of marked cells.
     pub fn marked_cells(&self) -> u64 {
         self.faces.iter().map(CellBits::count).sum()
     }
 
-    /// Marked cells' part of the whole domain, (0, 1] where any is marked.
+    /// Fraction of the domain that is marked, in (0, 1] if any cell is.
     pub fn marked_share(&self, launch: &Launch) -> f64 {
         let whole = launch.cell_measure(DVec2::ZERO, DVec2::ONE) * launch.face_count() as f64;
         self.marked_measure(launch) / whole
     }
 
-    /// Solid angle [sr] of the marked cells, or their area [m²] for a sun.
+    /// Solid angle of the marked cells [sr], or their area for a sun [m²].
     pub fn marked_measure(&self, launch: &Launch) -> f64 {
         let side = CELLS_PER_SIDE as f64;
         let mut sum = 0.0;
@@ -181,11 +178,11 @@ impl ItemBuffer {
         sum
     }
 
-    /// Lattice cells that touch a marked cell, over all faces: an upper bound of the rays.
+    /// Number of lattice cells that touch a marked cell, over all faces: an upper bound on the rays.
     pub fn lattice_cells(&self, faces: usize, size: (usize, usize)) -> u64 {
         let in_face = |face: usize| -> u64 {
             let mut sum = 0;
-            // Rows that touch the same cells hold as many.
+            // Rows that touch the same cells have the same count.
             let mut last: Option<((usize, usize), u64)> = None;
             for row in 0..size.1 {
                 let rows = touched(row, size.1, CELLS_PER_SIDE);
@@ -204,8 +201,8 @@ impl ItemBuffer {
         (0..faces).into_par_iter().map(in_face).sum()
     }
 
-    /// Lattice columns of a lattice row that touch a marked cell, as ascending, disjoint half-open spans. `size` is the
-    /// lattice's columns and rows.
+    /// The columns of a lattice row that touch a marked cell, as ascending, disjoint half-open spans. `size`: columns
+    /// and rows of the lattice.
     pub fn lattice_spans(&self, face: usize, row: usize, size: (usize, usize)) -> Vec<(usize, usize)> {
         self.spans(face, touched(row, size.1, CELLS_PER_SIDE), size.0)
             .collect()
@@ -227,7 +224,7 @@ impl ItemBuffer {
             .peekable();
         std::iter::from_fn(move || {
             let mut span = runs.next()?;
-            // Runs apart may lie in the same coarser lattice cell.
+            // Separate runs may fall into the same coarser lattice cell.
             while let Some(next) = runs.next_if(|next| next.0 <= span.1) {
                 span.1 = next.1;
             }
@@ -243,7 +240,7 @@ fn touched(index: usize, coarse: usize, fine: usize) -> (usize, usize) {
     (first, last.min(fine - 1))
 }
 
-/// The boxes themselves, or one around all where they are many.
+/// The boxes themselves, or one around all if there are too many.
 fn few(boxes: Vec<Bounds>) -> Vec<Bounds> {
     if boxes.len() <= MAX_BOXES {
         return boxes;

@@ -10,7 +10,7 @@ use crate::scene::Scene;
 use crate::settings::ItemBufferKind;
 use crate::transport::MediumStack;
 
-/// Start domain of one wavefront.
+/// Launch domain of one wavefront.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Launch {
     emitter: Emitter,
@@ -22,7 +22,7 @@ pub struct Launch {
 enum Domain {
     /// Six cube faces around a point.
     Sphere { position: DVec3, mapping: FaceMapping },
-    /// A rectangle across parallel light, before everything in the scene.
+    /// A rectangle across parallel light, in front of the whole scene.
     Plane {
         corner: DVec3,
         across: DVec3,
@@ -31,13 +31,13 @@ enum Domain {
     },
 }
 
-/// Sides from this one on double with the square root of the density [cells].
+/// Sides from this length on are rounded to multiples of powers of two, so that lattices nest [cells].
 const FIRST_NESTED_SIDE: f64 = 58.0;
 
-/// Smaller sides may be odd [cells].
+/// Sides up to this length may be odd [cells].
 const ODD_SIDES: f64 = 16.0;
 
-/// Cells along a side for as many as `wanted`, or a few more.
+/// Cells along a side: `wanted`, rounded up so that lattices nest.
 fn nested_side(wanted: f64) -> usize {
     let doublings = (wanted / FIRST_NESTED_SIDE).log2().floor().clamp(0.0, 24.0);
     let base = wanted / doublings.exp2();
@@ -46,9 +46,9 @@ fn nested_side(wanted: f64) -> usize {
 }
 
 impl Launch {
-    /// The domain of a source. For parallel light: the smallest rectangle, in a frame fixed by the direction alone, around all
-    /// `casters` (indices of specular objects), moved back before the whole scene. `None` where there is nothing to
-    /// aim at.
+    /// The domain of a source. For parallel light it is the smallest rectangle around all `casters` (indices of
+    /// specular objects), in a frame that depends on the direction alone, moved in front of the whole scene. `None` if
+    /// there is nothing to aim at.
     pub fn new(
         emitter: Emitter,
         scene: &Scene,
@@ -72,28 +72,27 @@ impl Launch {
         })
     }
 
-    /// The same light from within these bodies.
+    /// The same light inside these media.
     #[must_use]
     pub fn within(self, media: MediumStack) -> Self {
         Self { media, ..self }
     }
 
-    /// The bodies that its rays start in; none of parallel light.
+    /// The media in which its rays start; none for parallel light.
     pub fn media(&self) -> &MediumStack {
         &self.media
     }
 
-    /// Where the light comes from.
     pub fn emitter(&self) -> &Emitter {
         &self.emitter
     }
 
-    /// Whether the domain is fitted to what it is aimed at.
+    /// Whether the domain is fitted to the casters.
     pub fn is_fitted(&self) -> bool {
         matches!(self.domain, Domain::Plane { .. })
     }
 
-    /// Unit squares of the domain.
+    /// Number of unit squares.
     pub fn face_count(&self) -> usize {
         match self.domain {
             Domain::Sphere { .. } => 6,
@@ -101,11 +100,11 @@ impl Launch {
         }
     }
 
-    /// Lattice cells across and down each face at a density [1/sr]; suns take density/D² rays per m², D = `reach_m`
+    /// Lattice cells across and down each face at a density [1/sr]. Suns take density/D² rays per m²: D, `reach_m`, is
     /// the distance from the casters' centre to their farthest receiver.
     ///
     /// Sides are rounded up to multiples of powers of two, by a thirtieth at most, so that the lattice of a quarter of
-    /// the density is every second ray of this one.
+    /// the density consists of every second ray of this one.
     pub fn lattice_size(&self, density_per_sr: f64, reach_m: f64) -> (usize, usize) {
         match self.domain {
             Domain::Sphere { .. } => {
@@ -122,7 +121,7 @@ impl Launch {
         }
     }
 
-    /// The ray of a point of the domain; `square` in the unit square of `face`.
+    /// The ray of a point of the domain; `square` is in the unit square of `face`.
     pub fn ray(&self, face: usize, square: DVec2) -> Ray {
         match self.domain {
             Domain::Sphere { position, mapping } => {
@@ -144,8 +143,8 @@ impl Launch {
         }
     }
 
-    /// The ray through a point of the scene, and how far along it the point lies [m]. A point where the light itself is has
-    /// none that means anything.
+    /// The ray through a point of the scene, and the distance of the point along it [m]. The direction is arbitrary for
+    /// a point at the light itself.
     pub fn ray_through(&self, point: DVec3) -> (Ray, f64) {
         match self.domain {
             Domain::Sphere { position, .. } => {
@@ -169,8 +168,8 @@ impl Launch {
         }
     }
 
-    /// Flux [W per channel] through the cell between two corners of the unit square, for the strength that the light
-    /// has in the direction of the cell's ray.
+    /// Flux [W per channel] through the cell between two corners of the unit square, whose ray has the given direction.
+    /// The light's strength is taken in that direction.
     pub fn cell_flux_w(&self, low: DVec2, high: DVec2, direction: DVec3) -> LinearSrgb {
         let measure = self.cell_measure(low, high);
         self.emitter.strength * (self.emitter.kind.falloff(direction) * measure)
@@ -191,15 +190,14 @@ impl Launch {
         self.emitter.strength * (self.emitter.kind.falloff(direction) * measure)
     }
 
-    /// Whether the light sends anything into the cell between two corners of the unit square; never false where it
-    /// does.
+    /// False only if the light emits nothing into the cell between two corners of the unit square.
     pub fn may_light_cell(&self, face: usize, low: DVec2, high: DVec2) -> bool {
         let Some((axis, half_angle_rad)) = self.emitter.kind.cone() else {
             return true;
         };
         let middle = self.ray(face, (low + high) * 0.5).direction;
-        // The cell lies within the cap around its middle that reaches its farthest corner; borders bend by less than
-        // half of that again.
+        // The cell lies within the cap around its centre that reaches its farthest corner; edges bulge by less than
+        // half of that.
         let radius = [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
             .map(|corner| middle.angle_between(self.ray(face, corner).direction))
             .into_iter()
@@ -207,7 +205,7 @@ impl Launch {
         axis.angle_between(middle) <= half_angle_rad + 1.5 * radius
     }
 
-    /// Solid angle [sr] of a cell, or its area [m²] for a sun.
+    /// Solid angle of a cell [sr], or its area for a sun [m²].
     pub fn cell_measure(&self, low: DVec2, high: DVec2) -> f64 {
         match self.domain {
             Domain::Sphere { mapping, .. } => mapping.cell_solid_angle_sr(low, high),
@@ -217,7 +215,7 @@ impl Launch {
         }
     }
 
-    /// Area [m²] that the cell would light after a path of the given length [m], were it never bent.
+    /// Area that the cell lights after a path of the given length [m], as if the path were straight.
     pub fn cell_area_at_m2(&self, low: DVec2, high: DVec2, path_m: f64) -> f64 {
         let spread = match self.domain {
             Domain::Sphere { .. } => path_m * path_m,
@@ -226,14 +224,14 @@ impl Launch {
         self.cell_measure(low, high) * spread
     }
 
-    /// Upper bound of the flux of the whole domain [W], largest channel.
+    /// Upper bound on the flux of the whole domain [W, largest channel].
     pub fn power_bound_w(&self) -> f64 {
         let measure = self.cell_measure(DVec2::ZERO, DVec2::ONE) * self.face_count() as f64;
         measure * self.emitter.strength.max_channel()
     }
 
     /// Frame of a face: maps scene points to homogeneous plane coordinates (x, y, z) whose (x/z, y/z) is the point of
-    /// the face or, for a sun, with z = 1, of the rectangle as [−1, 1]².
+    /// the face or, for a sun, with z = 1, the point of the rectangle as [−1, 1]².
     pub fn to_face(&self, face: usize, point: DVec3) -> DVec3 {
         match self.domain {
             Domain::Sphere { position, .. } => {
@@ -250,8 +248,8 @@ impl Launch {
         }
     }
 
-    /// Grows the nearer a point is to the light, and over [`Self::to_face`]'s third coordinate is linear on planes: 1, or
-    /// for a sun the distance [m] before the launch plane, negative.
+    /// Increases towards the light; divided by the third coordinate of [`Self::to_face`] it is linear on planes. 1, or
+    /// for a sun the negative distance from the launch plane [m].
     pub fn nearness(&self, point: DVec3) -> f64 {
         match self.domain {
             Domain::Sphere { .. } => 1.0,
@@ -261,7 +259,7 @@ impl Launch {
         }
     }
 
-    /// The sign of the side of a plane that the light is on: 1 before it, -1 behind it.
+    /// 1 if the normal points to the light's side of the plane, −1 otherwise.
     pub fn side_of_light(&self, point: DVec3, normal: DVec3) -> f64 {
         let height = match self.domain {
             Domain::Sphere { position, .. } => (position - point).dot(normal),
@@ -270,7 +268,7 @@ impl Launch {
         height.signum()
     }
 
-    /// How the unit square lies on a face.
+    /// How the unit square maps to a face.
     pub fn mapping(&self) -> FaceMapping {
         match self.domain {
             Domain::Sphere { mapping, .. } => mapping,
@@ -279,7 +277,7 @@ impl Launch {
     }
 }
 
-/// Two unit vectors perpendicular to `direction` and to each other, that depend on nothing else.
+/// Orthonormal frame with `direction` as its z axis, which depends on nothing else.
 fn frame_across(direction: DVec3) -> DMat3 {
     let (across, down) = direction.any_orthonormal_pair();
     DMat3::from_cols(across, down, direction)
@@ -296,7 +294,7 @@ fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Doma
             (low, high) = (low.min(local), high.max(local));
         }
     }
-    // The nearest point of anything, occluders included.
+    // Nearest point of the scene, occluders included.
     let before = scene
         .objects
         .iter()
@@ -304,7 +302,7 @@ fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Doma
         .map(|position| (frame_from_scene * position).z)
         .fold(f64::INFINITY, f64::min);
     let size = high - low;
-    // Also false where there is no caster, or none with an area across the light.
+    // Also false without casters, or if none has an extent across the light.
     if !(size.x > 0.0 && size.y > 0.0 && before.is_finite()) {
         return None;
     }

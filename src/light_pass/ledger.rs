@@ -5,45 +5,45 @@ use std::ops::AddAssign;
 
 use serde::{Serialize, Serializer};
 
-/// What was given up, by cause [W, luminous-equivalent].
+/// Flux that was given up, by cause [W, luminous-equivalent].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Truncated {
     /// Paths longer than the depth limit.
     pub depth: f64,
     /// Branches below the threshold.
     pub threshold: f64,
-    /// Paths that met a number that is not finite.
+    /// Paths that met a non-finite number.
     pub non_finite: f64,
-    /// Light that no deposit could place.
+    /// Flux that no deposit could place.
     pub unresolved: f64,
-    /// What separate refinement left open.
+    /// Flux that surfaces passed on, less that of the separately refined paths; of either sign.
     pub quadrature: f64,
-    /// Light of effects that the user switched off.
+    /// Flux of effects that the user switched off.
     pub switched_off: f64,
 }
 
 impl Truncated {
-    /// Over all causes [W].
     pub fn total(&self) -> f64 {
         self.depth + self.threshold + self.non_finite + self.unresolved + self.quadrature + self.switched_off
     }
 }
 
-/// Accounts of the caustic layer [W, luminous-equivalent]; each is summed on its own, none is a remainder.
+/// Accounts of the caustic layer [W, luminous-equivalent]. Each is summed on its own; none is a remainder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct EnergyLedger {
     /// Flux whose first hit is a specular surface.
     pub emitted: f64,
     /// Flux incident on diffuse surfaces, before their albedo.
     pub deposited: f64,
-    /// Taken by metals, tints, volumes.
+    /// Absorbed by metals, tints and volumes.
     pub absorbed: f64,
     /// Left the scene.
     pub escaped: f64,
-    /// Given up by us; also told as a sum.
+    /// Given up; serialised by cause and as a sum.
     #[serde(flatten, serialize_with = "with_total")]
     pub truncated: Truncated,
-    /// What is conserved only in expectation, of either sign: photons that chance ended less what it gave to others.
+    /// Flux conserved only in expectation, of either sign: lost with photons that were ended at random, less gained by
+    /// those that go on.
     pub sampling: f64,
 }
 
@@ -92,7 +92,7 @@ impl<'a> Sum<&'a EnergyLedger> for EnergyLedger {
 }
 
 impl EnergyLedger {
-    /// |emitted − Σ| / emitted; 0 where nothing was emitted.
+    /// |emitted − Σ| / emitted; 0 if nothing was emitted.
     pub fn relative_imbalance(&self) -> f64 {
         if self.emitted == 0.0 {
             return 0.0;
@@ -102,21 +102,21 @@ impl EnergyLedger {
     }
 }
 
-/// What carried the light that diffuse surfaces got [W].
+/// Deposited flux, by what carried it [W].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CarriedFlux {
     /// Patches of the wavefront.
     pub patches: f64,
-    /// Bundles, which photons correct.
+    /// Bundles, before photons correct them.
     pub bundles: f64,
-    /// Photons, less what they took away from bundles: of either sign.
+    /// Photons, less the flux of bundles that they removed; of either sign.
     pub photons: f64,
     /// The paper's kernels.
     pub splats: f64,
 }
 
 impl CarriedFlux {
-    /// Of all lights.
+    /// Sum over lights.
     pub fn sum(ledgers: &[LightLedger]) -> Self {
         let sum = |part: fn(&Self) -> f64| ledgers.iter().map(|light| part(&light.carried_w)).sum();
         Self {
@@ -127,7 +127,7 @@ impl CarriedFlux {
         }
     }
 
-    /// "bundles 82.0 %, photons 18.0 %" of what was deposited [W]; `None` where nothing was.
+    /// Text such as "bundles 82.0 %, photons 18.0 %", of the deposited flux; `None` if nothing was carried.
     pub fn in_words(&self, deposited_w: f64) -> Option<String> {
         let parts = [
             ("patches", self.patches),
@@ -146,24 +146,23 @@ impl CarriedFlux {
 /// The ledger of one light.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LightLedger {
-    /// The light's name.
     pub light: String,
-    /// Its accounts.
     pub energy_w: EnergyLedger,
-    /// What was deposited, by what carried it.
+    /// Deposited flux, by what carried it.
     pub carried_w: CarriedFlux,
     /// Flux of launched rays whose first hit was not specular [W].
     pub not_emitted_w: f64,
-    /// What was emitted, as radiant flux [W]; `None` of light that is not traced by wavelength.
+    /// Emitted radiant flux [W]; `None` for light that is not traced by wavelength.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub emitted_radiant_w: Option<f64>,
-    /// What was deposited, as radiant flux [W]; `None` where the bands of the spectrum are not kept.
+    /// Deposited radiant flux [W]; `None` unless the bands of the spectrum are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub deposited_radiant_w: Option<f64>,
 }
 
 impl LightLedger {
-    /// With radiant flux: that of the light over its luminous-equivalent watts, and what its bands deposited [W].
+    /// Adds radiant flux. `radiant`: the light's radiant over its luminous-equivalent watts; `deposited_radiant_w`:
+    /// what its bands deposited [W].
     #[must_use]
     pub fn with_radiant(self, radiant: Option<f64>, deposited_radiant_w: Option<f64>) -> Self {
         Self {

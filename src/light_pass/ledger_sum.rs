@@ -4,7 +4,7 @@ use super::ledger::{CarriedFlux, EnergyLedger, LightLedger, Truncated};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::optics::LinearSrgb;
 
-/// What can become of flux.
+/// What becomes of flux.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Account {
     /// First hit was specular.
@@ -21,23 +21,23 @@ pub enum Account {
     Depth,
     /// Below the branch threshold.
     Threshold,
-    /// Met a number that is not finite.
+    /// Met a non-finite number.
     NonFinite,
     /// No deposit could place it.
     Unresolved,
-    /// What surfaces passed on, less what the paths refined on their own took up; of either sign.
+    /// Passed on by surfaces, less what the separately refined paths carry; of either sign.
     Quadrature,
-    /// Belongs to an effect that is switched off.
+    /// Of an effect that is switched off.
     SwitchedOff,
-    /// Conserved in expectation only: what chance took less what it gave, of either sign.
+    /// Conserved in expectation only: lost in random choices less gained, of either sign.
     Sampling,
-    /// What bundles laid on diffuse surfaces; told beside the others, which hold it already.
+    /// Deposited by bundles. The other accounts already contain it.
     Bundled,
 }
 
 const ACCOUNTS: usize = Account::Bundled as usize + 1;
 
-/// All accounts of one light, exact.
+/// Exact sums of all accounts of one light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct LedgerSum {
     counts: [[i128; 3]; ACCOUNTS],
@@ -49,7 +49,6 @@ impl LedgerSum {
         self.counts.iter().flatten().copied()
     }
 
-    /// The same, to be added to.
     pub fn counts_mut(&mut self) -> impl Iterator<Item = &mut i128> {
         self.counts.iter_mut().flatten()
     }
@@ -75,7 +74,8 @@ impl LedgerSum {
         }
     }
 
-    /// The same accounts in other channels: each triple of counts through a linear function, to the nearest count.
+    /// The same accounts in other channels: applies a linear function to each triple of counts and rounds to the
+    /// nearest count.
     #[must_use]
     pub fn transformed(&self, f: impl Fn(LinearSrgb) -> LinearSrgb) -> Self {
         let transform = |counts: [i128; 3]| {
@@ -88,15 +88,14 @@ impl LedgerSum {
         }
     }
 
-    /// Luminous-equivalent watts of an account, of a light of the given strength where the counts are of one of unit
-    /// strength.
+    /// An account's flux [W, luminous-equivalent] for a light of this strength, if the counts are for unit strength.
     pub fn watts(&self, account: Account, unit: FluxUnit, strength: LinearSrgb) -> f64 {
         let flux_w =
             LinearSrgb::from(self.counts[account as usize].map(|channel| channel as f64 * unit.watts()));
         (flux_w * strength).luminance()
     }
 
-    /// As it is reported.
+    /// The ledger in watts.
     pub fn report(&self, light: &str, unit: FluxUnit, strength: LinearSrgb) -> LightLedger {
         let watts = |account| self.watts(account, unit, strength);
         LightLedger {

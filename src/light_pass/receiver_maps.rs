@@ -11,19 +11,18 @@ use crate::illumination::islands::Islands;
 use crate::illumination::{Chart, Receiver, smoothing};
 use crate::optics::LinearSrgb;
 
-/// One surface's map with its flux.
+/// The map of one surface, with its flux.
 #[derive(Clone, Debug)]
 pub struct ReceiverMap {
-    /// How the surface lies in the map.
     pub chart: Arc<Chart>,
-    /// The flux so far: `levels[0]` at the map's size, each further one at half the size of the one before, made once a
-    /// kernel is smooth enough for it. Of a map in tiles there is but one.
+    /// Accumulated flux: `levels[0]` at the map's size, each further level at half the size of the one before,
+    /// allocated once a kernel is smooth enough for it. Tiled maps have one level.
     levels: Vec<FluxAccumulator>,
-    /// Islands of the chart, where there is more than one.
+    /// `None` if the chart is a single island.
     islands: Option<Islands>,
 }
 
-/// Gives the chart of a receiver at a size that suits it; `None` where it cannot take a map.
+/// Returns the chart of a receiver at a suitable size; `None` if it cannot take a map.
 pub type ChartFor<'a> = dyn Fn(Receiver) -> Option<Arc<Chart>> + Sync + 'a;
 
 /// Maps of all receivers that received flux.
@@ -42,19 +41,19 @@ enum Slot {
 }
 
 impl ReceiverMaps {
-    /// No map yet, for a scene of so many objects.
+    /// No maps yet, for a scene with this number of objects.
     pub fn new(objects: usize) -> Self {
         Self {
             slots: Receiver::all(objects).map(|_| Slot::Untouched).collect(),
         }
     }
 
-    /// All receivers that it has places for, in order.
+    /// All receivers of the scene, in order.
     pub fn receivers(&self) -> impl Iterator<Item = Receiver> + use<> {
         Receiver::all(self.slots.len() / 2)
     }
 
-    /// Allocates the map of a receiver unless that was tried before.
+    /// Allocates the map of a receiver, unless that was tried before.
     pub fn touch(&mut self, receiver: Receiver, chart_for: &ChartFor) {
         let slot = &mut self.slots[receiver.index()];
         if matches!(slot, Slot::Untouched) {
@@ -68,7 +67,6 @@ impl ReceiverMaps {
         }
     }
 
-    /// The map of a receiver, if it has one.
     pub fn get(&self, receiver: Receiver) -> Option<&ReceiverMap> {
         match &self.slots[receiver.index()] {
             Slot::Allocated(map) => Some(map),
@@ -76,7 +74,8 @@ impl ReceiverMaps {
         }
     }
 
-    /// Puts all flux into other channels: each triple of counts through a linear function, to the nearest count.
+    /// Converts all flux to other channels: applies a linear function to each triple of counts and rounds to the
+    /// nearest count.
     pub fn transform(&mut self, f: impl Fn(LinearSrgb) -> LinearSrgb + Sync) {
         for slot in &mut self.slots {
             if let Slot::Allocated(map) = slot {
@@ -103,8 +102,8 @@ impl ReceiverMaps {
         }
     }
 
-    /// Takes out maps that are a millionth as bright as all together: what strayed there between the traced rays. Returns
-    /// whose they are and the flux on them.
+    /// Removes maps less than a millionth as bright as all together: stray light between the traced rays. Returns their
+    /// receivers and the flux removed.
     pub fn drop_negligible_maps(&mut self) -> (Vec<Receiver>, [i128; 3]) {
         let fluxes: Vec<(Receiver, [i128; 3], f64)> = self
             .iter()
@@ -137,7 +136,6 @@ impl ReceiverMaps {
         Receiver::all(self.slots.len() / 2).filter_map(|receiver| Some((receiver, self.get(receiver)?)))
     }
 
-    /// All maps, to be changed.
     pub fn iter_mut(&mut self) -> impl Iterator<Item = (Receiver, &mut ReceiverMap)> {
         let maps = self.receivers().zip(&mut self.slots);
         maps.filter_map(|(receiver, slot)| match slot {
@@ -146,7 +144,6 @@ impl ReceiverMaps {
         })
     }
 
-    /// The map of a receiver, to be added to.
     pub fn get_mut(&mut self, receiver: Receiver) -> Option<&mut ReceiverMap> {
         match &mut self.slots[receiver.index()] {
             Slot::Allocated(map) => Some(map),
@@ -155,14 +152,14 @@ impl ReceiverMaps {
     }
 }
 
-/// Brightness of a map, as a share of that of all maps, below which its light is a stray.
+/// Brightness of a map relative to that of all maps, below which its light is stray.
 const STRAY_SHARE: f64 = 1e-6;
 
-/// Spreads that a kernel must have at a level [texels of the level]: linear interpolation between texels then adds less
-/// than one per cent to its variance.
+/// Minimum spread of a kernel at a level [texels of the level]: linear interpolation between texels then adds less than
+/// one per cent to its variance.
 const MIN_SPREAD_TEXELS: f64 = 6.0;
 
-/// Least side of a level [texels].
+/// Minimum side of a level [texels].
 const MIN_LEVEL_SIDE: usize = 16;
 
 impl ReceiverMap {
@@ -175,7 +172,7 @@ impl ReceiverMap {
         }
     }
 
-    /// Sizes of the levels that it may have.
+    /// Sizes of the levels that the map may have.
     fn level_sizes(&self) -> impl Iterator<Item = (usize, usize)> {
         let is_whole = self.chart.is_full() && self.chart.layout.is_none();
         let halves = |side: usize| side.is_multiple_of(2) && side / 2 >= MIN_LEVEL_SIDE;
@@ -185,12 +182,12 @@ impl ReceiverMap {
         })
     }
 
-    /// Levels that it may have.
+    /// Number of levels that the map may have.
     pub fn most_levels(&self) -> usize {
         self.level_sizes().count()
     }
 
-    /// Makes levels up to one.
+    /// Allocates levels up to this one.
     fn make_levels(&mut self, level: usize) {
         let missing: Vec<(usize, usize)> = self
             .level_sizes()
@@ -208,24 +205,24 @@ impl ReceiverMap {
         self.islands.is_none() && self.chart.layout.is_none()
     }
 
-    /// The coarsest level at which a smooth kernel of the given spread [texels of the map] is still well resolved.
+    /// The coarsest level that still resolves a smooth kernel of the given spread [texels of the map].
     pub fn level_for(&self, spread_texels: f64) -> usize {
         let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= MIN_SPREAD_TEXELS;
         let levels = (0..).zip(self.level_sizes()).map(|(level, _)| level);
         levels.skip(1).take_while(fits).last().unwrap_or(0)
     }
 
-    /// The flux so far, level by level.
+    /// Accumulated flux by level.
     pub fn levels(&self) -> &[FluxAccumulator] {
         &self.levels
     }
 
-    /// Texels at the map's size, to be added to.
+    /// Texels at the map's size.
     pub fn texels_mut(&mut self) -> &mut [FluxCount] {
         self.levels[0].texels_mut()
     }
 
-    /// All that was added to it.
+    /// Total flux over all levels.
     pub fn flux_counts(&self) -> [i128; 3] {
         let texels = self.levels.iter().flat_map(|level| level.texels());
         texels.fold([0; 3], |sum, texel| {
@@ -242,7 +239,7 @@ impl ReceiverMap {
         }
     }
 
-    /// All flux at the map's size: coarser levels spread smoothly.
+    /// Total flux at the map's size, with coarser levels interpolated smoothly.
     pub fn flux(&self) -> Cow<'_, FluxAccumulator> {
         let mut levels = self.levels.iter().rev();
         let mut sum = Cow::Borrowed(levels.next().expect("a map has a level"));
@@ -259,14 +256,14 @@ impl ReceiverMap {
 }
 
 impl ReceiverMap {
-    /// The island that an arrival lies on.
+    /// The island on which an arrival lies.
     pub fn island(&self, arrival: &Arrival) -> u32 {
         self.islands
             .as_ref()
             .map_or(0, |islands| islands.of_triangle(arrival.triangle as usize))
     }
 
-    /// A level's flux, to be added to, beside what says where it may go.
+    /// A level's flux, with the coverage that deposits have to respect.
     pub fn level(&mut self, level: usize) -> (&mut FluxAccumulator, IslandCoverage<'_>) {
         self.make_levels(level);
         let flux = &mut self.levels[level];
@@ -288,7 +285,7 @@ impl ReceiverMap {
 #[derive(Clone, Copy, Debug)]
 pub struct IslandCoverage<'a> {
     size: (usize, usize),
-    /// `None` where all texels are covered.
+    /// `None` if all texels are covered.
     chart: Option<&'a Chart>,
     islands: Option<&'a Islands>,
 }

@@ -1,18 +1,18 @@
 //! Selects a shard of a light pass: every n-th of its numbered tasks. Tasks depend on their numbers alone, so the
 //! shards add up to the whole.
 
-/// One share of several.
+/// One shard of several.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ShardIndex {
     /// Below `count`.
     index: u32,
     count: u32,
-    /// Added to all numbers, so that passes of few pieces do not all begin with the same share.
+    /// Added to all task numbers, so that passes of few tasks do not all begin with the same shard.
     shift: u64,
 }
 
 impl ShardIndex {
-    /// Share `number` of `count`, from 1 on; `None` where there is no such share.
+    /// Shard `number` of `count`, from 1 on; `None` if there is no such shard.
     pub fn new(number: u32, count: u32) -> Option<Self> {
         (1..=count).contains(&number).then(|| Self {
             index: number - 1,
@@ -26,12 +26,11 @@ impl ShardIndex {
         self.index + 1
     }
 
-    /// How many shares there are.
     pub fn count(self) -> u32 {
         self.count
     }
 
-    /// The same share of a pass whose pieces are dealt out from another share on.
+    /// The same shard, with all task numbers shifted.
     #[must_use]
     pub fn shifted(self, by: u64) -> Self {
         Self {
@@ -40,12 +39,12 @@ impl ShardIndex {
         }
     }
 
-    /// Whether a piece belongs to it.
+    /// Whether a task belongs to the shard.
     pub fn has(self, piece: u64) -> bool {
         piece.wrapping_add(self.shift) % u64::from(self.count) == u64::from(self.index)
     }
 
-    /// About how many of so many pieces it has.
+    /// Upper bound on the shard's number of tasks, out of so many in all.
     pub fn of(self, pieces: u64) -> u64 {
         pieces.div_ceil(u64::from(self.count))
     }

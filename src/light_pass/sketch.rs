@@ -15,63 +15,63 @@ use crate::progress::Control;
 use crate::settings::ItemBufferKind;
 use crate::transport::{EffectSet, Tracer};
 
-/// Rays start this far within the domain: its border may be the very border of a surface.
+/// Inset of rays from the border of the domain, which may coincide with the border of a surface.
 const MARGIN: f64 = 1e-9;
-/// The domain's side is divided by no more than this power of two.
+/// Maximum number of subdivisions of the domain's side.
 const FINEST: u32 = 14;
 
-/// How far light is followed, and how closely.
+/// Limits of a sketch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SketchLimits {
-    /// Most specular surfaces on a path.
+    /// Maximum number of specular surfaces on a path.
     pub max_depth: u32,
-    /// Least share of the ray's flux (luminance) that a branch must carry to be followed.
+    /// Fraction of a ray's flux (luminance) below which a branch is not followed.
     pub branch_threshold: f64,
-    /// Most cells of the lattice for each light, > 0.
+    /// Maximum number of lattice cells per light, > 0.
     pub cells: usize,
 }
 
-/// A ray that landed.
+/// A ray that reached a matte surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LandedRay {
     /// Index into `Scene::lights`.
     pub light: usize,
-    /// On a matte surface [m].
+    /// [m].
     pub point: DVec3,
 }
 
-/// Where a piece of a wavefront landed.
+/// A patch of a wavefront on a matte surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SketchedPatch {
     /// Index into `Scene::lights`.
     pub light: usize,
-    /// In their order around it, on one matte surface [m].
+    /// In order around the patch, all on one surface [m].
     pub corners: [DVec3; 4],
 }
 
-/// Where light landed.
+/// Where light lands.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PathPreview {
-    /// Of every ray, once for each way on which it came to a matte surface.
+    /// One for each ray and path to a matte surface.
     pub landings: Vec<LandedRay>,
-    /// Between neighbouring rays that met the same objects in the same way.
+    /// Between neighbouring rays on the same path.
     pub patches: Vec<SketchedPatch>,
-    /// Light rays.
+    /// Rays traced.
     pub rays: u64,
 }
 
 /// A corner of a cell: face, column and row.
 type Corner = (usize, u32, u32);
 
-/// How a ray came to a point.
+/// The path of a ray to a point.
 #[derive(Clone, Copy, Debug)]
 struct ArrivalKind {
     way: (PathSignature, Receiver),
     point: DVec3,
 }
 
-/// Follows thin wavefronts of all lights; lamps with a size shine from their middles, glass bends all light as at
-/// 587.56 nm, and rough surfaces are smooth. Ends early where it is cancelled.
+/// Traces thin wavefronts of all lights. Extended lights emit from their centres, glass refracts all light as at 587.56
+/// nm, and rough surfaces are smooth. Ends early if cancelled.
 pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> PathPreview {
     let aim = LightVisibility::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, false);
     let mut all = PathPreview::default();
@@ -107,7 +107,8 @@ fn of_light(tracer: &Tracer, visible_light: &VisibleLight, limits: SketchLimits,
     }
 }
 
-/// Cells that are worth a ray, as many as there may be or a quarter of that, and how many lie side by side.
+/// Cells that see a caster, as many as `most` or down to a quarter of that, and how many fit along a side of the
+/// domain.
 fn cells(visible_light: &VisibleLight, most: usize) -> (u32, BTreeSet<Corner>) {
     let marked = |face: usize| {
         let all = (0..CELLS_PER_SIDE).flat_map(|row| (0..CELLS_PER_SIDE).map(move |column| (column, row)));
@@ -135,12 +136,12 @@ fn quarters((face, column, row): Corner) -> [Corner; 4] {
     [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| (face, 2 * column + x, 2 * row + y))
 }
 
-/// In their order around the cell.
+/// In order around the cell.
 fn corners_of((face, column, row): Corner) -> [Corner; 4] {
     [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| (face, column + x, row + y))
 }
 
-/// All landings of the ray of a corner.
+/// All landings of a corner's ray.
 fn follow(
     tracer: &Tracer,
     visible_light: &VisibleLight,
@@ -173,7 +174,7 @@ fn follow(
     found
 }
 
-/// What four rays span that went the same way.
+/// Patches between four rays on the same path.
 fn patches<'a>(at: [&'a [ArrivalKind]; 4]) -> impl Iterator<Item = [DVec3; 4]> + 'a {
     let [first, others @ ..] = at;
     first.iter().filter_map(move |arrived| {

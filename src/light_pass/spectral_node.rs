@@ -6,20 +6,19 @@ use crate::optics::spectrum::{Spectrum, Xyz, xyz_bar};
 use crate::optics::{ColourMatrix, LinearSrgb, Nanometres};
 use crate::transport::Tracer;
 
-/// What is traced at one wavelength.
+/// A traced wavelength.
 #[derive(Debug)]
 pub struct SpectralNode {
-    /// The scene as that wavelength meets it.
+    /// The scene at this wavelength.
     pub tracer: Tracer,
-    /// From light in RGB to the CIE XYZ of all wavelengths that it stands for, of a lamp of 1 W (luminous-equivalent).
+    /// From RGB to the CIE XYZ of all wavelengths that the node represents, for a lamp of 1 W (luminous-equivalent).
     pub channels: ColourMatrix,
-    /// In which its tracer follows light.
     pub wavelength: Nanometres,
-    /// Tells its rays from those of the light's other wavelengths.
+    /// Distinguishes its rays from those of the light's other wavelengths.
     pub number: u32,
 }
 
-/// ∫ Φ(λ) w(λ) (x̄, ȳ, z̄)(λ) dλ over a range, for light that has factors in RGB on its way.
+/// ∫ Φ(λ) w(λ) (x̄, ȳ, z̄)(λ) dλ over a range, as a matrix for light with RGB factors on its path.
 pub fn channels_within(
     lamp: &Spectrum,
     range: RangeInclusive<Nanometres>,
@@ -32,13 +31,13 @@ pub fn channels_within(
     }))
 }
 
-/// Back to linear sRGB from X, Y and Z in the place of red, green and blue.
+/// To linear sRGB from X, Y and Z, held as red, green and blue.
 pub fn to_linear_srgb(channels: LinearSrgb) -> LinearSrgb {
     let [x, y, z] = channels.to_array();
     Xyz { x, y, z }.to_linear_srgb()
 }
 
-/// Along which refractive indices are smoothest [nm⁻²].
+/// Variable in which refractive indices are smoothest [nm⁻²].
 pub fn place_of(wavelength: Nanometres) -> f64 {
     wavelength.0.powi(-2)
 }

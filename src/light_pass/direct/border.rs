@@ -8,17 +8,18 @@ use crate::illumination::gutter::neighbours;
 use crate::illumination::lookup::blend;
 use crate::optics::{LinearSrgb, luminance};
 
-/// Light ends within little where it changes by this part of itself from the neighbour on one side to that on the other.
+/// Relative change of irradiance between the neighbours of a texel above which it counts as a shadow border.
 const STEEP: f32 = 0.5;
 
-/// Values of small texels, into which some of a chart's are divided.
+/// Values of the small texels into which some texels of a chart are subdivided.
 #[derive(Clone, Debug)]
 pub struct SubdividedTexels<T> {
-    /// Small texels along a side of one.
+    /// Small texels along one side of a texel.
     side: usize,
     /// Texels across and down the chart.
     size: (usize, usize),
-    /// By texel: first of its small ones, row by row; [`WHOLE`] where it is not divided.
+    /// By texel: index of the first of its small texels, which are stored row by row; [`WHOLE`] if it is not
+    /// subdivided.
     begins: Vec<u32>,
     values: Vec<T>,
 }
@@ -26,7 +27,7 @@ pub struct SubdividedTexels<T> {
 const WHOLE: u32 = u32::MAX;
 
 impl<T: Copy> SubdividedTexels<T> {
-    /// Divides the texels of a chart that are marked, and those around them.
+    /// Subdivides the marked texels of a chart and their neighbours.
     pub(super) fn new(chart: &Chart, side: usize, marked: &[bool], value: T) -> Self {
         let size = (chart.width, chart.height);
         let mut count = 0;
@@ -47,19 +48,19 @@ impl<T: Copy> SubdividedTexels<T> {
         }
     }
 
-    /// Small texels across and down the whole chart.
+    /// Size of the whole chart in small texels.
     fn small_size(&self) -> (usize, usize) {
         (self.size.0 * self.side, self.size.1 * self.side)
     }
 
-    /// Place of a small texel among the values, where it is there.
+    /// Index of a small texel's value; `None` if its texel is not subdivided.
     fn place(&self, column: usize, row: usize) -> Option<usize> {
         let begin = self.begins[row / self.side * self.size.0 + column / self.side];
         let within = row % self.side * self.side + column % self.side;
         (begin != WHOLE).then(|| begin as usize + within)
     }
 
-    /// A small texel, counted row by row over the whole chart.
+    /// `small` counts small texels row by row over the whole chart. `None` if the texel there is not subdivided.
     pub(super) fn get(&self, small: usize) -> Option<&T> {
         let (across, _) = self.small_size();
         Some(&self.values[self.place(small % across, small / across)?])
@@ -71,7 +72,7 @@ impl<T: Copy> SubdividedTexels<T> {
         }
     }
 
-    /// The small texels of one that is divided.
+    /// The small texels of a texel; `None` if it is not subdivided.
     pub(super) fn within(&self, texel: usize) -> Option<&[T]> {
         let begin = self.begins[texel];
         (begin != WHOLE).then(|| &self.values[begin as usize..][..self.side * self.side])
@@ -88,7 +89,7 @@ impl<T: Copy> SubdividedTexels<T> {
 }
 
 impl SubdividedTexels<Texel> {
-    /// Whether a small texel asks for another look.
+    /// Whether a small texel needs more samples.
     pub(super) fn is_unclear(&self, small: usize) -> bool {
         let (width, height) = self.small_size();
         let texel = |small: usize| self.get(small).copied().unwrap_or(Texel::DARK);
@@ -97,7 +98,8 @@ impl SubdividedTexels<Texel> {
 }
 
 impl SubdividedTexels<[f32; 3]> {
-    /// E between the middles of small texels [W/m²], at a place of the map in [0, 1]; `None` where texels are whole.
+    /// E [W/m²] at a map coordinate in [0, 1]², interpolated between the centres of small texels; `None` where texels
+    /// are not subdivided.
     pub fn at(&self, uv: DVec2) -> Option<LinearSrgb> {
         let (width, height) = self.small_size();
         let size = DVec2::new(width as f64, height as f64);
@@ -105,20 +107,20 @@ impl SubdividedTexels<[f32; 3]> {
         let row = ((uv.y * size.y) as usize).min(height - 1);
         let own = self.place(column, row)?;
         let value = |column: usize, row: usize| {
-            // Beside what is divided light changes little.
+            // Irradiance hardly changes where the subdivision ends.
             let place = self.place(column, row).unwrap_or(own);
             LinearSrgb::from(self.values[place].map(f64::from))
         };
         Some(blend(size, uv, value))
     }
 
-    /// How many times as long the texels of the chart are.
+    /// Small texels along one side of a texel.
     pub fn side(&self) -> usize {
         self.side
     }
 }
 
-/// Whether light changes much between the neighbours of a texel.
+/// Whether irradiance changes by more than [`STEEP`] between the neighbours of a texel.
 pub(super) fn is_steep(chart: &Chart, texels: &[Texel], texel: usize) -> bool {
     let around = neighbours(texel, chart.width, chart.height).chain([texel]);
     let covered = around.filter(|&other| texels[other].lit != LightsOfTexel::EMPTY);

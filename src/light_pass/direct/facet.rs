@@ -7,39 +7,35 @@ use crate::illumination::Chart;
 use crate::illumination::parametrisation::coverage::twice_signed_area;
 use crate::scene::Mesh;
 
-/// One triangle on the surface and in the map.
+/// A triangle of a mesh and its image in the map.
 pub struct Facet {
     /// Index within the mesh.
     pub triangle: u32,
     corners: [DVec3; 3],
     corner_normals: [DVec3; 3],
     geometric_normal: DVec3,
-    /// Of the side that is lit.
+    /// 1 if the front of the triangle is lit, −1 if its back is.
     sign: f64,
-    /// Corners in texels.
     pub corners_texels: [DVec2; 3],
-    /// Surface area per map area.
     pub m2_per_texel2: f64,
 }
 
-/// A point of a surface.
 pub struct SurfacePoint {
     /// Index within the mesh.
     pub triangle: usize,
-    /// Of the triangle's corners.
     pub barycentric: [f64; 3],
-    /// Where [m].
+    /// In the scene [m].
     pub position: DVec3,
-    /// Bound of its rounding error per axis [m].
+    /// Bound on the rounding error of the position, per axis [m].
     error: DVec3,
-    /// Unit, across the triangle, on the side that is lit.
+    /// Unit normal of the triangle, on the lit side.
     pub geometric_normal: DVec3,
-    /// Unit, interpolated from the vertices, for that side.
+    /// Unit normal interpolated from the vertices, on the lit side.
     pub shading_normal: DVec3,
 }
 
 impl SurfacePoint {
-    /// A ray that leaves in a unit direction, without meeting the surface again there.
+    /// A ray in a unit direction, offset so that it does not hit this surface again at its origin.
     pub fn spawn(&self, direction: DVec3) -> Ray {
         Ray {
             origin: ray::offset_origin(self.position, self.error, self.geometric_normal, direction),
@@ -49,7 +45,7 @@ impl SurfacePoint {
 }
 
 impl Facet {
-    /// A triangle of a chart's mesh; `None` where it has no area on the surface or in the map.
+    /// A triangle of a chart's mesh; `None` if it is degenerate on the surface or in the map.
     pub fn new(mesh: &Mesh, chart: &Chart, triangle: u32) -> Option<Self> {
         let index = triangle as usize;
         let size = DVec2::new(chart.width as f64, chart.height as f64);
@@ -68,7 +64,7 @@ impl Facet {
         })
     }
 
-    /// The point of the surface at a place of the map.
+    /// The surface point at a map position [texels].
     pub fn at(&self, place: DVec2) -> SurfacePoint {
         let [a, b, c] = self.corners_texels;
         let twice = twice_signed_area(self.corners_texels);
@@ -82,7 +78,7 @@ impl Facet {
             triangle: self.triangle as usize,
             barycentric,
             position,
-            // Barycentric coordinates from the map add up to 1 only within their own rounding.
+            // Barycentric coordinates computed from the map sum to 1 only up to their own rounding error.
             error: error * 2.0,
             geometric_normal: self.geometric_normal * self.sign,
             shading_normal: normal.try_normalize().unwrap_or(self.geometric_normal) * self.sign,

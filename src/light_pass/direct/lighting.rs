@@ -8,25 +8,25 @@ use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, EmitterKind};
 use crate::transport::DiffuseResponse;
 
-/// Light on its way to a point, whatever surface is there.
+/// Light that arrives at a point, whatever surface is there.
 pub struct IncidentLight {
-    /// Unit.
+    /// Unit vector.
     pub to_light: DVec3,
-    /// To the light [m], infinite for a sun.
+    /// Infinite for a sun.
     pub distance_m: f64,
-    /// E across the beam for a strength of 1.
+    /// E at unit strength on a surface that faces the light.
     pub across_beam: f64,
     pub strength: LinearSrgb,
 }
 
 impl IncidentLight {
-    /// From a source; `None` at its very place.
+    /// `None` at the source itself.
     pub fn new(emitter: &Emitter, point: DVec3) -> Option<Self> {
         Self::of_patch(emitter, point, 0.0)
     }
 
-    /// From a source that stands for a patch of a surface [m²]: near by it is a disc of that area (Wallace, Elmquist
-    /// and Haines, "A ray tracing algorithm for progressive radiosity", SIGGRAPH 1989), which sends no more than it can.
+    /// A source that represents a patch of a surface. Irradiance is that of a disc of its area [m²], which stays finite
+    /// close by (Wallace, Elmquist and Haines, "A ray tracing algorithm for progressive radiosity", SIGGRAPH 1989).
     pub fn of_patch(emitter: &Emitter, point: DVec3, patch_m2: f64) -> Option<Self> {
         let (to_light, distance_m, across_beam) = match (emitter.kind, emitter.kind.position()) {
             (EmitterKind::Parallel { direction }, _) => (-direction, f64::INFINITY, 1.0),
@@ -48,21 +48,21 @@ impl IncidentLight {
     }
 }
 
-/// Light that a surface takes if nothing stands in its way.
+/// Unoccluded light that arrives at a surface.
 pub struct UnshadowedLight {
-    /// E that it would give there [W/m²].
+    /// E [W/m²].
     pub irradiance: LinearSrgb,
-    /// Unit.
+    /// Unit vector.
     pub to_light: DVec3,
-    /// To the light [m], infinite for a sun.
+    /// Infinite for a sun.
     pub distance_m: f64,
-    /// E for a strength of 1, before polish reflects its share.
+    /// E at unit strength, before the coat reflects its share and the medium absorbs its own.
     pub open: f64,
 }
 
 impl UnshadowedLight {
-    /// What a beam gives a point; `None` where it is nothing, or comes to the wrong side. The light comes all the way
-    /// through what is around its source.
+    /// `None` if the light comes from behind the surface or none of it is left. Its whole path lies in the medium
+    /// around the source.
     pub fn from_beam(
         beam: &IncidentLight,
         point: &SurfacePoint,

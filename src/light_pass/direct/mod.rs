@@ -1,9 +1,9 @@
 //! Direct light (LD): irradiance of every texel straight from the lamps.
 //!
-//! E = I cos θ/r² for points and spots, E⊥ cos θ for suns, θ by the interpolated normal, stopped by every surface,
-//! clear glass included: what comes through that is caustic light (LS+D). Surfaces that are there in part let the rest of
-//! it pass. A body around a lamp takes its share on the way. Each side of a surface has a
-//! map of its own. Lights with extent are means over their places.
+//! E = I cos θ/r² for points and spots and E⊥ cos θ for suns, with θ from the interpolated normal. Every surface casts
+//! shadows, clear glass included: what passes through it is caustic light (LS+D). A surface of partial coverage lets
+//! the rest of the light pass. The medium around a lamp absorbs on the way. Each side of a surface has its own map.
+//! Extended lights are averaged over samples.
 
 pub mod border;
 pub(super) mod facet;
@@ -30,25 +30,25 @@ use lighting::{IncidentLight, UnshadowedLight};
 use source::{DirectSource, Emission};
 use texel::{LargestOverlap, LightsOfTexel, Sample, SamplingDetail, Texel, TexelRow, TexelSum, mark_of};
 
-/// Moves all samples by a millionth of a texel, so that none lies on the diagonal of a square of two triangles, where
-/// both would count it.
+/// Offset of all samples, about a millionth of a texel: none may lie on the diagonal between two triangles of a square,
+/// where both would count it.
 const OFF_THE_DIAGONALS: DVec2 = DVec2::new(0.6e-6, 1.1e-6);
 
 /// The direct layer of one map.
 #[derive(Clone, Debug)]
 pub struct DirectLayer {
-    /// Mean E over the covered part of each texel [W/m²], gutters filled.
+    /// Mean E over the covered part of each texel [W/m²], gutter filled.
     pub irradiance: Vec<[f32; 3]>,
-    /// The same of smaller texels, where light ends within little.
+    /// Mean E over each small texel at shadow borders [W/m²].
     pub divided: Option<SubdividedTexels<[f32; 3]>>,
-    /// Any-hit queries made for it.
     pub shadow_rays: u64,
-    /// False where it was cancelled: rows that are missing are black.
+    /// False if cancelled: missing rows are black.
     pub complete: bool,
 }
 
-/// Bakes the direct light of some lights onto charts, one layer each; into smaller texels of the same surface, if there is a
-/// chart of them, where light ends within little. The same for any number of threads. Progress counts rows over all charts.
+/// Bakes the direct light of some lights, one layer per chart. A chart's companion, if there is one, maps the same
+/// surface with small texels, into which texels at shadow borders are subdivided. The result does not depend on the
+/// number of threads. Progress counts rows over all charts.
 pub fn bake_direct(
     tracer: &Tracer,
     lights: &[Light],
@@ -71,8 +71,8 @@ pub fn bake_direct(
     charts.iter().map(of).collect()
 }
 
-/// The texels of charts on or beside which a light ends within little, and the shadow rays that it took to find them; `None`
-/// where it was cancelled. The same for any number of threads.
+/// Marks the texels at the shadow borders of a light, and counts the shadow rays traced to find them; `None` if
+/// cancelled. The result does not depend on the number of threads.
 pub fn find_borders(
     tracer: &Tracer,
     light: &Light,
@@ -102,7 +102,7 @@ fn sources(tracer: &Tracer, lights: &[Light]) -> Vec<Option<DirectSource>> {
         .collect()
 }
 
-/// Whether some lights have extent, and a glance may be enough for each of them.
+/// Whether there are extended lights, and a glance may be enough for each of them.
 fn begins_with_glance(sources: &[Option<DirectSource>]) -> bool {
     let soft = sources
         .iter()
@@ -115,7 +115,7 @@ fn begins_with_glance(sources: &[Option<DirectSource>]) -> bool {
     !even.is_empty() && even.iter().all(|is_even| *is_even)
 }
 
-/// What was seen of a chart so far.
+/// Results for a chart so far.
 struct ChartStatistics {
     width: usize,
     texels: Vec<Texel>,
@@ -159,11 +159,11 @@ impl ChartStatistics {
 
 struct Baker<'a> {
     tracer: &'a Tracer,
-    /// By light; `None` where it sends nothing.
+    /// By light; `None` for one that emits nothing.
     sources: &'a [Option<DirectSource>],
     chart: &'a Chart,
     material: &'a Material,
-    /// Triangles that reach each row: those of row r are `triangles[first[r]..first[r + 1]]`.
+    /// Row r is overlapped by `triangles[first[r]..first[r + 1]]`.
     first: Vec<usize>,
     triangles: Vec<u32>,
 }
@@ -199,8 +199,8 @@ impl<'a> Baker<'a> {
         }
     }
 
-    /// A coarse look everywhere or, where a glance is enough for what is seen whole or not at all, at the rest; then a fine
-    /// one where light meets shadow within a texel or between neighbours, in smaller texels where it does so within little.
+    /// Samples all texels coarsely, then those finely where visibility changes within a texel or between neighbours. At
+    /// shadow borders small texels are sampled instead.
     fn bake(&self, smaller: Option<&Baker>, row_done: &(impl Fn() + Sync), control: &Control) -> DirectLayer {
         let mut seen = ChartStatistics::new(self.chart);
         self.look_around(&mut seen, row_done, control);
@@ -222,7 +222,7 @@ impl<'a> Baker<'a> {
         }
     }
 
-    /// The first look at every texel.
+    /// The first pass over all texels. If that was a glance, a coarse pass follows where it was not enough.
     fn look_around(&self, seen: &mut ChartStatistics, row_done: &(impl Fn() + Sync), control: &Control) {
         seen.take(self.pass(row_done, control, self.first_look(), |_| true));
         if begins_with_glance(self.sources) {
@@ -242,7 +242,7 @@ impl<'a> Baker<'a> {
         }
     }
 
-    /// Looks at the smaller texels of those that are unclear and steep, which then are clear.
+    /// Subdivides the texels at shadow borders and samples their small texels. No more samples are needed there.
     fn divide(
         &self,
         smaller: &Baker,
@@ -276,13 +276,13 @@ impl<'a> Baker<'a> {
         divided
     }
 
-    /// Whether a texel asks for another look.
+    /// Whether a texel needs more samples.
     fn is_unclear(&self, texels: &[Texel], texel: usize) -> bool {
         let around = || neighbours(texel, self.chart.width, self.chart.height).map(|other| texels[other]);
         texels[texel].is_unclear(around)
     }
 
-    /// Whether other lights reach a neighbour, or a part of the texel.
+    /// Whether visibility differs within a texel or between it and its neighbours.
     fn meets_other(&self, texels: &[Texel], texel: usize, lit: impl Fn(&Texel) -> LightsOfTexel) -> bool {
         let around = neighbours(texel, self.chart.width, self.chart.height);
         lit(&texels[texel]).differs(around.map(|other| lit(&texels[other])))
@@ -348,7 +348,7 @@ impl<'a> Baker<'a> {
         content
     }
 
-    /// Adds the samples of a texel that lie on its part on one triangle; returns the shadow rays that it took.
+    /// Adds the samples of a texel that lie in its overlap with one triangle; returns the number of shadow rays.
     fn add_part(
         &self,
         facet: &Facet,
@@ -381,8 +381,8 @@ impl<'a> Baker<'a> {
         shadow_rays
     }
 
-    /// What arrives at a place of the map: the `index`th of the places of a texel with that hash, which a look has so many
-    /// of.
+    /// Direct light at a map position [texels], the `index`th sample point of a texel with this hash. `look` begins
+    /// with the number of sample points of a texel.
     fn sample(
         &self,
         facet: &Facet,
@@ -435,7 +435,7 @@ impl<'a> Baker<'a> {
         sample
     }
 
-    /// Tells texels of all maps apart.
+    /// Distinguishes the texels of all maps.
     fn hash(&self, texel: usize) -> u64 {
         (self.chart.receiver.index() as u64) << 40 ^ texel as u64
     }

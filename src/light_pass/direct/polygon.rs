@@ -2,23 +2,23 @@
 
 use glam::DVec3;
 
-/// A piece of a plane that glows.
+/// A flat polygon that emits uniformly.
 #[derive(Clone, Debug)]
 pub struct Polygon {
-    /// In order, either way [m].
+    /// In order, either way round [m].
     corners: Vec<DVec3>,
-    /// Unit.
+    /// Unit vector.
     normal: DVec3,
     both_sides: bool,
-    /// Below this height above its plane a point counts as lying in it [m].
+    /// Points closer to the polygon's plane count as lying in it [m].
     least_height_m: f64,
 }
 
-/// Heights are known to so many sizes of the polygon and of coordinates, and a little less.
+/// Rounding error of heights relative to the largest coordinate, with a margin.
 const FLAT: f64 = 1e-13;
 
 impl Polygon {
-    /// Of at least three corners that do not lie in a line; it glows to the side of its normal, or to both.
+    /// Of at least three corners, not all collinear. It emits to the side of its normal, or to both.
     pub fn new(corners: Vec<DVec3>, normal: DVec3, both_sides: bool) -> Self {
         let largest = corners
             .iter()
@@ -31,8 +31,8 @@ impl Polygon {
         }
     }
 
-    /// E/L [sr] at a point: ∫ cos θ dω over what is seen of the polygon on the sides of a surface where both normals
-    /// of it have it in front. `geometric` and `shading` are unit, turned to the side that takes light.
+    /// E/L [sr] at a point: ∫ cos θ dω over the part of the polygon in front of both normals of the receiving surface.
+    /// `geometric` and `shading` are unit vectors on the lit side.
     pub fn projected_solid_angle_sr(&self, point: DVec3, geometric: DVec3, shading: DVec3) -> f64 {
         let height = self.normal.dot(point - self.corners[0]);
         let seen = if self.both_sides { height.abs() } else { height };
@@ -90,8 +90,8 @@ mod tests {
         polygon.projected_solid_angle_sr(point, normal, normal)
     }
 
-    /// The corner of a rectangle a × b above a parallel plane: Siegel and Howell, Thermal Radiation Heat Transfer,
-    /// configuration factor of a parallel plane element to a rectangle, four times.
+    /// Four times the configuration factor from a plane element to a parallel rectangle over its corner: Siegel and
+    /// Howell, Thermal Radiation Heat Transfer.
     #[test]
     fn a_square_over_a_parallel_plane_follows_its_closed_form() {
         for height in [1e-3, 0.5, 1.0, 7.0] {
@@ -109,7 +109,7 @@ mod tests {
 
     #[test]
     fn halves_below_the_horizon_are_not_seen() {
-        // Upright, a wall sees half of the ceiling: the same as a quarter turn of everything.
+        // Close below a ceiling, a wall receives half of what the floor does.
         let whole = seen(&square(1e-6), DVec3::ZERO, DVec3::Y);
         assert!(
             (whole - std::f64::consts::PI).abs() < 1e-5,

@@ -1,8 +1,8 @@
 //! Lights as texels sample them: points and directions once, extended lights by samples of their area.
 //!
-//! What has extent is a sequence of places, the same for all texels: each run of 2ᵏ of them that begins at a multiple of
-//! 2ᵏ is evenly spread. A texel takes a run by a hash of itself, and shares it out among its own places, so that both
-//! the texel and the light are covered evenly and no pattern repeats from texel to texel.
+//! All texels share one sequence of samples of an extended light. Each run of 2ᵏ samples that begins at a multiple of
+//! 2ᵏ is evenly spread. A texel selects a run by its hash and divides it among its sample points, so that both the
+//! texel and the light are covered evenly and no pattern repeats from texel to texel.
 
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
@@ -21,57 +21,54 @@ use crate::scene::emitter::{Emitter, EmitterSampler};
 use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
 use crate::transport::{DiffuseResponse, Tracer};
 
-/// Places of a light that are ready: a power of 2.
+/// Number of samples that are prepared for a light: a power of 2.
 const READY: usize = 1 << 13;
-/// And of a sky, whose texels need more of them.
+/// Number of directions that are prepared for a sky, of which texels need more.
 const READY_OF_SKY: usize = 1 << 14;
-/// Angle of a sun [rad] whose places shine on a surface alike.
+/// Angular diameter of a sun [rad] up to which irradiance hardly varies over its disc.
 const NARROW_RAD: f64 = 0.03;
-/// Surfaces of more triangles are looked at by samples alone.
+/// Luminous surfaces of more triangles are integrated by samples alone.
 const MAX_POLYGONS: usize = 16;
-/// Corners that stand for the edge of a disc.
+/// Corners of the polygon that approximates a disc.
 const DISC_CORNERS: usize = 64;
-/// Share of its way that a shadow ray stops before a lamp, so as not to meet the lamp's own surface.
+/// Part of its length by which a shadow ray ends short of a light, so as not to hit the light's own surface.
 const BEFORE_LAMP: f64 = 1e-9;
 const SEED: u64 = 0x6c69_6768_7473;
 
-/// A light ready to be looked for.
+/// A light prepared for sampling.
 pub struct DirectSource {
-    /// Where its light comes from.
     pub emission: Emission,
-    /// What the light goes through.
+    /// Medium that the light travels through.
     pub within: MediumAround,
 }
 
-/// Where light comes from.
 pub enum Emission {
-    /// From one point or direction.
+    /// A single point or direction.
     Single(Emitter),
-    /// From many.
     Soft(Soft),
 }
 
-/// A light with extent.
+/// An extended light.
 pub struct Soft {
     places: ManyPlaces,
-    /// What it is made of, where that is little: E without shadows is exact, and samples say only what is hidden.
+    /// Polygons of a simple light: its unoccluded E is analytic, and samples only estimate occlusion.
     shape: Option<Shape>,
     light: u64,
-    /// Whether a few of its places tell what all do, unless some of them are hidden.
+    /// Whether a few samples are enough, unless the light is partly occluded.
     pub is_even: bool,
 }
 
 enum ManyPlaces {
     /// Each as if all light came from there.
     Emitters { all: Vec<Emitter>, area_m2: f64 },
-    /// Directions: half of them where the light comes from, half where the surface takes it from.
+    /// Directions: half of a run sampled from the sky, half by the cosine at the surface.
     Sky {
         sky: Arc<Environment>,
         strength: LinearSrgb,
         to_light: Vec<DVec3>,
         squares: Vec<DVec2>,
     },
-    /// A ball, by points of its visible cap.
+    /// A sphere, by points of its visible cap.
     Ball {
         centre: DVec3,
         radius_m: f64,
@@ -82,22 +79,22 @@ enum ManyPlaces {
 
 struct Shape {
     polygons: Vec<Polygon>,
-    /// Of all of its sides that shine [m²].
+    /// Of all emitting sides [m²].
     area_m2: f64,
 }
 
-/// What a light with extent gives a point.
+/// Irradiance at a point from an extended light.
 #[derive(Clone, Copy, Default)]
 pub struct Gathered {
     /// E [W/m²].
     pub irradiance: LinearSrgb,
     pub shadow_rays: u64,
-    /// Those that something stopped, all or part of what they carry.
+    /// Shadow rays that were blocked, in whole or in part.
     pub blocked_rays: u64,
 }
 
 impl DirectSource {
-    /// A light of a scene, the `index`th that is looked for; `None` where it sends nothing.
+    /// `index` is the light's place in the list of sources. `None` if the light emits nothing.
     pub fn new(light: &Light, tracer: &Tracer, index: usize) -> Option<Self> {
         let scene = tracer.scene();
         let middle = Emitter::middle(light, scene);
@@ -124,7 +121,7 @@ impl DirectSource {
 }
 
 impl ManyPlaces {
-    /// Places of what has a shape are spread over it evenly.
+    /// A light with a shape is sampled uniformly by area.
     fn new(light: &Light, scene: &Scene, index: usize, has_shape: bool) -> Option<Self> {
         let sequence = |count: usize, pair| {
             (0..count as u32).map(move |place| even_point(place, pair, SEED + index as u64))
@@ -164,7 +161,7 @@ impl ManyPlaces {
     }
 }
 
-/// The polygons of a lamp, where they are few.
+/// The polygons of a light if they are few.
 fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
     let polygons = match light.kind {
         LightKind::Panel {
@@ -183,7 +180,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
                     DVec2::new(-1.0, 1.0),
                 ],
                 PanelShape::Disc => {
-                    // As large as the disc.
+                    // A regular polygon of the disc's area.
                     let step = TAU / DISC_CORNERS as f64;
                     let radius = (step / step.sin()).sqrt();
                     let corner = |corner: usize| DVec2::from_angle(corner as f64 * step) * radius;
@@ -219,7 +216,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
 }
 
 impl Soft {
-    /// The places of the light for one of the places of a texel, which a look has so many of.
+    /// The light's samples for sample point `place` of a texel, which has `places` sample points.
     pub fn run(&self, texel: u64, place: usize, (places, look): (usize, SamplingDetail)) -> Range<usize> {
         let (ready, of_texel) = match self.places {
             ManyPlaces::Sky { .. } => (2 * READY_OF_SKY, look.samples_of_sky),
@@ -232,7 +229,7 @@ impl Soft {
         first..first + each
     }
 
-    /// What comes to a point from a run of its places.
+    /// Light at a point, estimated from a run of samples.
     pub fn gather(
         &self,
         tracer: &Tracer,
@@ -256,8 +253,8 @@ impl Soft {
             sum.irradiance += arriving.irradiance * passing;
         }
         let irradiance = match &self.shape {
-            // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018. What
-            // an image leaves of the light is part of the ratio, as shadows are.
+            // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018. The
+            // ratio includes the image on a light, as it includes shadows.
             Some(shape) if sum.open > 0.0 => {
                 sum.irradiance * (shape.seen_sr(point) / (sum.open * shape.area_m2))
             }
@@ -271,7 +268,7 @@ impl Soft {
         }
     }
 
-    /// What would come from one place of a run that stands for all.
+    /// One sample of a run, weighted as if all light came from it.
     fn beam(
         &self,
         index: usize,
@@ -321,7 +318,7 @@ impl Soft {
     }
 }
 
-/// Directions from a surface, as many as it takes light from: by the cosine, on one side or both.
+/// Cosine-weighted directions on one side of a surface or both.
 struct Cosines {
     normal: DVec3,
     both_sides: bool,
@@ -361,14 +358,14 @@ impl Cosines {
 #[derive(Default)]
 struct Sum {
     irradiance: LinearSrgb,
-    /// Σ of what would come for strength 1 without shadows, polish and what lies on the way left aside.
+    /// Σ [`UnshadowedLight::open`].
     open: f64,
     shadow_rays: u64,
     blocked_rays: u64,
 }
 
 impl Shape {
-    /// E/L [sr] at a point without shadows.
+    /// Unoccluded E/L [sr] at a point.
     fn seen_sr(&self, point: &SurfacePoint) -> f64 {
         let seen = self.polygons.iter().map(|polygon| {
             polygon.projected_solid_angle_sr(point.position, point.geometric_normal, point.shading_normal)
@@ -377,8 +374,8 @@ impl Shape {
     }
 }
 
-/// A ray towards a ball of even radiance, evenly by solid angle (Shirley, Wang and Zimmerman, "Monte Carlo techniques
-/// for direct lighting calculations", 1996); `None` within it.
+/// A sample of a sphere of uniform radiance, uniform in solid angle (Shirley, Wang and Zimmerman, "Monte Carlo
+/// techniques for direct lighting calculations", 1996); `None` inside the sphere.
 fn ball(
     centre: DVec3,
     radius_m: f64,
@@ -390,7 +387,7 @@ fn ball(
     let distance_m = offset.length();
     let axis = offset.try_normalize().filter(|_| distance_m > radius_m)?;
     let sine = radius_m / distance_m;
-    // 1 − cos of the half-angle, without a difference of nearly equal numbers.
+    // 1 − cos of the half-angle, without cancellation.
     let cap = sine * sine / (1.0 + (1.0 - sine * sine).sqrt());
     let height = cap * square.x;
     let sideways = (height * (2.0 - height)).sqrt();
@@ -409,7 +406,7 @@ fn ball(
     })
 }
 
-/// A hash of 64 bits (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
+/// 64-bit hash (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
 fn mixed(mut code: u64) -> u64 {
     code = (code ^ (code >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     code = (code ^ (code >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

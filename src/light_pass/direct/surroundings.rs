@@ -6,7 +6,6 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Scene, Volume};
 use crate::transport::{Tracer, media_at};
 
-/// The medium around a lamp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MediumAround {
     /// Refractive index [1].
@@ -15,13 +14,11 @@ pub struct MediumAround {
 }
 
 impl MediumAround {
-    /// Where nothing is.
     pub const VACUUM: Self = Self {
         ior: 1.0,
         volume: None,
     };
 
-    /// At a point.
     pub fn at(tracer: &Tracer, point: DVec3) -> Self {
         let (scene, media): (&Scene, _) = (tracer.scene(), media_at(tracer, point));
         Self {
@@ -30,7 +27,6 @@ impl MediumAround {
         }
     }
 
-    /// Share of the light that is left after a distance [m].
     pub fn transmittance(&self, distance_m: f64) -> LinearSrgb {
         self.volume
             .map_or(LinearSrgb::WHITE, |volume| volume.transmittance(distance_m))

@@ -4,25 +4,25 @@ use glam::DVec2;
 
 use crate::optics::LinearSrgb;
 
-/// How thoroughly a texel is looked at.
+/// Numbers of samples per texel.
 #[derive(Clone, Copy, Debug)]
 pub struct SamplingDetail {
-    /// Places across and down.
+    /// Sample points across and down.
     pub side: usize,
-    /// Samples of a lamp with extent, over all places.
+    /// Samples of an extended light, over all sample points.
     pub samples_of_lamp: usize,
-    /// And of a sky.
+    /// Samples of a sky, over all sample points.
     pub samples_of_sky: usize,
 }
 
 impl SamplingDetail {
-    /// Where lights with extent are seen whole or not at all.
+    /// Enough where extended lights are fully visible or fully occluded.
     pub const GLANCE: Self = Self::new(2, 8, 8);
-    /// Where light is all there or all away, or fades little.
+    /// Enough where all lights are fully visible or fully occluded, or penumbrae are wide.
     pub const COARSE: Self = Self::new(2, 64, 64);
-    /// At a border between light and shadow, in texels that were divided for it.
+    /// For small texels at a shadow border.
     pub const SMALL: Self = Self::new(4, 64, 128);
-    /// At a border that lies within a texel.
+    /// For a texel that a shadow border crosses.
     pub const FINE: Self = Self::new(8, 256, 512);
 
     const fn new(side: usize, samples_of_lamp: usize, samples_of_sky: usize) -> Self {
@@ -34,17 +34,17 @@ impl SamplingDetail {
     }
 }
 
-/// Which lights reach a texel, small enough to be kept for a whole map.
+/// Fingerprint of the lights that reach a texel, small enough to be stored for a whole map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LightsOfTexel(u32);
 
 impl LightsOfTexel {
-    /// No surface is there.
+    /// No sample lies on a surface.
     pub const EMPTY: Self = Self(0);
-    /// Some samples see what others do not.
+    /// Samples see different lights.
     pub const MIXED: Self = Self(1);
 
-    /// After one more sample that sees the lights of a mask.
+    /// Adds a sample that sees the lights of a mask.
     pub fn and(self, mask: u64) -> Self {
         let sample = Self((mask % u64::from(u32::MAX - 2)) as u32 + 2);
         match self {
@@ -54,14 +54,14 @@ impl LightsOfTexel {
         }
     }
 
-    /// Whether others are lit otherwise, or parts of this.
+    /// Whether visibility differs within the texel, or between it and others that lie on a surface.
     pub fn differs(self, mut others: impl Iterator<Item = Self>) -> bool {
         self == Self::MIXED
             || self != Self::EMPTY && others.any(|other| other != Self::EMPTY && other != self)
     }
 }
 
-/// A light's part of a mask: masks of different sets of lights differ however many lights there are (SplitMix64).
+/// A light's mark in a mask. XOR combines marks; masks of different sets differ for any number of lights (SplitMix64).
 pub fn mark_of(light: usize) -> u64 {
     let mut bits = (light as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -72,19 +72,19 @@ pub fn mark_of(light: usize) -> u64 {
 /// Sums over the samples of one texel that lie on the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct TexelSum {
-    /// Σ E·A [W], every sample standing for the same part of the texel.
+    /// Σ E·A [W]. Each sample stands for an equal part of the texel.
     pub flux: LinearSrgb,
     /// Σ A [m²].
     pub area_m2: f64,
     pub lit: LightsOfTexel,
-    /// The same of lights with extent: mixed where one is partly hidden.
+    /// The extended lights that reach the texel; mixed if one is partly occluded.
     pub soft_lit: LightsOfTexel,
     pub largest: Option<LargestOverlap>,
-    /// Of lights with extent.
+    /// Luminance of extended lights.
     pub soft: Spread,
 }
 
-/// How values differ from each other.
+/// Running sums for a mean and its standard error.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Spread {
     count: f64,
@@ -92,7 +92,7 @@ pub struct Spread {
     squares: f64,
 }
 
-/// Standard error of a texel's mean, as a share of it, above which it is looked at once more.
+/// Standard error relative to a texel's mean above which it is sampled again.
 const LARGEST_NOISE: f64 = 0.02;
 
 impl Spread {
@@ -102,8 +102,8 @@ impl Spread {
         self.squares += value * value;
     }
 
-    /// Whether the mean of the values may be off by more than [`LARGEST_NOISE`] of `whole`. A lone value says nothing
-    /// of itself.
+    /// Whether the standard error of the mean exceeds [`LARGEST_NOISE`] of `whole`. A single value has no error
+    /// estimate and counts as uncertain unless it is 0.
     fn is_uncertain(&self, whole: f64) -> bool {
         if self.count < 2.0 {
             return self.sum > 0.0;
@@ -114,7 +114,8 @@ impl Spread {
     }
 }
 
-/// The largest part of a texel that is covered by one triangle: what is looked at where no sample lies on the surface.
+/// The largest overlap of a texel with one triangle. Its centroid is sampled where no regular sample lies on the
+/// surface.
 #[derive(Clone, Copy, Debug)]
 pub struct LargestOverlap {
     pub triangle: u32,
@@ -157,31 +158,31 @@ impl TexelSum {
     }
 }
 
-/// What arrives at one point.
+/// Direct light at one point.
 pub struct Sample {
     /// E [W/m²].
     pub irradiance: LinearSrgb,
-    /// The points and directions that reach it, folded into a number.
+    /// XOR of the marks ([`mark_of`]) of the point lights and suns that reach the point.
     pub mask: u64,
-    /// The lights with extent that are seen whole; `None` where one is partly hidden.
+    /// XOR of the marks of the extended lights that are fully visible; `None` if one is partly occluded.
     pub soft_mask: Option<u64>,
-    /// Luminance of what comes from lights with extent [W/m²].
+    /// Luminance of the irradiance from extended lights [W/m²].
     pub soft: f64,
     pub shadow_rays: u64,
 }
 
-/// What a pass says of a texel.
+/// State of a texel after a pass.
 #[derive(Clone, Copy, Debug)]
 pub struct Texel {
     pub irradiance: [f32; 3],
     pub lit: LightsOfTexel,
     pub soft_lit: LightsOfTexel,
-    /// Whether lights with extent were looked for with too few samples.
+    /// Whether extended lights need more samples.
     pub is_uncertain: bool,
 }
 
 impl Texel {
-    /// Where nothing was looked at.
+    /// A texel that was not sampled.
     pub const DARK: Self = Self {
         irradiance: [0.0; 3],
         lit: LightsOfTexel::EMPTY,
@@ -189,14 +190,14 @@ impl Texel {
         is_uncertain: false,
     };
 
-    /// Whether it asks for another look: some of its neighbours or its parts are lit otherwise, or too little is known.
+    /// Whether the texel needs more samples: visibility differs within it or from its neighbours, or it is too noisy.
     pub fn is_unclear<Around: Iterator<Item = Self>>(&self, around: impl Fn() -> Around) -> bool {
         let differs = |lit: fn(&Self) -> LightsOfTexel| lit(self).differs(around().map(|other| lit(&other)));
         self.is_uncertain || differs(|texel| texel.lit) || differs(|texel| texel.soft_lit)
     }
 }
 
-/// The covered texels of one row that were asked for, by column.
+/// The sampled texels of one row that lie on a surface, by column.
 #[derive(Debug, Default)]
 pub struct TexelRow {
     pub texels: Vec<(u32, Texel)>,

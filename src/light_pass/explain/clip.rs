@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-/// Triangles of less area count by where their middle lies [squares].
+/// Triangles of less area count by the position of their centroid [unit squares].
 const MIN_AREA: f64 = 1e-12;
 
 /// Share of a triangle's area in the unit square, [0, 1].
@@ -12,7 +12,7 @@ pub(super) fn share_in_square(triangle: [DVec2; 3]) -> f64 {
         let middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
         return f64::from(u8::from(is_in_square(middle)));
     }
-    // Sutherland and Hodgman, CACM 1974: against one side after the other.
+    // Clipped against one side after the other (Sutherland and Hodgman, CACM 1974).
     let sides = [
         (DVec2::X, 0.0),
         (DVec2::NEG_X, -1.0),
@@ -38,7 +38,6 @@ pub(super) fn share_in_square(triangle: [DVec2; 3]) -> f64 {
     (area(&polygon).abs() / whole).min(1.0)
 }
 
-/// Whether a place lies in the unit square.
 pub(super) fn is_in_square(place: DVec2) -> bool {
     place.cmpge(DVec2::ZERO).all() && place.cmplt(DVec2::ONE).all()
 }
@@ -62,7 +61,7 @@ mod tests {
             (triangle([0.1, 0.1], [0.9, 0.1], [0.1, 0.9]), 1.0),
             (triangle([-1.0, 0.0], [1.0, 0.0], [1.0, 1.0]), 0.75),
             (triangle([2.0, 2.0], [3.0, 2.0], [2.0, 3.0]), 0.0),
-            // The whole square within it: 1 of 8.
+            // The triangle contains the whole square: 1 of 8.
             (triangle([-1.0, -1.0], [3.0, -1.0], [-1.0, 3.0]), 0.125),
             (triangle([0.5, 0.5], [0.5, 0.5], [0.5, 0.5]), 1.0),
             (triangle([1.5, 0.5], [1.5, 0.5], [1.5, 0.5]), 0.0),

@@ -1,8 +1,8 @@
 //! The light paths that reach a texel, with the flux of each: found by tracing the scene, without the baked maps.
 //!
-//! The part of a light's domain that lights the texel is found by halving the domain's cells; its flux is what comes to
-//! the texel. Cells that hang together and go the same way are one path, shown by the ray among them that meets the
-//! point that was asked about, found by Newton's method on where it starts.
+//! The part of a light's domain that lights the texel is found by subdividing the domain's cells; its flux is the flux
+//! of the texel. Connected cells on the same path form one [`LightPath`]. It is shown by the ray of these cells that
+//! hits the requested point, found by Newton's method on the ray's start.
 
 mod clip;
 mod search;
@@ -28,69 +28,70 @@ use crate::scene::emitter::Emitter;
 use crate::settings::ItemBufferKind;
 use crate::transport::{Event, Tracer};
 
-/// Places that lights with a size are looked at from.
+/// Sample points of an extended light.
 const PLACES: u32 = 16;
 const PLACES_SEED: u64 = 0;
-/// Light that does not matter, as a share of the irradiance that there is.
+/// Light that may be neglected, relative to the irradiance of the texel.
 const NEGLIGIBLE: f64 = 1e-5;
-/// A path is to meet the point that was asked about this nearly [m], and is looked for in so many steps.
+/// Distance from the requested point at which a path counts as meeting it [m], and maximum number of Newton steps
+/// towards that.
 const MEETS_M: f64 = 1e-9;
 const MAX_STEPS: u32 = 40;
 
-/// A specular surface on the way.
+/// A specular surface on a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathVertex {
     /// Index into `Scene::objects`.
     pub object: usize,
-    /// Index into the object's triangles.
+    /// Index within the object's mesh.
     pub triangle: usize,
-    /// Where [m].
+    /// [m].
     pub point: DVec3,
-    /// Unit, the way the light comes.
+    /// Unit vector, the direction of the incident light.
     pub incident: DVec3,
-    /// Unit, the way it goes on.
+    /// Unit vector, the direction in which it continues.
     pub outgoing: DVec3,
-    /// Unit, of the surface, on the side that the light comes from.
+    /// Unit normal of the surface, on the side of the incident light.
     pub normal: DVec3,
-    /// n of the side that it leaves over n of the side that it enters; 1 where it is sent back or goes straight on.
+    /// Refractive index of the side that light leaves over that of the side it enters; 1 if it is reflected or passes
+    /// straight.
     pub ior_ratio: f64,
-    /// What sent it on.
     pub event: Event,
 }
 
-/// A way that light takes to a texel.
+/// A path on which light reaches a texel.
 #[derive(Clone, Debug)]
 pub struct LightPath {
     /// Index into `Scene::lights`.
     pub light: usize,
-    /// Where it begins [m]; of a sun, before the scene.
+    /// Start [m]; for a sun, in front of the scene.
     pub start: DVec3,
-    /// What it meets; nothing where the light is seen from the texel.
+    /// Empty for direct light.
     pub vertices: Vec<PathVertex>,
-    /// Where it ends on the receiver [m].
+    /// End on the receiver [m].
     pub end: DVec3,
-    /// What it brings, mean over the texel [W/m²].
+    /// Contribution to the mean irradiance of the texel [W/m²].
     pub irradiance: LinearSrgb,
 }
 
-/// What lights a texel, light from other matte surfaces left out.
+/// The light of a texel, except for light from other matte surfaces.
 #[derive(Clone, Debug, Default)]
 pub struct Explanation {
     /// Brightest first.
     pub paths: Vec<LightPath>,
-    /// Rays that it took.
+    /// Rays traced.
     pub rays: u64,
-    /// False where it was stopped, or would have taken too long.
+    /// False if cancelled, or if a search exceeded [`Limits::most_rays`].
     pub is_complete: bool,
 }
 
 impl Explanation {
-    /// What the paths over specular surfaces bring [W/m²].
+    /// Irradiance from paths over specular surfaces [W/m²].
     pub fn caustic(&self) -> LinearSrgb {
         self.sum(|path| !path.vertices.is_empty())
     }
 
-    /// What comes straight from the lights [W/m²].
+    /// Irradiance straight from the lights [W/m²].
     pub fn direct(&self) -> LinearSrgb {
         self.sum(|path| path.vertices.is_empty())
     }
@@ -101,19 +102,20 @@ impl Explanation {
     }
 }
 
-/// How far light is followed.
+/// Limits of the search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Most specular surfaces on a path.
+    /// Maximum number of specular surfaces on a path.
     pub max_depth: u32,
-    /// Least share of the ray's flux (luminance) that a branch must carry to be followed.
+    /// Fraction of a ray's flux (luminance) below which a branch is not followed.
     pub branch_threshold: f64,
-    /// Most rays for each place of a light.
+    /// Maximum number of rays for each sample point of a light.
     pub most_rays: u64,
 }
 
-/// Finds what lights a texel. `scale_w_m2`: about how bright it is, or the least that matters [W/m²], > 0: light far
-/// below that is looked for less closely. Glass bends all light as at 587.56 nm, and rough surfaces are smooth.
+/// Finds the paths that light a texel. `scale_w_m2` > 0: its approximate irradiance, or the least that matters [W/m²];
+/// much fainter light is searched for less closely. Glass refracts all light as at 587.56 nm, and rough surfaces are
+/// smooth.
 pub fn explain(
     tracer: &Tracer,
     target: &Target,
@@ -196,7 +198,7 @@ fn explain_light(
             if places == 1 {
                 found.paths.push(path);
             } else if let Some(same) = by_way.get_mut(&way) {
-                // Shown from the first place of the light that takes it.
+                // Shown from the first sample point of the light that has it.
                 same.irradiance += path.irradiance;
             } else {
                 by_way.insert(way, path);
@@ -206,7 +208,7 @@ fn explain_light(
     found.paths.extend(by_way.into_values());
 }
 
-/// Pieces that share a corner and go the same way.
+/// Groups of pieces that are connected by corners and lie on the same path.
 fn hanging_together(pieces: Vec<LitCell>) -> Vec<Vec<LitCell>> {
     let mut groups: Vec<usize> = (0..pieces.len()).collect();
     fn root(groups: &mut [usize], mut at: usize) -> usize {
@@ -237,7 +239,7 @@ fn hanging_together(pieces: Vec<LitCell>) -> Vec<Vec<LitCell>> {
     together
 }
 
-/// The path of some pieces, for a light of strength 1.
+/// The path of some pieces, for a light of unit strength.
 fn path_of(walker: &LightPathWalker<'_>, light: usize, pieces: &[LitCell]) -> Option<LightPath> {
     let flux_w = pieces
         .iter()
@@ -255,7 +257,7 @@ fn path_of(walker: &LightPathWalker<'_>, light: usize, pieces: &[LitCell]) -> Op
     })
 }
 
-/// The ray of a piece that meets the point; the nearest one where none does, as beyond a bright line.
+/// The ray of a piece that hits the requested point; the nearest one if none does, as beyond the edge of a caustic.
 fn meeting(walker: &LightPathWalker<'_>, piece: &LitCell) -> Option<WalkedPath> {
     let goal = walker.target.place;
     let texel_m = walker.target.area_m2.sqrt();
@@ -279,7 +281,7 @@ fn meeting(walker: &LightPathWalker<'_>, piece: &LitCell) -> Option<WalkedPath> 
             break;
         }
         let mut move_by = slope.inverse() * miss;
-        // Never far beyond the piece, and only to what is nearer.
+        // Never far beyond the piece, and only to what lands nearer.
         move_by = move_by.clamp_length_max(2.0 * side);
         let better = (0..8).find_map(|halvings| {
             let to = square + move_by * (-f64::from(halvings)).exp2();
@@ -293,7 +295,7 @@ fn meeting(walker: &LightPathWalker<'_>, piece: &LitCell) -> Option<WalkedPath> 
     Some(best)
 }
 
-/// Light straight from each light, as the direct layer has it.
+/// Adds the direct light of each light, as the direct layer computes it.
 fn explain_direct(tracer: &Tracer, target: &Target, control: &Control, found: &mut Explanation) {
     let chart = target.chart_of_texel();
     let (low, high) = tracer.scene().bounds().unwrap_or_default();
@@ -318,7 +320,7 @@ fn explain_direct(tracer: &Tracer, target: &Target, control: &Control, found: &m
         found.rays += baked[0].shadow_rays;
         found.paths.push(LightPath {
             light: index,
-            // The sky comes from everywhere.
+            // The sky has no position.
             start: start.unwrap_or(target.point),
             vertices: Vec::new(),
             end: target.point,

@@ -13,23 +13,23 @@ use crate::light_pass::item_buffer::{CELLS_PER_SIDE, ItemBuffer};
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 
-/// Halvings of the domain's side that places are counted in.
+/// Subdivisions of the domain's side to the steps in which corners are counted.
 const FINEST: u32 = 30;
-/// Of the item buffer's cells.
+/// Subdivisions to the item buffer's cells.
 const BUFFER: u32 = CELLS_PER_SIDE.trailing_zeros();
-/// Cells that the search begins with, at most.
+/// Maximum number of cells at the start of the search.
 const FIRST_CELLS: u64 = 60_000;
-/// And halvings of the domain's side for them.
+/// Maximum number of subdivisions of the domain's side for these.
 const MAX_FIRST: u32 = 16;
-/// A way through a whole cell is followed no further where it lights no more than this across [texels], and its middle
-/// lies this near to that of its corners.
+/// A path that fills a cell is resolved if it lights no more than `FINE_TEXELS` across, and the arrival from the cell's
+/// centre lies within `STRAIGHT_TEXELS` of the mean of those from its corners.
 const FINE_TEXELS: f64 = 0.25;
 const STRAIGHT_TEXELS: f64 = 0.002;
-/// Part of the map that a way may reach beyond the places that are known of it, in cells of the first size: glass spreads
-/// what it sends back and forth widely.
+/// Where the extent of a path is unknown: part of the map by which it may exceed its known arrivals, in cells of the
+/// first size. Glass spreads light of many internal reflections widely.
 const BEYOND: f64 = 1.0;
 
-/// Rays start this far within the domain: its border may be the very border of a surface.
+/// Inset of rays from the border of the domain, which may coincide with the border of a surface.
 const MARGIN: f64 = 1e-9;
 
 /// A cell that lights part of the texel.
@@ -39,26 +39,26 @@ pub(super) struct LitCell {
     pub(super) face: usize,
     /// Corners of the cell, in steps of 2⁻³⁰.
     pub(super) corners: [[u64; 2]; 4],
-    /// A ray of it, in the unit square, and where that lands [texels]; on the texel where any is known to.
+    /// A ray of it, in the unit square, and where that lands [texels]; one that lands on the texel if any is known.
     pub(super) ray: DVec2,
     pub(super) place: DVec2,
-    /// On the texel [W].
+    /// Flux on the texel [W].
     pub(super) flux_w: LinearSrgb,
 }
 
 impl LitCell {
-    /// Side of the cell.
+    /// Side of the cell in the unit square.
     pub(super) fn side(&self) -> f64 {
         square(self.corners[3]).x - square(self.corners[0]).x
     }
 }
 
-/// All that lights the texel.
+/// All cells that light the texel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SearchResult {
     pub(super) pieces: Vec<LitCell>,
     pub(super) rays: u64,
-    /// False where it was stopped, or took more rays than it may.
+    /// False if cancelled, or if more rays were needed than allowed.
     pub(super) is_complete: bool,
 }
 
@@ -69,7 +69,7 @@ struct Cell {
     face: usize,
     level: u32,
     at: [u64; 2],
-    /// Ways that are known to be done with.
+    /// Paths that need no further search.
     done: Vec<PathSignature>,
 }
 
@@ -78,7 +78,7 @@ impl Cell {
         1 << (FINEST - self.level)
     }
 
-    /// Four corners and the middle.
+    /// The four corners and the centre.
     fn points(&self) -> [[u64; 2]; 5] {
         let (side, [x, y]) = (self.side(), self.at);
         let middle = side / 2;
@@ -108,13 +108,13 @@ fn square(point: [u64; 2]) -> DVec2 {
     at.clamp(DVec2::splat(MARGIN), DVec2::splat(1.0 - MARGIN))
 }
 
-/// What one way makes of a cell.
+/// Verdict on one path in a cell.
 enum CellVerdict {
-    /// It lights nothing of the texel.
+    /// It lights no part of the texel.
     Away,
-    /// All of it is as smooth as it has to be.
+    /// It is resolved.
     Done(Vec<LitCell>),
-    /// It has to be halved.
+    /// The cell has to be subdivided.
     Halve,
 }
 
@@ -122,7 +122,7 @@ enum CellVerdict {
 pub(super) struct TexelSearch<'a> {
     pub(super) walker: LightPathWalker<'a>,
     pub(super) item_buffer: &'a ItemBuffer,
-    /// Flux on the texel that does not matter [W].
+    /// Flux on the texel that may be neglected [W].
     pub(super) negligible_w: f64,
     pub(super) most_rays: u64,
     pub(super) control: &'a Control,
@@ -153,7 +153,7 @@ impl TexelSearch<'_> {
         found
     }
 
-    /// Marked cells, as small as there is room for.
+    /// Marked cells, as small as [`FIRST_CELLS`] allows.
     fn first_cells(&self) -> Vec<Cell> {
         let mut marked = Vec::new();
         for face in 0..self.walker.launch.face_count() {
@@ -174,7 +174,7 @@ impl TexelSearch<'_> {
         marked
     }
 
-    /// Follows the rays of all points that are not known; tells how many.
+    /// Traces the rays of all new points; returns their number.
     fn look(&self, cells: &[Cell], known: &mut HashMap<Point, Vec<Arrival>>) -> u64 {
         let points = cells
             .iter()
@@ -242,7 +242,7 @@ impl TexelSearch<'_> {
                     .abs()
                     .max_element()
             }
-            // Nobody knows how far it goes: less with each halving.
+            // The extent is unknown, but smaller with each subdivision.
             _ => {
                 let chart = &self.walker.target.chart;
                 let map_texels = chart.width.max(chart.height) as f64 / self.walker.target.size as f64;
@@ -270,7 +270,7 @@ impl TexelSearch<'_> {
         }
     }
 
-    /// The light of a cell that one way fills: four triangles around its middle.
+    /// The light of a cell that one path fills: four triangles around its centre.
     fn whole(&self, cell: &Cell, way: PathSignature, at: [Option<&Arrival>; 5], side: f64) -> Vec<LitCell> {
         let [Some(a), Some(b), Some(c), Some(d), Some(middle)] = at else {
             return Vec::new();
@@ -284,7 +284,7 @@ impl TexelSearch<'_> {
         self.piece(cell, way, (4, middle.place), flux_w)
     }
 
-    /// The light of a cell that a way fills in part, by its points.
+    /// The light of a cell that a path fills in part, estimated from its points.
     fn parts(&self, cell: &Cell, way: PathSignature, at: [Option<&Arrival>; 5], side: f64) -> Vec<LitCell> {
         let (mut flux_w, mut ray) = (LinearSrgb::BLACK, None);
         for (point, arrival) in at.into_iter().enumerate() {

@@ -8,36 +8,35 @@ use crate::geometry::Ray;
 use crate::illumination::{Chart, Receiver, Side};
 use crate::transport::{SurfaceHit, Tracer};
 
-/// Where a ray meets the plane of the texel farther than so many texels from the surface, the surface has left the
-/// plane.
+/// Distance from a ray's hit to its intersection with the texel's plane [texels] above which the surface is not flat
+/// enough for the plane.
 const FLAT_TEXELS: f64 = 3.0;
 
-/// A point of a receiver with the texel that holds its light.
+/// A point of a receiver and the texel that stores its light.
 #[derive(Clone, Debug)]
 pub struct Target {
-    /// The side of the surface that is meant.
     pub receiver: Receiver,
-    /// Where [m].
+    /// [m].
     pub point: DVec3,
-    /// Unit, by the triangle's winding.
+    /// Unit vector, by the triangle's winding.
     pub geometric_normal: DVec3,
-    /// Column and row of the texel's first corner, in texels of the chart's finest size.
+    /// Column and row of the texel's first corner, in finest texels of the chart.
     pub corner: [usize; 2],
-    /// How many of these it is wide.
+    /// Width of the texel in finest texels.
     pub size: usize,
-    /// Its place among the chart's texels.
+    /// Index among the chart's texels.
     pub texel: usize,
-    /// Surface under it [m²].
+    /// Surface area under the texel [m²].
     pub area_m2: f64,
     pub(super) chart: Arc<Chart>,
-    /// The point, in texels from the texel's corner.
+    /// The point relative to the texel's corner [texels].
     pub(super) place: DVec2,
-    /// Rows of the map from a displacement along the plane [m] to texels.
+    /// Rows of the matrix from a displacement in the plane [m] to texels.
     rows: [DVec3; 2],
 }
 
 impl Target {
-    /// The texel under a point that was seen along a direction; `None` where the chart has none there.
+    /// The texel under a point that is seen along a direction; `None` if the chart has none there.
     pub fn new(tracer: &Tracer, chart: &Arc<Chart>, hit: &SurfaceHit, direction: DVec3) -> Option<Self> {
         let receiver = Receiver::new(hit.object, Side::met(direction, hit.geometric_normal));
         let corners = tracer.scene().objects[hit.object]
@@ -71,8 +70,8 @@ impl Target {
         })
     }
 
-    /// Where a ray that meets its receiver lands, in texels from the texel's corner: by its plane near by, by the map
-    /// elsewhere.
+    /// Where a ray that hits the receiver lands, relative to the texel's corner [texels]: by the texel's plane near by,
+    /// by the chart elsewhere.
     pub(super) fn landing(&self, ray: &Ray, hit: &SurfaceHit) -> DVec2 {
         let slope = ray.direction.dot(self.geometric_normal);
         let distance_m = (self.point - ray.origin).dot(self.geometric_normal) / slope;

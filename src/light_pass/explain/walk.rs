@@ -11,21 +11,20 @@ use crate::light_pass::launch::Launch;
 use crate::optics::LinearSrgb;
 use crate::transport::{Event, MediumStack, Tracer};
 
-/// Segments that one light ray may have waiting.
+/// Maximum number of queued segments of one light ray.
 const MAX_WAITING: usize = 512;
 
-/// Light that came to the receiver over at least one specular surface.
+/// Light that reaches the receiver over at least one specular surface.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Arrival {
-    /// The way it took.
     pub(super) way: PathSignature,
-    /// Where it lands, in texels from the texel's corner.
+    /// Relative to the texel's corner [texels].
     pub(super) place: DVec2,
     /// Flux per unit square of the light's domain [W].
     pub(super) flux_w: LinearSrgb,
 }
 
-/// A whole way.
+/// A complete path.
 #[derive(Clone, Debug)]
 pub(super) struct WalkedPath {
     pub(super) start: DVec3,
@@ -34,7 +33,7 @@ pub(super) struct WalkedPath {
     pub(super) place: DVec2,
 }
 
-/// Follows rays of one wavefront to one target.
+/// Traces rays of one wavefront to one target.
 pub(super) struct LightPathWalker<'a> {
     pub(super) tracer: &'a Tracer,
     pub(super) launch: &'a Launch,
@@ -49,27 +48,27 @@ struct Segment {
     media: MediumStack,
     way: PathSignature,
     depth: u32,
-    /// What it left last, among all vertices.
+    /// Index of its last vertex.
     from: Option<usize>,
-    /// Whether it is direct light still.
+    /// Whether it is still direct light.
     is_straight: bool,
 }
 
-/// A vertex with the one before it.
+/// A vertex and the index of the one before it.
 struct Step {
     vertex: PathVertex,
     before: Option<usize>,
 }
 
 impl LightPathWalker<'_> {
-    /// All light that arrives of a ray, brightest way first among equals of order.
+    /// All arrivals of a ray at the target.
     pub(super) fn arrivals(&self, face: usize, square: DVec2) -> Vec<Arrival> {
         let mut found = Vec::new();
         self.walk(face, square, |arrival, _, _, _| found.push(arrival));
         found
     }
 
-    /// The way that the ray takes whose light arrives so.
+    /// The path of a ray that has the wanted signature; `None` if the ray takes no such path.
     pub(super) fn way(&self, face: usize, square: DVec2, wanted: PathSignature) -> Option<WalkedPath> {
         let mut found = None;
         self.walk(face, square, |arrival, end, last, steps| {

@@ -8,18 +8,17 @@ use crate::illumination::parametrisation::coverage::{
 };
 use crate::scene::Mesh;
 
-/// One element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Element {
     /// Row · width + column in the grid.
     pub texel: u32,
-    /// Which smooth piece.
+    /// Number of its smooth piece.
     pub piece: u32,
     /// On the surface [m²], > 0.
     pub area_m2: f64,
-    /// Its middle [texels of the grid].
+    /// Its centroid [texels of the grid].
     pub middle: DVec2,
-    /// Its parts: from here to where those of the next begin.
+    /// Index of its first part. Its parts end where those of the next element begin.
     first_part: u32,
 }
 
@@ -27,7 +26,7 @@ pub struct Element {
 #[derive(Clone, Copy, Debug)]
 struct ElementTriangle {
     triangle: u32,
-    /// Share of the element's area up to its end.
+    /// Share of the element's area up to the end of this part.
     until: f64,
 }
 
@@ -40,7 +39,7 @@ pub struct Elements {
     first: Vec<u32>,
 }
 
-/// A triangle's share of a texel, while they are collected.
+/// A triangle's share of a texel, before shares are grouped into elements.
 struct TriangleShare {
     texel: u32,
     piece: u32,
@@ -50,7 +49,7 @@ struct TriangleShare {
 }
 
 impl Elements {
-    /// Of a mesh in a chart whose triangles belong to smooth pieces.
+    /// `pieces`: the smooth piece of each triangle.
     pub fn new(mesh: &Mesh, chart: &Chart, pieces: &[u32]) -> Self {
         let mut cuts = cuts(mesh, chart, pieces);
         cuts.sort_unstable_by_key(|cut| (cut.texel, cut.piece, cut.triangle));
@@ -93,12 +92,11 @@ impl Elements {
         }
     }
 
-    /// All of them.
     pub fn all(&self) -> &[Element] {
         &self.all
     }
 
-    /// Indices of those of a texel.
+    /// Indices of a texel's elements.
     pub fn of_texel(&self, texel: usize) -> std::ops::Range<usize> {
         self.first[texel] as usize..self.first[texel + 1] as usize
     }
@@ -108,7 +106,8 @@ impl Elements {
         self.of_texel(texel).find(|&index| self.all[index].piece == piece)
     }
 
-    /// The triangle of an element at a share of its area in [0, 1), and how far within that triangle's part it lies.
+    /// Samples a triangle of an element by a share of the element's area in [0, 1). Also returns the share within the
+    /// triangle's part.
     pub fn triangle_at(&self, element: usize, share: f64) -> (u32, f64) {
         let first = self.all[element].first_part as usize;
         let end = self
@@ -125,7 +124,6 @@ impl Elements {
         (parts[index].triangle, within.clamp(0.0, 1.0))
     }
 
-    /// Memory that they take [bytes].
     pub fn bytes(&self) -> u64 {
         (size_of_val(&self.all[..]) + size_of_val(&self.parts[..]) + size_of_val(&self.first[..])) as u64
     }
@@ -160,7 +158,7 @@ fn cuts(mesh: &Mesh, chart: &Chart, pieces: &[u32]) -> Vec<TriangleShare> {
     cuts
 }
 
-/// A point of a polygon, evenly by its area, for a point of the unit square.
+/// A point of a polygon, uniform by area, from a point of the unit square.
 pub fn point_in(polygon: &Polygon, square: DVec2) -> DVec2 {
     let corners = polygon.corners();
     let fan = |index: usize| [corners[0], corners[index], corners[index + 1]];
@@ -177,7 +175,7 @@ pub fn point_in(polygon: &Polygon, square: DVec2) -> DVec2 {
                 0.5
             };
             let [a, b, c] = fan(index);
-            // Evenly over the triangle: the distance from its first corner by the root.
+            // Uniform over the triangle: the distance from its first corner grows with the square root.
             let root = across.sqrt();
             return a * (1.0 - root) + b * (root * (1.0 - square.y)) + c * (root * square.y);
         }

@@ -5,8 +5,8 @@ use super::network::Network;
 use super::solve::Solution;
 
 impl Network {
-    /// Expected error of the luminance of the elements of one grid [W/m²]: the root of the squared noise and the
-    /// squared bend of E from element to element, which a straight line between them misses.
+    /// Expected error of the luminance of a grid's elements [W/m²]: the root of the squared noise and the squared
+    /// curvature of E between elements, which linear interpolation misses.
     pub fn errors(&self, grid: &Grid, solution: &Solution) -> Vec<f64> {
         let value = |element: usize| solution.irradiance[grid.first + element].luminance();
         let noise = |element: usize| solution.noise[grid.first + element];
@@ -18,8 +18,8 @@ impl Network {
             .collect()
     }
 
-    /// Noise of single elements, which is one difference each, as the root mean square of what is found around: as if all
-    /// had as many rays.
+    /// Noise as the root mean square over the elements around, scaled to equal numbers of rays: for a single element it
+    /// is only one difference.
     pub(super) fn pooled(&self, noise: &[f64], passes: &[u8]) -> Vec<f64> {
         let mut pooled = Vec::with_capacity(noise.len());
         for grid in self.grids() {
@@ -37,7 +37,7 @@ impl Network {
     }
 }
 
-/// An element and those of its piece at the eight texels around it.
+/// An element and those of its piece in the eight texels around it.
 fn around(grid: &Grid, element: usize) -> impl Iterator<Item = usize> {
     let steps = (-1..=1).flat_map(|down| (-1..=1).map(move |right| (right, down)));
     steps.filter_map(move |step| beside(grid, element, step))
@@ -54,8 +54,8 @@ fn beside(grid: &Grid, element: usize, (right, down): (i64, i64)) -> Option<usiz
         .flatten()
 }
 
-/// Error of a straight line between neighbours: an eighth of the second difference; at a border, where nothing lies
-/// beyond, an eighth of the first.
+/// Error of linear interpolation between neighbours: an eighth of the second difference; at a border, an eighth of the
+/// first.
 fn bend(grid: &Grid, element: usize, (right, down): (i64, i64), value: &impl Fn(usize) -> f64) -> f64 {
     let ends = [(right, down), (-right, -down)].map(|step| beside(grid, element, step));
     match ends {

@@ -8,14 +8,14 @@ use crate::illumination::Chart;
 use crate::illumination::islands::root;
 use crate::scene::Mesh;
 
-/// Neighbouring triangles of one smooth piece lie at less than 30° to each other.
+/// Neighbouring triangles of one smooth piece meet at less than 30°.
 const MIN_COSINE: f64 = 0.866;
 
-/// Both ends of a side in the map, the lower one first.
+/// Both ends of an edge in the map, the lower one first.
 type Side = [(u64, u64); 2];
 
-/// The smooth piece of each triangle, counted from 0: triangles with a common side in the map, without a crease there.
-/// Both the map and the surface count: pieces touch on both.
+/// The smooth piece of each triangle, counted from 0. Triangles of a piece are connected by edges that they share in
+/// the map and that are not creases of the surface.
 pub fn smooth_pieces(mesh: &Mesh, chart: &Chart) -> Vec<u32> {
     let count = chart.corner_uvs.len();
     let mut parent: Vec<u32> = (0..count as u32).collect();
@@ -41,7 +41,7 @@ pub fn smooth_pieces(mesh: &Mesh, chart: &Chart) -> Vec<u32> {
 }
 
 fn side(a: DVec2, b: DVec2) -> Side {
-    // Adding zero makes both zeros alike.
+    // Adding zero turns −0 into +0.
     let [a, b] = [a, b].map(|corner| ((corner.x + 0.0).to_bits(), (corner.y + 0.0).to_bits()));
     [a.min(b), a.max(b)]
 }

@@ -11,22 +11,21 @@ use crate::illumination::parametrisation::coverage::Polygon;
 use crate::light_pass::direct::facet::{Facet, SurfacePoint};
 use crate::scene::{Mesh, Scene};
 
-/// Elements of one receiver.
 #[derive(Clone, Debug)]
 pub struct Grid {
-    /// How the surface lies in the grid.
+    /// Maps the surface to the texels of the grid.
     pub chart: Arc<Chart>,
     /// Smooth piece of each triangle.
     pub pieces: Vec<u32>,
     pub elements: Elements,
     /// Number of its first element among those of all grids.
     pub first: usize,
-    /// Area of an element, as a rule [m²].
+    /// Typical area of an element [m²].
     pub usual_m2: f64,
 }
 
 impl Grid {
-    /// Of a receiver by a chart of the grid's size; `first`: elements of the grids before it.
+    /// `chart` has the size of the grid; `first` is the number of elements in the grids before it.
     pub fn new(scene: &Scene, chart: &Arc<Chart>, first: usize) -> Self {
         let mesh = scene.objects[chart.object()].mesh_in_scene();
         let pieces = smooth_pieces(mesh, chart);
@@ -41,7 +40,7 @@ impl Grid {
         }
     }
 
-    /// The element at a point of a triangle, among those of all grids.
+    /// The element at a point of a triangle, numbered over all grids.
     pub fn element_at(&self, triangle: usize, barycentric: [f64; 3]) -> Option<usize> {
         let uv = self.chart.uv(triangle, barycentric);
         let texel_of = |coordinate: f64, count: usize| {
@@ -51,7 +50,7 @@ impl Grid {
         let (column, row) = (texel_of(uv.x, width), texel_of(uv.y, height));
         let piece = self.pieces[triangle];
         let own = self.elements.find(row * width + column, piece);
-        // By rounding, the point may lie beside the border of its texel.
+        // Rounding may put the point just outside of the element's texel.
         let beside = || {
             let rows = row.saturating_sub(1)..(row + 2).min(height);
             let mut texels = rows.flat_map(|row| {
@@ -62,7 +61,7 @@ impl Grid {
         own.or_else(beside).map(|index| self.first + index)
     }
 
-    /// A point of an element, evenly by its area, for a point of the unit square; `None` where its triangle has no area.
+    /// A point of an element, uniform by area, from a point of the unit square; `None` if its triangle is degenerate.
     pub fn point(&self, mesh: &Mesh, element: usize, square: DVec2) -> Option<SurfacePoint> {
         let (triangle, within) = self.elements.triangle_at(element, square.x);
         let facet = Facet::new(mesh, &self.chart, triangle)?;
@@ -74,14 +73,13 @@ impl Grid {
         Some(facet.at(point_in(&part, DVec2::new(within, square.y))))
     }
 
-    /// Memory that it takes, but for its chart [bytes].
+    /// Memory without the chart.
     pub fn bytes(&self) -> u64 {
         self.elements.bytes() + size_of_val(&self.pieces[..]) as u64
     }
 }
 
-/// A direction on the side of a surface that its geometric normal is on, by the cosine to its shading normal; what that
-/// would send through the surface is mirrored at it.
+/// A direction weighted by the cosine to the shading normal. Directions below the geometric surface are mirrored at it.
 pub fn cosine_direction(point: &SurfacePoint, square: DVec2) -> DVec3 {
     let (x, y) = point.shading_normal.any_orthonormal_pair();
     let along = DVec2::from_angle(std::f64::consts::TAU * square.y) * square.x.sqrt();

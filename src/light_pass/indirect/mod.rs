@@ -1,15 +1,15 @@
 //! Indirect light between diffuse surfaces (LD+D, LS+D+D), with any number of bounces.
 //!
-//! Each receiver has a grid of elements, coarser than its map, since this light is smooth. Rays leave every element by the
-//! cosine, are followed through glass and off mirrors as radiance is, and end on elements of diffuse surfaces. What
-//! they weigh (tints, absorption, polish, n², and the albedo where they end) makes a sparse matrix K, and
+//! Each receiver has a grid of elements, coarser than its map, since indirect light is smooth. Cosine-weighted rays
+//! leave every element, are traced through glass and off mirrors as radiance is, and end on elements of diffuse
+//! surfaces. Their weights (tints, absorption, coats, n², and the albedo where they end) form a sparse matrix K, and
 //!
 //! E = K (S + E), S = caustic + direct
 //!
-//! is iterated until it stands. The rays are traced once: lamps that become dimmer or brighter need none. Emission is no
-//! part of it: what glows lights by the direct and caustic layers.
+//! is iterated until it converges. Rays are traced once and do not depend on the strength of lights. Emission is not
+//! part of S: light of glowing surfaces is in the direct and caustic layers.
 //!
-//! Half of the rays against the other half tell the error of each element.
+//! The difference between two halves of its rays estimates the error of each element.
 
 mod element;
 mod error;

@@ -13,16 +13,16 @@ use crate::progress::{Control, Progress};
 use crate::scene::Scene;
 use crate::transport::{SurfaceHit, Tracer};
 
-/// Rays of an element in the first pass. The second has as many, and each further one as many as all before it.
+/// Rays per element in the first pass. The second has as many, and each further one as many as all before it.
 const FIRST_RAYS: u32 = 16;
 
-/// Passes that every element needs, 64 rays: less may miss a small bright spot altogether, and see no error either.
+/// Minimum number of passes per element, 64 rays: fewer may miss a small bright spot and then see no error either.
 pub const MIN_PASSES: u8 = 3;
 
-/// Passes of an element at most: 4,096 rays.
+/// Maximum number of passes per element: 4,096 rays.
 pub const MAX_PASSES: u8 = 9;
 
-/// Which grid a surface's light comes from.
+/// The grid of each receiver.
 #[derive(Clone, Debug)]
 pub struct SurfaceGrids {
     /// Number of the grid, by receiver.
@@ -30,13 +30,13 @@ pub struct SurfaceGrids {
 }
 
 impl SurfaceGrids {
-    /// The grid that a ray meets.
+    /// The grid of the surface that a ray hits.
     pub fn grid_of(&self, hit: &SurfaceHit, side: Side) -> Option<usize> {
         self.by_receiver[Receiver::new(hit.object, side).index()].map(|grid| grid as usize)
     }
 }
 
-/// Elements with their rays.
+/// Elements and the rays between them.
 #[derive(Clone, Debug)]
 pub struct Network {
     grids: Vec<Grid>,
@@ -44,13 +44,13 @@ pub struct Network {
     stances: Vec<ElementPoints>,
     closed: Vec<bool>,
     batches: Vec<Vec<Link>>,
-    /// By pass, then by element: the batch that it is in, and where.
+    /// By pass, then by element: the number of its batch, and its links there.
     rows: Vec<Vec<Option<(u32, LinkRange)>>>,
     counts: TraceCounts,
 }
 
 impl Network {
-    /// Elements of all receivers, one chart each, of the grids' sizes; no rays yet.
+    /// Elements of all receivers, one chart each at the size of its grid; no rays yet.
     pub fn new(scene: &Scene, charts: &[Arc<Chart>]) -> Self {
         let unnumbered: Vec<Grid> = charts
             .par_iter()
@@ -80,23 +80,21 @@ impl Network {
         }
     }
 
-    /// Grids of all receivers.
     pub fn grids(&self) -> &[Grid] {
         &self.grids
     }
 
-    /// Number of elements.
     pub fn element_count(&self) -> usize {
         self.stances.len()
     }
 
-    /// Whether an element lies within a solid, or nothing was seen from it: its light is not for others to go by.
+    /// Whether an element lies inside a solid or sees nothing: others should not interpolate from it.
     pub fn is_hidden(&self, element: usize) -> bool {
         let sees_nothing = |pass: u8| self.row(element, pass).is_none_or(|(_, kept)| kept == 0);
         self.stances[element] == ElementPoints::Inside || (0..MIN_PASSES).all(sees_nothing)
     }
 
-    /// Links of an element in a pass, and its rays that count; `None` where it was not traced.
+    /// Links of an element in a pass, and the number of its rays that count; `None` if it was not traced.
     pub fn row(&self, element: usize, pass: u8) -> Option<(&[Link], u32)> {
         let (batch, row) = (*self.rows.get(usize::from(pass))?.get(element)?)?;
         let first = row.first as usize;
@@ -104,24 +102,22 @@ impl Network {
         Some((links, row.kept))
     }
 
-    /// Rays of an element after so many passes, as a rule.
+    /// Rays of a typical element after this number of passes.
     pub fn rays_after(passes: u8) -> u32 {
         FIRST_RAYS << passes.saturating_sub(1)
     }
 
-    /// What all passes counted.
     pub fn counts(&self) -> TraceCounts {
         self.counts
     }
 
-    /// Memory [bytes].
     fn bytes(&self) -> u64 {
         let rows = self.rows.iter().map(|rows| size_of_val(&rows[..]) as u64);
         let links = self.batches.iter().map(|links| size_of_val(&links[..]) as u64);
         self.grids.iter().map(Grid::bytes).sum::<u64>() + rows.sum::<u64>() + links.sum::<u64>()
     }
 
-    /// Memory once every element has so many passes, about [bytes].
+    /// Approximate memory once every element has its number of passes.
     pub fn bytes_after(&self, passes: &[u8]) -> u64 {
         let missing: u64 = (0..MAX_PASSES)
             .map(|pass| {
@@ -132,15 +128,15 @@ impl Network {
         self.bytes() + missing * size_of::<Link>() as u64
     }
 
-    /// Elements that are to have a pass and do not.
+    /// Elements that still lack a pass.
     fn missing(&self, passes: &[u8], pass: u8) -> Vec<u32> {
         (0..passes.len() as u32)
             .filter(|&element| passes[element as usize] > pass && self.row(element as usize, pass).is_none())
             .collect()
     }
 
-    /// Traces what is missing for every element to have so many passes. False where it was cancelled: whole passes stay.
-    /// The same for any number of threads, and whatever was traced before.
+    /// Traces whatever is missing for every element to have its number of passes. False if cancelled; complete passes
+    /// are kept. The result depends neither on the number of threads nor on what was traced before.
     pub fn trace(
         &mut self,
         tracer: &Tracer,

@@ -8,38 +8,37 @@ use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
 use crate::transport::{Branch, EffectSet, Interaction, MediumStack, SurfaceHit, Tracer};
 
-/// Rays that carry less than this share of what they could are given up, and counted.
+/// Weight below which rays are truncated.
 const MIN_WEIGHT: f64 = 1e-4;
 
-/// How far rays are followed.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Most specular surfaces on the way.
+    /// Maximum number of specular surfaces on a path.
     pub max_depth: u32,
 }
 
-/// What a ray found.
+/// Result of tracing a ray.
 #[derive(Clone, Debug, Default)]
 pub struct PathEnd {
-    /// Segments that were searched.
+    /// Segments traced.
     pub segments: u64,
-    /// Share of the radiance that was given up.
+    /// Share of the radiance that was truncated.
     pub truncated: f64,
-    /// Whether the first surface was the back of an opaque one: (object, whether its back is drawn).
+    /// Present if the first surface was the back of an opaque one: (object, whether its back is drawn).
     pub first_back: Option<(usize, bool)>,
 }
 
-/// Follows rays through a scene.
+/// Traces rays through a scene.
 pub struct Follower<'a> {
     pub tracer: &'a Tracer,
     pub limits: Limits,
 }
 
 impl Follower<'_> {
-    /// Follows a ray; `choice` gives an even point of the unit square for each surface on the way, `land` takes each
-    /// diffuse surface that is met, with what its E counts for at the ray's start: L·π there, over E here.
+    /// Traces a ray. `choice` returns a point of the unit square for each random decision. `land` receives each diffuse
+    /// surface on the path with the weight of its E: π·L at the ray's start over E at the surface.
     ///
-    /// Where light could go two ways, one is taken by chance, as likely as it carries light.
+    /// Where light could take two branches, one is sampled in proportion to its share.
     pub fn follow(
         &self,
         mut ray: Ray,
@@ -68,7 +67,7 @@ impl Follower<'_> {
                     .interact_with(EffectSet::EVERYTHING, &hit, ray.direction, &media, micro);
             if material.surface.is_receiver() {
                 if is_back && !material.has_back() {
-                    // Nothing is drawn there, and nothing sends light.
+                    // A back that is not drawn sends no light.
                     return found;
                 }
                 land(
@@ -91,7 +90,7 @@ impl Follower<'_> {
     }
 }
 
-/// One way on, with its share over how likely it was chosen; `None` where the ray ends.
+/// One branch, with its share over the probability of sampling it; `None` if the ray ends.
 fn chosen(interaction: &Interaction, surface: SurfaceKind, at: f64) -> Option<(Branch, LinearSrgb)> {
     let [back, through] = [interaction.reflection, interaction.transmission];
     match (back, through) {

@@ -12,17 +12,17 @@ use crate::illumination::parametrisation::coverage::{for_each_texel_in_row, rows
 use crate::illumination::tiles::Tile;
 use crate::optics::LinearSrgb;
 
-/// How the map of a receiver and its grid lie over each other.
+/// Overlap of a receiver's map with its grid.
 #[derive(Debug)]
 pub struct Resampling<'a> {
     grid: &'a Grid,
     chart: &'a Chart,
-    /// The piece that has most of each texel of the map; empty where there is one piece.
+    /// The piece that covers most of each texel of the map; empty if there is a single piece.
     pieces: Vec<u32>,
 }
 
 impl<'a> Resampling<'a> {
-    /// Between a grid and a map of the same receiver.
+    /// For a grid and a map of the same receiver.
     pub fn new(grid: &'a Grid, chart: &'a Chart) -> Self {
         let is_one = grid.pieces.iter().all(|&piece| piece == 0);
         let pieces = if is_one {
@@ -37,7 +37,7 @@ impl<'a> Resampling<'a> {
         self.pieces.get(texel).copied().unwrap_or(0)
     }
 
-    /// The map as rectangles of texels that lie row by row: the whole map, or its tiles.
+    /// The map as rectangles of texels that are stored row by row: the whole map, or its tiles.
     fn blocks(&self) -> Vec<Block> {
         let (width, height) = (self.chart.width, self.chart.height);
         match &self.chart.layout {
@@ -59,7 +59,8 @@ impl<'a> Resampling<'a> {
         }
     }
 
-    /// Mean E of each element [W/m²], from that of the map's texels: each gives its flux to the elements that it lies on.
+    /// Mean E of each element [W/m²], from E of the map's texels: each texel gives its flux to the elements that it
+    /// overlaps.
     pub fn to_grid(&self, irradiance: &[[f32; 3]]) -> Vec<LinearSrgb> {
         let elements = self.grid.elements.all();
         let mut flux = vec![LinearSrgb::BLACK; elements.len()];
@@ -109,15 +110,15 @@ impl<'a> Resampling<'a> {
         };
         (0..elements.len())
             .map(|element| match area_m2[element] {
-                // A sliver that no texel of the map mostly belongs to.
+                // A sliver that is not the main piece of any texel of the map.
                 0.0 => at_middle(element),
                 covered => flux[element] / covered,
             })
             .collect()
     }
 
-    /// Values of the map's texels, between those of the elements around each; `is_hidden` elements count only where there
-    /// are no others: what is seen goes on a little beneath what hides it. The gutter is filled.
+    /// Values of the map's texels, interpolated between the elements around each. Hidden elements count only where
+    /// there are no others, so that visible light extends slightly beneath an occluder. The gutter is filled.
     pub fn to_map(&self, values: &[[f64; 3]], is_hidden: impl Fn(usize) -> bool + Sync) -> Vec<[f32; 3]> {
         let (width, height) = (self.chart.width, self.chart.height);
         let scale = DVec2::new(
@@ -144,7 +145,7 @@ impl<'a> Resampling<'a> {
         map
     }
 
-    /// Between the four elements around a place [texels of the grid] that belong to a piece.
+    /// Interpolates between the four elements around a position [texels of the grid] that belong to a piece.
     fn between(
         &self,
         place: DVec2,
@@ -162,7 +163,7 @@ impl<'a> Resampling<'a> {
         let own = element(place.x.floor() as i64, place.y.floor() as i64);
         let low = (place - 0.5).floor();
         let part = place - 0.5 - low;
-        // Of what is seen, and of what is hidden.
+        // Of visible and of hidden elements.
         let mut sums = [([0.0; 3], 0.0); 2];
         for (right, across) in [(0, 1.0 - part.x), (1, part.x)] {
             for (down, along) in [(0, 1.0 - part.y), (1, part.y)] {
@@ -180,7 +181,7 @@ impl<'a> Resampling<'a> {
         if let Some((sum, weights)) = sums.into_iter().find(|(_, weights)| *weights > 0.0) {
             return sum.map(|channel| channel / weights);
         }
-        // A sliver beyond the last centre of its piece.
+        // A sliver beyond the last element centre of its piece.
         let around = (-1..=1).flat_map(|down| (-1..=1).map(move |right| (right, down)));
         let nearest = own.or_else(|| {
             let mut near = around.filter_map(|(right, down)| {
@@ -192,20 +193,20 @@ impl<'a> Resampling<'a> {
     }
 }
 
-/// Texels of a map that lie row by row.
+/// Texels of a map that are stored row by row.
 struct Block {
     texels: Range<usize>,
     /// First column and row [texels of the finest size].
     origin: (usize, usize),
-    /// Texels in a row.
+    /// Texels per row.
     across: usize,
-    /// Of each texel [texels of the finest size].
+    /// Side of each texel [texels of the finest size].
     side: usize,
 }
 
-/// Texels of a line of `to` that some of `from` lie on, each with its share of them.
+/// Texels of a line of `to` that a range out of `from` overlaps, each with its share of the range.
 fn shares(texels: Range<usize>, from: usize, to: usize) -> Vec<(usize, f64)> {
-    // In units of 1/(from·to) of the line, all borders are whole.
+    // In units of 1/(from·to) of the line, all borders are integers.
     let count = texels.len();
     let (low, high) = (texels.start * to, texels.end * to);
     (low / from..high.div_ceil(from))
@@ -238,7 +239,7 @@ fn pieces_of_texels(grid: &Grid, chart: &Chart) -> Vec<u32> {
     match &chart.layout {
         None => (0..best.len()).map(piece).collect(),
         Some(layout) => {
-            // That of the middle of a larger texel.
+            // The piece at the centre of a larger texel.
             let middles = layout.tiles().flat_map(|tile| {
                 let side = 1_usize << tile.level;
                 (0..tile.texels.len()).map(move |index| {

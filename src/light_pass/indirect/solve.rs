@@ -5,32 +5,32 @@ use rayon::prelude::*;
 use super::network::{MAX_PASSES, Network};
 use crate::optics::LinearSrgb;
 
-/// Most times that light is sent on.
+/// Maximum number of bounces.
 pub const MAX_BOUNCES: u32 = 1000;
 
-/// What is still to come may be this part of the mean.
+/// Remaining light, relative to the mean, at which the iteration ends.
 const TOLERANCE: f64 = 1e-5;
 
-/// What the elements receive from each other.
+/// Irradiance of the elements from each other.
 #[derive(Clone, Debug)]
 pub struct Solution {
     /// E from other elements [W/m²].
     pub irradiance: Vec<LinearSrgb>,
-    /// Standard error of its luminance by the rays, element by element, from it and those around it [W/m²].
+    /// Standard error of its luminance by element [W/m²], estimated from the rays of the element and of those around
+    /// it.
     pub noise: Vec<f64>,
-    /// Mean of E by area [W/m²].
+    /// Mean luminance of E by area [W/m²].
     pub mean: f64,
-    /// How many times light was sent on.
     pub bounces: u32,
-    /// False where [`MAX_BOUNCES`] did not do.
+    /// False if [`MAX_BOUNCES`] was not enough.
     pub converged: bool,
-    /// Root mean square of the noise over the mean of E, by area; 0 without light.
+    /// Root mean square of the noise by area, relative to the mean; 0 without light.
     pub relative_noise: f64,
 }
 
 impl Network {
-    /// Solves E = K (S + E) for the E that sources S [W/m²] of all elements give, by the first so many passes of each
-    /// element, at least [`MIN_PASSES`](super::MIN_PASSES).
+    /// Solves E = K (S + E) for the sources S [W/m²] of all elements, using the first `passes` of each element, at
+    /// least [`MIN_PASSES`](super::MIN_PASSES).
     pub fn solve(&self, sources: &[LinearSrgb], passes: &[u8]) -> Solution {
         let count = self.element_count();
         let mut irradiance = vec![LinearSrgb::BLACK; count];
@@ -44,7 +44,7 @@ impl Network {
             bounces += 1;
             let (change, mean) = self.change(&irradiance, &next);
             irradiance = next;
-            // Changes shrink by a ratio; all that are to come add up to a geometric series.
+            // Changes shrink by a ratio; the remaining ones add up to a geometric series.
             let ratio = (change / last_change).clamp(0.0, 1.0);
             last_change = change;
             if change == 0.0 || change * ratio <= TOLERANCE * mean * (1.0 - ratio) && bounces > 2 {
@@ -69,7 +69,7 @@ impl Network {
         }
     }
 
-    /// E of an element by the rays of some passes.
+    /// E of an element from the rays of some passes.
     fn gathered(&self, element: usize, sent: &[LinearSrgb], passes: std::ops::Range<u8>) -> LinearSrgb {
         let (mut sum, mut rays) = ([0.0; 3], 0_u32);
         for (links, kept) in passes.filter_map(|pass| self.row(element, pass)) {
@@ -88,7 +88,7 @@ impl Network {
         }
     }
 
-    /// Half of the difference between the last pass and all before it, which have as many rays.
+    /// Half the difference between the last pass and all before it, which have equally many rays.
     fn noise(&self, element: usize, sent: &[LinearSrgb], passes: u8) -> f64 {
         let last = passes.saturating_sub(1);
         let halves = [0..last, last..passes];
@@ -96,7 +96,7 @@ impl Network {
         0.5 * (second - first).abs()
     }
 
-    /// Mean change and mean, by area, of the largest channel.
+    /// Change and new E, each summed over the area; of the largest channel.
     fn change(&self, old: &[LinearSrgb], new: &[LinearSrgb]) -> (f64, f64) {
         let (mut change, mut mean) = ([0.0; 3], [0.0; 3]);
         for grid in self.grids() {
@@ -115,7 +115,7 @@ impl Network {
         (largest(change), largest(mean))
     }
 
-    /// Mean of E, and the root mean square of the noise over it, by area.
+    /// Mean of E by area, and the root mean square of the noise relative to it.
     fn relative(&self, noise: &[f64], irradiance: &[LinearSrgb]) -> (f64, f64) {
         let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
         for grid in self.grids() {
@@ -135,14 +135,15 @@ impl Network {
 }
 
 impl Solution {
-    /// Elements that need more rays for a relative error, ascending. Each is to have that error by its own E, dark ones by
-    /// half of the mean; and while the error of all is larger, those that have most part in it are to do better than that.
+    /// Elements that need more rays for a relative error of `target`, ascending. The limit of each is relative to its
+    /// own E, or to half the mean if it is darker. As long as the total error exceeds the target, the limit is stricter
+    /// for elements that contribute most to it.
     pub fn wanting(&self, target: f64, passes: &[u8]) -> Vec<usize> {
         let is_rough = self.relative_noise > target;
         let most = |element: usize| {
             let own = self.irradiance[element].luminance() / self.mean;
             let alone = own.max(0.5);
-            // Errors like the root of E add up to the target.
+            // Errors in proportion to √E add up to the target.
             let together = (0.5 * own.max(0.25)).sqrt();
             target * self.mean * if is_rough { alone.min(together) } else { alone }
         };

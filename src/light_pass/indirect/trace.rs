@@ -13,59 +13,58 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::Mesh;
 use crate::transport::{MediumStack, Tracer, media_at};
 
-/// What one ray weighs where it ended.
+/// The contribution of one ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Link {
     /// Number of the element that sends the light.
     pub element: u32,
-    /// E at the start over E there, per channel, for this ray alone.
+    /// E at the start of the ray over E at that element, per channel, for this ray alone.
     pub weight: [f32; 3],
 }
 
-/// Where the links of one element in one pass are.
+/// The links of one element in one pass.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LinkRange {
-    /// Place of the first within its batch.
+    /// Index of the first link in its batch.
     pub first: u64,
-    /// Their number.
+    /// Number of links.
     pub links: u32,
-    /// Rays that count, those that found nothing included.
+    /// Rays that count, including those that found nothing.
     pub kept: u32,
 }
 
-/// What was traced for some elements.
+/// The rays of some elements.
 #[derive(Clone, Debug, Default)]
 pub struct Batch {
-    /// Links of all of them.
+    /// Links of all elements.
     pub links: Vec<Link>,
-    /// One for each of them, in their order, with how it is looked from.
+    /// By element, in their order.
     pub rows: Vec<(LinkRange, ElementPoints)>,
-    /// What it took.
     pub counts: TraceCounts,
 }
 
-/// Which of an element's points send rays: parts of a surface inside a solid do not.
+/// Which points of an element send rays: its surface may lie partly inside a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ElementPoints {
-    /// Nothing was looked at yet.
+    /// Not traced yet.
     #[default]
     Unknown,
     /// Those outside of solids.
     Outside,
-    /// Those within a solid: there are no others, or few.
+    /// Those inside a solid: there are no others, or few.
     Inside,
 }
 
-/// What a pass counted.
+/// Counts of a pass.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TraceCounts {
-    /// Rays that left an element.
+    /// Rays sent by elements.
     pub rays: u64,
-    /// Segments that were searched for them.
+    /// Segments traced for them.
     pub segments: u64,
-    /// Share of what they carried that was given up on the way (rays' weights).
+    /// Weight that was truncated, summed over rays.
     pub truncated: f64,
-    /// Rays that ended on a grid without an element there.
+    /// Rays that hit a grid where it has no element.
     pub lost: u64,
 }
 
@@ -78,34 +77,34 @@ impl std::ops::AddAssign for TraceCounts {
     }
 }
 
-/// Elements that a thread works on at a time.
+/// Elements per task.
 const CHUNK: usize = 32;
 
-/// An element far smaller than is usual on its grid takes up to so many times fewer rays.
+/// Maximum number of times that the rays of an element smaller than usual on its grid are halved.
 const MAX_HALVINGS: u32 = 3;
 
-/// All that tracing needs.
+/// Inputs of a pass.
 pub struct GatherPass<'a> {
     pub follower: Follower<'a>,
     pub grids: &'a [Grid],
     pub places: &'a SurfaceGrids,
     pub stances: &'a [ElementPoints],
-    /// Whether each object's mesh encloses space.
+    /// Whether each object's mesh is closed.
     pub closed: &'a [bool],
     pub seed: u64,
-    /// Rays of an element, as a rule: from so many to so many, powers of two or 0.
+    /// Range of a typical element's ray indices; both ends are powers of two or 0.
     pub rays: (u32, u32),
 }
 
-/// One ray with what it found.
+/// A ray with its links.
 struct RayEnd {
     links: std::ops::Range<usize>,
-    /// Whether it began within a solid, and whether the inside of that is drawn.
+    /// Present if it started inside a solid: whether the inside of that is drawn.
     within: Option<bool>,
 }
 
 impl GatherPass<'_> {
-    /// Traces for some elements; `None` where it was cancelled.
+    /// Traces the rays of some elements; `None` if cancelled.
     pub fn run(&self, elements: &[u32], (progress, control): (&dyn Progress, &Control)) -> Option<Batch> {
         let has_bodies = self.has_bodies();
         let chunks = elements.len().div_ceil(CHUNK);
@@ -182,7 +181,7 @@ impl GatherPass<'_> {
         part.rows.push((row, stance));
     }
 
-    /// Drops the links of rays that began on the wrong side; returns how many rays are left.
+    /// Drops the links of rays that started on the wrong side; returns the number of rays that are left.
     fn keep(&self, stance: ElementPoints, ends: &[RayEnd], first_link: usize, part: &mut Batch) -> u32 {
         let wanted = |end: &RayEnd| end.within.is_some() == (stance == ElementPoints::Inside);
         if !ends.iter().all(wanted) {
@@ -250,7 +249,7 @@ impl GatherPass<'_> {
         }
     }
 
-    /// Tells elements of all grids apart, whatever else lies in the scene.
+    /// Distinguishes the elements of all grids, whatever else is in the scene.
     fn seed_of(&self, grid: &Grid, element: usize) -> u64 {
         let element = grid.elements.all()[element];
         let place = (grid.chart.receiver.index() as u64) << 40 ^ u64::from(element.texel);
@@ -258,7 +257,7 @@ impl GatherPass<'_> {
     }
 }
 
-/// Outside, unless all points lie within a solid, or most do and its inside is drawn.
+/// Outside, unless all points lie inside a solid, or most do and its inside is drawn.
 fn stance(ends: &[RayEnd]) -> ElementPoints {
     let within = ends.iter().filter(|end| end.within.is_some()).count();
     let is_drawn = ends.iter().any(|end| end.within == Some(true));
@@ -269,7 +268,7 @@ fn stance(ends: &[RayEnd]) -> ElementPoints {
     }
 }
 
-/// A hash of 64 bits (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
+/// 64-bit hash (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
 fn mixed(code: u64) -> u64 {
     let mut code = code.wrapping_add(0x9e37_79b9_7f4a_7c15);
     code = (code ^ (code >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -8,12 +8,11 @@ const WORDS_PER_ROW: usize = CELLS_PER_SIDE / 64;
 // Rows are also read as one 128-bit word.
 const _: () = assert!(WORDS_PER_ROW == 2);
 
-/// One bit per cell, row by row.
 #[derive(Clone, Debug)]
 pub(super) struct CellBits(Vec<[u64; WORDS_PER_ROW]>);
 
 impl CellBits {
-    /// No bit, or all.
+    /// No bit set, or all.
     pub(super) fn filled(on: bool) -> Self {
         let word = if on { u64::MAX } else { 0 };
         Self(vec![[word; WORDS_PER_ROW]; CELLS_PER_SIDE])
@@ -48,7 +47,7 @@ impl CellBits {
         })
     }
 
-    /// Set bits of a rectangle, row by row.
+    /// Set bits of a rectangle as (column, row), row by row.
     pub(super) fn list(&self, cells: &CellRange) -> Vec<(usize, usize)> {
         let mask = row_mask(cells.columns);
         let mut list = Vec::new();
@@ -64,7 +63,7 @@ impl CellBits {
         list
     }
 
-    /// Bits that are set here and not in the other.
+    /// Bits set here but not in the other.
     #[must_use]
     pub(super) fn without(&self, other: &Self) -> Self {
         let rows = self.0.iter().zip(&other.0);
@@ -74,7 +73,7 @@ impl CellBits {
         )
     }
 
-    /// Runs of columns that are set in any of some rows, as ascending half-open spans.
+    /// Runs of columns set in any of some rows, as ascending half-open spans.
     pub(super) fn runs(&self, rows: (usize, usize)) -> impl Iterator<Item = (usize, usize)> {
         let mut any: u128 = 0;
         for row in &self.0[rows.0..=rows.1] {
@@ -93,7 +92,7 @@ impl CellBits {
     }
 }
 
-/// Bits of the columns from first to last.
+/// Bits of the columns from first to last, both included.
 fn row_mask((first, last): (usize, usize)) -> [u64; WORDS_PER_ROW] {
     let below = |end: usize| if end >= 64 { u64::MAX } else { (1 << end) - 1 };
     std::array::from_fn(|word| {

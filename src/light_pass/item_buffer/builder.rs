@@ -11,16 +11,16 @@ use super::search::{Bounds, Search};
 use crate::light_pass::launch::Launch;
 use crate::transport::{SceneNode, Tracer};
 
-/// Triangles of an object that are tried before its nodes are searched for one that the light sees.
+/// Triangles of an object that are tested before the hierarchy is searched for one that the light sees.
 const TRIED_FIRST: usize = 16;
 
-/// What marking needs.
+/// Inputs of marking.
 pub(super) struct Builder<'a> {
     pub(super) launch: &'a Launch,
     pub(super) tracer: &'a Tracer,
-    /// Of every object; `None` of one without corners.
+    /// Box of each object; `None` if it has no vertices.
     pub(super) bounds: &'a [Option<Bounds>],
-    /// Of the wanted objects.
+    /// Boxes of the wanted objects.
     pub(super) boxes: Vec<Bounds>,
     /// Whether an object is a caster.
     pub(super) wanted: &'a [bool],
@@ -37,7 +37,7 @@ impl Builder<'_> {
         self.tests.fetch_add(tests, Ordering::Relaxed);
     }
 
-    /// Whether any of the cells sees an object.
+    /// Whether any of the visible cells sees an object.
     pub(super) fn sees(&self, object: usize, bounds: Bounds, visible: &[CellBits]) -> bool {
         let wanted = |other: usize| other == object;
         let bounds = [bounds];
@@ -71,7 +71,7 @@ impl Builder<'_> {
         lit.par_iter().enumerate().map(mark).collect()
     }
 
-    /// Of each face, the cells in which something may be hidden, and what is; nothing where that is so nowhere.
+    /// By face: the cells in which something may be hidden, and what is hidden. Empty if nothing can be.
     pub(super) fn hidden(&self, faces: &[CellBits]) -> Vec<(CellBits, Hidden)> {
         let hiders = self.hiders();
         if hiders.is_empty() {
@@ -105,8 +105,8 @@ impl Builder<'_> {
         faces.par_iter().enumerate().map(find).collect()
     }
 
-    /// Opaque triangles, with their objects, whose plane has part of a caster's box behind it, as the light sees it: no
-    /// other can hide one. Casters come last, else the largest come first.
+    /// Opaque triangles, with their objects, that have part of a caster's box behind their plane as seen from the
+    /// light: no others can hide a caster. Largest first, but those of casters last; empty if there are only those.
     fn hiders(&self) -> Vec<(usize, usize)> {
         let scene = self.tracer.scene();
         let mut tests = 0;
@@ -136,14 +136,14 @@ impl Builder<'_> {
         }
         hiders.sort_by_cached_key(|&(object, triangle)| {
             let [a, b, c] = scene.objects[object].in_scene().corners(triangle);
-            // Bits of positive numbers are ordered as the numbers are.
+            // Bits of positive floats are ordered like their values.
             let area = (b - a).cross(c - a).length().to_bits();
             (self.wanted[object], Reverse(area))
         });
         hiders
     }
 
-    /// Nothing hides itself.
+    /// An object does not hide itself.
     fn is_the_only_caster(&self, object: usize) -> bool {
         self.wanted[object] && self.wanted.iter().filter(|wanted| **wanted).count() == 1
     }

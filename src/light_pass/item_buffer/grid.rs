@@ -7,15 +7,15 @@ use glam::DVec2;
 use super::CELLS_PER_SIDE;
 use crate::geometry::cube_face::FaceMapping;
 
-/// Widening of the cell test, in units of the face's half side: above rounding, far below a cell.
+/// Enlargement of cells in tests, in half sides of the face: above rounding, far below the size of a cell.
 pub(super) const MARGIN: f64 = 1e-9;
 
 /// Borders between cells on the plane z = 1 of a face.
 pub(super) struct Grid {
     mapping: FaceMapping,
-    /// Of each column: its border's x, ascending.
+    /// x of each column's border, ascending.
     x: Vec<f64>,
-    /// On each column's border, at each row's border: y, ascending.
+    /// On each column's border: y of each row's border, ascending.
     y: Vec<Vec<f64>>,
 }
 
@@ -65,8 +65,8 @@ impl Grid {
         }
     }
 
-    /// Smallest rectangle around a cell, a little widened. Columns do not cross the face's middle (there is a border),
-    /// so that y is farthest and nearest at the corners.
+    /// Bounding rectangle of a cell, slightly enlarged. There is a border at the centre of the face, so that no column
+    /// crosses it and y is extreme at the corners.
     pub(super) fn cell(&self, column: usize, row: usize) -> (DVec2, DVec2) {
         let (left, right) = (&self.y[column], &self.y[column + 1]);
         let low = DVec2::new(self.x[column], left[row].min(right[row]));
@@ -76,7 +76,7 @@ impl Grid {
 
     /// Cells that may overlap a rectangle of the face.
     pub(super) fn cells(&self, low: DVec2, high: DVec2) -> CellRange {
-        // Rows are farthest from the middle at the largest |x|: at a given y, |v| falls with |x|.
+        // At a given y, |v| decreases with |x|: rows are extreme at the nearest and the farthest x.
         let nearest_x = if low.x <= 0.0 && high.x >= 0.0 {
             0.0
         } else {
@@ -100,7 +100,7 @@ impl Grid {
     }
 }
 
-/// Of the interval that a share of the side lies in.
+/// Index of the interval in which a share of the side lies.
 fn index(share: f64) -> usize {
     ((share * CELLS_PER_SIDE as f64).max(0.0) as usize).min(CELLS_PER_SIDE - 1)
 }

@@ -1,10 +1,10 @@
 //! Cells whose casters are occluded by opaque faces.
 //!
-//! A cell is dropped only where its whole frustum is covered by opaque faces that are nearer to the light than every
-//! caster in it: each ray that could start there ends on an opaque face first. Mirrors are opaque too, and hide what is
-//! behind them, though not themselves. Faces are subtracted from the cell's
-//! rectangle one by one. Two faces that share an edge share its plane bit for bit, so that no gap opens between them;
-//! what is left thinner than [`SLIVER`] is rounding.
+//! A cell is dropped only if its whole frustum is covered by opaque faces that are nearer to the light than every
+//! caster in it: each ray that could start there hits an opaque face first. Mirrors are opaque too and hide what is
+//! behind them, but not themselves. Faces are subtracted from the cell's rectangle one by one. Two faces that share an
+//! edge have bitwise the same plane there, so that no gap opens between them; remainders thinner than [`SLIVER`] are
+//! rounding.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -16,30 +16,31 @@ use super::grid::Grid;
 use super::polygon::Polygon;
 use crate::light_pass::launch::Launch;
 
-/// Widths below this are rounding [half sides of a face].
+/// Widths below this are rounding error [half sides of a face].
 const SLIVER: f64 = 1e-11;
 
-/// A face counts as nearer by this relative distance.
+/// Relative distance by which a face has to be nearer than a caster.
 const NEARER: f64 = 1e-7;
 
-/// A triangle that spans less than this, seen from the light, has a plane that rounding may tilt.
+/// Volume between a triangle's corners and the light, relative to the product of their distances, below which rounding
+/// may tilt the triangle's plane.
 const MIN_VOLUME: f64 = 1e-6;
 
-/// Faces that are subtracted from a cell: those that came first.
+/// Maximum number of faces that are subtracted from a cell; later ones are ignored.
 const MAX_FACES: usize = 64;
 
-/// Pieces that a cell may fall into.
+/// A cell that falls into more pieces counts as visible.
 const MAX_PIECES: usize = 256;
 
-/// A triangle in a face's homogeneous coordinates, with how near to the light it is.
+/// A triangle in the homogeneous coordinates of a face, with its nearness to the light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Facet {
-    /// Planes through the light and the edges: positive on directions within, where the light sees the triangle.
+    /// Planes through the light and each edge: positive for directions inside the triangle.
     edges: [DVec3; 3],
-    /// `nearness·(x, y, 1)` is how near the triangle's plane is in the direction of a point of the face: 1/z or, for a
-    /// sun, the distance before the launch plane's origin. `None` where the triangle is small or seen edge-on.
+    /// `nearness·(x, y, 1)` is the nearness of the triangle's plane in the direction of a point of the face: 1/z or,
+    /// for a sun, the negative distance from the launch plane. `None` if the triangle is too small or seen edge-on.
     nearness: Option<DVec3>,
-    /// Largest and smallest nearness of the corners, where all of them lie before the light.
+    /// Largest and smallest nearness of the corners; `None` unless all of them lie in front of the light.
     range: Option<(f64, f64)>,
 }
 
@@ -66,7 +67,7 @@ impl Facet {
         }
     }
 
-    /// No point of the triangle in a rectangle of the face is nearer than this.
+    /// Upper bound on the nearness of the triangle in a rectangle of the face.
     fn nearest_in(&self, cell: (DVec2, DVec2)) -> f64 {
         let by_plane = self
             .nearness
@@ -75,7 +76,7 @@ impl Facet {
         by_plane.min(by_corners)
     }
 
-    /// All points of the triangle in a rectangle of the face are at least this near; `None` where that is not known.
+    /// Lower bound on the nearness of the triangle in a rectangle of the face; `None` if unknown.
     pub(super) fn farthest_in(&self, cell: (DVec2, DVec2)) -> Option<f64> {
         let by_plane = self.nearness.map(|plane| extremes(plane, cell).0);
         let by_corners = self.range.map(|(_, farthest)| farthest);
@@ -95,25 +96,25 @@ fn extremes(plane: DVec3, (low, high): (DVec2, DVec2)) -> (f64, f64) {
     (value - reach, value + reach)
 }
 
-/// What lies in the marked cells of one face.
+/// Opaque faces and casters in the marked cells of one face.
 pub(super) struct HiddenCells<'a> {
     launch: &'a Launch,
     face: usize,
     grid: &'static Grid,
-    /// Opaque faces that may hide a caster, with their object, by cell.
+    /// By cell: opaque faces that may hide a caster, with their objects.
     faces: Vec<Vec<(usize, Facet)>>,
-    /// Cells that hold such faces.
+    /// Cells with such faces.
     doubtful: CellBits,
-    /// How near an object comes at most in a doubtful cell (column, row).
+    /// Largest nearness of an object in a doubtful cell (column, row).
     casters: BTreeMap<((usize, usize), usize), f64>,
 }
 
-/// What is hidden of the casters in the doubtful cells of one face.
+/// Hidden cells and visible casters among the doubtful cells of one face.
 #[derive(Debug)]
 pub(super) struct Hidden {
     /// Cells in which every caster is hidden.
     pub(super) cells: CellBits,
-    /// Casters that are not hidden in some doubtful cell.
+    /// Casters that are visible in some doubtful cell.
     pub(super) seen: BTreeSet<usize>,
 }
 
@@ -129,9 +130,9 @@ impl<'a> HiddenCells<'a> {
         }
     }
 
-    /// Adds an opaque triangle of an object that may lie before a caster in some of the `marked` cells, which become
-    /// doubtful by it. Without any, as for a caster, whose own light leaves from there, cells that are doubtful already
-    /// are meant: alone it drops none. Returns the cells looked at.
+    /// Adds an opaque triangle of an object that may lie in front of a caster in some of the `marked` cells, which
+    /// become doubtful. `None` for a triangle of a caster, from which light goes on: alone it drops no cell, so that it
+    /// is added only to cells that are doubtful already. Returns the number of tests.
     pub(super) fn add_opaque(
         &mut self,
         object: usize,
@@ -162,7 +163,7 @@ impl<'a> HiddenCells<'a> {
         &self.doubtful
     }
 
-    /// Adds a triangle of a caster. Returns the cells looked at.
+    /// Adds a triangle of a caster. Returns the number of tests.
     pub(super) fn add_caster(&mut self, object: usize, corners: &[DVec3; 3]) -> u64 {
         let cells = self.touched(corners, &self.doubtful);
         if cells.is_empty() {
@@ -176,7 +177,7 @@ impl<'a> HiddenCells<'a> {
         1 + cells.len() as u64
     }
 
-    /// Looks at every caster in every doubtful cell.
+    /// Tests every caster in every doubtful cell.
     pub(super) fn find(&self) -> Hidden {
         let mut hidden = Hidden {
             cells: CellBits::filled(false),
@@ -194,7 +195,7 @@ impl<'a> HiddenCells<'a> {
         hidden
     }
 
-    /// Whether faces of other objects cover a whole cell before an object that comes this near.
+    /// Whether faces of other objects cover a whole cell in front of an object of this nearness.
     fn is_covered(&self, (column, row): (usize, usize), object: usize, nearness: f64) -> bool {
         let faces = &self.faces[row * CELLS_PER_SIDE + column];
         let cell = self.grid.cell(column, row);
@@ -227,18 +228,18 @@ impl<'a> HiddenCells<'a> {
     }
 }
 
-/// What is left of a convex piece of the plane z = 1 outside of a triangle.
+/// The part of a convex polygon in the plane z = 1 outside of a triangle, as convex pieces.
 fn without(piece: Vec<DVec3>, facet: &Facet) -> Vec<Vec<DVec3>> {
     let mut left = Vec::new();
     let mut inside = piece.clone();
     for edge in facet.edges {
         let heights: Vec<f64> = inside.iter().map(|corner| corner.dot(edge)).collect();
-        // Distances on the plane are heights over this.
+        // Heights divided by this are distances in the plane.
         let scale = edge.truncate().length();
         let sliver = SLIVER * scale;
         let lowest = heights.iter().copied().fold(f64::INFINITY, f64::min);
         let highest = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Also where a number is not one: then nothing is taken away.
+        // Also for NaN: then nothing is subtracted.
         if highest <= sliver || highest.is_nan() {
             return vec![piece];
         }
@@ -251,7 +252,7 @@ fn without(piece: Vec<DVec3>, facet: &Facet) -> Vec<Vec<DVec3>> {
     left
 }
 
-/// The part of a convex polygon where the heights have a sign.
+/// The part of a convex polygon whose heights have the given sign.
 fn half(polygon: &[DVec3], heights: &[f64], sign: f64) -> Vec<DVec3> {
     let mut part = Vec::with_capacity(polygon.len() + 1);
     for (index, &a) in polygon.iter().enumerate() {

@@ -6,7 +6,7 @@ use super::CELLS_PER_SIDE;
 use super::bits::CellBits;
 use crate::light_pass::launch::Launch;
 
-/// Cells of a face that the light may light: those that its cone touches.
+/// Cells of a face that the light's cone touches.
 pub(super) fn lit_cells(launch: &Launch, face: usize) -> CellBits {
     let Some((axis, half_angle_rad)) = launch.emitter().kind.cone() else {
         return CellBits::filled(true);
@@ -30,7 +30,7 @@ struct Cone<'a> {
 }
 
 impl Cone<'_> {
-    /// Sets the lit cells of a square block, in quarters until each is wholly lit, dark, or a cell.
+    /// Sets the lit cells of a square block, subdivided until each part is fully lit, dark or a single cell.
     fn fill(&self, column: usize, row: usize, side: usize, lit: &mut CellBits) {
         let scale = 1.0 / CELLS_PER_SIDE as f64;
         let low = DVec2::new(column as f64, row as f64) * scale;
@@ -50,7 +50,7 @@ impl Cone<'_> {
         }
     }
 
-    /// Whether all corners of a block lie in the cone, which is convex. What borders bend beyond is counted as lit.
+    /// Whether all corners of a block lie in the cone, which is convex. Edges that bulge beyond it count as lit.
     fn holds(&self, low: DVec2, high: DVec2) -> bool {
         [low, high, DVec2::new(low.x, high.y), DVec2::new(high.x, low.y)]
             .into_iter()

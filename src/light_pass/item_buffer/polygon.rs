@@ -11,10 +11,10 @@ pub(super) struct Polygon {
     count: usize,
 }
 
-/// A face sees |x| ≤ z and |y| ≤ z; a little more is taken for it.
+/// A face sees |x| ≤ z and |y| ≤ z, enlarged by this factor.
 pub(super) const WIDENED: f64 = 1.0 + MARGIN;
 
-/// Planes around the part of space that a face sees: normals point inwards.
+/// Planes around the frustum of a face; normals point inwards.
 const SIDES: [DVec3; 4] = [
     DVec3::new(1.0, 0.0, WIDENED),
     DVec3::new(-1.0, 0.0, WIDENED),
@@ -23,7 +23,7 @@ const SIDES: [DVec3; 4] = [
 ];
 
 impl Polygon {
-    /// The part of a triangle that the face sees; `None` where that is nothing.
+    /// The part of a triangle that the face sees; `None` if it sees nothing.
     pub(super) fn seen(triangle: &[DVec3; 3]) -> Option<Self> {
         let mut corners = [DVec3::ZERO; 8];
         corners[..3].copy_from_slice(triangle);
@@ -69,7 +69,7 @@ impl Polygon {
         self.count += 1;
     }
 
-    /// Bounds on the plane z = 1, within the face; `None` where the polygon reaches the light itself.
+    /// Bounds on the plane z = 1, clamped to the face; `None` if the polygon reaches the light itself.
     pub(super) fn plane_bounds(&self) -> Option<(DVec2, DVec2)> {
         let mut low = DVec2::INFINITY;
         let mut high = DVec2::NEG_INFINITY;
@@ -86,7 +86,7 @@ impl Polygon {
         ))
     }
 
-    /// Cells of `set` that the polygon touches; all of them where it reaches the light.
+    /// Cells of `set` that the polygon touches; all of them if it reaches the light.
     pub(super) fn touched(&self, grid: &Grid, set: &CellBits) -> Vec<(usize, usize)> {
         let Some((low, high)) = self.plane_bounds() else {
             return set.list(&CellRange::ALL);
@@ -108,7 +108,7 @@ impl Polygon {
         };
         let corners = self.corners();
         for (index, a) in corners.iter().enumerate() {
-            // Homogeneous, so that no division loses a near corner.
+            // Homogeneous: no division loses precision at corners close to the light.
             let plane = a.cross(corners[(index + 1) % corners.len()]);
             let inside = corners
                 .iter()
@@ -123,21 +123,21 @@ impl Polygon {
     }
 }
 
-/// Planes that a polygon lies on the positive side of.
+/// Planes with the polygon on their positive side.
 pub(super) struct Edges {
     planes: [DVec3; 8],
     count: usize,
 }
 
 impl Edges {
-    /// Whether a rectangle of the plane z = 1 is not wholly on the far side of any edge.
+    /// False only if a rectangle of the plane z = 1 lies entirely beyond one edge.
     pub(super) fn touch(&self, (low, high): (DVec2, DVec2)) -> bool {
         let beyond = |plane: &DVec3| {
             let x = if plane.x > 0.0 { high.x } else { low.x };
             let y = if plane.y > 0.0 { high.y } else { low.y };
             plane.x * x + plane.y * y + plane.z < 0.0
         };
-        // A plane that is not a number drops nothing.
+        // A plane of NaN rejects nothing.
         !self.planes[..self.count].iter().any(beyond)
     }
 }

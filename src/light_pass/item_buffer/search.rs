@@ -15,35 +15,34 @@ use crate::transport::SceneNode;
 /// A box, as minimum and maximum corner [m].
 pub(super) type Bounds = (DVec3, DVec3);
 
-/// What is looked for, and from where.
+/// A search for the triangles of wanted objects on one face.
 pub(super) struct Search<'a> {
     launch: &'a Launch,
     face: usize,
     grid: &'static Grid,
-    /// Boxes of the objects looked for: nodes beyond all of them are passed over.
+    /// Boxes of the wanted objects: nodes that overlap none are skipped.
     boxes: &'a [Bounds],
-    /// Boxes of all other objects: a node beyond all of these holds nothing else than what is looked for.
+    /// Boxes of all other objects: a node that overlaps none has wanted triangles only.
     others: &'a [Bounds],
-    /// Whether an object is one of them.
+    /// Whether an object is wanted.
     wanted: &'a (dyn Fn(usize) -> bool + Sync),
-    /// Absolute values of the linear part of the way from the scene to the face: what a box's half sides reach there.
+    /// Absolute linear part of the transform from the scene to the face, for the half extents of boxes.
     reach: DMat3,
     /// Nodes and triangles tested so far.
     tests: Cell<u64>,
 }
 
-/// Where a node's box lies on a face.
+/// Projection of a node's box onto a face.
 enum Projection {
-    /// Nowhere.
+    /// Outside of the face.
     Outside,
-    /// Around the light, or beside it.
+    /// Not entirely in front of the light: the projection has no bounds.
     Unbounded,
-    /// Within these cells; `inside` where no part of it leaves the face.
+    /// Within these cells; `inside` if no part of it leaves the face.
     Cells { cells: CellRange, inside: bool },
 }
 
 impl<'a> Search<'a> {
-    /// A search on one face.
     pub(super) fn new(
         launch: &'a Launch,
         face: usize,
@@ -65,7 +64,6 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Nodes and triangles tested so far.
     pub(super) fn tests(&self) -> u64 {
         self.tests.get()
     }
@@ -74,7 +72,7 @@ impl<'a> Search<'a> {
         self.tests.set(self.tests.get() + 1);
     }
 
-    /// Whether a box may lie in any cell of a set.
+    /// Whether a box may touch any cell of a set.
     pub(super) fn may_touch(&self, bounds: Bounds, cells: &CellBits) -> bool {
         match self.project(bounds) {
             Projection::Outside => false,
@@ -83,7 +81,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether a box lies before any part of a wanted triangle, in the marked cells that it may lie in.
+    /// Whether a box may lie in front of a wanted triangle in any of the marked cells.
     pub(super) fn may_hide(&self, bounds: Bounds, marked: &CellBits, roots: Vec<SceneNode>) -> bool {
         let range = match self.project(bounds) {
             Projection::Outside => return false,
@@ -107,7 +105,7 @@ impl<'a> Search<'a> {
         found
     }
 
-    /// How near the nearest point of a box before the light is.
+    /// Largest nearness of a box that lies in front of the light.
     fn nearest(&self, (low, high): Bounds) -> f64 {
         let corners = (0..8).map(|corner| {
             let side = |axis: usize| {
@@ -123,7 +121,7 @@ impl<'a> Search<'a> {
         corners.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Hands out the wanted triangles, with their object, below nodes that may touch any cell of a set.
+    /// Passes the wanted triangles, with their objects, of nodes that may touch a cell of the set to `take`.
     pub(super) fn visit(
         &self,
         mut waiting: Vec<SceneNode>,
@@ -144,7 +142,7 @@ impl<'a> Search<'a> {
 
     /// Clears the bits of all cells in `open` that a wanted triangle touches.
     ///
-    /// A node whose cells are all closed is passed over; in a node within a single cell, any wanted triangle will do.
+    /// Nodes whose cells are all closed are skipped. In a node within a single cell, any wanted triangle is enough.
     pub(super) fn close(&self, mut waiting: Vec<SceneNode>, open: &mut CellBits) {
         while let Some(node) = waiting.pop() {
             let bounds = node.bounds();
@@ -175,8 +173,8 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Clears the bits of cells in `open` that some corners of a large mesh lie in, spread over it, for as long as that
-    /// closes cells faster than the search does.
+    /// Clears the bits of cells in `open` that contain sampled vertices of a large mesh, for as long as that closes
+    /// cells faster than the search does.
     pub(super) fn close_some(&self, mesh: InScene, open: &mut CellBits) {
         const BATCH: u64 = 1024;
         const MIN_CLOSED: u64 = BATCH / 12;
@@ -196,7 +194,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Clears the bits of the cells that a point lies in.
+    /// Clears the bits of the cells that contain a point.
     fn close_at(&self, point: DVec3, open: &mut CellBits) {
         let point = self.launch.to_face(self.face, point);
         if !(point.z > 0.0 && point.truncate().abs().max_element() <= point.z) {
@@ -209,7 +207,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Whether any wanted triangle touches a cell that is set in `lit`.
+    /// Whether any wanted triangle touches a cell of `lit`.
     pub(super) fn finds(&self, mut waiting: Vec<SceneNode>, lit: &CellBits) -> bool {
         while let Some(node) = waiting.pop() {
             let bounds = node.bounds();
@@ -232,12 +230,12 @@ impl<'a> Search<'a> {
         node.triangles().filter(|(object, _)| (self.wanted)(*object))
     }
 
-    /// Whether a triangle touches a cell that is set.
+    /// Whether a triangle touches a cell of the set.
     pub(super) fn touches(&self, corners: &[DVec3; 3], cells: &CellBits) -> bool {
         !self.touched(corners, cells).is_empty()
     }
 
-    /// Set cells that a triangle touches; all of them where it reaches the light.
+    /// Cells of a set that a triangle touches; all of them if it reaches the light.
     fn touched(&self, corners: &[DVec3; 3], set: &CellBits) -> Vec<(usize, usize)> {
         self.count();
         let projected = corners.map(|corner| self.launch.to_face(self.face, corner));
@@ -247,7 +245,7 @@ impl<'a> Search<'a> {
         polygon.touched(self.grid, set)
     }
 
-    /// Whether any triangle below a node is wanted.
+    /// Whether a node has a wanted triangle.
     fn holds_wanted(&self, node: SceneNode) -> bool {
         if !node.may_be_left() && !overlaps(node.bounds(), self.others) {
             return true;
@@ -265,7 +263,7 @@ impl<'a> Search<'a> {
         false
     }
 
-    /// Cells that a box may touch; `None` where it touches none.
+    /// Cells that a box may touch; `None` if it touches none.
     pub(super) fn cells_of(&self, bounds: Bounds) -> Option<CellRange> {
         match self.project(bounds) {
             Projection::Outside => None,
@@ -274,7 +272,6 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Where a box lies on the face.
     fn project(&self, (from, to): Bounds) -> Projection {
         self.count();
         let half = (to - from) * 0.5;
@@ -285,7 +282,7 @@ impl<'a> Search<'a> {
         if beyond((low.x, high.x)) || beyond((low.y, high.y)) {
             return Projection::Outside;
         }
-        // Not where it is not a number, either.
+        // Also for NaN.
         if !(low.z > 0.0 && high.is_finite()) {
             return Projection::Unbounded;
         }
@@ -302,7 +299,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// Whether a box overlaps any of some.
+/// Whether a box overlaps any of several.
 fn overlaps((low, high): Bounds, boxes: &[Bounds]) -> bool {
     boxes
         .iter()

@@ -1,16 +1,17 @@
 //! Bundles of light that stay together, as a control variate for photons.
 //!
-//! The launch domain is divided into triangles. Where the light of all three corners takes the same way, the triangle has a
-//! *bundle*: flux spread evenly between the three places where that light arrives. Bundles are deposited as they are. A
-//! photon that starts in the triangle removes the bundle's flux where the bundle says that the photon arrives, and leaves
-//! its own flux where it does arrive. The mean of what photons deposit is therefore the difference between the light and its
-//! bundles, whatever is wrong with them: edges that they run across, surfaces that they missed, curvature within them. Only
-//! that difference is noisy (control variates: Hammersley and Handscomb, "Monte Carlo Methods", 1964, section 5.5).
+//! The launch domain is divided into triangles. Where the light of all three corners takes the same path, the triangle
+//! has a *bundle*: flux spread evenly over the triangle between the three arrivals. Bundles are deposited directly. A
+//! photon that starts in the triangle removes the bundle's flux where the bundle predicts its arrival, and deposits its
+//! own flux where it does arrive. In the mean, photons thus contribute the difference between the light and its
+//! bundles, whatever is wrong with these: edges inside them, surfaces that they missed, curvature. Only that difference
+//! is noisy (control variates: Hammersley and Handscomb, "Monte Carlo Methods", 1964, section 5.5).
 //!
-//! A photon's way is drawn at random, so it removes a bundle's flux divided by the probability of having followed it: when
-//! both arrive, or where the scene itself parts them. Where a draw parts them, photons with the other outcome remove it.
+//! A photon's path is random, so it removes the bundle's flux divided by the probability of having followed it: when
+//! both arrive, or where the scene separates them. Where a random choice separates them, photons with the other outcome
+//! remove it.
 //!
-//! More photons start where more is left to them.
+//! Photons are denser where bundles leave more to them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -28,53 +29,53 @@ use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::wavefront::coverage::FluxTriangle;
 use crate::optics::LinearSrgb;
 
-/// Bundles are as fine as so many photons ask for, at most.
+/// Number of photons beyond which bundles become no finer.
 const MAX_PHOTONS: f64 = 8e6;
 
-/// One cell of so many tells what bundles would carry.
+/// One in this many cells is surveyed first, to predict how much bundles would carry.
 const TRIED: usize = 16;
 
-/// Bundles that carry less of what arrives are not worth it.
+/// Fraction of the arriving flux below which bundles are not worth their cost.
 const MIN_CARRIED: f64 = 0.25;
 
-/// Bundles of a light, about: 100 bytes each.
+/// Approximate limit on the bundles of a light, each of 100 bytes.
 const MAX_BUNDLES: usize = 1 << 21;
 
-/// Triangles that are deposited at once, about.
+/// Approximate number of triangles deposited at once.
 const TRIANGLES_AT_ONCE: usize = 1 << 17;
 
-/// Light of one part of a lamp arrives within so many texels, unless there are too many parts.
+/// Extent of the light from one part of a lamp on the map [texels], unless that takes too many parts.
 const PART_TEXELS: f64 = 0.1;
 
-/// Parts of a lamp along an axis for one photon, at most.
+/// Maximum number of parts of a lamp along each axis, for a single photon.
 const MAX_LAMP_PARTS: f64 = 8.0;
 
-/// The same of light that is parted.
+/// [`MAX_LAMP_PARTS`] for dispersed light.
 const FEW_LAMP_PARTS: f64 = 2.0;
 
-/// Parts of a spectrum, least and most: few would leave colours to chance.
+/// Minimum and maximum number of parts of a spectrum. Fewer would leave colour noise.
 const HUE_PARTS: (f64, f64) = (8.0, 64.0);
 
-/// A specular surface of a bundle's way.
+/// A specular event on a bundle's path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Step {
     pub(super) object: u32,
     pub(super) is_reflected: bool,
 }
 
-/// How far light arrives from that of the middle of its lamp and of the middle wavelength [texels].
+/// Displacement of the arrival on the map, relative to light from the lamp's centre at the middle wavelength [texels].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct BundleOffsets {
-    /// From the end of either half-axis of a lamp with a size.
+    /// For light from the end of each half-axis of an extended light.
     pub(super) lamp: [Vec2; 2],
-    /// At the first and the last wavelength of light that is parted.
+    /// At the first and the last wavelength of dispersed light.
     pub(super) hues: [Vec2; 2],
 }
 
-/// Where on its lamp light starts, and of which wavelength it is.
+/// Point on the lamp and wavelength.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Origin {
-    /// In half-axes from the lamp's middle.
+    /// In half-axes from the lamp's centre.
     pub(super) lamp: DVec2,
     /// [`Hue::ends`](super::spectrum::Hue::ends).
     pub(super) ends: [f64; 2],
@@ -87,49 +88,48 @@ impl BundleOffsets {
         x * origin.lamp.x + y * origin.lamp.y + first * origin.ends[0] + last * origin.ends[1]
     }
 
-    /// Parts of a lamp that a bundle is deposited for, along both axes: what the draw of their points leaves is to be less than
-    /// the noise of so many photons. No more than `most` along an axis.
+    /// Parts of a lamp for which a bundle is deposited, along both axes: enough that their sampling error stays below
+    /// the noise of this number of photons, but at most `most` along an axis.
     fn lamp_parts(&self, photons: f64, most: f64) -> DVec2 {
         let finer = (photons.sqrt() / MAX_LAMP_PARTS).max(1.0);
         let parts = |moved: Vec2| (2.0 * finer * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
         DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(most))
     }
 
-    /// How far light of one part of a lamp arrives from that of the next [texels].
+    /// Distance between the arrivals from neighbouring parts of a lamp [texels].
     pub(super) fn lamp_step_texels(&self) -> f64 {
         let parts = self.lamp_parts(1.0, MAX_LAMP_PARTS).to_array();
         let steps = [0, 1].map(|axis| 2.0 * f64::from(self.lamp[axis].abs().max_element()) / parts[axis]);
         steps[0].max(steps[1])
     }
 
-    /// Parts of the spectrum that a bundle is deposited for.
+    /// Parts of the spectrum for which a bundle is deposited.
     fn hue_parts(&self) -> f64 {
         let across = f64::from((self.hues[0] - self.hues[1]).abs().max_element());
         (across / PART_TEXELS).ceil().clamp(HUE_PARTS.0, HUE_PARTS.1)
     }
 }
 
-/// Light of a triangle that takes one way.
+/// Light of a triangle of the launch domain that takes one path.
 #[derive(Clone, Debug)]
 pub(super) struct Bundle {
     pub(super) steps: Arc<[Step]>,
-    /// Where it arrives.
     pub(super) receiver: Receiver,
-    /// Where the light of the triangle's corners arrives [texels].
+    /// Arrivals of the light of the triangle's corners [texels].
     pub(super) corners: [Vec2; 3],
-    /// How far from there it arrives otherwise.
+    /// Displacement for other points of the lamp and other wavelengths.
     pub(super) moves: BundleOffsets,
-    /// Mean flux of a photon of the triangle [W per channel if it were the only photon].
+    /// Mean flux of a photon of the triangle, as if it were the only photon [W per channel].
     pub(super) flux_w: [f32; 3],
 }
 
 impl Bundle {
-    /// Flux of a photon [W per channel if it were the only one].
+    /// Mean flux of a photon of the triangle, as if it were the only photon [W per channel].
     pub(super) fn flux_w(&self) -> LinearSrgb {
         LinearSrgb::from(self.flux_w.map(f64::from))
     }
 
-    /// Where the light of a photon of the triangle arrives [texels].
+    /// Predicted arrival of a photon of the triangle [texels].
     pub(super) fn place(&self, carried: &Carried) -> DVec2 {
         let [a, b, c] = self.corners.map(|corner| corner.as_dvec2());
         let [first, second, third] = carried.barycentric;
@@ -140,11 +140,11 @@ impl Bundle {
 /// The bundles of a light.
 #[derive(Debug, Default)]
 pub(super) struct Bundles {
-    /// Of a lamp with a size: [`PhotonLaunch::lamp_offsets`](super::launch::PhotonLaunch::lamp_offsets).
+    /// Of an extended light: [`PhotonLaunch::lamp_offsets`](super::launch::PhotonLaunch::lamp_offsets).
     lamp_offsets: Option<fn(DVec2) -> DVec2>,
-    /// Along the domain's curve.
+    /// In order along the domain's curve.
     squares: Vec<Square>,
-    /// Where each square's part of all photons ends, [0, 2⁶⁴).
+    /// Upper end of each square's share of all photons, [0, 2⁶⁴).
     ends: Vec<u64>,
 }
 
@@ -153,20 +153,20 @@ pub(super) struct Bundles {
 pub(super) struct Square {
     /// Cell of the item buffer.
     pub(super) cell: usize,
-    /// Where it begins on the cell's curve.
+    /// Its start on the cell's curve.
     pub(super) begin: u64,
-    /// How often the cell was divided.
+    /// Subdivision depth below the cell.
     pub(super) divisions: u32,
-    /// Bundles of its four triangles around the middle: above, right, below, left.
+    /// Bundles of its four triangles around the centre: top, right, bottom, left.
     pub(super) bundles: Vec<Bundle>,
-    /// Where those of each triangle end.
+    /// End of each triangle's bundles.
     pub(super) ends: [u8; 4],
-    /// Density of photons that suits it, in any unit.
+    /// Density of photons that suits it, up to a factor common to all squares.
     pub(super) density: f64,
 }
 
 impl Square {
-    /// Its part of the cell.
+    /// Fraction of the cell's area.
     fn share(&self) -> f64 {
         0.25_f64.powi(self.divisions as i32)
     }
@@ -177,20 +177,20 @@ impl Square {
     }
 }
 
-/// Bundles of the triangle that a photon starts in.
+/// Bundles of the triangle in which a photon starts.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Carried<'a> {
     pub(super) bundles: &'a [Bundle],
-    /// Where the photon starts in the triangle.
+    /// Start of the photon in the triangle.
     pub(super) barycentric: [f64; 3],
-    /// Factor of its flux and of theirs: the mean density of photons over that of its square.
+    /// Factor on the flux of the photon and of its bundles: mean density of photons over that of its square.
     pub(super) scale: f64,
-    /// What it starts as.
     pub(super) origin: Origin,
 }
 
 impl Bundles {
-    /// As fine as suits so many photons; none where they are too few.
+    /// Bundles as fine as this number of photons warrants; none if there are too few photons or bundles would carry too
+    /// little.
     pub(super) fn new(surveyor: &Surveyor, photons: f64) -> Self {
         let cells = surveyor.launch.cell_count();
         let photons = photons.min(MAX_PHOTONS) / cells as f64;
@@ -229,13 +229,13 @@ impl Bundles {
         self.lamp_offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp))
     }
 
-    /// Cells of the domain.
+    /// Number of cells of the domain.
     fn cells(&self) -> f64 {
         self.squares.last().map_or(0, |last| last.cell + 1) as f64
     }
 
-    /// Cell, place in it and bundles of the photon of a place along the domain's curve, once that is stretched by density,
-    /// and of a point of the lamp's unit square; `None` where there are no squares.
+    /// Cell, position in it and bundles of the photon at a place along the domain's curve, which is stretched by
+    /// density, and at a point of the lamp's unit square; `None` if there are no squares.
     pub(super) fn beginning(&self, place: u64, lamp: DVec2) -> Option<(usize, DVec2, Carried<'_>)> {
         let last = self.squares.len().checked_sub(1)?;
         let number = self.ends.partition_point(|end| *end <= place).min(last);
@@ -258,8 +258,9 @@ impl Bundles {
         Some((square.cell, within, carried))
     }
 
-    /// Hands out all flux for so many photons, each time some of one receiver's and band's; `count`: of a flux [W per channel].
-    /// A lamp with a size and a spectrum are stood for by one point of each of their parts, which the seed draws.
+    /// Passes the flux of all bundles, for this number of photons, to `take` in batches of one band and receiver.
+    /// `count` converts flux [W per channel] to counts. Each part of an extended light and of a spectrum is represented
+    /// by one point, which depends on the seed.
     pub(super) fn deposit(
         &self,
         (photons, seed): (f64, u64),
@@ -273,7 +274,7 @@ impl Bundles {
         for square in &self.squares {
             let photons = 0.25 * square.share() * photons / self.cells();
             for triangle in 0..4 {
-                // Neighbours, whose light may arrive at one place, are drawn as different as can be.
+                // A low-discrepancy sequence: the light of neighbouring triangles may arrive at one place.
                 let number = drawn.next().unwrap_or(0);
                 let on_lamp = even_point(number, LAMP_DIMENSION, seed);
                 let in_hue =
@@ -307,7 +308,7 @@ impl Bundles {
         hand_out(&mut waiting, &mut take);
     }
 
-    /// Points of a lamp and wavelengths that stand for all, for so many photons of a triangle, and what either counts.
+    /// Samples of lamp and wavelength for this number of photons of a triangle, with their weights.
     fn parts<'a>(
         &self,
         moves: &BundleOffsets,
@@ -328,7 +329,7 @@ impl Bundles {
         };
         let lamp_parts = match hues.len() {
             1 => moves.lamp_parts(photons, photons.sqrt().floor().max(MAX_LAMP_PARTS)),
-            // Each of them is deposited at every wavelength.
+            // Each part of the lamp is deposited at every wavelength.
             hues => {
                 let photons = photons / hues as f64;
                 moves.lamp_parts(photons, photons.sqrt().floor().max(FEW_LAMP_PARTS))
@@ -351,7 +352,7 @@ impl Bundles {
     }
 }
 
-/// Triangles of one band and receiver.
+/// Triangles by band and receiver.
 type QueuedTriangles = BTreeMap<(Option<usize>, Receiver), Vec<FluxTriangle>>;
 
 fn hand_out(waiting: &mut QueuedTriangles, take: &mut impl FnMut(Option<usize>, Receiver, &[FluxTriangle])) {
@@ -360,7 +361,7 @@ fn hand_out(waiting: &mut QueuedTriangles, take: &mut impl FnMut(Option<usize>, 
     }
 }
 
-/// The triangle of a square that a point lies in, and where in it: the middle comes first.
+/// The triangle of a square in which a point lies, and its barycentric coordinates there, centre first.
 fn triangle_at(within: DVec2) -> (usize, [f64; 3]) {
     let [x, y] = (within * 2.0 - 1.0).to_array();
     let (triangle, outwards, along) = if y <= -x.abs() {

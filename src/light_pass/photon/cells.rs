@@ -1,6 +1,6 @@
 //! A hierarchy of sums over a map's texels, four to a cell from level to level, for tiled and untiled maps alike.
 //!
-//! Cells of level l are 2^l finest texels long. Where a tile is coarser than that, there are none.
+//! A cell of level l is 2^l finest texels long. Tiles with coarser texels than that have no cells at that level.
 
 use rayon::prelude::*;
 
@@ -10,14 +10,14 @@ use crate::illumination::tiles::{COARSEST, SIDE};
 /// No cell, or no texel.
 const NONE: u32 = u32::MAX;
 
-/// The last level has at most so many cells each way.
+/// The last level has at most this many cells along each axis.
 const FEWEST_ACROSS: usize = 4;
 
-/// What lies around a cell are cells so many levels coarser.
+/// The surroundings of a cell are averaged over cells this many levels coarser.
 const STEPS_AROUND: usize = 2;
 
-/// Weight of a cell, one way, in the mean over such a coarser cell that is interpolated to its own place: 5/8 or 3/4 of a
-/// fourth.
+/// Weight of a cell along one axis in the mean over coarser cells that is interpolated at its own centre: 5/8 or 3/4 of
+/// a quarter.
 const OWN_WEIGHTS: [f32; 4] = [5.0 / 32.0, 3.0 / 16.0, 3.0 / 16.0, 5.0 / 32.0];
 
 /// Cells of all levels, finest first.
@@ -30,22 +30,22 @@ pub(super) type Values<const N: usize> = Vec<Vec<[f32; N]>>;
 
 /// Cells of one level: those of a tile together, row by row.
 pub(super) struct Level {
-    /// Cells across and down, if there were all.
+    /// Cells across and down, including those that are missing.
     size: (usize, usize),
     /// A tile is 2^shift cells long.
     shift: u32,
-    /// First cell of each tile.
+    /// First cell of each tile; [`NONE`] if the tile is coarser than the level.
     begins: Vec<u32>,
     /// Column and row of each cell.
     places: Vec<(u32, u32)>,
-    /// The texel that a cell is; none where it holds several.
+    /// The texel that a cell consists of; [`NONE`] if it holds several.
     texels: Vec<u32>,
-    /// Surface in each cell [m²].
+    /// Surface area in each cell [m²].
     areas_m2: Vec<f32>,
 }
 
 impl Level {
-    /// Of a map so large [finest texels].
+    /// `(width, height)` of the map in finest texels.
     fn new(level: u8, (width, height): (usize, usize), chart: &Chart) -> Self {
         let length = 1_usize << level;
         let size = (width.div_ceil(length), height.div_ceil(length));
@@ -95,7 +95,7 @@ impl Level {
         (begin != NONE).then(|| begin as usize + (row - first_row) * across + column - first_column)
     }
 
-    /// Sums over the cells of the finer level in each of this one's.
+    /// Sum over the cells of the finer level in one cell.
     fn add_up<const N: usize>(&self, place: (u32, u32), finer: &Self, values: &[[f32; N]]) -> [f32; N] {
         let mut sum = [0.0; N];
         let within = |first: u32, end: usize| {
@@ -135,7 +135,7 @@ impl Cells {
         cells
     }
 
-    /// The first level that has cells everywhere and means of many texels, though not of a large part of the map.
+    /// The first level that covers the whole map, with cells of many texels but still a small part of the map.
     pub fn pool(&self) -> usize {
         let across = self.levels[0].size.0.max(self.levels[0].size.1);
         let of_tiles = self.levels.iter().position(|level| !level.begins.contains(&NONE));
@@ -143,7 +143,6 @@ impl Cells {
         many.max(of_tiles.unwrap_or(0)).min(self.levels.len() - 1)
     }
 
-    /// The values of every texel.
     pub fn texels<const N: usize>(&self, values: &Values<N>) -> Vec<[f32; N]> {
         let own = |level: usize| {
             let cells = self.levels[level].texels.iter().zip(&values[level]);
@@ -157,7 +156,7 @@ impl Cells {
         of_texels
     }
 
-    /// Sums of a value of texels over every cell.
+    /// Sum of a value of texels over every cell.
     pub fn sums<const N: usize>(&self, value: impl Fn(usize) -> [f32; N] + Sync) -> Values<N> {
         let mut sums: Values<N> = Vec::with_capacity(self.levels.len());
         for (number, level) in self.levels.iter().enumerate() {
@@ -171,7 +170,7 @@ impl Cells {
         sums
     }
 
-    /// The same per area [1/m²]; 0 where there is none.
+    /// Sum of a value of texels over every cell, per area [1/m²]; 0 where there is no surface.
     pub fn densities<const N: usize>(&self, value: impl Fn(usize) -> [f32; N] + Sync) -> Values<N> {
         let mut densities = self.sums(value);
         for (values, level) in densities.iter_mut().zip(&self.levels) {
@@ -180,8 +179,8 @@ impl Cells {
         densities
     }
 
-    /// Densities of a level's cells, linearly between those of the next coarser level, of which all are known. Where there
-    /// is no such cell, the coarser texel there stands for it.
+    /// Densities interpolated at a level's cells from those of the next coarser level, which have to be known. Where
+    /// that has no cell, the coarser texel there is used.
     pub fn between<const N: usize>(&self, level: usize, values: &Values<N>) -> Vec<[f32; N]> {
         self.interpolated(level, |mut column, mut row| {
             let coarser = (level + 1..self.levels.len()).find_map(|number| {
@@ -196,7 +195,7 @@ impl Cells {
         })
     }
 
-    /// Densities of a level's cells, of their means over cells `steps` levels coarser.
+    /// Densities of a level's cells, averaged over cells `steps` levels coarser and interpolated back.
     pub fn pooled<const N: usize>(&self, level: usize, values: Vec<[f32; N]>, steps: usize) -> Vec<[f32; N]> {
         let last = (level + steps).min(self.levels.len() - 1);
         let mut sums = values;
@@ -236,7 +235,7 @@ impl Cells {
         sums
     }
 
-    /// The same without what a cell itself adds to its mean, where cells are whole.
+    /// [`Self::pooled`] without a cell's own contribution; exact where the surface covers the coarser cells completely.
     pub fn around<const N: usize>(&self, level: usize, values: &[[f32; N]]) -> Vec<[f32; N]> {
         let mut means = self.pooled(level, values.to_vec(), STEPS_AROUND);
         if level + STEPS_AROUND < self.levels.len() {
@@ -253,14 +252,14 @@ impl Cells {
         means
     }
 
-    /// Values at the middles of a level's cells, linearly between those at the middles of the next coarser one's.
+    /// Values at the centres of a level's cells, interpolated linearly between the centres of the next coarser level's.
     fn interpolated<const N: usize>(
         &self,
         level: usize,
         at: impl Fn(usize, usize) -> Option<[f32; N]> + Sync,
     ) -> Vec<[f32; N]> {
         let (width, height) = self.levels[level + 1].size;
-        // The parent, and the one on the side of which the cell lies.
+        // The parent, and its neighbour on the side of the cell.
         let near = |place: u32, count: usize| {
             let own = place as usize / 2;
             let other = if place.is_multiple_of(2) {

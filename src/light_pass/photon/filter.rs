@@ -1,10 +1,11 @@
 //! Filters the noise of photons where the light is smooth.
 //!
-//! A map is taken apart into a coarse picture and, level by level, what finer cells differ by from what lies between
-//! coarser ones. Of two independent halves A and B, such details have the mean product S = ⟨d_A d_B⟩, which noise adds
-//! nothing to, and the noise N = ⟨(d_A − d_B)²⟩/4. Each is kept in part, S/(S + N), which is what a Wiener filter keeps
-//! (Wiener 1949). What is dropped of S, and what is left of N, is the error. S and N are those of the cells around: a cell
-//! that judged itself would keep what happens to be alike in both halves, and its error would look smaller than it is.
+//! A map is decomposed into a coarse picture and details: on each level, the differences between cells and the
+//! interpolation of coarser ones. Over two independent halves A and B, details have the mean product S = ⟨d_A d_B⟩, to
+//! which noise adds nothing, and the noise N = ⟨(d_A − d_B)²⟩/4. A detail is scaled by S/(S + N), as by a Wiener filter
+//! (Wiener 1949). The error is the part of S that is dropped and the part of N that is left. S and N are averaged over
+//! the cells around: a cell that judged itself would keep whatever happens to agree in both halves, and its error would
+//! be underestimated.
 
 use rayon::prelude::*;
 
@@ -14,28 +15,28 @@ use crate::light_pass::accuracy::Noise;
 use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use crate::optics::{LinearSrgb, luminance};
 
-/// What a photon brings is a mean over cells so many levels coarser.
+/// The noise per photon is averaged over cells this many levels coarser.
 const PHOTONS_POOLED: usize = 5;
 
-/// Products of details as large as by so many pairs of photons are taken for chance: two photons in one texel.
+/// Products of details up to that of this many pairs of photons are attributed to chance: two photons in one texel.
 const CHANCE_PAIRS: f32 = 2.0;
 
-/// The error of a texel is in proportion to this power of its light, among the texels around it.
+/// Among neighbouring texels, error is taken as proportional to this power of irradiance.
 const ERROR_BY_LIGHT: f32 = 1.5;
 
-/// Details take no more of the light of a cell than leaves this part of it, where channels may be negative.
+/// Minimum fraction of a cell's luminance that its details leave, where channels may be negative.
 const MIN_LEFT: f32 = 1e-5;
 
-/// Light below this fraction of the map's mean counts as none.
+/// Floor of irradiance relative to the map's mean.
 const DARKEST: f32 = 1e-4;
 
-/// Whether a map can be filtered: charts of several islands without tiles stay as they are, and keep their noise.
+/// Whether a map can be filtered. Charts of several islands without tiles stay as they are, with their noise.
 pub fn takes(map: &ReceiverMap) -> bool {
     map.chart.layout.is_some() || map.is_one_piece()
 }
 
-/// Filters the sum of two halves, and gives the squared error of each texel that is left [W²/m⁴]. `sum` holds the light of
-/// both; `is_signed`: channels of its light may be negative. Adds the counts of maps that could not take them to `left`.
+/// Filters the sum of two halves and returns the remaining squared error of each texel [W²/m⁴]. `is_signed`: channels
+/// may be negative. Adds counts that a map could not take to `left`.
 pub fn filter(
     sum: &mut ReceiverMaps,
     halves: [&ReceiverMaps; 2],
@@ -52,7 +53,7 @@ pub fn filter(
     noise
 }
 
-/// Counts of many texels.
+/// Counts summed over many texels.
 pub type Sums = [i128; 3];
 
 fn add(sums: &mut Sums, more: Sums) {
@@ -61,8 +62,8 @@ fn add(sums: &mut Sums, more: Sums) {
     }
 }
 
-/// Takes negative light, which the noise of bundles leaves where there is little, out of all other. Adds the counts of maps
-/// that have not enough of that to `left`.
+/// Removes negative light, which the noise of bundles leaves in dark places, at the expense of all other texels. Adds
+/// counts that a map could not absorb to `left`.
 pub fn without_negative(maps: &mut ReceiverMaps, is_signed: bool, left: &mut Sums) {
     for (_, map) in maps.iter_mut() {
         let counts = map.levels()[0].texels();
@@ -74,7 +75,8 @@ pub fn without_negative(maps: &mut ReceiverMaps, is_signed: bool, left: &mut Sum
     }
 }
 
-/// Counts of a texel without what is negative: channels, or all of them below a luminance of 0 where they may be negative.
+/// A texel's counts without negative light: without negative channels or, if these are allowed, without negative
+/// luminance.
 fn lit(count: FluxCount, is_signed: bool) -> FluxCount {
     if !is_signed {
         return count.map(|count| count.max(0));
@@ -83,25 +85,25 @@ fn lit(count: FluxCount, is_signed: bool) -> FluxCount {
     if luminance < 0.0 { [0; 3] } else { count }
 }
 
-/// Densities in a cell, in means of the map: the channels of each half as if it were all the light.
+/// Densities in a cell, relative to the map's mean: the channels of each half, as if it were all the light.
 type Raw = [f32; 6];
 
-/// The same after the filter, channels first, and the squared bias.
+/// A filtered cell: its channels, the luminance of each half, the squared bias.
 type FilteredCell = [f32; 6];
 
-/// Of each half.
+/// Luminance of each half.
 fn luminances(raw: &Raw) -> [f32; 2] {
     let [r, g, b, r2, g2, b2] = *raw;
     [luminance(&[r, g, b]) as f32, luminance(&[r2, g2, b2]) as f32]
 }
 
-/// Of both halves.
+/// Channels of both halves.
 fn channels(raw: &Raw) -> [f32; 3] {
     [0, 1, 2].map(|channel| 0.5 * (raw[channel] + raw[3 + channel]))
 }
 
-/// What the details of each half differ by from grey ones of the same luminance in the light around: photons of single
-/// wavelengths err by far more in it than in luminance.
+/// Deviation of each half's details from grey ones, which have the colour of the smooth light around. Photons of single
+/// wavelengths make it far noisier than luminance.
 fn tints(detail: &Raw, smooth: &FilteredCell) -> [[f32; 3]; 2] {
     let light = luminance(&[smooth[0], smooth[1], smooth[2]]) as f32;
     let [a, b] = luminances(detail);
@@ -117,7 +119,7 @@ fn tints(detail: &Raw, smooth: &FilteredCell) -> [[f32; 3]; 2] {
 struct Details {
     cells: Cells,
     raw: Values<6>,
-    /// Luminance [W/m²].
+    /// Mean luminance of the map [W/m²].
     mean: f64,
     /// Channels may be negative, as those of pure colours are.
     is_signed: bool,
@@ -151,7 +153,7 @@ impl Details {
         }
     }
 
-    /// Every texel: coarse cells as they are, finer ones with what is kept of their details.
+    /// All texels: the coarsest cells as they are, plus the filtered details of each finer level.
     fn filtered(&self) -> Vec<FilteredCell> {
         let coarsest = self.raw.len() - 1;
         let mut kept: Values<6> = vec![Vec::new(); self.raw.len()];
@@ -166,7 +168,7 @@ impl Details {
         self.cells.texels(&kept)
     }
 
-    /// One level, of all coarser ones.
+    /// The filtered cells of a level, given those of all coarser levels.
     fn refined(&self, level: usize, kept: &Values<6>) -> Vec<FilteredCell> {
         let mut details: Vec<Raw> = self.cells.between(level, &self.raw);
         let cells = details.par_iter_mut().zip(&self.raw[level]);
@@ -176,7 +178,7 @@ impl Details {
             let [a, b] = luminances(detail);
             0.25 * (a - b) * (a - b)
         };
-        // Noise is in proportion to light where photons bring alike.
+        // Noise is proportional to light where photons carry equal flux.
         let light = |smooth: &FilteredCell| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
         let both = details
             .par_iter()
@@ -230,8 +232,8 @@ impl Details {
         refined
     }
 
-    /// The channels of a cell with a share of its detail's luminance and one of its tint, less where nothing would be left of
-    /// its light.
+    /// Channels of a cell with one share of its detail's luminance and another of its tint, both reduced where too
+    /// little light would be left.
     fn channels_of(&self, smooth: &FilteredCell, detail: &Raw, [share, of_tint]: [f32; 2]) -> [f32; 3] {
         let [first, second] = tints(detail, smooth);
         let tint = [0, 1, 2].map(|channel| 0.5 * (first[channel] + second[channel]));
@@ -249,12 +251,12 @@ impl Details {
         } else {
             with(((before - least) / (before - after)).clamp(0.0, 1.0))
         };
-        // What rounds to less than nothing is grey.
+        // Luminance that rounds below 0 becomes grey.
         if luminance(&lit) < 0.0 { [least; 3] } else { lit }
     }
 
-    /// The squared error of each texel [W²/m⁴]: what was missed and what is left of the noise, among the texels around it as
-    /// their light is.
+    /// The squared error of each texel [W²/m⁴], bias and remaining noise: averaged over the texels around and
+    /// distributed among them by their irradiance.
     fn squares(&self, of_texels: &[FilteredCell], map: &ReceiverMap) -> Vec<f64> {
         let expected = |[.., a, b, _]: &FilteredCell| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
         let square = |[.., a, b, missed]: &FilteredCell| missed + 0.25 * (a - b) * (a - b);
@@ -284,7 +286,7 @@ impl Details {
         squares.collect()
     }
 
-    /// Puts what was kept in the place of a map's counts.
+    /// Replaces a map's counts by the filtered light.
     fn put(&self, of_texels: &[FilteredCell], map: &mut ReceiverMap, unit: FluxUnit) -> Sums {
         let counts_per_mean = self.mean / unit.watts();
         let chart = map.chart.clone();
@@ -296,8 +298,8 @@ impl Details {
     }
 }
 
-/// Puts other counts in the place of a map's; each channel keeps its sum. What is missing is shared out as the channel is, or
-/// as luminance is where channels may be negative: that stays above 0. Gives what no texel could take.
+/// Replaces a map's counts; each channel keeps its sum. The difference is distributed in proportion to the channel, or
+/// to luminance where channels may be negative: luminance stays above 0. Returns what no texel could take.
 fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3], is_signed: bool) -> Sums {
     let texels = map.texels_mut();
     let sums = |texels: &[FluxCount]| {
@@ -329,7 +331,7 @@ fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3], is_signed: bool)
         let wanted = [0, 1, 2].map(|channel| flux[channel] + share[channel] * missing[channel]);
         *count = lit(wanted.map(|wanted| wanted.round() as i64), is_signed);
     }
-    // The brightest texel takes what rounding left.
+    // The brightest texel takes the rounding error.
     let rounded = sums(texels);
     let left = [0, 1, 2].map(|channel| before[channel] - rounded[channel]);
     let brightness = |count: &&mut FluxCount| count.iter().map(|&count| i128::from(count)).sum::<i128>();

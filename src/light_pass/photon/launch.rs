@@ -1,8 +1,8 @@
 //! Starts of photons: aimed at specular surfaces, and stratified as finely as there are photons.
 //!
-//! A photon's index, scrambled, is a place along a curve through the whole launch domain (Morton's, cell by cell of the
-//! item buffer). The first n indices divide the curve into n strata with one photon each, for every power of two; more of
-//! them fill the gaps, so that no photon is ever traced in vain (Owen, "Scrambled Net Variance", 1997).
+//! A photon's index, scrambled, is a place along a space-filling curve through the launch domain (Morton's, cell by
+//! cell of the item buffer). For every power of two, the first n indices divide the curve into n strata of one photon
+//! each; further indices fill the gaps, so that no photon is wasted (Owen, "Scrambled Net Variance", 1997).
 
 use glam::DVec2;
 
@@ -18,29 +18,28 @@ use crate::scene::emitter::{Emitter, EmitterSampler};
 use crate::scene::{Light, Scene};
 use crate::transport::{MediumStack, Tracer, media_at};
 
-/// Places of a lamp that tell whether it lies within one medium.
+/// Points of a lamp that are probed to tell whether all of it lies within one medium.
 const MEDIUM_PROBES: u32 = 16;
 
-/// Photons that tell their mean flux.
+/// Photons from which the mean flux is estimated.
 const FLUX_PROBES: u32 = 1 << 12;
 
-/// Places that are looked from where the middle of a lamp sees nothing.
+/// Points of a lamp that are tried where its centre sees nothing.
 const MIDDLE_PROBES: u32 = 16;
 
-/// Dimension of [`even_point`] that places on lamps are drawn from; those of micro-normals follow.
+/// Dimension of [`even_point`] for points on lamps; those for micro-normals follow.
 pub(super) const LAMP_DIMENSION: u32 = 0;
 
-/// Of a lamp's unit square.
+/// In a lamp's unit square.
 pub(super) const LAMP_MIDDLE: DVec2 = DVec2::splat(0.5);
 
 /// A photon at its light.
 #[derive(Clone, Copy, Debug)]
 pub struct Start {
-    /// Its first segment.
     pub ray: Ray,
-    /// Flux [W per channel of a light of unit strength] that it stands for if it were the only photon.
+    /// Flux, as if it were the only photon [W per channel of a light of unit strength].
     pub flux_w: LinearSrgb,
-    /// Bodies around its origin.
+    /// Media around its origin.
     pub media: MediumStack,
 }
 
@@ -52,26 +51,27 @@ pub struct PhotonLaunch<'a> {
 
 #[derive(Debug)]
 enum Domain<'a> {
-    /// Light of one place or direction: the marked cells of its item buffer.
+    /// Light from one point or direction: the marked cells of its item buffer.
     Cells {
         launch: &'a Launch,
         cells: Vec<Cell>,
-        /// Flux [W per channel] of a photon in a direction of full strength; `None` where that depends on its place.
+        /// Flux [W per channel] of a photon in a direction of full strength; `None` if it depends on the position in a
+        /// cell.
         full_w: Option<LinearSrgb>,
     },
-    /// Light of many: spheres around what is specular, as each place sees them.
+    /// Extended light: bounding spheres of specular surfaces, as seen from each point of the light.
     Spheres(Lamp<'a>),
 }
 
-/// A lamp with a size.
+/// An extended light.
 #[derive(Debug)]
 struct Lamp<'a> {
     places: EmitterSampler<'a>,
     tracer: &'a Tracer,
     spheres: &'a Spheres,
-    /// Around all places; `None` where they lie in different media.
+    /// Around all its points; `None` if they lie in different media.
     media: Option<MediumStack>,
-    /// Reaches across the whole scene [m].
+    /// Diagonal of the scene [m].
     across_m: f64,
 }
 
@@ -84,7 +84,7 @@ struct Cell {
 }
 
 impl<'a> PhotonLaunch<'a> {
-    /// The domain of a light as its item buffer sees it.
+    /// The domain of a light from one point or direction: the cells that its item buffer marks.
     pub fn of_cells(visible_light: &'a VisibleLight) -> Self {
         let side = CELLS_PER_SIDE;
         let marked = |face: usize| {
@@ -111,7 +111,7 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// The domain of a light with a size; `light` is of unit strength.
+    /// The domain of an extended light; `light` has unit strength.
     pub fn of_places(tracer: &'a Tracer, light: &'a Light, spheres: &'a Spheres, seed: u64) -> Self {
         let scene: &Scene = tracer.scene();
         let places = EmitterSampler::new(light, scene);
@@ -136,7 +136,7 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// Whether no photon could start.
+    /// Whether no photon can start.
     pub fn is_empty(&self) -> bool {
         match &self.domain {
             Domain::Cells { cells, .. } => cells.is_empty(),
@@ -144,8 +144,8 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// Solid angle [sr] of the domain, or its area [m²] of parallel light; of a light with a size as its middle place sees
-    /// it.
+    /// Solid angle of the domain [sr], or its cross-section in parallel light [m²]. For an extended light, as seen from
+    /// its centre.
     pub fn measure(&self) -> f64 {
         match &self.domain {
             Domain::Cells { launch, cells, .. } => {
@@ -162,7 +162,7 @@ impl<'a> PhotonLaunch<'a> {
                     emitter.map_or(0.0, |emitter| lamp.spheres.measure(&emitter))
                 };
                 match seen(LAMP_MIDDLE) {
-                    // The middle may face away.
+                    // The centre may face away.
                     0.0 => (0..MIDDLE_PROBES)
                         .map(|probe| seen(even_point(probe, LAMP_DIMENSION, 0)))
                         .fold(0.0, f64::max),
@@ -172,7 +172,7 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// Mean flux of a photon [W, largest channel], by some of them.
+    /// Mean flux of a photon [W, largest channel], estimated from a few.
     pub fn mean_flux_w(&self, seed: u64) -> f64 {
         let of = |index: u32| {
             let start = self.start(index, Self::place(index, seed), seed);
@@ -181,12 +181,13 @@ impl<'a> PhotonLaunch<'a> {
         (0..FLUX_PROBES).map(of).sum::<f64>() / f64::from(FLUX_PROBES)
     }
 
-    /// Place along the domain's curve of a photon, [0, 2⁶⁴).
+    /// A photon's place along the domain's curve, [0, 2⁶⁴).
     pub fn place(index: u32, seed: u64) -> u64 {
         even_code(index, seed)
     }
 
-    /// Cells that the domain is divided into, each with as many photons, where neighbours of one have much the same way.
+    /// Number of cells. All get equally many photons, and neighbours within one take much the same path. 0 for an
+    /// extended light without [`Self::lamp_offsets`].
     pub(super) fn cell_count(&self) -> usize {
         match &self.domain {
             Domain::Cells { cells, .. } => cells.len(),
@@ -194,7 +195,7 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// Where on its lamp the photon of an index starts, in the lamp's unit square; the middle of light of one place.
+    /// Where on its lamp a photon starts, in the lamp's unit square; the centre for light from one point or direction.
     pub(super) fn lamp_place(&self, index: u32, seed: u64) -> DVec2 {
         match &self.domain {
             Domain::Cells { .. } => LAMP_MIDDLE,
@@ -202,7 +203,7 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// Where a point of the lamp's unit square lies on a lamp that faces one way, in half-axes from its middle.
+    /// Maps the unit square of a lamp that faces one way to half-axes from its centre; `None` for other lights.
     pub(super) fn lamp_offsets(&self) -> Option<fn(DVec2) -> DVec2> {
         match &self.domain {
             Domain::Cells { .. } => None,
@@ -210,7 +211,7 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// The photon that starts at a point of a cell, from a point of its lamp's unit square; `None` where nothing does.
+    /// The photon from a point of a cell and a point of its lamp's unit square; `None` if no light starts there.
     pub(super) fn start_in(&self, cell: usize, within: DVec2, lamp: DVec2) -> Option<Start> {
         let (launch, cells, full_w) = match &self.domain {
             Domain::Cells {
@@ -240,8 +241,8 @@ impl<'a> PhotonLaunch<'a> {
         })
     }
 
-    /// The photon of an index at a place along the domain's curve; `None` where its place of the lamp sends nothing to
-    /// anything specular.
+    /// The photon of an index at a place along the domain's curve; `None` if its point of the lamp emits nothing
+    /// towards specular surfaces.
     pub fn start(&self, index: u32, place: u64, seed: u64) -> Option<Start> {
         match &self.domain {
             Domain::Cells { .. } => {
@@ -258,7 +259,7 @@ impl<'a> PhotonLaunch<'a> {
 }
 
 impl Lamp<'_> {
-    /// The photon of a ray of a place, and the measure [sr or m²] that it stands for.
+    /// The photon of a ray, which represents a measure [sr or m²].
     fn start(&self, emitter: &Emitter, (ray, measure): (Ray, f64)) -> Start {
         let media = match (self.media, emitter.kind.position()) {
             (Some(media), _) => media,
@@ -273,7 +274,7 @@ impl Lamp<'_> {
     }
 }
 
-/// So many cells' part of a face.
+/// Fraction of a face that this number of cells covers.
 fn cell_share(cells: usize) -> f64 {
     cells as f64 / (CELLS_PER_SIDE * CELLS_PER_SIDE) as f64
 }
@@ -284,7 +285,7 @@ fn full_w(launch: &Launch, cells: usize) -> Option<LinearSrgb> {
     is_even.then(|| launch.emitter().strength * measure)
 }
 
-/// Which of so many equal parts of the curve a place lies in, and where in it.
+/// Which of `parts` equal parts of the curve a place lies in, and where in that part, [0, 2⁶⁴).
 fn chosen(place: u64, parts: usize) -> (usize, u64) {
     let product = u128::from(place) * parts as u128;
     ((product >> 64) as usize, product as u64)

@@ -1,8 +1,8 @@
 //! Photons: paths sampled from a light, one branch at each event, each hit counted in its texel.
 //!
-//! Where patches of a wavefront shatter (cut glass, rough glass, many inner reflections) or would have to be averaged
-//! over a lamp, photons cost what a path costs. Lamp, micro-normals and wavelength are dimensions of the path. Bundles carry
-//! what stays together, photons the difference.
+//! Where patches of a wavefront shatter (cut glass, rough glass, many internal reflections) or would have to be
+//! averaged over an extended light, a photon still costs one path. Point of the lamp, micro-normals and wavelength are
+//! dimensions of the path. Bundles carry coherent light, photons the difference.
 
 mod bundles;
 mod cells;

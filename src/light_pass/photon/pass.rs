@@ -20,24 +20,23 @@ use crate::light_pass::shard_index::ShardIndex;
 use crate::light_pass::wavefront::coverage::deposit_triangles;
 use crate::progress::{Control, Stage};
 
-/// Photons of a block, about: a short stretch of the domain's curve, so that neighbours meet the same triangles.
+/// Approximate number of photons in a block: a short stretch of the domain's curve, so that neighbours hit the same
+/// triangles.
 const BLOCK: u32 = 1 << 14;
 
-/// Blocks that are followed before their hits are counted.
+/// Blocks that are traced before their hits are deposited.
 const BLOCKS_AT_ONCE: usize = 16;
 
-/// Independent samples of the same strata: their difference is the noise.
+/// Independent samples of the same strata; their difference is the noise.
 pub const HALVES: usize = 2;
 
 /// The photons of one light.
 pub struct PhotonPass<'a> {
-    /// Where they start.
     pub launch: &'a PhotonLaunch<'a>,
-    /// What they share; the seed is that of the first half.
+    /// Both halves derive their seeds from the one here.
     pub rules: PhotonRules<'a>,
-    /// Whether light may stay together.
+    /// Whether bundles serve as a control variate.
     pub has_bundles: bool,
-    /// Charts of maps.
     pub chart_for: &'a ChartFor<'a>,
 }
 
@@ -45,12 +44,11 @@ pub struct PhotonPass<'a> {
 struct Deposit {
     receiver: Receiver,
     texel: u32,
-    /// Band of its wavelength.
     band: Option<usize>,
     count: FluxCount,
 }
 
-/// What became of a block.
+/// Result of a block of photons.
 #[derive(Default)]
 struct Block {
     half: usize,
@@ -60,12 +58,12 @@ struct Block {
     segments: u64,
 }
 
-/// Charts that were asked for, by receiver.
+/// Charts requested so far, by receiver.
 type KnownCharts = Vec<OnceLock<Option<Arc<Chart>>>>;
 
 impl PhotonPass<'_> {
-    /// Follows the photons of both halves with these indices, or a share of the blocks that they are divided into.
-    /// Each half has one set of maps, or one for each band.
+    /// Traces the photons of both halves with these indices, or a shard of their blocks. Each half has one set of maps,
+    /// or one for each band.
     pub fn run(
         &self,
         indices: Range<u32>,
@@ -73,7 +71,7 @@ impl PhotonPass<'_> {
         halves: &mut [&mut [ReceiverMaps]],
         listener: &ProgressScope,
     ) -> PassReport {
-        // Indices that are alike in their last bits have places that are alike in their first ones.
+        // Indices that agree in their last bits have places that agree in their first ones.
         let stride = (indices.end / BLOCK).max(1).next_power_of_two();
         let blocks: Vec<(usize, u32)> = (0..stride)
             .flat_map(|first| (0..HALVES).map(move |half| (half, first)))
@@ -124,7 +122,7 @@ impl PhotonPass<'_> {
         report
     }
 
-    /// Bundles for so many photons of each half.
+    /// Bundles for this number of photons in each half.
     fn bundles(&self, charts: &KnownCharts, photons: f64, control: &Control) -> Bundles {
         if !self.has_bundles {
             return Bundles::default();
@@ -139,7 +137,7 @@ impl PhotonPass<'_> {
         Bundles::new(&surveyor, photons * HALVES as f64)
     }
 
-    /// Puts bundles into the maps of both halves, for photons with these indices each.
+    /// Deposits bundles into the maps of both halves, for photons of these indices in each.
     fn deposit_bundles(
         &self,
         bundles: &Bundles,
@@ -234,7 +232,7 @@ impl PhotonPass<'_> {
         block
     }
 
-    /// The texel that a hit lies in; `None` without a map, and where the surface reaches none.
+    /// The texel that a hit lies in; `None` without a map, or if the texel has no surface.
     fn texel(&self, hit: &Hit, charts: &KnownCharts) -> Option<u32> {
         let chart = self.chart(hit.receiver, charts)?;
         let size = DVec2::new(chart.width as f64, chart.height as f64);
@@ -279,7 +277,7 @@ impl PhotonPass<'_> {
     }
 }
 
-/// Which of so many sets of maps light of a band goes to: one holds all, or each has one of its own.
+/// The set of maps for light of a band: one set holds all bands, or each band has its own.
 fn set_of(band: Option<usize>, sets: usize) -> usize {
     if sets == 1 { 0 } else { band.unwrap_or(0) }
 }

@@ -4,46 +4,45 @@ use crate::light_pass::spectral_node::{SpectralNode, place_of};
 use crate::optics::ColourMatrix;
 use crate::transport::Tracer;
 
-/// The light of one lamp by wavelength.
+/// The spectrum of one light.
 #[derive(Debug)]
 pub struct PhotonSpectrum {
-    /// The scene as light of all wavelengths meets it.
+    /// The scene for photons that carry all wavelengths.
     whole: Tracer,
-    /// From light in RGB to CIE XYZ.
+    /// From RGB to CIE XYZ.
     channels: ColourMatrix,
     nodes: Vec<WeightedNode>,
-    /// Whether a photon has its own wavelength before a surface parts them: where bands have maps of their own.
+    /// Whether photons have a single wavelength from their start, as separate maps for each band require.
     starts_parted: bool,
 }
 
 #[derive(Debug)]
 struct WeightedNode {
-    /// Its channels are divided by the probability of the node.
+    /// Its channels are divided by the node's probability.
     node: SpectralNode,
-    /// Band of the node among all bands of the bake.
+    /// Index among all bands of the bake.
     band: usize,
-    /// Probability of all nodes up to this one, itself included.
+    /// Cumulative probability, including its own.
     upto: f64,
     /// See [`Hue::ends`].
     ends: [f64; 2],
 }
 
-/// How a photon sees the scene: by all wavelengths, or by one.
+/// The wavelengths of a photon: all of them, or one.
 #[derive(Clone, Copy, Debug)]
 pub struct Hue<'a> {
-    /// The scene.
     pub tracer: &'a Tracer,
-    /// From flux in RGB to the channels of the light.
+    /// From RGB flux to the channels of the light.
     pub channels: ColourMatrix,
-    /// Its band; `None` while it has all of them.
+    /// `None` for all wavelengths.
     pub band: Option<usize>,
-    /// What a value that differs by so much at the spectrum's first and at its last wavelength from that in the middle has of
-    /// either difference: a parabola along which refractive indices are smooth.
+    /// Weights that interpolate how a value differs at this wavelength from the middle one, given its differences at
+    /// the first and at the last: by a parabola in a variable in which refractive indices are smooth.
     pub ends: [f64; 2],
 }
 
 impl PhotonSpectrum {
-    /// Of bands with what they stand for; each is chosen in proportion to its X + Y + Z.
+    /// Each band is sampled in proportion to the X + Y + Z of its node.
     pub fn new(whole: Tracer, bands: Vec<(usize, SpectralNode)>, starts_parted: bool) -> Self {
         let brightness =
             |node: &SpectralNode| node.channels.of_white().to_array().iter().sum::<f64>().max(0.0);
@@ -75,12 +74,11 @@ impl PhotonSpectrum {
         }
     }
 
-    /// Whether a photon has its own wavelength from its start.
     pub fn starts_parted(&self) -> bool {
         self.starts_parted
     }
 
-    /// All wavelengths.
+    /// All wavelengths together.
     pub fn whole(&self) -> Hue<'_> {
         Hue {
             tracer: &self.whole,
@@ -90,7 +88,7 @@ impl PhotonSpectrum {
         }
     }
 
-    /// The scene as light of the middle, the first and the last wavelength meets it; `None` of fewer than three.
+    /// The scene at the middle, the first and the last wavelength; `None` if there are fewer than three.
     pub fn tracers(&self) -> Option<[&Tracer; 3]> {
         let [first, .., last] = &self.nodes[..] else {
             return None;
@@ -99,13 +97,13 @@ impl PhotonSpectrum {
         (self.nodes.len() > 2).then_some([middle, first, last].map(|node| &node.node.tracer))
     }
 
-    /// One of them, by a number in [0, 1).
+    /// Samples one wavelength by a number in [0, 1).
     pub fn one(&self, place: f64) -> Option<Hue<'_>> {
         let index = self.nodes.partition_point(|node| node.upto <= place);
         self.nodes.get(index).or(self.nodes.last()).map(WeightedNode::hue)
     }
 
-    /// Each of them, with its probability.
+    /// Each wavelength with its probability.
     pub fn hues(&self) -> impl Iterator<Item = (Hue<'_>, f64)> {
         let before = std::iter::once(0.0).chain(self.nodes.iter().map(|node| node.upto));
         let nodes = self.nodes.iter().zip(before);
@@ -124,7 +122,7 @@ impl WeightedNode {
     }
 }
 
-/// See [`Hue::ends`], of a place among those of all wavelengths.
+/// [`Hue::ends`] at one place among those of all wavelengths.
 fn ends(places: &[f64], place: f64) -> [f64; 2] {
     let [first, .., last] = places else {
         return [0.0; 2];

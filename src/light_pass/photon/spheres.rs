@@ -13,36 +13,37 @@ use crate::scene::emitter::{Emitter, EmitterKind, EmitterSampler, in_cap, on_dis
 use crate::scene::{Light, Scene};
 use crate::transport::Tracer;
 
-/// Spheres at most.
+/// Maximum number of spheres per light.
 const MAX_SPHERES: usize = 16;
 
-/// Cells across and down the square that directions towards a sphere, or places on its disc, are drawn from: a power of 2.
+/// Cells along each side of the square from which directions towards a sphere, or points on its disc, are drawn: a
+/// power of 2.
 const SIDE: usize = 32;
 const CELLS: usize = SIDE * SIDE;
 
-/// Photons that tell which cells meet something specular.
+/// Pilot photons that find out which cells see specular surfaces.
 const PROBES: u32 = 1 << 16;
 
-/// Their seed: other photons than those of any picture, so that these stay unbiased.
+/// Their seed. No bake shares it, so that bakes stay unbiased.
 const PROBE_SEED: u64 = 0x7072_6f62_6573;
 
-/// Photons of a cell where nothing was met, over those of one where something was.
+/// Density of photons in a cell without hits, relative to one with hits.
 const RARE: f64 = 1.0 / 16.0;
 
-/// Spheres around what is specular.
+/// Bounding spheres of specular surfaces.
 #[derive(Clone, Debug, Default)]
 pub struct Spheres(Vec<GuidedSphere>);
 
-/// A sphere, with how its photons are shared out.
+/// A sphere with the distribution of its photons.
 #[derive(Clone, Debug)]
 struct GuidedSphere {
     sphere: Sphere,
-    /// Photons of the cells before each along Morton's curve, over those of all cells if each had as many as the best.
+    /// Density summed over the cells before each along Morton's curve; full density in all cells sums to 1.
     before: Vec<f64>,
 }
 
 impl Spheres {
-    /// Around casters, for a light of unit strength.
+    /// Bounding spheres of casters, for a light of unit strength.
     pub fn around(tracer: &Tracer, light: &Light, casters: &[usize]) -> Self {
         let spheres = spheres(tracer.scene(), casters, MAX_SPHERES);
         let evenly = |sphere| GuidedSphere::new(sphere, |_| 1.0);
@@ -71,30 +72,30 @@ impl Spheres {
         Self(guided.collect())
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Solid angle [sr] that a place of a lamp sends light into towards them, or their cross-section [m²] in parallel light.
+    /// Solid angle that a point of a lamp illuminates towards the spheres [sr], or their cross-section in parallel
+    /// light [m²].
     pub fn measure(&self, emitter: &Emitter) -> f64 {
         self.0.iter().map(|guided| guided.sphere.measure(emitter)).sum()
     }
 
-    /// A ray of a place of a lamp towards one of the spheres, and the measure [sr or m²] that it stands for. `None` for a ray
-    /// that an earlier sphere could have been given: it is that one's.
+    /// A ray from a point of a lamp towards one of the spheres, and the measure [sr or m²] that it represents. `None`
+    /// also if the ray could have been aimed at an earlier sphere, to which it then belongs.
     pub fn aim(&self, emitter: &Emitter, place: u64, across_m: f64) -> Option<(Ray, f64)> {
         let (ray, choice) = self.choose(emitter, place, across_m)?;
         Some((ray, choice.measure))
     }
 
-    /// Cells of all spheres.
     pub(super) fn cell_count(&self) -> usize {
         self.0.len() * CELLS
     }
 
-    /// A ray of a place of a lamp from a point of a cell, and the measure [sr or m²] of a photon whose cell is drawn evenly
-    /// among all. `None` for what is not sent towards the cell's sphere, or is an earlier one's.
+    /// A ray from a point of a lamp through a point of a cell, and the measure [sr or m²] that a photon represents if
+    /// its cell is drawn uniformly. `None` if nothing is emitted towards the cell's sphere, or the ray belongs to an
+    /// earlier one.
     pub(super) fn aim_in(
         &self,
         emitter: &Emitter,
@@ -117,7 +118,7 @@ impl Spheres {
         Some((ray, choice))
     }
 
-    /// From a place of a lamp to a point of a sphere's square.
+    /// From a point of a lamp through a point of a sphere's square; `None` if the ray belongs to an earlier sphere.
     fn ray(&self, emitter: &Emitter, which: usize, square: DVec2, across_m: f64) -> Option<Ray> {
         let sphere = &self.0[which].sphere;
         let ray = match emitter.kind {
@@ -176,19 +177,19 @@ impl Spheres {
     }
 }
 
-/// What a place along the curve of all spheres becomes.
+/// The sample that a place along the curve of all spheres selects.
 struct Choice {
-    /// The sphere.
+    /// Index of the sphere.
     which: usize,
-    /// Of the sphere's square, along Morton's curve.
+    /// Cell of the sphere's square, along Morton's curve.
     cell: usize,
-    /// Along the curve of the sphere's square, [0, 2⁶⁴).
+    /// Place along the curve of the sphere's square, [0, 2⁶⁴).
     place: u64,
-    /// What it stands for [sr or m²].
+    /// Measure that a photon represents [sr or m²].
     measure: f64,
 }
 
-/// A cell of a sphere and those around it: what is small may lie beside the photons that were looked by.
+/// A cell of a sphere and its neighbours: pilot photons may have passed beside small objects.
 fn with_neighbours((which, cell): (usize, usize)) -> impl Iterator<Item = (usize, [u32; 2])> {
     let [column, row] = unfolded(cell as u64);
     let near = |index: u32| index.saturating_sub(1)..=(index + 1).min(SIDE as u32 - 1);
@@ -212,7 +213,7 @@ struct Sphere {
 }
 
 impl Sphere {
-    /// Solid angle [sr] that a place sends light into towards it, or its cross-section [m²] in parallel light.
+    /// Solid angle that an emitter illuminates towards the sphere [sr], or its cross-section in parallel light [m²].
     fn measure(&self, emitter: &Emitter) -> f64 {
         let Some(position) = emitter.kind.position() else {
             return std::f64::consts::PI * self.radius_m * self.radius_m;
@@ -236,7 +237,7 @@ impl Sphere {
         cap_sr(half_angle_rad)
     }
 
-    /// Half-angle [rad] of the cone around it; π from within.
+    /// Half-angle of the cone around the sphere [rad]; π from inside.
     fn half_angle_rad(&self, position: DVec3) -> f64 {
         let distance_m = position.distance(self.centre);
         if distance_m > self.radius_m {
@@ -246,7 +247,7 @@ impl Sphere {
         }
     }
 
-    /// Whether a ray of an emitter may have been aimed at it.
+    /// Whether a ray of an emitter may have been aimed at the sphere.
     fn has(&self, ray: &Ray, emitter: &Emitter) -> bool {
         let Some(position) = emitter.kind.position() else {
             let towards = self.centre - ray.origin;
@@ -266,7 +267,7 @@ fn cap_sr(half_angle_rad: f64) -> f64 {
     4.0 * std::f64::consts::PI * (0.5 * half_angle_rad).sin().powi(2)
 }
 
-/// Spheres around objects: around each, or around groups of neighbours where there are more than `most`.
+/// Bounding spheres of objects: one each, or one for each group of neighbours if there are more objects than `most`.
 fn spheres(scene: &Scene, objects: &[usize], most: usize) -> Vec<Sphere> {
     let mut bounded: Vec<(usize, DVec3)> = objects
         .iter()
@@ -310,7 +311,7 @@ fn around(scene: &Scene, objects: &[(usize, DVec3)]) -> Option<Sphere> {
     let radius_m = vertices()
         .map(|position| position.distance(centre))
         .fold(0.0, f64::max);
-    // A hair more, so that rounding loses nothing at the rim.
+    // Slightly enlarged, so that rounding loses nothing at the rim.
     (radius_m > 0.0 && radius_m.is_finite()).then_some(Sphere {
         centre,
         radius_m: radius_m * (1.0 + 1e-9),

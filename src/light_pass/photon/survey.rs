@@ -16,45 +16,45 @@ use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
 
-/// Ways with less than this part of the light that starts are left to photons.
+/// Paths with less than this part of the emitted flux are left to photons.
 const MIN_SHARE: f64 = 0.01;
 
-/// Longer ways are left to photons.
+/// Longer paths are left to photons.
 const MAX_STEPS: usize = 12;
 
-/// Ways of a point; further ones are left to photons.
+/// Maximum number of paths of a point; further ones are left to photons.
 const MAX_WAYS: usize = 16;
 
-/// Cells are looked at where so many photons start in them, of light of one place and of a lamp with a size: for that there
-/// are more points to follow.
+/// Photons per cell below which bundles are not worth a survey: for light from one point or direction, and for an
+/// extended light, which takes more points to follow.
 pub(super) const MIN_PHOTONS: [f64; 2] = [24.0, 400.0];
 
-/// A square is divided where those of its photons that follow no bundle take as many segments as its division, times this.
+/// A square is subdivided if its photons that follow no bundle take as many segments as the subdivision, times this.
 const WORTH: f64 = 1.0;
 
-/// Points whose light a division follows.
+/// Points that are followed for a subdivision.
 const POINTS_OF_DIVISION: f64 = 8.0;
 
-/// Divisions of a cell, at most.
+/// Maximum subdivision depth of a cell.
 const MAX_DIVISIONS: u32 = 10;
 
-/// A bundle is of use while the light of the middle of its square arrives no farther than this from the mean of two opposite
-/// corners [texels]. Within its triangles it is wrong by a quarter of that or less.
+/// A bundle is of use while the light of its square's centre arrives no farther than this from the mean of two opposite
+/// corners [texels]. Within its triangles its error is a quarter of that or less.
 const MAX_BENT_TEXELS: f64 = 1.0;
 
-/// Light of one part of a lamp arrives within so many texels.
+/// Maximum distance between the arrivals from neighbouring parts of a lamp [texels].
 const MAX_STEP_TEXELS: f64 = 0.5;
 
-/// Segments of a photon that takes a way without bundles, about.
+/// Approximate segments of a photon on a path without bundles.
 const LOST_SEGMENTS: f64 = 10.0;
 
-/// Photons start as if no less than this part of the light were left to them.
+/// Photon density assumes that bundles leave at least this part of the light.
 const MIN_LEFT: f64 = 0.03;
 
-/// Corners of the triangles of a square, beside its middle.
+/// Corners of the triangles of a square, besides its centre.
 pub(super) const TRIANGLES: [[usize; 2]; 4] = [[0, 1], [1, 3], [2, 3], [0, 2]];
 
-/// Follows the light of points of the domain.
+/// Traces the light of points of the domain along all of its paths.
 pub(super) struct Surveyor<'a> {
     pub(super) launch: &'a PhotonLaunch<'a>,
     pub(super) rules: PhotonRules<'a>,
@@ -62,24 +62,24 @@ pub(super) struct Surveyor<'a> {
     pub(super) control: &'a Control,
 }
 
-/// The light of one point.
+/// The light of one point, along all of its paths.
 #[derive(Debug, Default)]
 struct Light {
     arrivals: Vec<Arrival>,
-    /// What starts [W, largest channel, if it were the only photon].
+    /// Emitted flux [W, largest channel, as if it were the only photon].
     start_w: f64,
-    /// What was not followed to its end.
+    /// Flux that was not followed to its end.
     lost_w: f64,
     /// Mean segments of a photon.
     segments: f64,
-    /// Segments that were followed.
+    /// Segments that were traced.
     followed: u64,
 }
 
-/// Light of a point at the end of one way.
+/// Light of a point at the end of one path.
 #[derive(Debug)]
 struct Arrival {
-    /// The way: surfaces, their smoothing groups, events, receiver.
+    /// The path: surfaces, their smoothing groups, events, receiver.
     key: PathSignature,
     steps: Arc<[Step]>,
     receiver: Receiver,
@@ -88,7 +88,7 @@ struct Arrival {
     flux_w: LinearSrgb,
 }
 
-/// Light under way.
+/// Light of a path that is to be continued.
 struct QueuedLight {
     ray: Ray,
     media: MediumStack,
@@ -97,54 +97,55 @@ struct QueuedLight {
     steps: Vec<Step>,
 }
 
-/// A square that may be divided.
+/// A square that may be subdivided.
 struct Candidate {
     cell: usize,
     begin: u64,
     low: DVec2,
     side: f64,
-    /// Along Morton's curve.
+    /// In Morton order.
     corners: [Arc<Light>; 4],
     middle: Arc<Light>,
-    /// The light of the middle from half-way out on both axes of a lamp with a size.
+    /// Light of the centre from half-way out along both axes of an extended light.
     outer: Option<[Light; 2]>,
-    /// The light of the middle at the first and the last wavelength of a spectrum.
+    /// Light of the centre at the first and the last wavelength of a spectrum.
     hues: Option<[Light; 2]>,
-    /// That start in it.
+    /// Photons that start in the square.
     photons: f64,
     divisions: u32,
 }
 
-/// What becomes of the light of a square, as parts of what starts.
+/// How the light of a square is carried.
 struct LightShares {
-    /// Mean flux of a photon [W, largest channel] that bundles carry.
+    /// Mean flux of a photon that bundles carry [W, largest channel].
     carried_w: f64,
-    /// The same that arrives.
+    /// Mean flux of a photon that arrives [W, largest channel].
     arriving_w: f64,
-    /// Smaller bundles might carry it.
+    /// Part of the emitted light that smaller bundles might carry.
     left: f64,
-    /// No bundle could.
+    /// Part of the emitted light that no bundle can carry.
     lost: f64,
     /// Mean segments of a photon.
     segments: f64,
-    /// Mean segments that the light of a point takes.
+    /// Mean segments traced for a point.
     followed: f64,
 }
 
-/// Squares of a cell so far.
+/// The squares of a cell found so far.
 #[derive(Default)]
 pub(super) struct PhotonSurvey {
     pub(super) squares: Vec<Square>,
-    /// Mean flux of a photon [W, largest channel] that bundles carry.
+    /// Mean flux of a photon that bundles carry [W, largest channel].
     pub(super) carried_w: f64,
-    /// The same that arrives anywhere.
+    /// Mean flux of a photon that arrives [W, largest channel].
     pub(super) arriving_w: f64,
-    /// Bundles that it may still have.
+    /// Further bundles that the cell may have.
     bundles_left: usize,
 }
 
 impl Surveyor<'_> {
-    /// A cell in squares along its curve, for so many photons; no finer where it has `most_bundles`.
+    /// Divides a cell into squares along its curve, for this number of photons; no further once there are
+    /// `most_bundles`.
     pub(super) fn survey(&self, cell: usize, photons: f64, most_bundles: usize) -> PhotonSurvey {
         let mut survey = PhotonSurvey {
             bundles_left: most_bundles,
@@ -174,7 +175,7 @@ impl Surveyor<'_> {
             || square.divisions == MAX_DIVISIONS
             || survey.bundles_left == 0;
         if is_fine || self.control.is_cancelled() {
-            // The variance of a photon over its cost.
+            // The density with the least noise for its cost: the root of a photon's variance over its cost.
             let left = (outcome.left + outcome.lost).clamp(MIN_LEFT, 1.0);
             let share = 0.25_f64.powi(square.divisions as i32);
             survey.carried_w += share * outcome.carried_w;
@@ -223,26 +224,26 @@ impl Surveyor<'_> {
         }
     }
 
-    /// The light of a point of a cell from half-way out on both axes of a lamp with a size.
+    /// Light of a point of a cell from half-way out along both axes of an extended light.
     fn outer(&self, cell: usize, within: DVec2) -> Option<[Light; 2]> {
         self.launch.lamp_offsets()?;
         let half_way = [DVec2::new(0.75, 0.5), DVec2::new(0.5, 0.75)];
         Some(half_way.map(|lamp| self.light(self.tracer(), cell, within, lamp)))
     }
 
-    /// The light of a point of a cell at the first and the last wavelength of a spectrum.
+    /// Light of a point of a cell at the first and the last wavelength of a spectrum.
     fn hues(&self, cell: usize, within: DVec2) -> Option<[Light; 2]> {
         let [_, first, last] = self.rules.spectrum?.tracers()?;
         Some([first, last].map(|tracer| self.light(tracer, cell, within, LAMP_MIDDLE)))
     }
 
-    /// The scene as light meets it, of the middle wavelength where they are parted.
+    /// The scene, at the middle wavelength if light is dispersed.
     fn tracer(&self) -> &Tracer {
         let parted = self.rules.spectrum.and_then(PhotonSpectrum::tracers);
         parted.map_or(self.rules.tracer, |[middle, ..]| middle)
     }
 
-    /// The light of a point of a cell and of its lamp, on all its ways.
+    /// The light of a point of a cell and of its lamp, along all paths.
     fn light(&self, tracer: &Tracer, cell: usize, within: DVec2, lamp: DVec2) -> Light {
         let mut light = Light::default();
         let Some(start) = self.launch.start_in(cell, within, lamp) else {
@@ -338,7 +339,8 @@ impl Surveyor<'_> {
         meeting.transmission().into_iter().for_each(&mut go_on);
     }
 
-    /// Where a hit lies on a map that its surface fills: on another one, a triangle may lie across what is not covered.
+    /// Position of a hit on a map that its surface fills. `None` on others: a triangle of flux could cross uncovered
+    /// texels.
     fn place(&self, receiver: Receiver, hit: &SurfaceHit) -> Option<DVec2> {
         let chart = (self.chart_of)(receiver).filter(|chart| chart.is_full())?;
         let size = DVec2::new(chart.width as f64, chart.height as f64);
@@ -347,7 +349,7 @@ impl Surveyor<'_> {
 }
 
 impl Candidate {
-    /// The bundles of its triangles, where those of each triangle end, and what becomes of the light.
+    /// The bundles of its triangles, where those of each triangle end, and how the light is carried.
     fn bundles(&self) -> (Vec<Bundle>, [u8; 4], LightShares) {
         let (mut bundles, mut ends) = (Vec::new(), [0; 4]);
         let (mut carried_w, mut blurred_w) = (0.0, 0.0);
@@ -414,7 +416,7 @@ impl Candidate {
         }
     }
 
-    /// How far the light of the middle arrives from there otherwise; `None` where it takes another way, or its lamp is too large.
+    /// Displacements of an arrival at the centre; `None` if light takes another path there, or the lamp is too large.
     fn moves(&self, middle: &Arrival) -> Option<BundleOffsets> {
         let mut moves = BundleOffsets::default();
         let moved = |light: &Light| Some((light.find(middle.key)?.place - middle.place).as_vec2());
@@ -427,7 +429,7 @@ impl Candidate {
         (moves.lamp_step_texels() < MAX_STEP_TEXELS).then_some(moves)
     }
 
-    /// How far the light of the middle arrives from where opposite corners say [texels], where two of them say so.
+    /// Deviation of the centre's arrival from the mean of opposite corners on the same path [texels].
     fn bent_texels(&self, middle: &Arrival) -> f64 {
         let bends = [[0, 3], [1, 2]].map(|opposite| {
             let [a, b] = opposite.map(|corner| self.corners[corner].find(middle.key));
@@ -439,7 +441,7 @@ impl Candidate {
 }
 
 impl Light {
-    /// Leaves light to photons; what is no number is theirs to book.
+    /// Leaves light to photons. They also book flux that is not finite.
     fn lose(&mut self, flux_w: LinearSrgb) {
         if flux_w.is_finite() {
             self.lost_w += flux_w.max_channel();

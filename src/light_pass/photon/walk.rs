@@ -13,85 +13,76 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::transport::{Branch, EffectSet, Event, MediumStack, Meeting, Tracer};
 
-/// A photon whose flux (largest channel) has become less than this part of what it started with goes on by chance, with
-/// this part of it or not at all.
+/// Fraction of its initial flux (largest channel) below which a photon plays Russian roulette. Survivors return to this
+/// fraction.
 const ROULETTE_BELOW: f64 = 0.1;
 
-/// Dimension of [`even_point`] that wavelengths are drawn from.
+/// Dimension of [`even_point`] from which wavelengths are drawn.
 pub(super) const WAVELENGTH_DIMENSION: u32 = 1 << 16;
 
-/// What a photon leaves on a diffuse surface.
+/// Flux that a photon deposits on a diffuse surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Hit {
-    /// Whose light it becomes.
     pub receiver: Receiver,
-    /// Where.
     pub place: PhotonArrival,
-    /// Incident flux [W per channel of the light] if it were the only photon, before the albedo.
+    /// Incident flux before the albedo, as if it were the only photon [W per channel of the light].
     pub flux_w: LinearSrgb,
-    /// Band of its wavelength, where it has one.
+    /// `None` for all wavelengths.
     pub band: Option<usize>,
 }
 
-/// Where a photon arrives.
 #[derive(Clone, Copy, Debug)]
 pub enum PhotonArrival {
     Surface {
-        /// Index into the object's triangles.
+        /// Index within the object's mesh.
         triangle: usize,
-        /// Of the triangle's corners.
         barycentric: [f64; 3],
     },
-    /// On the map [texels], where the flux of a bundle is removed.
+    /// Position on the map [texels] at which a bundle's flux is removed.
     Map(DVec2),
 }
 
 /// What all photons of a light share.
 #[derive(Clone, Copy, Debug)]
 pub struct PhotonRules<'a> {
-    /// The scene.
     pub tracer: &'a Tracer,
-    /// Of a light whose wavelengths go different ways.
+    /// Of dispersed light.
     pub spectrum: Option<&'a PhotonSpectrum>,
-    /// What paths may need.
     pub effects: EffectSet,
-    /// Most specular events.
+    /// Maximum number of specular events on a path.
     pub max_depth: u32,
-    /// Of the accounts: that of a single photon.
+    /// Unit of the ledger's counts, for flux as if each photon were the only one.
     pub unit: FluxUnit,
-    /// Of everything random.
     pub seed: u64,
 }
 
-/// Follows photons, one after the other, and books what becomes of their flux.
+/// Traces photons one after the other and books their flux.
 #[derive(Debug)]
 pub struct PhotonWalk<'a> {
     rules: PhotonRules<'a>,
-    /// Accounts of all photons so far.
     pub ledger: LedgerSum,
-    /// Closest-hit queries so far.
+    /// Rays traced so far.
     pub segments: u64,
 }
 
-/// The photon under way.
+/// The photon that is being traced.
 struct Photon<'a> {
     hue: Hue<'a>,
-    /// What it becomes where wavelengths part.
+    /// Its single wavelength, once the light is dispersed.
     own_hue: Option<Hue<'a>>,
     flux_w: LinearSrgb,
     index: u32,
     choice: Choice,
     carried: Carried<'a>,
-    /// Those that it has followed so far, a bit each.
+    /// Bit mask of the bundles that it has followed so far.
     followed: u32,
-    /// Probability of having been drawn to go this way.
+    /// Probability of its random choices so far.
     probability: f64,
-    /// Whether it is direct light still.
+    /// Whether it is still direct light.
     is_straight: bool,
 }
 
 impl<'a> PhotonWalk<'a> {
-    /// With empty accounts.
     pub fn new(rules: PhotonRules<'a>) -> Self {
         Self {
             rules,
@@ -108,7 +99,7 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
-    /// Flux in the channels of the light.
+    /// Converts flux to the channels of the light.
     fn apply(&self, channels: &ColourMatrix, flux_w: LinearSrgb) -> LinearSrgb {
         match self.rules.spectrum {
             Some(_) => channels.apply(flux_w),
@@ -116,8 +107,8 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
-    /// Follows the photon of an index, if there is one, to its end; hits on diffuse surfaces after at least one specular event
-    /// are handed to `arrive`. `Deposited` is not booked here but by who places the flux.
+    /// Traces the photon of an index to its end; without a `start` it only removes its bundles' flux. Hits on diffuse
+    /// surfaces after at least one specular event go to `arrive`. Whoever places their flux books it as `Deposited`.
     pub(super) fn follow(
         &mut self,
         index: u32,
@@ -174,7 +165,7 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
-    /// To the next surface, and the way on from there.
+    /// Traces to the next surface and returns the branch that is followed from there; `None` at the end of the path.
     fn step(
         &mut self,
         photon: &mut Photon<'a>,
@@ -221,7 +212,7 @@ impl<'a> PhotonWalk<'a> {
             photon.part_at(depth as usize, hit.object, &meeting, arrive);
         }
         if photon.is_straight {
-            // What a surface takes on the first hit is direct light.
+            // Before any specular event, deposits are direct light.
             self.book(Account::NotEmitted, &sent_hue.channels, deposit_w);
             let sent_w = if depth == 0 { sent_w } else { LinearSrgb::BLACK };
             self.book(Account::Emitted, &sent_hue.channels, sent_w - deposit_w);
@@ -250,7 +241,7 @@ impl<'a> PhotonWalk<'a> {
         self.choose(photon, depth as usize, &meeting)
     }
 
-    /// Gives a photon that has all wavelengths one of them.
+    /// Reduces a photon of all wavelengths to its own one.
     fn part(&mut self, photon: &mut Photon<'a>) {
         if photon.hue.band.is_some() {
             return;
@@ -262,7 +253,7 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
-    /// Draws the way on by the flux that goes there.
+    /// Draws reflection or transmission in proportion to flux; `None` if neither carries any.
     fn choose(&mut self, photon: &mut Photon<'a>, depth: usize, meeting: &Meeting) -> Option<Branch> {
         let carried = |share: Option<LinearSrgb>| {
             let flux_w = share.map_or(LinearSrgb::BLACK, |share| photon.flux_w * share);
@@ -300,7 +291,7 @@ impl<'a> PhotonWalk<'a> {
         Some(branch)
     }
 
-    /// Russian roulette with what has become too little to follow.
+    /// Russian roulette for photons of little flux.
     fn survives(&mut self, photon: &mut Photon<'a>, least_w: f64) -> bool {
         let probability = photon.flux_w.max_channel() / least_w;
         if probability >= 1.0 {
@@ -320,7 +311,7 @@ impl<'a> PhotonWalk<'a> {
 }
 
 impl Photon<'_> {
-    /// Parts from all bundles that it has followed.
+    /// Separates the photon from all bundles that it has followed.
     #[inline]
     fn leave_all(&mut self, arrive: &mut impl FnMut(Hit)) {
         if self.followed != 0 {
@@ -328,7 +319,8 @@ impl Photon<'_> {
         }
     }
 
-    /// Parts from some of the bundles that it has followed: their flux is removed where they say that it arrives.
+    /// Separates the photon from some of the bundles that it has followed: their flux is removed at their predicted
+    /// arrival.
     fn leave_where(&mut self, is_left: impl Fn(&Bundle) -> bool, arrive: &mut impl FnMut(Hit)) {
         let carried = self.carried;
         for (number, bundle) in carried.bundles.iter().enumerate() {
@@ -346,7 +338,7 @@ impl Photon<'_> {
         }
     }
 
-    /// Parts from the bundles that end at a surface, have not met it, or go on from it where no light goes.
+    /// Separates the photon from bundles that end here, miss this surface, or go on from it where no light goes.
     fn part_at(&mut self, depth: usize, object: usize, meeting: &Meeting, arrive: &mut impl FnMut(Hit)) {
         let flux_w = self.flux_w;
         let goes =
@@ -363,7 +355,7 @@ impl Photon<'_> {
         self.leave_where(|bundle| !bundle.steps.get(depth).is_some_and(follows), arrive);
     }
 
-    /// Was drawn to go one of two ways: bundles that go the other one are left to photons that do.
+    /// Drops the bundles that took the other outcome of a random choice: photons with that outcome remove their flux.
     fn follow_only(&mut self, depth: usize, is_reflected: bool, probability: f64) {
         for (number, bundle) in self.carried.bundles.iter().enumerate() {
             let step = bundle.steps.get(depth);
@@ -375,14 +367,14 @@ impl Photon<'_> {
     }
 }
 
-/// Part of the interval [0, 1) in which a choice has no certain digits left.
+/// Width of the interval below which a choice has too few significant digits left.
 const MIN_WIDTH: f64 = 1e-7;
 
-/// What makes all decisions of a photon: one number that is even among those of its neighbours. Within the part of the
-/// interval that a decision took it is even again, and serves for the next one.
+/// Makes all decisions of a photon from one low-discrepancy number. Within the part of the interval that a decision
+/// selects, the number is uniform again and serves the next decision.
 struct Choice {
     number: f64,
-    /// How much of the first interval is left.
+    /// Width of the remaining part of the first interval.
     width: f64,
     random: Random,
 }
@@ -396,7 +388,7 @@ impl Choice {
         }
     }
 
-    /// Decides with a probability in (0, 1).
+    /// True with a probability in (0, 1).
     fn falls_below(&mut self, probability: f64) -> bool {
         let is_below = self.number < probability;
         let (first, part) = if is_below {
@@ -413,7 +405,7 @@ impl Choice {
     }
 }
 
-/// Numbers in [0, 1) that belong to one photon (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators",
+/// Random numbers in [0, 1) of one photon (Steele, Lea and Flood, "Fast Splittable Pseudorandom Number Generators",
 /// 2014).
 struct Random(u64);
 
