@@ -117,7 +117,7 @@ impl TriangleBvh {
         })
     }
 
-    /// The hierarchy for devices, in its own frame or in one of something larger around it.
+    /// The hierarchy for devices, in its own frame or in a larger one around it.
     pub fn packed(&self, frame: &Frame) -> PackedBvh {
         let local = |place: DVec3| to_single(frame.local(place));
         let placed = |corner: Vec3A, margin: f32| {
@@ -194,7 +194,7 @@ impl Frame {
         (point - self.centre) * self.scale
     }
 
-    /// A point in local coordinates in the scene [m].
+    /// Inverse of [`Self::local`] [m].
     fn place(&self, local: Vec3A) -> DVec3 {
         // Exact except for the sum: the scale is a power of two.
         self.centre + local.as_dvec3() * (1.0 / self.scale)

@@ -11,7 +11,7 @@ use super::bvh::to_single;
 /// Generous bound on the rounding of a coordinate or an operation.
 const ROUNDING: f32 = 1e-6;
 
-/// Stack entries that are kept off the heap.
+/// Largest stack that is kept off the heap [entries].
 const USUAL_STACK: usize = 48;
 
 /// Triangles tested at once.

@@ -13,7 +13,7 @@ const SMOOTH_TURN: f64 = 0.97;
 /// Cosine of the angle between face normals above which they belong to one side.
 const SAME_SIDE: f64 = 0.97;
 
-/// Fewest sides around a vertex of a closed body that make it a corner.
+/// Fewest sides around a vertex that make it a corner.
 const SIDES_AT_A_CORNER: usize = 3;
 
 /// Larger meshes are taken for smooth shapes [triangles].

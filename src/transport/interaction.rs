@@ -303,7 +303,7 @@ impl Meeting<'_> {
         })
     }
 
-    /// Adds a reflected fraction; books it as switched off where reflection is.
+    /// Adds a reflected fraction, or books it as switched off if reflection is off.
     fn sends_back(&mut self, effects: EffectSet, share: LinearSrgb) {
         if effects.reflection {
             self.reflected = Some(self.reflected.map_or(share, |before| before + share));
@@ -312,7 +312,7 @@ impl Meeting<'_> {
         }
     }
 
-    /// Scales all fractions set so far but the deposit.
+    /// Scales all fractions set so far, except the deposit.
     fn scale(&mut self, part: f64) {
         self.reflected = self.reflected.map(|share| share * part);
         self.transmitted = self.transmitted.map(|share| share * part);

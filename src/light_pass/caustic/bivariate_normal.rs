@@ -22,7 +22,7 @@ pub(super) struct BivariateNormal {
 /// A node of the integral over r from 0 to the correlation.
 #[derive(Clone, Copy, Debug, Default)]
 struct Node {
-    /// 1/(2(1 − r²)).
+    /// 1/(2(1 − r²)) and r/(1 − r²).
     square: f64,
     cross: f64,
     /// The node's weight times the density along each border.

@@ -33,10 +33,10 @@ pub struct Lattice<'a> {
     pub placement: RayPlacement,
     /// Common place of the rays within their cells for [`RayPlacement::Lattice`], [0, 1)².
     pub centre: DVec2,
-    /// Of the jitter.
+    /// Seed of the jitter.
     pub seed: u64,
     pub limits: PathLimits,
-    /// Of the ledger.
+    /// Unit of the flux counts.
     pub unit: FluxUnit,
 }
 

@@ -15,7 +15,7 @@ use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 
-/// Limits on splitting cells whose cuts leave open what lies in them. What still does becomes one small patch per ray.
+/// Limits on splitting cells whose cuts leave open what lies in them. At the limit, each ray becomes one small patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SubdivisionLimits {
     /// Where cuts are ambiguous.
@@ -68,7 +68,7 @@ pub enum SpectralTag {
     Spectrum {
         /// Samples at the other wavelengths that have the same segments.
         others: [[SampleId; 4]; NODES - 1],
-        /// Whether each wavelength stands for those around it, because other light of the cell parts.
+        /// Whether each wavelength stands for those around it, because other light of the cell is dispersed.
         parted: bool,
     },
 }
@@ -125,14 +125,14 @@ pub struct CellOutput {
 pub struct CellCutter<'a> {
     /// Traces further rays.
     pub edges: EdgeCutter<'a>,
-    /// Of the ledger.
+    /// Unit of the flux counts.
     pub unit: FluxUnit,
     /// `None` without refinement.
     pub refinement: Option<&'a Refinement<'a>>,
     /// Features that the corners alone would miss.
     pub bodies: &'a SubcellFeatures,
     pub splits: SubdivisionLimits,
-    /// The light, before its wavelengths part.
+    /// The light, before it is dispersed.
     pub light: LightPart<'a>,
     /// Given to all patches.
     pub tone: SpectralTag,

@@ -13,7 +13,7 @@ const MANY_CHANGES: usize = 12;
 /// Bisections in that case.
 const SHATTERED_BITS: i32 = 3;
 
-/// Bisections that decide whether two ends of the brightest light lie on one sheet of the wavefront. Where light takes
+/// Bisections that decide whether both ends of the brightest light lie on one sheet of the wavefront. Where light takes
 /// very many paths, dimmer light gets fewer.
 const JUMP_BITS: i32 = 6;
 
@@ -300,7 +300,7 @@ pub fn may_bulge(ends: [&LatticeRay; 2], beyond: [&LatticeRay; 2]) -> bool {
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeCutter<'a> {
     pub tracer: &'a StrandTracer<'a>,
-    /// Of the launch domain.
+    /// Face of the launch domain.
     pub face: usize,
 }
 
@@ -341,7 +341,7 @@ impl EdgeCutter<'_> {
             }
         }
         if changes.len() > MANY_CHANGES {
-            // Shattered light: no single cut says much.
+            // Shattered light: no single cut matters much.
             changes
                 .iter_mut()
                 .for_each(|(_, bits, _)| *bits = (*bits).min(SHATTERED_BITS));
@@ -444,7 +444,7 @@ impl EdgeCutter<'_> {
     /// The sample of this tracer's wavelength where another wavelength was traced.
     pub fn again(&self, other: SampleId, work: &mut Workspace) -> SampleId {
         let node = self.tracer.wavelength.unwrap_or(0);
-        // At the place of the sample, not of a patch's corner: the corner on a border has its sample beside it.
+        // At the sample's own position: a patch's corner on a border uses a sample beside the border.
         let square = work.get(other).square;
         if let Some(known) = work.known(node, square) {
             return known;

@@ -19,7 +19,7 @@ impl EdgeSearch {
         cells_across_casters: 160.0,
     };
 
-    /// For light that hardly shows beside that of others.
+    /// For light that hardly shows next to that of other lights.
     pub const DIM: Self = Self {
         cut_bits: 5,
         corner_levels: 1,

@@ -39,7 +39,7 @@ pub struct WavefrontLattice<'a> {
     pub item_buffer: &'a ItemBuffer,
     /// Columns and rows of cells of each face.
     pub size: (usize, usize),
-    /// Of the ledger.
+    /// Unit of the flux counts.
     pub unit: FluxUnit,
     /// `None` without refinement.
     pub refinement: Option<&'a Refinement<'a>>,
@@ -53,7 +53,7 @@ pub struct WavefrontLattice<'a> {
 /// Some traced rows of cells of one face.
 #[derive(Clone, Debug, Default)]
 pub struct TracedBand {
-    /// Of the launch domain.
+    /// Face of the launch domain.
     pub face: u32,
     /// All samples that patches refer to.
     pub samples: Samples,

@@ -102,7 +102,7 @@ pub struct ReceiverSurface {
     pub plane: Option<PlaneChart>,
     /// Whether it takes all incident light.
     pub is_diffuse: bool,
-    /// Of the whole surface [m²].
+    /// Area of the whole surface [m²].
     pub area_m2: f64,
 }
 

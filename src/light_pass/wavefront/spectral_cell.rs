@@ -146,7 +146,7 @@ impl CellCutter<'_> {
     }
 
     /// Emits patches and books fluxes that all wavelengths share up to the same borders, such as those of surfaces that
-    /// light hits before its wavelengths part.
+    /// light hits before it is dispersed.
     fn cut_shared(
         &self,
         spectrum: &LightSpectrum,

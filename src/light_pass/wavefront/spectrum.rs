@@ -45,7 +45,7 @@ pub struct LightSpectrum {
     ladder: Vec<Vec<Slice>>,
     /// Length of the whole spectrum relative to the distance between the outer nodes, along 1/λ².
     reach: f64,
-    /// Of the whole lamp.
+    /// From emitted light in RGB to CIE XYZ, over all wavelengths of the lamp.
     pub channels: ColourMatrix,
 }
 
@@ -54,7 +54,7 @@ pub struct LightSpectrum {
 pub enum LightPart<'a> {
     /// All of a light in RGB.
     White,
-    /// All of a light whose wavelengths part.
+    /// All of a light that may be dispersed.
     Spectrum(&'a LightSpectrum),
     /// The band that one wavelength stands for.
     Band(&'a SpectralNode),
@@ -243,7 +243,7 @@ impl Slice {
     /// The slice's segment, interpolated between the nodes' segments of one signature; its flux is in the light's
     /// channels.
     ///
-    /// `parted`: whether each node stands for the wavelengths around it, because other light of theirs parts.
+    /// `parted`: whether each node stands for the wavelengths around it, because other light of its cell is dispersed.
     pub fn strand(&self, nodes: [&PathSegment; NODES], parted: bool) -> PathSegment {
         let mix = |of: &dyn Fn(&PathSegment) -> glam::DVec3| {
             let weighted = nodes.iter().zip(self.weights);

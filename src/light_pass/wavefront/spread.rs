@@ -30,11 +30,11 @@ const FAR_TEXELS: f64 = 32.0;
 #[derive(Clone, Copy, Debug)]
 pub struct Spreader<'a> {
     pub receivers: &'a Receivers<'a>,
-    /// Of the launch domain.
+    /// Face of the launch domain.
     pub face: u32,
     /// Samples that the patches refer to.
     pub samples: &'a Samples,
-    /// Of the ledger.
+    /// Unit of the flux counts.
     pub unit: FluxUnit,
     /// Whether bodies absorb light along the way.
     pub absorption: bool,

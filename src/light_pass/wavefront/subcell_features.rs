@@ -84,7 +84,7 @@ pub struct SubcellFeatures {
 
 impl SubcellFeatures {
     /// Objects that are small relative to cells of the given size in the unit square, and sharp corners of casters that
-    /// the light sees. Both only where they can refract light or occlude it, according to `visible`.
+    /// the light sees. Both only where they can deflect light or occlude it, according to `visible`.
     pub fn find(
         tracer: &Tracer,
         launch: &Launch,
@@ -158,7 +158,7 @@ impl SubcellFeatures {
         }
     }
 
-    /// 1 where no single body shows much beside the others, otherwise 0.
+    /// 1 if there are so many casters that no single one shows much, otherwise 0.
     pub fn are_many(&self) -> u32 {
         u32::from(self.casters >= MANY_CASTERS)
     }

@@ -11,7 +11,7 @@ use super::shape::{Shape, is_finite};
 use super::{CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
 
-/// Triangles that are sorted by bands at a time.
+/// Triangles sorted by bands at a time.
 const TRIANGLES_PER_CHUNK: usize = 8192;
 
 /// Fewer triangles are not worth dividing among threads.
