@@ -11,37 +11,37 @@ use super::Ray;
 use super::packed::{self, PackedBvh, PackedNode};
 use super::wide::{WideBvh, WideRay};
 
-/// Boxes are widened by this share of the scene's size, so that no rounding of the single-precision box test can lose
-/// a hit: origin, direction and slab distances err by at most some 2⁻²⁰ of the size.
+/// Boxes are widened by this fraction of the scene's size, so that the rounding of the single-precision box test cannot
+/// lose a hit: origin, direction and slab distances err by at most some 2⁻²⁰ of the size.
 pub const BOX_MARGIN: f32 = 1.0 / (1 << 19) as f32;
 
-/// Leaves hold what is tested at once.
+/// A leaf holds as many triangles as are tested at once.
 const BUILD: BvhBuildParams = BvhBuildParams {
     max_prims_per_leaf: 4,
     ..BvhBuildParams::medium_build()
 };
 
 /// Rays that start farther from the centre than this many scene radii are advanced before the box tests, which would
-/// lose their precision out there.
+/// lose precision at that distance.
 const FAR_RADII: f64 = 4.0;
 
-/// A bounding volume hierarchy over triangles, or over boxes.
+/// A bounding volume hierarchy over triangles or boxes.
 ///
-/// Single-precision coordinates are relative to the triangles' centre and scaled by a power of two to a radius of
-/// about one, so that neither a far nor a tiny nor a huge scene loses precision.
+/// Single-precision coordinates are relative to the triangles' centre and scaled by a power of two to a radius of about
+/// one, so that scenes that are far away, tiny or huge keep their precision.
 pub struct TriangleBvh {
     bvh: Bvh2,
-    /// Corners in the order of the hierarchy's leaves.
+    /// Corners by slot, in the order of the leaves.
     corners: Vec<[DVec3; 3]>,
-    /// Finds what a ray may meet.
+    /// For ray traversal.
     wide: WideBvh,
     frame: Frame,
 }
 
-/// Single-precision coordinates for what lies within a sphere: (place − `centre`) · `scale`.
+/// Single-precision coordinates for the inside of a sphere: (point − `centre`) · `scale`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frame {
-    /// [m]
+    /// [m].
     pub centre: DVec3,
     /// Single-precision units per metre, a power of two: the sphere's radius is between 1/2 and 1.
     pub scale: f64,
@@ -57,20 +57,20 @@ impl std::fmt::Debug for TriangleBvh {
 }
 
 impl TriangleBvh {
-    /// Builds the hierarchy. Corners must be finite; triangles without area are allowed and never hit.
+    /// Corners must be finite; degenerate triangles are allowed and never hit.
     pub fn build(triangles: &[[DVec3; 3]]) -> Self {
         let frame = Frame::around(triangles.iter().flatten());
         Self::over(triangles, frame, BUILD, |corner| frame.local(corner))
     }
 
-    /// Over boxes by their minimum and maximum corner [m], in the coordinates of something around them.
+    /// Over boxes given by their minimum and maximum corner [m], in an enclosing frame.
     pub fn over_boxes(boxes: &[(DVec3, DVec3)], frame: Frame) -> Self {
         let build = BvhBuildParams {
             max_prims_per_leaf: 1,
             ..BUILD
         };
         let corners: Vec<[DVec3; 3]> = boxes.iter().map(|&(low, high)| [low, high, high]).collect();
-        // A triangle in one point is never clearly missed: its box decides.
+        // A triangle shrunk to a point is never clearly missed: its box decides.
         Self::over(&corners, frame, build, |_| DVec3::ZERO)
     }
 
@@ -97,9 +97,8 @@ impl TriangleBvh {
         }
     }
 
-    /// Hands out the slots of all triangles or boxes that a ray may meet before `end_m`, near ones first as a rule. `meet`
-    /// gives a distance [m] beyond which nothing is looked for any more, infinite where it knows of none; `None` ends the
-    /// search.
+    /// Calls `meet` with the slots of all triangles or boxes that a ray may hit before `end_m`, roughly front to back.
+    /// `meet` returns the distance [m] at which to end the search, infinite for no change; `None` ends it at once.
     #[inline(always)]
     pub fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
         let (local, advanced_m) = self.frame.local_ray(ray, end_m);
@@ -110,7 +109,7 @@ impl TriangleBvh {
         });
     }
 
-    /// The node around all triangles; `None` without any.
+    /// `None` without triangles.
     pub fn root(&self) -> Option<Node<'_>> {
         (!self.corners.is_empty()).then_some(Node {
             hierarchy: self,
@@ -118,7 +117,7 @@ impl TriangleBvh {
         })
     }
 
-    /// The hierarchy for devices, in its own coordinates or in those of something larger around it.
+    /// The hierarchy for devices, in its own frame or in a larger one around it.
     pub fn packed(&self, frame: &Frame) -> PackedBvh {
         let local = |place: DVec3| to_single(frame.local(place));
         let placed = |corner: Vec3A, margin: f32| {
@@ -153,12 +152,12 @@ impl TriangleBvh {
         }
     }
 
-    /// Its own single-precision coordinates.
+    /// Frame of the single-precision coordinates.
     pub fn frame(&self) -> &Frame {
         &self.frame
     }
 
-    /// The triangle or box in a slot, by its index in the order that they were given.
+    /// Index of the triangle or box in a slot, in the order given to the constructor.
     pub fn triangle(&self, slot: u32) -> u32 {
         self.bvh.primitive_indices[slot as usize]
     }
@@ -170,7 +169,7 @@ impl TriangleBvh {
 }
 
 impl Frame {
-    /// Around points; of some size where there are none.
+    /// Around points; of unit radius without any.
     pub fn around<'a>(points: impl Iterator<Item = &'a DVec3>) -> Self {
         let mut points = points.peekable();
         let is_empty = points.peek().is_none();
@@ -190,14 +189,14 @@ impl Frame {
         }
     }
 
-    /// A place [m] in its coordinates.
+    /// A point [m] in local coordinates.
     pub fn local(&self, point: DVec3) -> DVec3 {
         (point - self.centre) * self.scale
     }
 
-    /// And back [m].
+    /// Inverse of [`Self::local`] [m].
     fn place(&self, local: Vec3A) -> DVec3 {
-        // Exact but for the sum: the scale is a power of two.
+        // Exact except for the sum: the scale is a power of two.
         self.centre + local.as_dvec3() * (1.0 / self.scale)
     }
 
@@ -206,12 +205,12 @@ impl Frame {
         Aabb::new(aabb.min - BOX_MARGIN, aabb.max + BOX_MARGIN)
     }
 
-    /// The ray in single-precision coordinates, with the distance [m] by which its origin was advanced.
+    /// The ray in single precision, and the distance [m] by which its origin was advanced.
     fn local_ray(&self, ray: &Ray, limit_m: f64) -> (WideRay, f64) {
         let towards_centre = (self.centre - ray.origin).dot(ray.direction);
         let advanced_m = (towards_centre - FAR_RADII * self.radius_m).max(0.0);
         let origin = to_single(self.local(ray.at(advanced_m)));
-        // A negative zero would turn the slab test inside out.
+        // A negative zero would swap the slab planes.
         let direction = to_single(ray.direction) + Vec3A::ZERO;
         let limit = if limit_m.is_finite() {
             self.local_distance(limit_m, advanced_m)
@@ -226,13 +225,13 @@ impl Frame {
         (local, advanced_m)
     }
 
-    /// A distance [m] along the ray in single-precision units, rounded up so that it never cuts off what it bounds.
+    /// A distance [m] along the ray in single-precision units, rounded up so that the bound stays conservative.
     fn local_distance(&self, distance_m: f64, advanced_m: f64) -> f32 {
         (((distance_m - advanced_m) * self.scale).max(0.0) as f32).next_up() + BOX_MARGIN
     }
 }
 
-/// A node of the hierarchy, for searches other than along rays.
+/// A node of the hierarchy, for traversals other than along rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Node<'a> {
     hierarchy: &'a TriangleBvh,
@@ -240,14 +239,14 @@ pub struct Node<'a> {
 }
 
 impl<'a> Node<'a> {
-    /// A box around all triangles of the node, a little too large, as minimum and maximum corner [m].
+    /// Conservative bounding box of the node's triangles: minimum and maximum corner [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let aabb = self.hierarchy.bvh.nodes[self.index].aabb();
         let frame = &self.hierarchy.frame;
         (frame.place(aabb.min), frame.place(aabb.max))
     }
 
-    /// The two nodes that share out its triangles; `None` for a leaf.
+    /// Child nodes; `None` for a leaf.
     pub fn children(&self) -> Option<[Node<'a>; 2]> {
         let node = &self.hierarchy.bvh.nodes[self.index];
         let child = |index: u32| Node {
@@ -257,7 +256,7 @@ impl<'a> Node<'a> {
         (!node.is_leaf()).then(|| [child(node.first_index), child(node.first_index + 1)])
     }
 
-    /// Slots of the triangles of a leaf; none for other nodes.
+    /// Slots of a leaf's triangles; empty for inner nodes.
     pub fn slots(&self) -> std::ops::Range<u32> {
         let node = &self.hierarchy.bvh.nodes[self.index];
         node.first_index..node.first_index + node.prim_count

@@ -7,17 +7,17 @@ use glam::{DMat3, DVec2, DVec3};
 /// Solid angle [sr] of one face: a sixth of the sphere.
 pub const FACE_SOLID_ANGLE_SR: f64 = 2.0 * std::f64::consts::PI / 3.0;
 
-/// How the unit square is laid onto a face.
+/// Mapping from the unit square to a face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FaceMapping {
-    /// Equal areas become equal solid angles; smooth within the face. The symmetric case of Ureña, Fajardo and King,
+    /// Equal areas map to equal solid angles; smooth within the face. The symmetric case of Ureña, Fajardo and King,
     /// "An Area-Preserving Parametrization for Spherical Rectangles", 2013.
     EqualSolidAngle,
-    /// Equal areas of the face, as in the paper (eq. 4.1).
+    /// Equal areas map to equal areas of the face, as in the paper (eq. 4.1).
     Plain,
 }
 
-/// Rotation from the face's frame (x right, y down, z outwards) to the axes: columns are the face's x, y and z.
+/// Rotation from the face's frame (x right, y down, z outwards) to the world axes: columns are the face's x, y and z.
 pub fn axes_from_face(face: usize) -> DMat3 {
     let (x, y, z) = match face {
         0 => (DVec3::Y, DVec3::Z, DVec3::X),
@@ -30,7 +30,7 @@ pub fn axes_from_face(face: usize) -> DMat3 {
     DMat3::from_cols(x, y, z)
 }
 
-/// Solid angle [sr] of the part of the plane z = 1 with 0 ≤ x ≤ `x` and 0 ≤ y ≤ `y`, odd in both.
+/// Solid angle [sr] of the part of the plane z = 1 from the origin to (`x`, `y`), odd in both.
 fn corner_solid_angle_sr(x: f64, y: f64) -> f64 {
     (x * y).atan2((1.0 + x * x + y * y).sqrt())
 }
@@ -46,8 +46,8 @@ pub fn rectangle_solid_angle_sr(low: DVec2, high: DVec2) -> f64 {
 impl FaceMapping {
     /// Point of the face for a point of the unit square.
     ///
-    /// Equal solid angle: the part left of x fills Ω(x) = π/3 + 2·atan(x/√(2 + x²)) of the face's 2π/3, which is
-    /// solved for x; within a column the sine of the elevation, y/√(1 + x² + y²), is linear in v.
+    /// Equal solid angle: the part of the face left of x covers Ω(x) = π/3 + 2·atan(x/√(2 + x²)) of the face's 2π/3,
+    /// which is solved for x. Within a column, the sine of the elevation y/√(1 + x² + y²) is linear in v.
     pub fn plane_from_square(self, square: DVec2) -> DVec2 {
         match self {
             Self::Plain => square * 2.0 - 1.0,
@@ -73,7 +73,7 @@ impl FaceMapping {
         }
     }
 
-    /// The `y` of [`Self::square_from_plane`] alone, without the arc tangent of its `x`.
+    /// The `y` of [`Self::square_from_plane`] alone, without the arctangent of its `x`.
     pub fn row_share(self, plane: DVec2) -> f64 {
         match self {
             Self::Plain => (plane.y + 1.0) * 0.5,

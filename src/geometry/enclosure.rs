@@ -4,11 +4,11 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-/// A box, as minimum and maximum corner [m].
+/// Minimum and maximum corner of a box [m].
 pub type Bounds = (DVec3, DVec3);
 
-/// Whether a mesh encloses space without a gap: every edge belongs to two triangles that run along it in opposite
-/// directions. Vertices at the very same place count as one; triangles without area do not count.
+/// Whether a mesh is watertight: every edge belongs to two triangles that traverse it in opposite directions. Vertices
+/// at equal positions count as one; triangles with a repeated vertex are ignored.
 pub fn is_closed(positions: &[DVec3], triangles: &[[u32; 3]]) -> bool {
     let mut welded: HashMap<[u64; 3], u32> = HashMap::with_capacity(positions.len());
     let place = |position: &DVec3| (*position + DVec3::ZERO).to_array().map(f64::to_bits);
@@ -19,7 +19,7 @@ pub fn is_closed(positions: &[DVec3], triangles: &[[u32; 3]]) -> bool {
             *welded.entry(place(position)).or_insert(next)
         })
         .collect();
-    // Of each edge, from its lower to its higher vertex: how often it is run along forwards and backwards.
+    // Per edge, from its lower to its higher vertex: forward and backward traversals.
     let mut edges: HashMap<(u32, u32), (u32, u32)> = HashMap::with_capacity(2 * triangles.len());
     for triangle in triangles {
         let [a, b, c] = triangle.map(|vertex| ids[vertex as usize]);
@@ -34,8 +34,8 @@ pub fn is_closed(positions: &[DVec3], triangles: &[[u32; 3]]) -> bool {
     !edges.is_empty() && edges.values().all(|&times| times == (1, 1))
 }
 
-/// How often a closed surface winds around a point: the solid angles of its triangles over 4π (van Oosterom and
-/// Strackee 1983). ±1 inside, 0 outside, near neither on the surface itself.
+/// Winding number of a closed surface around a point: the solid angles of its triangles over 4π (van Oosterom and
+/// Strackee 1983). ±1 inside, 0 outside, close to neither on the surface itself.
 pub fn winding_number(triangles: impl Iterator<Item = [DVec3; 3]>, point: DVec3) -> f64 {
     let solid_angle_sr = |corners: [DVec3; 3]| {
         let [a, b, c] = corners.map(|corner| corner - point);
@@ -47,7 +47,7 @@ pub fn winding_number(triangles: impl Iterator<Item = [DVec3; 3]>, point: DVec3)
     triangles.map(solid_angle_sr).sum::<f64>() / (4.0 * std::f64::consts::PI)
 }
 
-/// Whether a triangle and a box have a point in common; touching counts.
+/// Whether a triangle and a box intersect; touching counts.
 pub fn triangle_meets_box(corners: [DVec3; 3], (low, high): Bounds) -> bool {
     let [a, b, c] = corners;
     if a.min(b).min(c).cmpgt(high).any() || a.max(b).max(c).cmplt(low).any() {
@@ -82,7 +82,7 @@ fn clipped(polygon: &[DVec3], inside: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
 mod tests {
     use super::*;
 
-    /// The cube [-1, 1]³, seen from outside counter-clockwise.
+    /// The cube [-1, 1]³, counter-clockwise as seen from outside.
     fn cube() -> (Vec<DVec3>, Vec<[u32; 3]>) {
         let positions = (0..8)
             .map(|corner| {
@@ -141,7 +141,7 @@ mod tests {
         assert!(triangle_meets_box(through, whole));
         let beyond = through.map(|corner| corner + DVec3::Y * 1.2);
         assert!(!triangle_meets_box(beyond, whole));
-        // Past a corner of the box, within the triangle's own bounds.
+        // Passes a corner of the box, which lies within the triangle's own bounds.
         let past = [
             DVec3::new(3.5, 0.0, 0.0),
             DVec3::new(0.0, 3.5, 0.0),

@@ -2,28 +2,26 @@
 
 use glam::DVec3;
 
-/// Rounding of a box and a camera, as a share of the largest of their coordinates: pictures are drawn in single
-/// precision.
+/// Rounding of boxes and the camera, relative to their largest coordinate: pictures are drawn in single precision.
 const SLACK: f64 = 1e-5;
 
-/// The pyramid that a perspective camera sees, from its near plane to infinity.
+/// View frustum of a perspective camera, from its near plane to infinity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Frustum {
     eye: DVec3,
-    /// Unit; what is seen lies on their side of the eye.
+    /// Unit normals through the eye that point inwards.
     sides: [DVec3; 4],
     /// Unit.
     forward: DVec3,
-    /// [m].
     near_m: f64,
 }
 
 impl Frustum {
-    /// A pyramid with its tip at `eye` around the unit vector `forward`. `right` and `up`, perpendicular to it and to
+    /// A frustum with its apex at `eye` around the unit vector `forward`. `right` and `up`, perpendicular to it and to
     /// each other, are as long as the tangents of half the angles of view.
     pub fn new(eye: DVec3, forward: DVec3, right: DVec3, up: DVec3, near_m: f64) -> Self {
         let side = |across: DVec3| {
-            // Perpendicular to the edge ray `forward + across`, towards the middle.
+            // Perpendicular to the edge ray `forward + across`, pointing inwards.
             (forward * across.length_squared() - across).normalize_or(forward)
         };
         Self {
@@ -34,8 +32,8 @@ impl Frustum {
         }
     }
 
-    /// Whether a box may be seen, given by its minimum and maximum corner [m]. Never false for one that is seen; true
-    /// for some that lie just outside the pyramid's edges.
+    /// Whether a box, given by its minimum and maximum corner [m], may be visible. Conservative: true for some boxes
+    /// just outside the edges of the frustum.
     pub fn may_see(&self, (low, high): (DVec3, DVec3)) -> bool {
         let slack_m = SLACK * low.abs().max(high.abs()).max(self.eye.abs()).length();
         let (low, high) = (low - self.eye, high - self.eye);

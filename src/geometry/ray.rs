@@ -2,30 +2,29 @@
 
 use glam::DVec3;
 
-/// A half-line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it starts [m].
+    /// [m].
     pub origin: DVec3,
     /// Unit.
     pub direction: DVec3,
 }
 
 impl Ray {
-    /// The point at a distance [m].
+    /// The point at a distance [m] along the ray.
     pub fn at(&self, distance_m: f64) -> DVec3 {
         self.origin + self.direction * distance_m
     }
 }
 
-/// Bound γ(n) = nε/(1 − nε) of the relative error of n rounded operations (Higham 2002, 3.1).
+/// Bound γ(n) = nε/(1 − nε) on the relative error of n rounded operations (Higham 2002, 3.1).
 pub fn gamma(operations: f64) -> f64 {
     let unit_roundoff = 0.5 * f64::EPSILON;
     operations * unit_roundoff / (1.0 - operations * unit_roundoff)
 }
 
-/// A point of a triangle from barycentric coordinates, with a bound of its rounding error per axis [m]
-/// (Pharr, Jakob and Humphreys, Physically Based Rendering, 6.8.5).
+/// A point of a triangle from barycentric coordinates, with a bound on its rounding error per axis [m] (Pharr, Jakob
+/// and Humphreys, Physically Based Rendering, 6.8.5).
 pub fn point_with_error(corners: &[DVec3; 3], barycentric: [f64; 3]) -> (DVec3, DVec3) {
     let terms = [
         corners[0] * barycentric[0],
@@ -36,9 +35,9 @@ pub fn point_with_error(corners: &[DVec3; 3], barycentric: [f64; 3]) -> (DVec3, 
     (terms[0] + terms[1] + terms[2], magnitude * gamma(7.0))
 }
 
-/// Start of a ray that leaves a surface at `point` in `direction`: moved along the geometric normal just beyond the
-/// rounding error of the point, towards the side of the direction. There is no fixed epsilon: in double precision the
-/// step is some 1e-15 of the coordinates.
+/// Origin of a ray that leaves a surface at `point` in `direction`: offset along the geometric normal just beyond the
+/// point's rounding error, to the side of the direction. No fixed epsilon: in double precision the offset is some 1e-15
+/// of the coordinates.
 pub fn offset_origin(point: DVec3, error: DVec3, geometric_normal: DVec3, direction: DVec3) -> DVec3 {
     let step = geometric_normal.abs().dot(error);
     let side = if direction.dot(geometric_normal) < 0.0 {

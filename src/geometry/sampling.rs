@@ -6,7 +6,7 @@
 
 use glam::DVec2;
 
-/// Direction numbers of Sobol's second dimension; the first is the reversal of bits.
+/// Direction numbers of Sobol's second dimension; the first is bit reversal.
 const fn second_dimension() -> [u32; 32] {
     let mut numbers = [0; 32];
     let mut bit = 0;
@@ -21,7 +21,8 @@ const fn second_dimension() -> [u32; 32] {
 
 static SECOND: [u32; 32] = second_dimension();
 
-/// The pair of a sequence at an index, in [0, 1)². Different `pair`s of one `seed` are independent of each other.
+/// Point of a sequence at an index, in [0, 1)². The points of different `pair`s of dimensions are independent for one
+/// `seed`.
 pub fn even_point(index: u32, pair: u32, seed: u64) -> DVec2 {
     let seed = hash(seed as u32 ^ hash((seed >> 32) as u32 ^ hash(pair)));
     let index = scrambled(index.reverse_bits(), seed).reverse_bits();
@@ -31,12 +32,12 @@ pub fn even_point(index: u32, pair: u32, seed: u64) -> DVec2 {
         let code = scrambled(code.reverse_bits(), hash(seed ^ dimension)).reverse_bits();
         f64::from(code) * (-32_f64).exp2()
     };
-    // The middle of the cell that 32 bits tell: never 0.
+    // Centre of the interval that 32 bits resolve: never 0.
     DVec2::new(unit(x, 0x9e37_79b9), unit(y, 0x7f4a_7c15)) + DVec2::splat((-33_f64).exp2())
 }
 
-/// A place of the sequence in one dimension at an index, as a whole number below 2⁶⁴: the first 2ᵏ indices have one place
-/// in each of 2ᵏ equal parts, and lie anywhere within them. Other seeds are independent.
+/// A one-dimensional sequence at an index, as a whole number below 2⁶⁴: the first 2ᵏ indices have one point in each of
+/// 2ᵏ equal strata, at a random place within it. Other seeds are independent.
 pub fn even_code(index: u32, seed: u64) -> u64 {
     let folded = hash(seed as u32 ^ hash((seed >> 32) as u32 ^ 0x51ed_270b));
     let high = scrambled(index, folded).reverse_bits();
@@ -44,8 +45,9 @@ pub fn even_code(index: u32, seed: u64) -> u64 {
     u64::from(high) << 32 | u64::from(low)
 }
 
-/// A number in [0, 1) that goes with the code of an index: codes and numbers of 2ᵏ indices are a net, so that numbers are
-/// even among neighbours along the codes, in every part of 2ʲ codes one in each 2ʲth of the interval.
+/// A number in [0, 1) that goes with the code of an index. Codes and numbers of 2ᵏ indices form a net, so that numbers
+/// are stratified among neighbours in the code: every 2ʲ consecutive codes have one number in each 2ʲth of the
+/// interval.
 pub fn even_number(index: u32, seed: u64) -> f64 {
     let folded = hash(seed as u32 ^ hash((seed >> 32) as u32 ^ 0x6d2b_79f5));
     let high = scrambled(second(index).reverse_bits(), folded).reverse_bits();
@@ -59,7 +61,7 @@ fn second(index: u32) -> u32 {
     bits.fold(0, |code, bit| code ^ SECOND[bit as usize])
 }
 
-/// Owen's scrambling of reversed bits: every bit is flipped by a hash of the lower ones (Laine and Karras 2011, with
+/// Owen scrambling of reversed bits: each bit is flipped by a hash of the lower ones (Laine and Karras 2011, with
 /// Vegdahl's constants).
 fn scrambled(mut code: u32, seed: u32) -> u32 {
     code ^= code.wrapping_mul(0x3d20_adea);
@@ -79,7 +81,7 @@ fn hash(mut code: u32) -> u32 {
     code ^ (code >> 16)
 }
 
-/// Column and row of a place along Morton's curve: its odd and its even bits.
+/// Column and row of a position along the Morton curve: its even and its odd bits.
 pub fn unfolded(place: u64) -> [u32; 2] {
     let every_second = |code: u64| {
         let mut code = code & 0x5555_5555_5555_5555;
@@ -97,7 +99,7 @@ pub fn unfolded(place: u64) -> [u32; 2] {
     [every_second(place), every_second(place >> 1)]
 }
 
-/// A place along Morton's curve as a point of the unit square.
+/// A position along the Morton curve as a point of the unit square.
 pub fn in_square(place: u64) -> DVec2 {
     DVec2::from(unfolded(place).map(|code| (f64::from(code) + 0.5) * (-32_f64).exp2()))
 }
@@ -106,7 +108,7 @@ pub fn in_square(place: u64) -> DVec2 {
 mod tests {
     use super::*;
 
-    /// Every elementary box of area 2⁻ᵏ holds one of 2ᵏ consecutive points that begin at a multiple of 2ᵏ.
+    /// Every elementary interval of area 2⁻ᵏ holds one of 2ᵏ consecutive points that begin at a multiple of 2ᵏ.
     #[test]
     fn points_are_nets() {
         for (pair, first) in [(0, 0), (1, 64), (7, 192)] {
@@ -129,7 +131,7 @@ mod tests {
         }
     }
 
-    /// However many photons there are so far, each has its own stratum.
+    /// The first 2ᵏ photons have a stratum each.
     #[test]
     fn codes_fill_strata_one_by_one() {
         for bits in [0, 5, 10] {
@@ -141,7 +143,7 @@ mod tests {
         }
     }
 
-    /// Among neighbours along the codes, numbers are even.
+    /// Numbers are stratified among neighbours in the code.
     #[test]
     fn codes_and_numbers_are_nets() {
         for across in 0..=8_u32 {

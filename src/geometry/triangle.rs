@@ -6,7 +6,7 @@ use glam::DVec3;
 use super::Ray;
 use super::ray::gamma;
 
-/// What all triangles need of a ray: the axis order and the shear that make it the z axis.
+/// Ray data that all triangle tests share: the axis order and the shear that make the ray the z axis.
 #[derive(Clone, Copy, Debug)]
 pub struct ShearedRay {
     origin: DVec3,
@@ -15,7 +15,7 @@ pub struct ShearedRay {
 }
 
 impl ShearedRay {
-    /// Prepares a ray with a finite, non-zero direction.
+    /// Expects a finite, non-zero direction.
     pub fn new(ray: &Ray) -> Self {
         let d = ray.direction;
         let magnitude = d.abs();
@@ -37,8 +37,8 @@ impl ShearedRay {
         }
     }
 
-    /// Distance in units of the ray's direction and barycentric coordinates of the hit in front of the origin; both
-    /// sides count. Two triangles that share an edge or a vertex leave no gap between them.
+    /// Distance in units of the ray's direction and barycentric coordinates of the hit in front of the origin;
+    /// triangles are two-sided. Triangles that share an edge or a vertex leave no gap.
     #[inline]
     pub fn intersect(&self, corners: &[DVec3; 3]) -> Option<(f64, [f64; 3])> {
         let [a, b, c] = corners.map(|corner| (corner - self.origin).to_array());
@@ -61,7 +61,7 @@ impl ShearedRay {
         let z = [a[kz], b[kz], c[kz]].map(|z| (self.shear.z * z).abs());
         let bound =
             distance_error(max([ax, bx, cx]), max([ay, by, cy]), max(z), max([u, v, w])) / determinant.abs();
-        // Also refuses NaN.
+        // Rejects NaN too.
         if distance > bound && distance.is_finite() {
             Some((distance, [u / determinant, v / determinant, w / determinant]))
         } else {
@@ -74,9 +74,9 @@ fn max(values: [f64; 3]) -> f64 {
     values[0].abs().max(values[1].abs()).max(values[2].abs())
 }
 
-/// Bound of the rounding error of a hit's distance, times the determinant: a distance below it may be no distance at
-/// all, as when a ray leaves this very surface or its coplanar neighbour (Pharr, Jakob and Humphreys, Physically Based
-/// Rendering, 6.8.7). `x`, `y`, `z`: largest sheared coordinates, `edge`: largest edge function, all absolute.
+/// Bound on the rounding error of a hit's distance, times the determinant. A distance below it may be zero, as when a
+/// ray leaves this very surface or a coplanar neighbour (Pharr, Jakob and Humphreys, Physically Based Rendering,
+/// 6.8.7). `x`, `y`, `z`: largest sheared coordinates, `edge`: largest edge function, all absolute.
 fn distance_error(x: f64, y: f64, z: f64, edge: f64) -> f64 {
     let error_z = gamma(3.0) * z;
     let error_x = gamma(5.0) * (x + z);

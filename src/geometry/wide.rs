@@ -8,38 +8,38 @@ use obvhs::bvh2::Bvh2;
 
 use super::bvh::to_single;
 
-/// Rounding of a coordinate or of an operation, several times over.
+/// Generous bound on the rounding of a coordinate or an operation.
 const ROUNDING: f32 = 1e-6;
 
-/// Entries of a stack that needs no heap.
+/// Largest stack that is kept off the heap [entries].
 const USUAL_STACK: usize = 48;
 
-/// Triangles that are tested at once.
+/// Triangles tested at once.
 const LANES: usize = 4;
 
-/// Up to four nodes or leaves and their boxes.
+/// Boxes of up to four child nodes or leaves.
 #[derive(Clone, Debug)]
 struct Wide {
-    /// Least and greatest x, y and z of the four boxes; turned inside out where there is none.
+    /// Minimum and maximum x, y and z of the four boxes; inverted in empty lanes.
     planes: [Vec4; 6],
-    /// Indices of nodes; of the first packs of leaves, marked by [`LEAF`].
+    /// Indices of nodes, or of the first packs of leaves, marked by [`LEAF`].
     children: [u32; 4],
 }
 
 /// Marks leaves among children.
 const LEAF: u32 = 1 << 31;
 
-/// Up to four triangles (Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997), with margins wider
-/// than all rounding: what they turn away the exact test would turn away, and nothing else is decided here.
+/// Up to four triangles (Möller and Trumbore, "Fast, Minimum Storage Ray/Triangle Intersection", 1997). The test has
+/// margins wider than all rounding: it only rejects what the exact test would reject too.
 #[derive(Clone, Debug)]
 struct Pack {
     corner: [Vec4; 3],
     edges: [[Vec4; 3]; 2],
     /// Lengths of the edges, rounded up.
     lengths: [Vec4; 2],
-    /// Slot of the first; the others follow.
+    /// Slot of the first triangle; the others follow.
     first: u32,
-    /// Which of them are triangles.
+    /// Bit mask of the lanes in use.
     lanes: u32,
     /// Whether it is the last of its leaf.
     is_last: bool,
@@ -50,20 +50,20 @@ struct Pack {
 pub(super) struct WideRay {
     pub(super) origin: Vec3A,
     pub(super) direction: Vec3A,
-    /// Nothing beyond this is looked for.
+    /// End of the search.
     pub(super) end: f32,
 }
 
-/// The hierarchy in single precision.
+/// A four-wide hierarchy in single precision.
 pub(super) struct WideBvh {
     nodes: Vec<Wide>,
     packs: Vec<Pack>,
-    /// Entries of a stack, at most.
+    /// Largest number of stack entries.
     stack: usize,
 }
 
 impl WideBvh {
-    /// Over triangles in the order of the hierarchy's leaves, in units in which the scene has a radius of about one.
+    /// `triangles` are in the order of the leaves, in units in which the scene has a radius of about one.
     pub(super) fn new(bvh: &Bvh2, triangles: &[[DVec3; 3]]) -> Self {
         let mut wide = Self {
             nodes: Vec::new(),
@@ -77,9 +77,9 @@ impl WideBvh {
         wide
     }
 
-    /// Folds nodes below the root, which is there.
+    /// Fills the nodes below the root, which exists already.
     fn fold(&mut self, bvh: &Bvh2, triangles: &[[DVec3; 3]]) {
-        // Of each node to fill: its own place, its place in the other hierarchy, and how deep it lies.
+        // Nodes to fill: own index, index in the binary hierarchy, depth.
         let mut waiting = vec![(0, 0, 1)];
         while let Some((place, from, depth)) = waiting.pop() {
             self.stack = self.stack.max(3 * depth + 1);
@@ -114,8 +114,8 @@ impl WideBvh {
         index | LEAF
     }
 
-    /// Hands the slots of all triangles that the ray may meet to `meet`, near ones first as a rule. It gives the end beyond
-    /// which nothing is looked for any more; a negative one ends the search.
+    /// Calls `meet` with the slots of all triangles that the ray may hit, roughly front to back. `meet` returns the new
+    /// end of the search; a negative one ends it at once.
     #[inline(always)]
     pub(super) fn search(&self, ray: WideRay, meet: impl FnMut(usize) -> f32) {
         if self.nodes.is_empty() {
@@ -185,7 +185,7 @@ impl WideBvh {
     }
 }
 
-/// Up to four nodes below one, the largest divided first; a root that is a leaf itself.
+/// Up to four nodes below one, splitting the largest first; the node itself if it is a leaf.
 fn four(bvh: &Bvh2, from: usize) -> impl Iterator<Item = usize> {
     let mut found = vec![from];
     while found.len() < 4 {
@@ -211,17 +211,17 @@ impl Wide {
     };
 }
 
-/// What boxes need of a ray.
+/// Ray data for the slab tests.
 struct Slabs {
     origin: [Vec4; 3],
     inverse: [Vec4; 3],
-    /// Places of the planes that the ray meets first.
+    /// Indices of the planes that the ray crosses first.
     near: [usize; 3],
 }
 
 impl Slabs {
     fn new(ray: &WideRay) -> Self {
-        // A component that hardly is one is as good as the least that is.
+        // Clamps components near zero, which keeps their inverses finite.
         let inverse = ray.direction.to_array().map(|component| {
             if component.abs() > f32::EPSILON {
                 1.0 / component
@@ -237,7 +237,7 @@ impl Slabs {
         }
     }
 
-    /// Where the ray enters the boxes, and which of them it meets before its end.
+    /// Distances at which the ray enters the boxes, and the bit mask of those it hits before its end.
     fn meet(&self, node: &Wide, end: f32) -> (Vec4, u32) {
         let plane = |axis: usize, which: usize| (node.planes[which] - self.origin[axis]) * self.inverse[axis];
         let near = |axis: usize| plane(axis, self.near[axis]);
@@ -248,11 +248,11 @@ impl Slabs {
     }
 }
 
-/// What triangles need of a ray.
+/// Ray data for the triangle tests.
 struct RayLanes {
     origin: [Vec4; 3],
     direction: [Vec4; 3],
-    /// Of a coordinate: of origin and corner, and of the sums and products that follow.
+    /// Error of a coordinate: of origin and corner, and of the sums and products derived from them.
     error: Vec4,
 }
 
@@ -261,7 +261,7 @@ impl RayLanes {
         Self {
             origin: ray.origin.to_array().map(Vec4::splat),
             direction: ray.direction.to_array().map(Vec4::splat),
-            // No corner lies farther from the middle than some units.
+            // No corner is farther from the centre than a few units.
             error: Vec4::splat(ROUNDING * (3.0 + ray.origin.length())),
         }
     }
@@ -304,8 +304,8 @@ impl Pack {
         pack
     }
 
-    /// Triangles but for those that the ray clearly misses, or meets clearly behind its start or beyond its end. Numbers
-    /// that are not finite are never clear.
+    /// Bit mask of the triangles, except those that the ray clearly misses or hits clearly behind its origin or beyond
+    /// its end. Non-finite numbers never count as clear.
     #[inline(always)]
     fn may_meet(&self, ray: &RayLanes, end: f32) -> u32 {
         let [e1, e2] = self.edges;

@@ -8,8 +8,8 @@ use super::Nanometres;
 use super::spectrum::csv::columns;
 use super::wavelength::VISIBLE;
 
-/// A triple in linear sRGB (Rec. 709 primaries, D65 white). As a factor it has no unit; as a quantity its name says
-/// the unit, and its [luminance](Self::luminance) is the luminous-equivalent value.
+/// A colour in linear sRGB (Rec. 709 primaries, D65 white). Factors have no unit; quantities are named with their unit,
+/// and their [luminance](Self::luminance) is the luminous-equivalent value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[f64; 3]", into = "[f64; 3]")]
 pub struct LinearSrgb {
@@ -22,12 +22,12 @@ pub struct LinearSrgb {
 }
 
 impl LinearSrgb {
-    /// Nothing.
+    /// All channels 0.
     pub const BLACK: Self = Self::grey(0.0);
-    /// One in every channel.
+    /// All channels 1.
     pub const WHITE: Self = Self::grey(1.0);
 
-    /// The three channels.
+    /// From its channels.
     pub const fn new(r: f64, g: f64, b: f64) -> Self {
         Self { r, g, b }
     }
@@ -48,12 +48,12 @@ impl LinearSrgb {
             + 0.072_192_315_360_733_71 * self.b
     }
 
-    /// Channels as an array.
+    /// Red, green, blue.
     pub const fn to_array(self) -> [f64; 3] {
         [self.r, self.g, self.b]
     }
 
-    /// The function applied to each channel.
+    /// Applies a function to each channel.
     pub fn map(self, f: impl Fn(f64) -> f64) -> Self {
         Self::new(f(self.r), f(self.g), f(self.b))
     }
@@ -68,7 +68,7 @@ impl LinearSrgb {
         self.r.is_finite() && self.g.is_finite() && self.b.is_finite()
     }
 
-    /// From one 8-bit sRGB-encoded channel (IEC 61966-2-1) to linear light [0, 1].
+    /// Decodes an 8-bit sRGB channel (IEC 61966-2-1) to linear light [0, 1].
     pub fn decode_channel(encoded: u8) -> f64 {
         let value = f64::from(encoded) / 255.0;
         if value <= 0.040_45 {
@@ -78,7 +78,7 @@ impl LinearSrgb {
         }
     }
 
-    /// From linear light, cut to [0, 1], to the sRGB encoding [0, 1] (IEC 61966-2-1): for display only.
+    /// Encodes linear light, clamped to [0, 1], as sRGB [0, 1] (IEC 61966-2-1): for display only.
     pub fn encode_channel(linear: f64) -> f64 {
         let value = linear.clamp(0.0, 1.0);
         if value <= 0.003_130_8 {
@@ -89,7 +89,7 @@ impl LinearSrgb {
     }
 }
 
-/// Luminance of a triple in linear sRGB, as maps and pictures hold them.
+/// Luminance of a linear sRGB triple, the pixel format of maps and pictures.
 pub fn luminance(rgb: &[f32; 3]) -> f64 {
     LinearSrgb::from(rgb.map(f64::from)).luminance()
 }
@@ -147,53 +147,53 @@ impl std::ops::Div<f64> for LinearSrgb {
     }
 }
 
-/// A linear map from linear sRGB to three channels, such as CIE XYZ; a row for each channel.
+/// A linear map from linear sRGB to three channels, such as CIE XYZ; one row per channel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColourMatrix([[f64; 3]; 3]);
 
 impl ColourMatrix {
-    /// All stays as it is.
+    /// Leaves every colour unchanged.
     pub const IDENTITY: Self = Self([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
-    /// Nothing is left.
+    /// Maps every colour to black.
     pub const ZERO: Self = Self([[0.0; 3]; 3]);
 
-    /// For light of one wavelength that has such values in the channels.
+    /// For light of one wavelength with the given channel values.
     pub fn of_wavelength(channels: [f64; 3], wavelength: Nanometres) -> Self {
         let row = ColourBasis::at(wavelength).row();
         Self(channels.map(|channel| row.map(|part| channel * part)))
     }
 
-    /// From its rows, one after the other.
+    /// From its rows, concatenated.
     pub fn from_array(values: [f64; 9]) -> Self {
         Self(std::array::from_fn(|row| {
             std::array::from_fn(|column| values[3 * row + column])
         }))
     }
 
-    /// Its rows, one after the other.
+    /// Its rows, concatenated.
     pub fn to_array(self) -> [f64; 9] {
         std::array::from_fn(|index| self.0[index / 3][index % 3])
     }
 
-    /// The channels of a colour.
+    /// The matrix times a colour.
     pub fn apply(&self, colour: LinearSrgb) -> LinearSrgb {
         let colour = colour.to_array();
         let row = |row: &[f64; 3]| row[0] * colour[0] + row[1] * colour[1] + row[2] * colour[2];
         LinearSrgb::new(row(&self.0[0]), row(&self.0[1]), row(&self.0[2]))
     }
 
-    /// So many times as much.
+    /// Every element times a factor.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {
         Self(self.0.map(|row| row.map(|value| value * factor)))
     }
 
-    /// What white becomes.
+    /// Channels of white.
     pub fn of_white(&self) -> LinearSrgb {
         self.apply(LinearSrgb::WHITE)
     }
 
-    /// For light of a colour: channel by channel, the parts that red, green and blue have in it.
+    /// For light of a colour: each column times the colour's channel.
     #[must_use]
     pub fn weighing(&self, colour: LinearSrgb) -> Self {
         let colour = colour.to_array();
@@ -203,8 +203,8 @@ impl ColourMatrix {
         )
     }
 
-    /// For factors on light whose channels are made of such parts: what a factor is in each channel. Of a channel that
-    /// has nothing, as in its neighbours: the mean of the three.
+    /// Rows normalised to a sum of 1: maps an RGB factor to the factor on each channel. A channel without light takes
+    /// the mean of red, green and blue.
     #[must_use]
     pub fn per_channel(&self) -> Self {
         Self(self.0.map(|row| {
@@ -233,12 +233,12 @@ impl std::iter::Sum for ColourMatrix {
     }
 }
 
-/// The parts that red, green and blue have in a factor at one wavelength; they add up to 1, so that grey stays what it
-/// is and shares that add up to 1 still do.
+/// Weights of red, green and blue in an RGB factor at one wavelength. They sum to 1, so that grey stays unchanged and
+/// fractions that sum to 1 still do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColourBasis([f64; 3]);
 
-/// The parts every [`STEP_NM`] of the visible.
+/// The weights every [`STEP_NM`] across the visible range.
 static TABLE: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
     columns(include_str!("../../assets/spectra/srgb_parts.csv"))
         .map(|row| [row[1], row[2], row[3]])
@@ -249,7 +249,7 @@ static TABLE: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
 const STEP_NM: f64 = 5.0;
 
 impl ColourBasis {
-    /// At a wavelength: linear between rows of the table; outside of the visible as at its end.
+    /// At a wavelength: linear between rows of the table, clamped to its ends.
     pub fn at(wavelength: Nanometres) -> Self {
         let last = TABLE.len() - 1;
         let place = ((wavelength.0 - VISIBLE.start().0) / STEP_NM).clamp(0.0, last as f64);
@@ -259,12 +259,12 @@ impl ColourBasis {
         Self(std::array::from_fn(|i| below[i] + along * (above[i] - below[i])))
     }
 
-    /// The parts of red, green and blue, [0, 1]: what a factor's channels are multiplied by and added up.
+    /// Weights of red, green and blue, [0, 1].
     pub fn row(&self) -> [f64; 3] {
         self.0
     }
 
-    /// A factor [0, 1] per channel, as the same grey in all channels.
+    /// An RGB factor [0, 1] at this wavelength, as grey.
     pub fn tone(&self, factor: LinearSrgb) -> LinearSrgb {
         if factor.r == factor.g && factor.g == factor.b {
             return factor;

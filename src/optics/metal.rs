@@ -14,7 +14,7 @@ use super::{ColourBasis, LinearSrgb, Nanometres};
 use super::{key, nearest};
 use crate::error::Error;
 
-/// Name and table of each: columns wavelength [nm], n, k; from below 360 to above 830 nm (see assets/SOURCES.md).
+/// Name and table of each metal: wavelength [nm], n, k; from below 360 to above 830 nm (see assets/SOURCES.md).
 const TABLES: [(&str, &str); 4] = [
     ("Gold", include_str!("../../assets/metals/gold.csv")),
     ("Silver", include_str!("../../assets/metals/silver.csv")),
@@ -22,7 +22,7 @@ const TABLES: [(&str, &str); 4] = [
     ("Aluminium", include_str!("../../assets/metals/aluminium.csv")),
 ];
 
-/// How much a difference from the usual colour counts beside one of what is seen, squared.
+/// Regularisation of [`Metal::factor_under`] towards the colour under D65, relative to the trace of the normal matrix.
 const HOLD: f64 = 1e-6;
 
 static METALS: LazyLock<Vec<Metal>> = LazyLock::new(|| {
@@ -38,7 +38,7 @@ static METALS: LazyLock<Vec<Metal>> = LazyLock::new(|| {
     TABLES.into_iter().map(metal).collect()
 });
 
-/// A metal, opaque and smooth.
+/// An opaque, smooth metal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Metal {
     name: &'static str,
@@ -50,26 +50,25 @@ pub struct Metal {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("no metal is named `{name}`; there are {known}")]
 pub struct UnknownMetal {
-    /// What was asked for.
+    /// The name asked for.
     pub name: String,
-    /// Names most like it.
+    /// The most similar names.
     pub known: String,
 }
 
 impl UnknownMetal {
-    /// The same fault as an error of the command.
+    /// As a usage error of the command.
     pub fn at(self, location: impl Into<String>) -> Error {
         Error::usage(location, self.to_string(), "choose one of them")
     }
 }
 
 impl Metal {
-    /// Every metal.
     pub fn all() -> &'static [Self] {
         &METALS
     }
 
-    /// Gold, silver, copper or aluminium (aluminum), in any case.
+    /// Gold, silver, copper or aluminium (aluminum), case-insensitive.
     ///
     /// # Errors
     /// [`UnknownMetal`] with the nearest names.
@@ -87,7 +86,7 @@ impl Metal {
         })
     }
 
-    /// Written down by its name; none where there is none.
+    /// Serialises a metal by its name.
     ///
     /// # Errors
     /// Those of `serializer`.
@@ -98,7 +97,7 @@ impl Metal {
         metal.map(Self::name).serialize(serializer)
     }
 
-    /// Found again by its name.
+    /// Deserialises a metal from its name.
     ///
     /// # Errors
     /// A name that no metal has; those of `deserializer`.
@@ -111,13 +110,12 @@ impl Metal {
             .map_err(D::Error::custom)
     }
 
-    /// Its name.
     pub fn name(&self) -> &'static str {
         self.name
     }
 
     /// Complex refractive index (n, k) [1] against vacuum: linear between the rows of its table, which cover the
-    /// visible; beyond its first and last row, theirs.
+    /// visible range; clamped to the first and last row.
     pub fn index(&self, wavelength: Nanometres) -> (f64, f64) {
         let last = self.rows.len() - 1;
         let above = self
@@ -132,23 +130,23 @@ impl Metal {
         )
     }
 
-    /// Reflectance [0, 1] for unpolarised light that comes in at an angle of the given cosine [0, 1], from air.
+    /// Reflectance [0, 1] for unpolarised light from air, at an angle of incidence of the given cosine [0, 1].
     pub fn reflectance(&self, cos_incident: f64, wavelength: Nanometres) -> f64 {
         let (n, k) = self.index(wavelength);
         conductor_reflectance(cos_incident, n, k)
     }
 
-    /// Colour of that reflectance under D65, relative to a perfect mirror, which is white: for light that is traced
-    /// as red, green and blue. Nothing is cut off: gold lies outside of sRGB's cube, its red head on being 1.04, so
-    /// that white light keeps its luminance but red light would gain.
+    /// Colour of the reflectance under D65, relative to a perfect mirror, which is white: for light that is traced in
+    /// RGB. Not clamped: gold is outside the sRGB gamut with a red of 1.04 at normal incidence. White light thus keeps
+    /// its luminance, but red light would gain.
     pub fn reflectance_srgb(&self, cos_incident: f64) -> LinearSrgb {
         colour_under_d65(|wavelength| self.reflectance(cos_incident, wavelength))
     }
 
-    /// The factor in RGB that stands for its reflectance head on where a lamp's light is followed by wavelength and
-    /// factors are what [`ColourBasis`] makes of them: the lamp's reflected light has the XYZ that the table gives it.
-    /// Channels may lie above 1, as gold's red does. What the lamp does not tell, as one line tells nothing of three
-    /// channels, stays near to [`reflectance_srgb`](Self::reflectance_srgb).
+    /// RGB factor for the reflectance at normal incidence where a lamp is traced by wavelength and factors are
+    /// evaluated by [`ColourBasis`]: the reflected light of the lamp has the same XYZ as with the tabulated
+    /// reflectance. Channels may exceed 1, as gold's red does. Where the lamp leaves channels undetermined, as a single
+    /// spectral line does, they stay close to [`reflectance_srgb`](Self::reflectance_srgb).
     pub fn factor_under(&self, lamp: &Spectrum) -> LinearSrgb {
         let seen_of = |factor: &dyn Fn(Nanometres) -> f64| {
             let seen = |wavelength| xyz_bar(wavelength).map(|channel| channel * factor(wavelength));
@@ -158,7 +156,7 @@ impl Metal {
         let parts = DMat3::from_cols(part(0), part(1), part(2));
         let wanted = seen_of(&|wavelength| self.reflectance(1.0, wavelength));
         let usual = DVec3::from_array(self.reflectance_srgb(1.0).to_array());
-        // Least squares, held to the usual factor where the parts look alike.
+        // Least squares, regularised towards the usual factor where the columns are nearly dependent.
         let squares = parts.transpose() * parts;
         let trace = squares.x_axis.x + squares.y_axis.y + squares.z_axis.z;
         let held = squares + DMat3::from_diagonal(DVec3::splat(HOLD * trace));

@@ -17,7 +17,7 @@ pub use glass::Glass;
 pub use metal::Metal;
 pub use wavelength::Nanometres;
 
-/// Letters and digits of a name, in lower case: `N-BK7`, `n bk7` and `nbk7` are one.
+/// Letters and digits of a name in lower case: `N-BK7`, `n bk7` and `nbk7` are equal.
 fn key(name: &str) -> String {
     name.chars()
         .filter(|c| c.is_alphanumeric())
@@ -25,7 +25,7 @@ fn key(name: &str) -> String {
         .collect()
 }
 
-/// The three known names most like a text, nearest first, for a sentence: `A, B or C`.
+/// The three known names most similar to a text, nearest first, for a sentence: `A, B or C`.
 fn nearest<'a>(text: &str, known: impl Iterator<Item = &'a str>) -> String {
     let wanted = key(text);
     let mut ranked: Vec<_> = known.map(|name| (distance(&wanted, &key(name)), name)).collect();
@@ -38,8 +38,7 @@ fn nearest<'a>(text: &str, known: impl Iterator<Item = &'a str>) -> String {
     }
 }
 
-/// Letters to insert, drop or replace to come from one text to another (Levenshtein), less half a step for each
-/// letter they begin with alike.
+/// Twice the Levenshtein distance of two texts, less the length of their common prefix.
 fn distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();

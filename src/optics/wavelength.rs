@@ -4,22 +4,22 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-/// A wavelength in vacuum [nm]; in air it differs by less than 0.03 %, which no table here resolves.
+/// A wavelength in vacuum [nm]. In air it differs by less than 0.03 %, which no table here resolves.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Nanometres(pub f64);
 
 impl Nanometres {
-    /// The same length [µm], in which dispersion formulas are written.
+    /// In [µm], the unit of dispersion formulas.
     pub fn micrometres(self) -> f64 {
         self.0 * 1e-3
     }
 }
 
-/// Where the CIE 1931 observer sees anything at all: 360 to 830 nm (CIE 018:2019).
+/// Range of the CIE 1931 observer: 360 to 830 nm (CIE 018:2019).
 pub const VISIBLE: RangeInclusive<Nanometres> = Nanometres(360.0)..=Nanometres(830.0);
 
-/// Helium d [nm]: `n_d` is the index here.
+/// Helium d [nm]: the wavelength of `n_d`.
 pub const D_LINE: Nanometres = Nanometres(587.56);
 /// Hydrogen F [nm]: the blue end of the Abbe number.
 pub const F_LINE: Nanometres = Nanometres(486.13);

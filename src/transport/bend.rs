@@ -3,18 +3,18 @@
 
 use glam::DVec3;
 
-/// The gradient of the height without its part along the unit normal [1].
+/// Tangential component of the height's gradient [1].
 fn along_surface(normal: DVec3, gradient: DVec3) -> DVec3 {
     gradient - normal * normal.dot(gradient)
 }
 
-/// The bent unit normal.
+/// Perturbed unit normal.
 pub fn bent(normal: DVec3, gradient: DVec3) -> DVec3 {
-    // At least as long as the unit normal, which the rest is perpendicular to.
+    // Never shorter than 1: the subtracted part is perpendicular to the unit normal.
     (normal - along_surface(normal, gradient)).normalize()
 }
 
-/// The change of the bent normal [1] for a step along which the normal and the gradient change by so much.
+/// Change of the perturbed normal [1] from the changes of the normal and of the height's gradient along a step.
 pub fn bent_change(normal: DVec3, gradient: DVec3, normal_change: DVec3, gradient_change: DVec3) -> DVec3 {
     let sum = normal - along_surface(normal, gradient);
     let length = sum.length();

@@ -7,47 +7,46 @@ use glam::DVec3;
 
 use crate::scene::InScene;
 
-/// A border that turns by less is smooth [cosine of the angle].
+/// Cosine of the angle of a turn above which a border counts as smooth.
 const SMOOTH_TURN: f64 = 0.97;
 
-/// Sides whose normals differ by less are one [cosine of the angle].
+/// Cosine of the angle between face normals above which they belong to one side.
 const SAME_SIDE: f64 = 0.97;
 
-/// Sides that meet at a corner of a body, at least.
+/// Fewest sides around a vertex that make it a corner.
 const SIDES_AT_A_CORNER: usize = 3;
 
-/// Larger meshes stand for smooth shapes [triangles].
+/// Larger meshes are taken for smooth shapes [triangles].
 const MAX_TRIANGLES: usize = 1 << 14;
 
-/// More corners than these are facets: the lattice has to resolve them by itself.
+/// A mesh with more corners is faceted: the lattice has to resolve them itself.
 const MAX_CORNERS: usize = 64;
 
-/// The same for edges.
+/// The same limit for edges.
 const MAX_EDGES: usize = 1 << 12;
 
-/// A mesh whose vertices at one place are one.
+/// A mesh with vertices at equal positions merged.
 struct WeldedMesh {
-    /// Places [m].
+    /// Vertex positions [m].
     points: Vec<DVec3>,
-    /// Normals of the sides around each point, those that are alike once.
+    /// Face normals around each vertex, one per side.
     sides: Vec<Vec<DVec3>>,
-    /// By their points, the lower index first.
+    /// Keyed by vertices, the lower index first.
     edges: BTreeMap<(usize, usize), JoinedEdge>,
 }
 
-/// An edge between triangles.
 #[derive(Default)]
 struct JoinedEdge {
-    /// Triangles at it.
+    /// Adjacent triangles.
     count: usize,
-    /// Normal of the first of them.
+    /// Face normal of the first adjacent triangle.
     normal: DVec3,
-    /// Whether another one faces elsewhere.
+    /// Whether another adjacent triangle belongs to a different side.
     is_crease: bool,
 }
 
 impl WeldedMesh {
-    /// `None` for larger meshes.
+    /// `None` above [`MAX_TRIANGLES`].
     fn new(mesh: InScene) -> Option<Self> {
         if mesh.triangle_count() > MAX_TRIANGLES {
             return None;
@@ -86,7 +85,7 @@ impl WeldedMesh {
     }
 }
 
-/// Sharp corners [m]; none where there are very many, or in a very fine mesh.
+/// Sharp corners [m]; empty where there are too many or the mesh is too fine.
 pub fn sharp_corners(mesh: InScene) -> Vec<DVec3> {
     let Some(WeldedMesh { points, sides, edges }) = WeldedMesh::new(mesh) else {
         return Vec::new();
@@ -114,7 +113,7 @@ pub fn sharp_corners(mesh: InScene) -> Vec<DVec3> {
     }
 }
 
-/// Both ends [m] of each sharp edge; none where there are very many, or in a very fine mesh.
+/// End points [m] of each sharp edge; empty where there are too many or the mesh is too fine.
 pub fn sharp_edges(mesh: InScene) -> Vec<[DVec3; 2]> {
     let Some(joined) = WeldedMesh::new(mesh) else {
         return Vec::new();

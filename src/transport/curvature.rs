@@ -10,20 +10,21 @@ use glam::{DMat3, DVec3};
 
 use crate::scene::{InScene, Mesh};
 
-/// Derivative of the unit normal by position [1/m], symmetric 3×3: `dn = S·dp` for a step dp along the surface.
+/// Derivative of the unit normal with respect to position [1/m], symmetric 3×3: `dn = S·dp` for a step dp along the
+/// surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ShapeOperator {
-    /// xx, xy, xz, yy, yz, zz: single precision is far below the error of any mesh.
+    /// xx, xy, xz, yy, yz, zz. Single precision rounds far below the discretisation error of any mesh.
     entries: [f32; 6],
 }
 
-/// How the normals of a mesh turn, by the shape operators at its vertices.
+/// Shape operators at the vertices of a mesh.
 #[derive(Clone, Debug)]
 pub enum NormalField {
-    /// They are known.
+    /// Precomputed.
     Known(Vec<ShapeOperator>),
-    /// They are found from the triangles around a vertex whenever they are needed: of a mesh with many instances, the
-    /// operators would take more memory than all else.
+    /// Computed on demand from the triangles around a vertex: stored operators of a mesh with many instances would take
+    /// more memory than everything else.
     Found(Arc<TrianglesAround>),
 }
 
@@ -32,7 +33,6 @@ pub enum NormalField {
 pub struct TrianglesAround(Vec<Vec<u32>>);
 
 impl TrianglesAround {
-    /// Of a mesh.
     pub fn of(mesh: &Mesh) -> Self {
         let mut around = vec![Vec::new(); mesh.positions.len()];
         for (triangle, vertices) in (0..).zip(&mesh.triangles) {
@@ -43,7 +43,7 @@ impl TrianglesAround {
         Self(around)
     }
 
-    /// Average of the triangles around a vertex, by area.
+    /// Area-weighted average over the triangles around a vertex.
     fn operator(&self, mesh: InScene, vertex: usize) -> ShapeOperator {
         let (mut sum, mut sum_m2) = (DMat3::ZERO, 0.0);
         let triangles = self.0[vertex].iter();
@@ -60,7 +60,7 @@ impl TrianglesAround {
 }
 
 impl NormalField {
-    /// Of a mesh in scene coordinates, known.
+    /// Precomputed, for a mesh in scene coordinates.
     pub fn new(mesh: &Mesh) -> Self {
         let around = TrianglesAround::of(mesh);
         let vertices = 0..mesh.positions.len();
@@ -71,7 +71,7 @@ impl NormalField {
         )
     }
 
-    /// The normal's change [1] for a step along the surface [m] at a point of a triangle.
+    /// Change of the normal [1] for a step [m] along the surface at a point of a triangle.
     pub fn turn(&self, mesh: InScene, triangle: usize, barycentric: [f64; 3], step: DVec3) -> DVec3 {
         let corners = mesh.triangle(triangle).map(|vertex| vertex as usize);
         let operators = match self {
@@ -111,8 +111,8 @@ impl ShapeOperator {
     }
 }
 
-/// The linear map that takes a triangle's edges to the differences of its corner normals and its normal to zero, with
-/// the triangle's area [m²]; `None` without area.
+/// Linear map that takes a triangle's edges to the differences of its vertex normals, and its face normal to zero; with
+/// the triangle's area [m²]. `None` for a degenerate triangle.
 fn of_triangle(mesh: InScene, triangle: usize) -> Option<(DMat3, f64)> {
     let [a, b, c] = mesh.corners(triangle);
     let [na, nb, nc] = mesh.corner_normals(triangle);
@@ -124,14 +124,15 @@ fn of_triangle(mesh: InScene, triangle: usize) -> Option<(DMat3, f64)> {
     ))
 }
 
-/// Vectors in the plane of two edges whose products with (edge 1, edge 2) are (1, 0) and (0, 1) [1/m].
+/// Dual basis of two edges within their plane [1/m]: dot products with (e1, e2) are (1, 0) and (0, 1). `None` if
+/// degenerate.
 pub(super) fn dual_edges(e1: DVec3, e2: DVec3) -> Option<(DVec3, DVec3)> {
     let normal = e1.cross(e2);
     let squared = normal.length_squared();
     (squared > 0.0 && squared.is_finite()).then(|| (e2.cross(normal) / squared, normal.cross(e1) / squared))
 }
 
-/// The change of the interpolated, normalised normal [1] for a step [m] within one triangle.
+/// Change of the interpolated, normalised normal [1] for a step [m] within one triangle.
 pub fn turn_within(mesh: InScene, triangle: usize, barycentric: [f64; 3], step: DVec3) -> DVec3 {
     let [a, b, c] = mesh.corners(triangle);
     let Some((dual_b, dual_c)) = dual_edges(b - a, c - a) else {

@@ -10,26 +10,26 @@ use super::microfacets::MicrofacetEvent;
 use super::{SurfaceHit, Tracer};
 use crate::geometry::Ray;
 
-/// Derivatives of a ray's origin [m] and unit direction [1] by one coordinate of the unit square it starts from.
+/// Derivatives of a ray with respect to one coordinate of the unit square that it is launched from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RayDerivative {
-    /// Of the origin [m].
+    /// [m].
     pub origin: DVec3,
-    /// Of the direction, perpendicular to it [1].
+    /// Perpendicular to the ray's direction [1].
     pub direction: DVec3,
 }
 
-/// Derivatives by both coordinates.
+/// Derivatives of a ray with respect to both coordinates of its launch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RayDifferential {
-    /// By the first coordinate.
+    /// With respect to the first coordinate.
     pub across: RayDerivative,
-    /// By the second.
+    /// With respect to the second coordinate.
     pub down: RayDerivative,
 }
 
 impl RayDifferential {
-    /// Both derivatives through the same function.
+    /// Applies one function to both derivatives.
     #[must_use]
     pub fn map(self, f: impl Fn(RayDerivative) -> RayDerivative) -> Self {
         Self {
@@ -38,7 +38,6 @@ impl RayDifferential {
         }
     }
 
-    /// Whether all numbers are finite.
     pub fn is_finite(&self) -> bool {
         [self.across, self.down]
             .iter()
@@ -46,27 +45,27 @@ impl RayDifferential {
     }
 }
 
-/// What the derivatives of a surface are taken from.
+/// Geometry from which surface derivatives are taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceScale {
-    /// The smooth surface that the mesh stands for: steps are longer than its triangles.
+    /// The smooth surface that the mesh approximates, for steps longer than its triangles.
     Smooth,
-    /// The triangle itself: steps stay within it.
+    /// The triangle alone, for steps within it.
     Facet,
 }
 
-/// Which detail of a surface's normals its derivatives have.
+/// Detail of the normals that surface derivatives include.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceDetail {
-    /// All that turns light.
+    /// All bumps.
     Bumps,
-    /// What the mesh shows: for steps that are longer than all bumps.
+    /// The mesh's normals only, for steps longer than all bumps.
     Mesh,
 }
 
 impl Tracer {
-    /// Whether steps of a ray's differential [m, at the hit] leave the triangle that was hit: then the surface's
-    /// derivatives are those of the smooth surface around it. `steps` are in units of the differential's coordinates.
+    /// Scale for a ray differential [m, at the hit]: smooth once its steps leave the triangle that was hit. `steps` are
+    /// in units of the launch coordinates.
     pub fn surface_scale(&self, hit: &SurfaceHit, moved: &RayDifferential, steps: [f64; 2]) -> SurfaceScale {
         let [a, b, c] = self.scene().objects[hit.object].in_scene().corners(hit.triangle);
         let shortest = a
@@ -82,8 +81,8 @@ impl Tracer {
         }
     }
 
-    /// The differential of a ray carried on to its hit: the origin's derivatives are then those of the hit point,
-    /// along the tangent plane of the surface at the given scale.
+    /// Transfers a differential to the ray's hit: the origin's derivatives become those of the hit point, within the
+    /// tangent plane of the surface at the given scale.
     pub fn transfer(
         &self,
         ray: &Ray,
@@ -105,7 +104,7 @@ impl Tracer {
         })
     }
 
-    /// The differential of a branch that leaves a hit, from that of the incoming ray at the hit.
+    /// Differential of a branch that leaves a hit, from that of the incident ray at the hit.
     pub fn differential_after(
         &self,
         incident: DVec3,
@@ -167,7 +166,7 @@ impl Tracer {
         })
     }
 
-    /// Change of the shading normal, as oriented in `normal`, for a step along the surface [m].
+    /// Change of the shading normal, oriented like `normal`, for a step [m] along the surface.
     fn normal_change(
         &self,
         hit: &SurfaceHit,

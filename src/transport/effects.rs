@@ -2,25 +2,22 @@
 
 use crate::plan::{Effect, EffectPlan};
 
-/// Effects of paths, as a plan decides them.
+/// Path effects that a plan switches on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct EffectSet {
-    /// Light goes through surfaces.
     pub transmission: bool,
-    /// Surfaces send light back.
     pub reflection: bool,
-    /// Bodies absorb light along the way.
+    /// Absorption inside bodies.
     pub absorption: bool,
-    /// Textures tint what goes on from specular surfaces.
+    /// Textures tint light at specular surfaces.
     pub textures: bool,
-    /// Rough surfaces spread what they send on.
+    /// Rough surfaces scatter light into lobes.
     pub lobes: bool,
-    /// Normals are bent by what no mesh shows: see [`super::Tracer::without_bumps`].
+    /// Waves and normal textures perturb normals: see [`super::Tracer::without_bumps`].
     pub bumps: bool,
 }
 
 impl EffectSet {
-    /// Every effect.
     pub const EVERYTHING: Self = Self {
         transmission: true,
         reflection: true,
@@ -30,7 +27,6 @@ impl EffectSet {
         bumps: true,
     };
 
-    /// The effects that are on in a plan.
     pub fn of(plan: &EffectPlan) -> Self {
         Self {
             transmission: plan.is_on(Effect::Refraction),

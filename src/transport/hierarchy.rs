@@ -19,28 +19,27 @@ use crate::geometry::{Ray, TriangleBvh};
 use crate::scene::mesh::Placement;
 use crate::scene::{Mesh, Object, Scene, instances};
 
-/// Rays that start farther from an instance than this many of its radii are advanced before they are brought into its
-/// coordinates.
+/// Rays that start farther from an instance than this many of its radii are advanced before they are transformed into
+/// object space, which keeps their precision.
 const FAR_RADII: f64 = 4.0;
 
-/// The hierarchies of a scene.
 #[derive(Debug)]
 pub(super) struct Hierarchy {
     pub(super) copied: Arc<Copied>,
-    /// Objects that were moved away from their copies, which are passed over then; ascending.
+    /// Objects that were moved since they were copied, ascending. Hits on their stale copies are skipped.
     pub(super) moved: Vec<usize>,
-    /// The meshes of instances.
+    /// Meshes that instances share.
     pub(super) meshes: Vec<Arc<SharedMesh>>,
-    /// By their objects, ascending.
+    /// Ascending by object.
     pub(super) instances: Vec<Instance>,
-    /// Over the instances' boxes.
+    /// Over the instances' bounding boxes.
     pub(super) above: TriangleBvh,
     max_copied: usize,
-    /// Single-precision coordinates of devices.
+    /// Frame of the single-precision coordinates on devices.
     pub(super) frame: Frame,
 }
 
-/// All objects but instances.
+/// Triangles of all objects that are not instances, in scene coordinates.
 #[derive(Debug)]
 pub(super) struct Copied {
     objects: Vec<usize>,
@@ -49,7 +48,7 @@ pub(super) struct Copied {
     pub(super) triangles: Vec<(u32, u32)>,
 }
 
-/// A mesh of many instances.
+/// A mesh that instances share, with its hierarchy in object space.
 #[derive(Debug)]
 pub(super) struct SharedMesh {
     mesh: Arc<Mesh>,
@@ -59,11 +58,11 @@ pub(super) struct SharedMesh {
     pub(super) groups: Arc<Vec<u32>>,
 }
 
-/// An object whose mesh is not copied.
+/// An object whose triangles are not copied.
 #[derive(Debug)]
 pub(super) struct Instance {
     pub(super) object: u32,
-    /// Its place among the meshes.
+    /// Index into [`Hierarchy::meshes`].
     pub(super) mesh: usize,
     pub(super) shared: Arc<SharedMesh>,
     pub(super) placement: Option<Placement>,
@@ -71,11 +70,11 @@ pub(super) struct Instance {
     pub(super) bounds: (DVec3, DVec3),
 }
 
-/// A triangle: its slot in the hierarchy of an instance's mesh, or in that of what is copied.
+/// A triangle: its slot in the hierarchy of an instance's mesh, or in that of the copied triangles.
 pub(super) type Found<'a> = (Option<&'a Instance>, u32);
 
 impl Hierarchy {
-    /// Of a scene. `max_copied`: see [`instances::MAX_COPIED`].
+    /// `max_copied`: see [`instances::MAX_COPIED`].
     pub(super) fn new(scene: &Scene, max_copied: usize) -> Self {
         let is_instance = instances::find(&scene.objects, max_copied);
         let copied = Arc::new(Copied::new(scene, &is_instance));
@@ -91,7 +90,7 @@ impl Hierarchy {
         none.with_instances(scene, &is_instance)
     }
 
-    /// Of the same objects, edited.
+    /// Hierarchy of the edited scene. Rebuilds only what changed if every object is the same or can become an instance.
     pub(super) fn edited(&self, was: &Scene, is: &Scene) -> Self {
         let objects = || was.objects.iter().zip(&is.objects);
         let can_move = |(was, is): (&Object, &Object)| {
@@ -107,7 +106,7 @@ impl Hierarchy {
         self.with_instances(is, &is_instance)
     }
 
-    /// With other instances; those that were copied are passed over there.
+    /// Replaces the instances. A copied object that becomes an instance counts as moved.
     fn with_instances(&self, scene: &Scene, is_instance: &[bool]) -> Self {
         let known = self.meshes.iter();
         let known: HashMap<_, _> = known.map(|shared| (Arc::as_ptr(&shared.mesh), shared)).collect();
@@ -148,13 +147,12 @@ impl Hierarchy {
         }
     }
 
-    /// Whether what is met of an object's copy is not there any more.
+    /// Whether an object was moved, so that its copied triangles are stale.
     pub(super) fn is_moved(&self, object: usize) -> bool {
         self.moved.binary_search(&object).is_ok()
     }
 
-    /// The nearest place in front of a ray's origin where something is there; of places at the same distance, that of the
-    /// first object and triangle.
+    /// Closest hit for which `is_there` holds; among hits at the same distance, that of the lowest object and triangle.
     #[inline]
     pub(super) fn closest(
         &self,
@@ -214,7 +212,7 @@ impl Hierarchy {
         is_blocked
     }
 
-    /// Hands out all triangles that a ray may meet before `end_m`, with their corners in the scene, as
+    /// Calls `meet` for every triangle that a ray may hit before `end_m`, with its corners in the scene, as
     /// [`TriangleBvh::search`] does.
     #[inline(always)]
     fn search<'a>(
@@ -234,7 +232,7 @@ impl Hierarchy {
         }
     }
 
-    // Out of the way of scenes without any.
+    // Not inlined: scenes without instances stay fast.
     #[inline(never)]
     fn search_instances<'a>(
         &'a self,
@@ -262,12 +260,12 @@ impl Hierarchy {
         }
     }
 
-    /// Whether an object's triangle is of a copy that it was moved away from.
+    /// Whether a triangle belongs to the stale copy of a moved object.
     fn is_left(&self, (object, (instance, _)): (u32, Found)) -> bool {
         instance.is_none() && self.is_moved(object as usize)
     }
 
-    /// Its corners in the scene [m].
+    /// Corners in the scene [m].
     pub(super) fn corners(&self, (instance, slot): Found) -> [DVec3; 3] {
         match instance {
             Some(instance) => instance.placed(instance.shared.bvh.corners(slot)),
@@ -275,7 +273,7 @@ impl Hierarchy {
         }
     }
 
-    /// What all instances of an object's mesh share; `None` where the object is none.
+    /// Data that all instances of an object's mesh share; `None` where the object is not an instance.
     pub(super) fn shared(&self, object: usize) -> Option<&SharedMesh> {
         let found = self
             .instances
@@ -283,7 +281,7 @@ impl Hierarchy {
         Some(&self.instances[found.ok()?].shared)
     }
 
-    /// The nodes around all triangles.
+    /// Root nodes that together hold all triangles.
     pub(super) fn roots(&self) -> Vec<SceneNode<'_>> {
         let roots = self.instances.iter().map(Some);
         let roots = std::iter::once(None).chain(roots).filter_map(|instance| {
@@ -327,7 +325,7 @@ impl SharedMesh {
         Self {
             bvh: TriangleBvh::build(&corners),
             around: Arc::new(TrianglesAround::of(mesh)),
-            // Normals have any length in a file; these are unit.
+            // Placing normalises the normals, which may have any length in a file.
             groups: Arc::new(smoothing_groups(&mesh.placed(&DAffine3::IDENTITY))),
             mesh: Arc::clone(mesh),
         }
@@ -335,7 +333,7 @@ impl SharedMesh {
 }
 
 impl Instance {
-    /// Hands out all triangles that a ray may meet before `end_m`, with their corners in the scene, as
+    /// Calls `meet` for every triangle that a ray may hit before `end_m`, with its corners in the scene, as
     /// [`TriangleBvh::search`] does.
     #[inline]
     fn search(&self, ray: &Ray, end_m: f64, mut meet: impl FnMut(&[DVec3; 3], u32) -> Option<f64>) {
@@ -363,7 +361,7 @@ impl Instance {
     }
 }
 
-/// A node of a hierarchy of the scene, for searches other than along rays.
+/// A node of one of the scene's hierarchies, for traversals other than along rays.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneNode<'a> {
     hierarchy: &'a Hierarchy,
@@ -372,7 +370,7 @@ pub struct SceneNode<'a> {
 }
 
 impl<'a> SceneNode<'a> {
-    /// A box around all triangles of the node, a little too large, as minimum and maximum corner [m].
+    /// Conservative bounding box of the node's triangles: minimum and maximum corner [m].
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let (low, high) = self.node.bounds();
         let Some(placement) = self.instance.and_then(|instance| instance.placement.as_ref()) else {
@@ -387,17 +385,17 @@ impl<'a> SceneNode<'a> {
         (centre - reach, centre + reach)
     }
 
-    /// The two nodes that share out its triangles; `None` for a leaf.
+    /// Child nodes; `None` for a leaf.
     pub fn children(&self) -> Option<[Self; 2]> {
         Some(self.node.children()?.map(|node| Self { node, ..*self }))
     }
 
-    /// Whether its box may be that of an object which was moved away.
+    /// Whether the box may hold the stale copy of a moved object.
     pub fn may_be_left(&self) -> bool {
         self.instance.is_none() && !self.hierarchy.moved.is_empty()
     }
 
-    /// Object and corners of each triangle of a leaf; nothing for other nodes.
+    /// Object and corners of each triangle of a leaf; empty for inner nodes.
     pub fn triangles(&self) -> impl Iterator<Item = (usize, [DVec3; 3])> + use<'a> {
         let (hierarchy, instance) = (self.hierarchy, self.instance);
         self.node.slots().filter_map(move |slot| {
@@ -421,13 +419,13 @@ mod tests {
     use crate::scene::{Edit, Material, Motion, Object, Scene, SurfaceKind};
     use crate::transport::Tracer;
 
-    /// Of the box from −1 to 1, the same one every time.
+    /// Reproducible vector in the box from −1 to 1.
     fn vector(index: usize, seed: u64) -> DVec3 {
         let [a, b] = [0, 1].map(|pair| even_point(index as u32, pair, seed));
         DVec3::new(a.x, a.y, b.x) * 2.0 - 1.0
     }
 
-    /// Balls of one mesh, turned, stretched, mirrored, and two at the very same place, over a floor.
+    /// Instances of one sphere, rotated, stretched and mirrored, two of them at the same place, over a floor.
     fn balls() -> Scene {
         let mesh = Arc::new(shapes::sphere(DVec3::new(0.3, -0.2, 0.1), 1.0, 2));
         let ball = |node: usize| {
@@ -459,7 +457,7 @@ mod tests {
         }
     }
 
-    /// Rays from anywhere to anywhere, and to vertices and middles of edges.
+    /// Rays between arbitrary points, and to vertices and edge midpoints.
     fn rays(scene: &Scene) -> impl Iterator<Item = Ray> {
         (0..20_000).map(|index: usize| {
             let origin = vector(index, 6) * if index.is_multiple_of(7) { 1e4 } else { 5.0 };
@@ -475,7 +473,7 @@ mod tests {
         })
     }
 
-    /// Fails unless both find the same, to the last bit.
+    /// Panics unless both tracers agree to the last bit.
     fn compare(copied: &Tracer, shared: &Tracer) {
         let mut hits = 0;
         for ray in rays(copied.scene()) {
@@ -505,7 +503,7 @@ mod tests {
     fn instances_are_met_as_copies_are() {
         let scene = Arc::new(balls());
         let copied = Tracer::sharing(Arc::clone(&scene), usize::MAX);
-        // Not by the copies that the other one made.
+        // A scene of its own, so that it does not reuse cached copies of the first one.
         let shared = Tracer::sharing(Arc::new(balls()), 0);
         compare(&copied, &shared);
         let edit = Edit::Place(7, Motion::turned(0.4, DVec3::new(0.3, 0.2, -0.1)));
@@ -515,7 +513,7 @@ mod tests {
         compare(&fresh, &shared.edited(moved));
     }
 
-    /// No hierarchy of triangles is built for a drag, but for one of the mesh of what is copied, when it first moves.
+    /// Dragging builds no triangle hierarchy, except for the mesh of a copied object when it first moves.
     #[test]
     fn a_drag_builds_no_hierarchy_of_triangles() {
         let mut scene = balls();

@@ -11,18 +11,15 @@ use crate::optics::{LinearSrgb, fresnel, refraction};
 use crate::scene::material::SMOOTH_ROUGHNESS;
 use crate::scene::{Material, Mixture, SurfaceKind};
 
-/// What happened to a ray at a specular surface.
+/// Scattering event at a specular surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Event {
-    /// Sent back.
     Reflection,
-    /// Sent back by total internal reflection.
     TotalInternalReflection,
-    /// Bent through an interface.
     Refraction,
     /// Straight through a thin wall.
     ThinTransmission,
-    /// Straight on where a surface is there in part: such light is direct light still.
+    /// Straight through the uncovered part of a surface. Such light is still direct light.
     Passage,
 }
 
@@ -33,50 +30,47 @@ impl Event {
     }
 }
 
-/// One way on from a surface.
+/// One outgoing ray of an interaction.
 #[derive(Clone, Copy, Debug)]
 pub struct Branch {
-    /// Leaves the surface.
     pub ray: Ray,
-    /// Share of the flux, [0, 1] per channel.
+    /// Fraction of the flux, [0, 1] per channel.
     pub share: LinearSrgb,
-    /// What sent it there.
     pub event: Event,
     /// Media after the event.
     pub media: MediumStack,
-    /// n of the side it leaves over n of the side it enters; 1 for reflections. Radiance that comes back along the
-    /// branch is scaled by its square, flux is not.
+    /// Refractive index on the side that the ray leaves over that on the side it enters; 1 for reflections. Radiance
+    /// that travels back along the branch scales with its square, flux does not.
     pub ior_ratio: f64,
-    /// Unit normal of the surface on the side of the incoming ray that gave the direction.
+    /// Unit normal about which the light scattered, on the side of the incident ray.
     pub normal: DVec3,
-    /// How it did.
+    /// Kind of that normal.
     pub by: NormalSource,
 }
 
-/// What light turns about.
+/// Normal about which light scatters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum NormalSource {
-    /// The triangle's normal, where the shading normal would send light through the facet.
+    /// The triangle's normal, where the shading normal would send the ray to the wrong side of the triangle.
     Geometric,
-    /// The shading normal.
     Shading,
-    /// A micro-facet around the shading normal.
+    /// A microfacet's normal around the shading normal.
     Micro(Facet),
 }
 
-/// What the diffuse body of a surface takes of the light that falls on it, for its illumination map.
+/// Response of a surface's diffuse component to incident light, for its illumination map.
 #[derive(Clone, Copy, Debug)]
 pub struct DiffuseResponse {
-    /// Part of the surface that it is, [0, 1].
+    /// Diffuse fraction of the surface, [0, 1].
     pub share: f64,
-    /// Part of it that polish covers, [0, 1].
+    /// Fraction of it under a coat of polish, [0, 1].
     pub polish: f64,
-    /// Refractive index of the polish.
+    /// Refractive index of the coat.
     pub ior: f64,
 }
 
 impl DiffuseResponse {
-    /// Of light that comes at an angle out of a medium of an index.
+    /// Fraction of light taken at an angle of incidence from a medium of index `ior_around`.
     pub fn of(&self, cosine: f64, ior_around: f64) -> f64 {
         if self.polish == 0.0 {
             return self.share;
@@ -85,37 +79,34 @@ impl DiffuseResponse {
     }
 }
 
-/// The shares of the light at one hit.
+/// How light splits at a hit, with the outgoing rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Interaction {
-    /// Mirror direction.
     pub reflection: Option<Branch>,
-    /// Through the surface.
     pub transmission: Option<Branch>,
-    /// Taken by the illumination map, before the albedo.
+    /// Fraction taken by the illumination map, before the albedo.
     pub deposit: LinearSrgb,
-    /// What the map's light is multiplied by where it leaves against the incoming ray.
+    /// Factor on the map's light for radiance that leaves against the incident ray.
     pub leaving: LinearSrgb,
-    /// Turned into heat here.
     pub absorbed: LinearSrgb,
-    /// What a branch would have taken that is switched off.
+    /// Fraction of the branches that are switched off.
     pub switched_off: LinearSrgb,
 }
 
-/// Orientation of a hit: normals on the side of the incoming ray.
+/// A hit with its normals turned to the side of the incident ray.
 struct HitFrame {
-    /// Whether the outside was met.
+    /// Whether the outside was hit.
     front: bool,
     geometric: DVec3,
-    /// Shading normal, or the geometric one where the shading normal faces away from the ray.
+    /// Shading normal; the geometric one where the shading normal faces away from the ray.
     shading: DVec3,
     /// Whether `shading` is the shading normal.
     is_smooth: bool,
-    /// The micro-facet that is met, where the surface is rough.
+    /// Sampled microfacet of a rough surface.
     micro: Option<Facet>,
 }
 
-/// A direction with the normal that gave it.
+/// A direction with the normal about which the light scattered.
 struct ScatteredDirection {
     direction: DVec3,
     normal: DVec3,
@@ -143,7 +134,7 @@ impl HitFrame {
         }
     }
 
-    /// Cosine between the incoming ray and what it is reflected by.
+    /// Cosine of incidence at the microfacet, or at the shading normal of a smooth surface.
     fn cos_incident(&self, incident: DVec3) -> f64 {
         match self.micro {
             Some(facet) => -incident.dot(facet.normal(incident, self.shading)),
@@ -151,7 +142,7 @@ impl HitFrame {
         }
     }
 
-    /// By a micro-facet; on the facet's right side in any case.
+    /// Scatters at a microfacet, always to the correct side of the triangle. `None` for total internal reflection.
     fn turned_by(&self, facet: Facet, incident: DVec3, turn: MicrofacetEvent) -> Option<ScatteredDirection> {
         let side = if turn == MicrofacetEvent::Reflected {
             1.0
@@ -166,7 +157,7 @@ impl HitFrame {
         })
     }
 
-    /// Mirror direction by the shading normal; by the geometric one where the former would end below the surface.
+    /// Mirror direction about the shading normal; about the geometric one where the former points below the surface.
     fn reflected(&self, incident: DVec3) -> ScatteredDirection {
         let by_micro = self
             .micro
@@ -186,7 +177,8 @@ impl HitFrame {
         }
     }
 
-    /// Refracted direction by the shading normal; by the geometric one where the former would stay above the surface.
+    /// Refracted direction about the shading normal; about the geometric one where the former stays above the surface.
+    /// `None` for total internal reflection.
     fn refracted(&self, incident: DVec3, eta: f64) -> Option<ScatteredDirection> {
         if let Some(facet) = self.micro {
             return self.turned_by(facet, incident, MicrofacetEvent::Refracted { eta });
@@ -203,7 +195,7 @@ impl HitFrame {
         }
     }
 
-    /// Straight on through a thin wall, but for its roughness.
+    /// Straight on through a thin wall, deflected only by its roughness.
     fn passed(&self, incident: DVec3) -> ScatteredDirection {
         let by_micro = self
             .micro
@@ -211,7 +203,7 @@ impl HitFrame {
         by_micro.unwrap_or_else(|| self.turned(incident))
     }
 
-    /// A direction that came by the shading normal.
+    /// A direction that scattered about `shading`.
     fn turned(&self, direction: DVec3) -> ScatteredDirection {
         ScatteredDirection {
             direction,
@@ -225,39 +217,35 @@ impl HitFrame {
     }
 }
 
-/// The shares of the light at one hit, before any of it is followed: its ways on are made when they are asked for.
+/// How light splits at a hit. The outgoing rays are computed on demand.
 pub struct Meeting<'a> {
     hit: &'a SurfaceHit,
     incident: DVec3,
     media: &'a MediumStack,
     facing: HitFrame,
-    /// Goes back, where something does.
+    /// Reflected fraction; `None` without reflection.
     pub reflected: Option<LinearSrgb>,
-    /// Goes through, where something does.
+    /// Transmitted fraction; `None` without transmission.
     pub transmitted: Option<LinearSrgb>,
-    /// Taken by the illumination map, before the albedo.
+    /// Fraction taken by the illumination map, before the albedo.
     pub deposit: LinearSrgb,
-    /// What the map's light is multiplied by where it leaves against the incoming ray, where that is not `deposit`: the
-    /// map has the share of the surface that takes light already.
+    /// Factor on the map's light for radiance that leaves against the incident ray, where it differs from `deposit`:
+    /// the map already includes the diffuse fraction of the surface.
     leaving: Option<LinearSrgb>,
-    /// Turned into heat here.
     pub absorbed: LinearSrgb,
-    /// What a branch would have taken that is switched off.
+    /// Fraction of the branches that are switched off.
     pub switched_off: LinearSrgb,
     through: BehindSurface,
 }
 
-/// What lies behind a surface.
 enum BehindSurface {
-    /// Nothing: all that does not go back stays.
+    /// An opaque body: what is not reflected stays.
     Nothing,
-    /// A medium that light cannot enter at this angle.
+    /// A medium beyond the critical angle.
     Unreachable,
-    /// The other side of a thin wall.
     ThinWall,
-    /// The other side of a surface that is not there.
+    /// The far side of the uncovered part of a surface.
     Hole,
-    /// Another medium.
     Medium {
         turned: ScatteredDirection,
         media: MediumStack,
@@ -266,7 +254,6 @@ enum BehindSurface {
 }
 
 impl Meeting<'_> {
-    /// The way back.
     #[inline]
     pub fn reflection(&self) -> Option<Branch> {
         let share = self.reflected?;
@@ -285,7 +272,6 @@ impl Meeting<'_> {
         })
     }
 
-    /// The way through.
     #[inline]
     pub fn transmission(&self) -> Option<Branch> {
         let share = self.transmitted?;
@@ -317,7 +303,7 @@ impl Meeting<'_> {
         })
     }
 
-    /// A further share goes back, or would if that were on.
+    /// Adds a reflected fraction, or books it as switched off if reflection is off.
     fn sends_back(&mut self, effects: EffectSet, share: LinearSrgb) {
         if effects.reflection {
             self.reflected = Some(self.reflected.map_or(share, |before| before + share));
@@ -326,7 +312,7 @@ impl Meeting<'_> {
         }
     }
 
-    /// Leaves a part of all that was shared out so far.
+    /// Scales all fractions set so far, except the deposit.
     fn scale(&mut self, part: f64) {
         self.reflected = self.reflected.map(|share| share * part);
         self.transmitted = self.transmitted.map(|share| share * part);
@@ -334,7 +320,7 @@ impl Meeting<'_> {
         self.switched_off = self.switched_off * part;
     }
 
-    /// What does not go back goes through, but for what the surface's tint takes.
+    /// Transmits what is not reflected; the tint's loss is absorbed.
     fn lets_through(&mut self, effects: EffectSet, reflectance: f64, tint: impl FnOnce() -> LinearSrgb) {
         let beneath = LinearSrgb::grey(1.0 - reflectance);
         if effects.transmission {
@@ -348,12 +334,12 @@ impl Meeting<'_> {
 }
 
 impl Tracer {
-    /// What becomes of light that arrives at `hit` along the unit direction `incident`, within `media`, with every effect.
+    /// Splits light that arrives at `hit` along the unit direction `incident` within `media`, with every effect on.
     pub fn interact(&self, hit: &SurfaceHit, incident: DVec3, media: &MediumStack) -> Interaction {
         self.interact_with(EffectSet::EVERYTHING, hit, incident, media, None)
     }
 
-    /// The same with some effects, as of [`Self::meet`].
+    /// Splits light with some effects only; parameters as of [`Self::meet`].
     pub fn interact_with(
         &self,
         effects: EffectSet,
@@ -373,10 +359,10 @@ impl Tracer {
         }
     }
 
-    /// How light that arrives at `hit` along the unit direction `incident`, within `media`, is shared out. Light that
-    /// would need a branch which is not among the effects is `switched_off`; where textures are not, the material's factor
-    /// alone tints. `micro`: which micro-facet a rough surface shows, as a point of the unit square; rough surfaces are
-    /// smooth without it, or without lobes among the effects.
+    /// Splits light that arrives at `hit` along the unit direction `incident` within `media`. Fractions of branches
+    /// outside `effects` are `switched_off`; without textures, the material's factor alone tints. `micro` selects the
+    /// microfacet of a rough surface by a point of the unit square; without it, or without lobes among the effects,
+    /// rough surfaces are smooth.
     #[inline]
     pub fn meet<'a>(
         &self,
@@ -449,7 +435,7 @@ impl Tracer {
         meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
     }
 
-    /// Each share of a mixture as the class that it is of. Nothing is both clear and has holes.
+    /// Splits each fraction of a mixture as its surface class does. No mixture is both clear and partly uncovered.
     fn meet_mixture(&self, effects: EffectSet, material: &Material, mixture: Mixture, meeting: &mut Meeting) {
         let &mut Meeting {
             hit, incident, media, ..
@@ -494,10 +480,10 @@ impl Tracer {
         let (ior_near, ior_far) = if is_front {
             (media.ior(self.scene()), material.ior)
         } else if beyond == *media {
-            // Never entered: an open sheet, or a start within.
+            // Never entered: an open sheet, or a path that starts inside.
             (material.ior, media.ior(self.scene()))
         } else {
-            // Where bodies overlap, the one that was entered last is the medium until it is left.
+            // Where bodies overlap, the one entered last is the medium until it is left.
             (media.ior(self.scene()), beyond.ior(self.scene()))
         };
         let eta = ior_far / ior_near;
@@ -517,7 +503,7 @@ impl Tracer {
         meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
     }
 
-    /// Base colour at a hit, its texture included where textures are.
+    /// Base colour at a hit, with its texture where textures are on.
     fn tint(&self, effects: EffectSet, hit: &SurfaceHit, material: &Material) -> LinearSrgb {
         if effects.textures {
             self.base_colour(hit)
@@ -526,8 +512,8 @@ impl Tracer {
         }
     }
 
-    /// What a metal sends back: by the table of its substance where that and the wavelength are known, else by
-    /// Schlick's formula.
+    /// Reflectance of a metal: tabulated where its substance and the wavelength are known, otherwise by Schlick's
+    /// approximation.
     fn metal_share(
         &self,
         effects: EffectSet,
@@ -542,7 +528,8 @@ impl Tracer {
         if !effects.textures {
             return clean;
         }
-        // Schlick's formula is linear in what the texture multiplies: the metal where it is white, else the rise alone.
+        // Schlick's formula is linear in F0, which the texture scales: blend the metal itself with the rise of a black
+        // F0.
         let kept = self.texture_colour(hit);
         let rise = fresnel::metal_reflectance(cos_incident, LinearSrgb::BLACK);
         clean * kept + rise * (LinearSrgb::WHITE - kept)

@@ -3,13 +3,13 @@
 use crate::optics::LinearSrgb;
 use crate::scene::{Scene, Volume};
 
-/// Bodies that can be nested around a path.
+/// Most nested bodies that a path keeps track of.
 const CAPACITY: usize = 8;
 
-/// Objects whose inside the path is in, innermost last. Rule: entering an object puts it on top, leaving takes its
-/// topmost entry out; the medium is the one on top, vacuum when there is none. Where bodies overlap it is thus the one that
-/// was entered last, and leaving the other one within it bends nothing. A body beyond the capacity is not
-/// remembered: the path then leaves it into the medium on top.
+/// Objects that the path is inside of, innermost last. Entering an object pushes it, leaving it removes its topmost
+/// entry. The medium is the one on top, or vacuum when empty. Where bodies overlap, the medium is thus the one entered
+/// last, and leaving the other one within it does not refract. A body beyond the capacity is not recorded: the path
+/// then leaves it into the medium on top.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MediumStack {
     objects: [u32; CAPACITY],
@@ -34,7 +34,7 @@ impl MediumStack {
             .map(|top| self.objects[usize::from(top)] as usize)
     }
 
-    /// After entering an object.
+    /// The media after entering an object.
     #[must_use]
     pub fn entered(mut self, object: usize) -> Self {
         if usize::from(self.depth) < CAPACITY {
@@ -44,7 +44,8 @@ impl MediumStack {
         self
     }
 
-    /// After leaving an object; unchanged where the path was not inside it (an open sheet, or a start within).
+    /// The media after leaving an object; unchanged where the path was not inside it (an open sheet, or a start
+    /// inside).
     #[must_use]
     pub fn left(mut self, object: usize) -> Self {
         let depth = usize::from(self.depth);
@@ -58,13 +59,13 @@ impl MediumStack {
         self
     }
 
-    /// Whether the medium on top absorbs anything.
+    /// Whether the medium on top absorbs light.
     pub fn absorbs(&self, scene: &Scene) -> bool {
         let volume = self.top().and_then(|object| scene.material_of(object).volume);
         volume.is_some_and(|volume| volume.attenuation_distance_m.is_finite())
     }
 
-    /// Share of the light that is left after a distance [m] in the medium on top.
+    /// Transmittance of a distance [m] in the medium on top.
     pub fn transmittance(&self, scene: &Scene, distance_m: f64) -> LinearSrgb {
         match self.top().and_then(|object| scene.material_of(object).volume) {
             Some(volume) => volume.transmittance(distance_m),
@@ -74,7 +75,7 @@ impl MediumStack {
 }
 
 impl Volume {
-    /// Beer and Lambert's law: colour^(distance/attenuation distance).
+    /// Beer–Lambert law: colour^(distance/attenuation distance).
     pub fn transmittance(&self, distance_m: f64) -> LinearSrgb {
         if self.attenuation_distance_m.is_infinite() {
             return LinearSrgb::WHITE;

@@ -13,58 +13,59 @@ use glam::{DVec2, DVec3};
 
 use crate::optics::refraction;
 
-/// Specular events along a path that have a point of their own; later ones use the same again, moved.
+/// Specular events along a path with a sample of their own; later events reuse these samples, shifted.
 const POINTS: usize = 12;
 
-/// Which micro-normal rough surfaces show, event by event along a path.
+/// Samples that select the microfacets of rough surfaces, event by event along a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Microfacets {
     points: [DVec2; POINTS],
 }
 
 impl Microfacets {
-    /// By a function from the number of a pair to a point of the unit square.
+    /// `point` maps the number of a pair of dimensions to a point of the unit square.
     pub fn new(mut point: impl FnMut(u32) -> DVec2) -> Self {
         Self {
             points: std::array::from_fn(|pair| point(pair as u32)),
         }
     }
 
-    /// The point of the unit square for the event after so many others.
+    /// Sample of the event that follows `depth` others.
     pub fn at(&self, depth: u32) -> DVec2 {
         let round = f64::from(depth / POINTS as u32);
         let point = self.points[depth as usize % POINTS];
-        // The golden ratio's steps fill the square evenly, however many there are.
+        // Steps of the plastic number, the golden ratio's counterpart in two dimensions, fill the square evenly at any
+        // count.
         (point + DVec2::new(0.754_877_666_246_693, 0.569_840_290_998_053_1) * round).fract()
     }
 }
 
-/// One micro-facet of a surface.
+/// A sampled microfacet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet {
     /// GGX α: the square of glTF's roughness.
     pub alpha: f64,
-    /// Which of them, as a point of the unit square.
+    /// Sample of the unit square that selects the microfacet.
     pub point: DVec2,
 }
 
-/// What sends light on.
+/// Scattering event at a microfacet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MicrofacetEvent {
-    /// Back.
     Reflected,
-    /// Through an interface of n_t/n_i.
+    /// Through an interface.
     Refracted {
         /// n_t/n_i.
         eta: f64,
     },
-    /// Through a wall without thickness: the mirror image of what it sends back.
+    /// Through a wall without thickness: the mirror image of the reflection.
     ThroughThinWall,
 }
 
 impl Facet {
-    /// Its unit normal, for light along the unit vector `incident` on a surface of unit normal `normal` (incident ·
-    /// normal < 0): a visible one (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps", 2023).
+    /// Unit normal for light along the unit vector `incident` on a surface of unit normal `normal` (incident · normal <
+    /// 0), sampled among the visible ones (Dupuy and Benyoub, "Sampling Visible GGX Normals with Spherical Caps",
+    /// 2023).
     pub fn normal(&self, incident: DVec3, normal: DVec3) -> DVec3 {
         let (x, y) = frame(normal);
         let to_light = -incident;
@@ -78,7 +79,7 @@ impl Facet {
         (x * micro.x + y * micro.y + normal * micro.z).normalize()
     }
 
-    /// Where light goes on; `None` where a refraction is total.
+    /// Scattered direction; `None` for total internal reflection.
     pub fn turned(&self, incident: DVec3, normal: DVec3, turn: MicrofacetEvent) -> Option<DVec3> {
         let micro = self.normal(incident, normal);
         let (direction, side) = match turn {
@@ -92,8 +93,8 @@ impl Facet {
         Some(out_of(direction, normal, side))
     }
 
-    /// Derivative of [`Self::turned`] by those of the incident direction and the normal, by central differences: smooth
-    /// functions in double precision are good to some 1e-10.
+    /// Derivative of [`Self::turned`] from those of the incident direction and the normal, by central differences:
+    /// accurate to some 1e-10 for smooth functions in double precision.
     pub fn turned_derivative(
         &self,
         (incident, incident_change): (DVec3, DVec3),
@@ -101,7 +102,7 @@ impl Facet {
         turn: MicrofacetEvent,
     ) -> DVec3 {
         let size = incident_change.length().max(normal_change.length());
-        // Also where it is not a number.
+        // Catches NaN too.
         if !(size > 0.0 && size.is_finite()) {
             return DVec3::ZERO;
         }
@@ -113,18 +114,19 @@ impl Facet {
         };
         match (at(step), at(-step)) {
             (Some(after), Some(before)) => (after - before) / (2.0 * step),
-            // At the very edge of total reflection.
+            // At the critical angle.
             _ => DVec3::ZERO,
         }
     }
 }
 
-/// The mirror image of a direction in the plane across a unit normal.
+/// Mirror image of a direction in the plane perpendicular to a unit normal.
 fn mirrored(direction: DVec3, normal: DVec3) -> DVec3 {
     direction - normal * (2.0 * direction.dot(normal))
 }
 
-/// A direction, or its mirror image, so that it leaves on one side of the plane across `normal`: 1 before, -1 behind.
+/// The direction, mirrored if necessary to lie on one side of the plane perpendicular to `normal`: 1 in front, -1
+/// behind.
 pub fn out_of(direction: DVec3, normal: DVec3, side: f64) -> DVec3 {
     if direction.dot(normal) * side >= 0.0 {
         direction
@@ -133,17 +135,17 @@ pub fn out_of(direction: DVec3, normal: DVec3, side: f64) -> DVec3 {
     }
 }
 
-/// The direction in which [`frame`] has to break, as every field of tangents on a sphere does: none that surfaces are
-/// usually built along.
+/// Singularity of [`frame`], which no tangent field on a sphere can avoid: a direction that surfaces are rarely built
+/// along.
 const POLE: DVec3 = DVec3::new(
     -0.362_357_181_989_727_66,
     -0.815_303_659_476_887_2,
     0.451_638_368_060_176_6,
 );
 
-/// Two unit tangents of a unit normal, smooth everywhere but at [`POLE`] (Frisvad 2012, turned so that the pole is there).
+/// Two unit tangents of a unit normal, smooth except at [`POLE`] (Frisvad 2012, rotated to put the singularity there).
 fn frame(normal: DVec3) -> (DVec3, DVec3) {
-    // The turn about POLE × normal that takes −POLE to the normal takes two fixed tangents along.
+    // The rotation about POLE × normal that takes −POLE to the normal, applied to two fixed tangents.
     let (x, y) = POLE_TANGENTS;
     let divisor = 1.0 - POLE.dot(normal);
     if divisor <= 1e-12 {
@@ -153,7 +155,7 @@ fn frame(normal: DVec3) -> (DVec3, DVec3) {
     (turned(x), turned(y))
 }
 
-/// Unit, perpendicular to [`POLE`] and to each other.
+/// Unit vectors perpendicular to [`POLE`] and to each other.
 const POLE_TANGENTS: (DVec3, DVec3) = (
     DVec3::new(-0.913_811_548_620_257_3, 0.406_138_466_053_447_7, 0.0),
     DVec3::new(
@@ -185,7 +187,7 @@ mod tests {
             ] {
                 worst = worst.max(product.abs());
             }
-            // No jump: neighbours' frames are near each other, but near the pole.
+            // Neighbouring frames are close, except near the pole.
             if normal.dot(POLE) < 0.9 {
                 let next = (normal + DVec3::new(1e-4, -2e-4, 1.5e-4)).normalize();
                 assert!(frame(next).0.distance(x) < 1e-2, "{normal}");

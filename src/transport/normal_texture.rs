@@ -6,23 +6,23 @@ use glam::{DVec2, DVec3};
 use super::curvature::dual_edges;
 use crate::scene::{InScene, NormalMap, Scene, TextureRef, normal_map::Slope};
 
-/// A triangle with its texture coordinates.
+/// Texture mapping at a point of a triangle.
 struct TexturedTriangle {
     /// Gradients of u and v along the triangle [1/m].
     gradients: [DVec3; 2],
-    /// +X along growing u, +Y along falling v, both along the surface [1].
+    /// Tangents along increasing u and decreasing v [1].
     axes: [DVec3; 2],
     uv: DVec2,
 }
 
-/// A gradient [1] with what tells how it changes.
+/// Height gradient of a normal texture with its derivatives.
 pub struct TextureBump {
     place: TexturedTriangle,
     slope: Slope,
 }
 
 impl TextureBump {
-    /// At a point of a triangle, over a unit normal; `None` where texture coordinates are missing or degenerate.
+    /// At a point of a triangle with a unit normal; `None` where texture coordinates are missing or degenerate.
     pub fn at(
         (scene, mesh): (&Scene, InScene),
         map: &NormalMap,
@@ -39,7 +39,7 @@ impl TextureBump {
         self.along_axes(self.slope.value)
     }
 
-    /// Its change [1] for a step [m] along the triangle.
+    /// Change of ∇h [1] for a step [m] along the triangle.
     pub fn gradient_change(&self, step: DVec3) -> DVec3 {
         let [u, v] = self.place.gradients.map(|gradient| gradient.dot(step));
         self.along_axes(self.slope.by_u * u + self.slope.by_v * v)
@@ -66,7 +66,7 @@ impl TexturedTriangle {
             dual_b * to_b.x + dual_c * to_c.x,
             dual_b * to_b.y + dual_c * to_c.y,
         ];
-        // ∂P/∂u of the plane that the coordinates span, up to a positive factor.
+        // ∂P/∂u in the triangle's plane, up to a positive factor.
         let turn = to_b.perp_dot(to_c).signum();
         let by_u = ((b - a) * to_c.y - (c - a) * to_b.y) * turn;
         let x = (by_u - normal * normal.dot(by_u)).try_normalize()?;
@@ -80,7 +80,7 @@ impl TexturedTriangle {
     }
 }
 
-/// Coordinates of a triangle's corners in an image.
+/// Texture coordinates of a triangle's corners; `None` without the image's set.
 fn corner_uvs(mesh: InScene, image: &TextureRef, triangle: usize) -> Option<[DVec2; 3]> {
     let uvs = mesh.uvs(image.uv_set)?;
     Some(
@@ -89,7 +89,7 @@ fn corner_uvs(mesh: InScene, image: &TextureRef, triangle: usize) -> Option<[DVe
     )
 }
 
-/// Mean side of a texel of an image on a mesh [m]; `None` without coordinates or area.
+/// Mean texel size of an image on a mesh [m]; `None` without texture coordinates or area.
 pub fn texel_m(scene: &Scene, mesh: InScene, image: &TextureRef) -> Option<f64> {
     let texture = &scene.textures[image.texture];
     let mut texels = 0.0;

@@ -10,28 +10,26 @@ use super::hierarchy::{Hierarchy, Instance};
 use crate::geometry::PackedBvh;
 use crate::geometry::bvh::{BOX_MARGIN, Frame};
 
-/// Triangles on a device: a mesh in its own coordinates, or what stands somewhere in local ones.
+/// Triangles on a device: a shared mesh in its own coordinates, or placed triangles in local ones.
 #[derive(Debug)]
 pub struct PackedMesh {
-    /// Their hierarchy.
     pub bvh: PackedBvh,
-    /// Object and triangle within it, slot by slot. Without an object where the mesh has instances, or where that was moved
-    /// away.
+    /// Object and triangle within it, by slot. No object where the mesh is instanced or the object was moved.
     pub owners: Vec<(Option<u32>, u32)>,
 }
 
-/// A mesh where it stands.
+/// A placed mesh.
 #[derive(Debug)]
 pub struct PackedInstance {
-    /// Index into the scene's objects; `None` where the mesh's triangles are local already.
+    /// Index into the scene's objects; `None` where the mesh's triangles are in local coordinates already.
     pub object: Option<u32>,
-    /// Index into the meshes.
+    /// Index into [`Tracer::packed_meshes`].
     pub mesh: usize,
-    /// From coordinates of the mesh to local ones.
+    /// From the mesh's coordinates to local ones.
     pub from_mesh: DAffine3,
-    /// From local ones to those of the mesh's nodes.
+    /// From local coordinates to those of the mesh's nodes.
     pub to_nodes: DAffine3,
-    /// By which boxes have to be widened, in coordinates of the nodes: what rounding on the way there moves rays.
+    /// Margin added to boxes, in coordinates of the nodes: covers the rounding of the ray transform.
     pub margin: f32,
 }
 
@@ -43,12 +41,12 @@ impl PackedMesh {
 }
 
 impl Tracer {
-    /// Local coordinates of devices.
+    /// Frame of the local coordinates on devices.
     pub fn frame(&self) -> &Frame {
         &self.hierarchy().frame
     }
 
-    /// Whether both have the same meshes for devices, but for where [`moved_meshes`](Self::moved_meshes) are.
+    /// Whether both have the same device meshes, except for the placement of [`moved_meshes`](Self::moved_meshes).
     pub fn has_meshes_of(&self, other: &Self) -> bool {
         let (a, b) = (self.hierarchy(), other.hierarchy());
         let meshes = |hierarchy: &'_ Hierarchy| hierarchy.meshes.iter().map(Arc::as_ptr).collect::<Vec<_>>();
@@ -56,8 +54,8 @@ impl Tracer {
             && (&a.moved, &a.frame, meshes(a)) == (&b.moved, &b.frame, meshes(b))
     }
 
-    /// The meshes of the scene: all objects that stand where they were found and are no instances, the meshes of
-    /// instances, and [`moved_meshes`](Self::moved_meshes).
+    /// Device meshes: the triangles of all copied objects that were not moved, the meshes of instances, and
+    /// [`moved_meshes`](Self::moved_meshes).
     pub fn packed_meshes(&self) -> Vec<PackedMesh> {
         let hierarchy = self.hierarchy();
         let copied = PackedMesh::new(hierarchy.copied.bvh.packed(&hierarchy.frame), |triangle| {
@@ -74,7 +72,8 @@ impl Tracer {
             .collect()
     }
 
-    /// What was moved away from where it was found: nodes in coordinates of its mesh, triangles in local ones.
+    /// Meshes of the objects that were moved since they were copied: nodes in coordinates of the mesh, triangles in
+    /// local ones.
     pub fn moved_meshes(&self) -> Vec<PackedMesh> {
         let Hierarchy { instances, frame, .. } = self.hierarchy();
         let packed = |instance: &Instance| {
@@ -90,7 +89,7 @@ impl Tracer {
         instances.iter().filter(is_moved).map(packed).collect()
     }
 
-    /// Where the meshes of instances stand, slot by slot of the hierarchy over them.
+    /// Instances, by slot of the hierarchy over them.
     pub fn packed_instances(&self) -> (PackedBvh, Vec<PackedInstance>) {
         let hierarchy = self.hierarchy();
         let frame = &hierarchy.frame;

@@ -7,10 +7,10 @@ use glam::DVec3;
 
 use crate::scene::Mesh;
 
-/// Normals at a shared position count as one up to this much per coordinate [1].
+/// Normals at a shared position that agree to this much per component are equal [1].
 const NORMAL_STEP: f64 = 1e-4;
 
-/// The group of every triangle, numbered from 0 in the order of their first triangles.
+/// Group of every triangle, numbered from 0 in the order of first triangles.
 pub fn smoothing_groups(mesh: &Mesh) -> Vec<u32> {
     let mut groups = Groups::new(mesh.positions.len());
     for &[a, b, c] in &mesh.triangles {
@@ -28,8 +28,8 @@ pub fn smoothing_groups(mesh: &Mesh) -> Vec<u32> {
         .collect()
 }
 
-/// Vertices that lie in one place with one normal are one, whatever else (texture coordinates) divides them. Only
-/// vertices at the border of a group can be such.
+/// Merges vertices of equal position and normal that other attributes (texture coordinates) split. Split vertices lie
+/// on the borders of groups: a single group has none.
 fn join_split_vertices(mesh: &Mesh, groups: &mut Groups) {
     let first = groups.root(0);
     if (0..mesh.positions.len() as u32).all(|vertex| groups.root(vertex) == first) {
@@ -46,7 +46,7 @@ fn join_split_vertices(mesh: &Mesh, groups: &mut Groups) {
     }
 }
 
-/// Disjoint sets of vertices.
+/// Disjoint sets of vertices (union-find).
 struct Groups {
     parents: Vec<u32>,
 }
@@ -72,7 +72,7 @@ impl Groups {
 
     fn join(&mut self, a: u32, b: u32) {
         let (a, b) = (self.root(a), self.root(b));
-        // The lower number leads, so that the order of the triangles alone decides.
+        // The lower index becomes the root, so that the result depends on the order of the triangles alone.
         self.parents[a.max(b) as usize] = a.min(b);
     }
 }

@@ -5,11 +5,11 @@ use glam::DVec3;
 use super::{MediumStack, Tracer};
 use crate::geometry::Ray;
 
-/// Surfaces that are looked at above the point before it is taken to be outside of all others.
+/// Surfaces crossed above the point before the search ends.
 const MAX_CROSSINGS: usize = 100_000;
 
-/// The media around a point: bodies of which a ray straight up leaves the inside more often than it enters, outermost
-/// first. Straight up, so that an open sheet of water with its normals up counts as what lies below it.
+/// Media around a point, outermost first: bodies that an upward ray leaves more often than it enters. Upward, so that
+/// an open sheet of water with its normals up counts as the water below it.
 pub fn media_at(tracer: &Tracer, point: DVec3) -> MediumStack {
     let scene = tracer.scene();
     let mut entered = vec![0u32; scene.objects.len()];
@@ -33,14 +33,14 @@ pub fn media_at(tracer: &Tracer, point: DVec3) -> MediumStack {
         }
         ray = hit.spawn(ray.direction);
     }
-    // A body that is inside out is left before it is entered: the point is in neither.
+    // An inside-out body is left before it is entered: the point is not inside it.
     let mut is_within = |object: &usize| {
         let is_balanced = entered[*object] > 0;
         entered[*object] -= u32::from(is_balanced);
         !is_balanced
     };
     left_from_inside.retain(&mut is_within);
-    // What is left first is innermost.
+    // The body that is left first is innermost.
     left_from_inside
         .into_iter()
         .rev()

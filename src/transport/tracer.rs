@@ -20,85 +20,80 @@ use crate::scene::{
     Adjacency, AlphaMask, Material, Mixture, Scene, SurfaceKind, TextureRef, Waves, instances,
 };
 
-/// A scene with its hierarchy. What edits of the scene leave as it is, edited copies share.
+/// A scene with its hierarchies and shape data. Edited copies share what the edits leave unchanged.
 #[derive(Debug)]
 pub struct Tracer {
     scene: Arc<Scene>,
     hierarchy: Arc<Hierarchy>,
-    /// Of each object.
+    /// By object.
     shapes: Vec<Arc<Shape>>,
-    /// Of specular objects; `None` for the others.
+    /// By object; `None` where it is not specular.
     specular: Vec<Option<Arc<SpecularShape>>>,
-    /// Whether waves and textures bend normals.
+    /// Whether waves and textures perturb normals.
     has_bumps: bool,
-    /// Whether anything is cut out of a surface.
+    /// Whether any material has an alpha mask.
     has_masks: bool,
-    /// Whether any surface is there in part.
+    /// Whether any material has partial coverage.
     has_partial: bool,
-    /// The wavelength of all light, where it has but one.
+    /// Wavelength of all light; `None` for RGB.
     wavelength: Option<Nanometres>,
 }
 
-/// What is found of the shape of an object when it is asked for.
+/// Shape data of an object, computed on first use.
 #[derive(Debug, Default)]
 struct Shape {
-    /// How its triangles hang together.
     adjacency: OnceLock<Adjacency>,
-    /// Its sharp edges.
     edges: OnceLock<Vec<[DVec3; 2]>>,
 }
 
-/// What is known of the shape of a specular object.
+/// Shape data of a specular object.
 #[derive(Debug)]
 struct SpecularShape {
-    /// How its normals turn.
     normals: NormalField,
     /// Smoothing group of each triangle.
     groups: Arc<Vec<u32>>,
-    /// Its sharp corners [m].
+    /// Sharp corners [m].
     corners: Vec<DVec3>,
-    /// Side of a texel of its normal texture [m].
+    /// Texel size of its normal texture [m].
     texel_m: Option<f64>,
 }
 
-/// The place where a ray met a surface, and nothing that follows from it: what is worth keeping of a hit.
+/// Where a ray hit a surface, without derived data: the compact form to store.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayHit {
     /// Index into `Scene::objects`.
     pub object: u32,
     /// Index into the object's triangles.
     pub triangle: u32,
-    /// Of the triangle's corners.
     pub barycentric: [f64; 3],
     /// From the ray's origin [m].
     pub distance_m: f64,
 }
 
-/// A point of a surface that a ray met.
+/// A surface point hit by a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceHit {
     /// Index into `Scene::objects`.
     pub object: usize,
     /// Index into the object's triangles.
     pub triangle: usize,
-    /// Of the triangle's corners.
     pub barycentric: [f64; 3],
     /// From the ray's origin [m].
     pub distance_m: f64,
-    /// Where [m].
+    /// [m].
     pub point: DVec3,
-    /// Bound of the rounding error of `point` per axis [m].
+    /// Bound on the rounding error of `point` per axis [m].
     pub point_error: DVec3,
     /// Unit, by the triangle's winding: outwards.
     pub geometric_normal: DVec3,
-    /// Unit, interpolated from the vertices: of the surface that the mesh stands for.
+    /// Unit, interpolated from the vertices: the normal of the smooth surface that the mesh approximates.
     pub interpolated_normal: DVec3,
-    /// Unit, what turns light: the interpolated one, bent by the bumps of a specular surface.
+    /// Unit, the normal for scattering: interpolated, and perturbed by the bumps of a specular surface.
     pub shading_normal: DVec3,
 }
 
 impl SurfaceHit {
-    /// A ray that leaves this point in a unit direction, without meeting the surface again there.
+    /// A ray that leaves this point in a unit direction, offset so that it does not hit the surface again.
     pub fn spawn(&self, direction: DVec3) -> Ray {
         Ray {
             origin: ray::offset_origin(self.point, self.point_error, self.geometric_normal, direction),
@@ -113,7 +108,7 @@ impl Tracer {
         Self::sharing(scene, instances::MAX_COPIED)
     }
 
-    /// The same, where copies of one mesh have no more than that many triangles.
+    /// `max_copied`: see [`instances::MAX_COPIED`].
     pub(super) fn sharing(scene: Arc<Scene>, max_copied: usize) -> Self {
         let hierarchy = Arc::new(Hierarchy::new(&scene, max_copied));
         let specular = (0..scene.objects.len())
@@ -132,8 +127,7 @@ impl Tracer {
         }
     }
 
-    /// For an edited copy of the scene, with the same objects and for light of all wavelengths: builds only what the
-    /// edits changed.
+    /// Tracer of an edited copy of the scene, for light of all wavelengths; rebuilds only what the edits changed.
     #[must_use]
     pub fn edited(&self, scene: Arc<Scene>) -> Self {
         let is_same = |object: usize| {
@@ -174,7 +168,7 @@ impl Tracer {
         }
     }
 
-    /// The same scene with the normals that its meshes have.
+    /// The same scene with the unperturbed normals of its meshes.
     #[must_use]
     pub fn without_bumps(&self) -> Self {
         Self {
@@ -189,7 +183,7 @@ impl Tracer {
         }
     }
 
-    /// The same scene for rays that pass clear bodies as if these were not there.
+    /// The same scene without its clear bodies: rays pass straight through them.
     #[must_use]
     pub fn without_clear_bodies(&self) -> Self {
         let mut scene = Scene::clone(&self.scene);
@@ -200,7 +194,7 @@ impl Tracer {
         self.edited(Arc::new(scene))
     }
 
-    /// The same scene with the refractive indices of one wavelength; colours stay as they are.
+    /// The same scene with the refractive indices of one wavelength. Colours are unchanged.
     #[must_use]
     pub fn with_indices_at(&self, wavelength: Nanometres) -> Self {
         let mut scene = Scene::clone(&self.scene);
@@ -210,8 +204,8 @@ impl Tracer {
         self.edited(Arc::new(scene))
     }
 
-    /// The same scene for the light of a lamp that is followed at some of its wavelengths, with factors in RGB on its
-    /// way: metals of a known substance have the factor of [`Metal::factor_under`](crate::optics::Metal::factor_under).
+    /// The same scene for a lamp that is traced at some of its wavelengths with RGB throughput: metals of a known
+    /// substance have the factor of [`Metal::factor_under`](crate::optics::Metal::factor_under).
     #[must_use]
     pub fn with_metals_under(&self, lamp: &Spectrum) -> Self {
         let mut scene = Scene::clone(&self.scene);
@@ -223,9 +217,9 @@ impl Tracer {
         self.edited(Arc::new(scene))
     }
 
-    /// The same scene as light of one wavelength meets it: metals of a known substance reflect as they do there, the
-    /// same in all channels. All other colours stay as they are: [`ColourBasis`](crate::optics::ColourBasis) tells what
-    /// they are there.
+    /// The same scene at one wavelength: metals of a known substance have their reflectance there, equal in all
+    /// channels. Other colours are unchanged: [`ColourBasis`](crate::optics::ColourBasis) has their values at the
+    /// wavelength.
     #[must_use]
     pub fn at_wavelength(&self, wavelength: Nanometres) -> Self {
         Self {
@@ -234,12 +228,12 @@ impl Tracer {
         }
     }
 
-    /// The wavelength of the light that this is for; `None` where it is red, green and blue at once.
+    /// Wavelength of the traced light; `None` for RGB.
     pub fn wavelength(&self) -> Option<Nanometres> {
         self.wavelength
     }
 
-    /// Whether something bends the normals of an object.
+    /// Whether anything perturbs the normals of an object.
     fn is_bumpy(&self, object: usize) -> bool {
         self.has_bumps && self.scene.material_of(object).has_bumps()
     }
@@ -249,7 +243,7 @@ impl Tracer {
             return None;
         }
         let shared = hierarchy.shared(object);
-        // A copy of what was moved takes no more memory than the one before.
+        // A moved object stores its operators, which takes no more memory than its copy did.
         let normals = match shared.filter(|_| !hierarchy.is_moved(object)) {
             Some(shared) => NormalField::Found(Arc::clone(&shared.around)),
             None => NormalField::new(scene.objects[object].mesh_in_scene()),
@@ -268,17 +262,17 @@ impl Tracer {
         }))
     }
 
-    /// How the normals of an object turn; `None` where it is not specular.
+    /// Shape operators of an object; `None` where it is not specular.
     pub fn normal_field(&self, object: usize) -> Option<&NormalField> {
         self.specular[object].as_ref().map(|shape| &shape.normals)
     }
 
-    /// Sharp corners of an object [m]; none where it is not specular.
+    /// Sharp corners of an object [m]; empty where it is not specular.
     pub fn sharp_corners(&self, object: usize) -> &[DVec3] {
         self.specular[object].as_ref().map_or(&[], |shape| &shape.corners)
     }
 
-    /// Sharp edges of an object, both ends of each [m]; none where there are very many.
+    /// End points of each sharp edge of an object [m]; empty where there are too many.
     pub fn sharp_edges(&self, object: usize) -> &[[DVec3; 2]] {
         let edges = &self.shapes[object].edges;
         edges.get_or_init(|| sharp_edges(self.scene.objects[object].in_scene()))
@@ -292,18 +286,16 @@ impl Tracer {
             .unwrap_or(0)
     }
 
-    /// How the triangles of an object hang together.
     pub fn adjacency(&self, object: usize) -> &Adjacency {
         let adjacency = &self.shapes[object].adjacency;
         adjacency.get_or_init(|| Adjacency::of(self.scene.objects[object].in_scene()))
     }
 
-    /// The scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
-    /// The nodes of its hierarchies that lie around all triangles.
+    /// Root nodes that together hold all triangles.
     pub fn roots(&self) -> Vec<SceneNode<'_>> {
         self.hierarchy.roots()
     }
@@ -312,13 +304,13 @@ impl Tracer {
         &self.hierarchy
     }
 
-    /// The nearest surface in front of the ray's origin.
+    /// Closest surface in front of the ray's origin.
     pub fn closest_hit(&self, ray: &Ray) -> Option<SurfaceHit> {
         let (place, found) = self.closest(ray)?;
         Some(self.surface_with(&place, &self.hierarchy.corners(found)))
     }
 
-    /// Where the nearest surface in front of the ray's origin is met.
+    /// Closest hit in front of the ray's origin, without surface data.
     pub fn intersect(&self, ray: &Ray) -> Option<RayHit> {
         Some(self.closest(ray)?.0)
     }
@@ -332,7 +324,7 @@ impl Tracer {
         }
     }
 
-    /// The surface at a place that a ray met.
+    /// Surface data of a hit.
     pub fn surface_at(&self, hit: &RayHit) -> SurfaceHit {
         let mesh = self.scene.objects[hit.object as usize].in_scene();
         self.surface_with(hit, &mesh.corners(hit.triangle as usize))
@@ -366,7 +358,7 @@ impl Tracer {
         surface
     }
 
-    /// Gradient of the height that bends the normal at a hit [1]; `None` where nothing does.
+    /// Height gradient that perturbs the normal at a hit [1]; `None` without bumps.
     pub(super) fn bump_gradient(&self, hit: &SurfaceHit) -> Option<DVec3> {
         if !self.is_bumpy(hit.object) {
             return None;
@@ -377,7 +369,7 @@ impl Tracer {
         Some(of_waves.unwrap_or_default() + of_texture.unwrap_or_default())
     }
 
-    /// Its change [1] for a step [m] along the surface.
+    /// Change of the height gradient [1] for a step [m] along the surface.
     pub(super) fn bump_gradient_change(&self, hit: &SurfaceHit, step: DVec3) -> DVec3 {
         let waves = self.scene.material_of(hit.object).bending_waves();
         let of_waves = waves.map(|waves| waves.gradient_change(hit.point, step));
@@ -392,7 +384,7 @@ impl Tracer {
         TextureBump::at((&self.scene, mesh), map, place, hit.interpolated_normal)
     }
 
-    /// Length of the finest waves of a specular object's normals, beyond what its mesh has [m]; infinite without.
+    /// Finest length scale of a specular object's bumps, beyond its mesh [m]; infinite without bumps.
     pub fn finest_bump_m(&self, object: usize) -> f64 {
         match &self.specular[object] {
             Some(_) if !self.is_bumpy(object) => f64::INFINITY,
@@ -419,8 +411,7 @@ impl Tracer {
         }
     }
 
-    /// Share of the light along a ray that no surface before `distance_m` stops: where one is there in part, the rest goes
-    /// straight on.
+    /// Visibility along a shadow ray up to `distance_m`: the product of the uncovered fractions of all surfaces on it.
     pub fn passing_share(&self, ray: &Ray, distance_m: f64) -> f64 {
         if !self.has_partial {
             return f64::from(u8::from(!self.is_blocked(ray, distance_m)));
@@ -442,13 +433,13 @@ impl Tracer {
         if is_blocked {
             return 0.0;
         }
-        // The same product in whichever order the hierarchies have them.
+        // Sorted, so that the product does not depend on the order of traversal.
         let mut holes = holes.into_inner();
         holes.sort_unstable_by(f64::total_cmp);
         holes.iter().product()
     }
 
-    /// Whether a surface is there at a place of a triangle, or cut out.
+    /// Whether the surface exists at a point of a triangle or is cut out by its alpha mask.
     fn is_there(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> bool {
         let material = self.scene.material_of(object);
         let Some(mask) = &material.alpha_mask else {
@@ -460,7 +451,7 @@ impl Tracer {
         )
     }
 
-    /// What the surface is made of at a place of a triangle; by the material's factors alone without `textures`.
+    /// Mixture of surface classes at a point of a triangle; by the material's factors alone without `textures`.
     pub(super) fn mixture(
         &self,
         object: usize,
@@ -479,7 +470,7 @@ impl Tracer {
         )
     }
 
-    /// What the diffuse body of a surface takes at a place of a triangle.
+    /// Response of the diffuse component at a point of a triangle.
     pub fn taking(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> DiffuseResponse {
         let material = self.scene.material_of(object);
         let (share, polish) = match material.surface {
@@ -497,12 +488,12 @@ impl Tracer {
         }
     }
 
-    /// Base colour of the surface at a hit, its texture included.
+    /// Base colour at a hit, including texture and vertex colours.
     pub fn base_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
         self.scene.material_of(hit.object).base_colour * self.texture_colour(hit)
     }
 
-    /// What texture and vertices at a hit multiply the base colour by: white where there is nothing.
+    /// Factor of texture and vertex colours on the base colour at a hit: white without either.
     pub(super) fn texture_colour(&self, hit: &SurfaceHit) -> LinearSrgb {
         let image = self.scene.material_of(hit.object).base_colour_texture.as_ref();
         let place = (hit.object, hit.triangle);

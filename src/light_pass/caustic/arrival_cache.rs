@@ -9,12 +9,12 @@ use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::optics::LinearSrgb;
 
-/// All that one light sent to diffuse surfaces, row by row of its lattice.
+/// All arrivals of one light at diffuse surfaces, row by row of its lattice.
 #[derive(Debug, Default)]
 pub struct ArrivalCache {
     /// Rows of all faces, face by face.
     rows: Vec<KeptRow>,
-    /// Accounts of the paths; `Deposited` is not among them.
+    /// Ledger of the paths, without `Deposited`.
     ledger: LedgerSum,
     bytes: u64,
 }
@@ -24,15 +24,15 @@ fn is_grey(arrival: &Arrival) -> bool {
     r == g && g == b
 }
 
-/// Arrivals of one row, in their order.
+/// Arrivals of one row, in order.
 #[derive(Debug)]
 struct KeptRow {
     arrivals: Box<[StoredArrival]>,
-    /// Second and third channel of each arrival's flux [W]; empty where all are grey.
+    /// Second and third channel of each arrival's flux [W]; empty if all are grey.
     colours: Box<[[f64; 2]]>,
 }
 
-/// An arrival without what follows from the rest: 56 bytes.
+/// An arrival without what can be derived from the rest: 56 bytes.
 #[derive(Clone, Copy, Debug)]
 struct StoredArrival {
     signature: u64,
@@ -46,22 +46,20 @@ struct StoredArrival {
 }
 
 impl ArrivalCache {
-    /// Memory taken [bytes].
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Number of arrivals.
     pub fn arrivals(&self) -> u64 {
         self.rows.iter().map(|row| row.arrivals.len() as u64).sum()
     }
 
-    /// Accounts of the paths.
+    /// Ledger of the paths, without `Deposited`.
     pub fn ledger(&self) -> &LedgerSum {
         &self.ledger
     }
 
-    /// Adds the next rows that were traced.
+    /// Appends the next traced rows.
     pub fn push(&mut self, traced: &[TracedRow]) {
         let rows: Vec<KeptRow> = traced.par_iter().map(KeptRow::pack).collect();
         self.bytes += rows.iter().map(KeptRow::bytes).sum::<u64>();
@@ -69,8 +67,8 @@ impl ArrivalCache {
         traced.iter().for_each(|row| self.ledger.merge(&row.ledger));
     }
 
-    /// A row as [`Lattice::trace_row`] traced it, bit by bit, without its accounts. A thinner lattice takes what its
-    /// own rays brought.
+    /// A row identical to that of [`Lattice::trace_row`], bit by bit, but without its ledger. A lattice with strides
+    /// gets the arrivals of its own rays.
     pub fn row(&self, lattice: &Lattice, face: usize, row: usize) -> TracedRow {
         let fine_row = lattice.fine_row(row);
         let kept = &self.rows[face * lattice.size.1 + fine_row];
@@ -120,7 +118,7 @@ impl KeptRow {
         }
     }
 
-    /// All but its point.
+    /// Everything except its point.
     fn unpack(&self, index: usize) -> Arrival {
         let kept = &self.arrivals[index];
         let [g, b] = self

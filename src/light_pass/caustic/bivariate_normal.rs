@@ -7,15 +7,15 @@ use super::numeric::exp;
 /// Gauss-Legendre nodes and weights on [0, 1].
 type Rule = &'static [(f64, f64)];
 
-/// Correlation from which the expansion about full correlation errs by less than 2e-5.
+/// Correlation above which the expansion about full correlation errs by less than 2e-5.
 const STRONG: f64 = 0.9;
 
-/// The distribution of a pair of correlated normal variables for all borders of a row.
+/// Distribution function of two correlated normal variables at all borders of a row.
 #[derive(Debug, Default)]
 pub(super) struct BivariateNormal {
     correlation: f64,
     nodes: [Node; 8],
-    /// Of the nodes.
+    /// Number of nodes.
     count: usize,
 }
 
@@ -34,7 +34,7 @@ struct Node {
 pub(super) struct Borders<'a> {
     /// Ascending, a fixed step apart [standard deviations].
     pub(super) at: &'a [f64],
-    /// Share of the kernel below each.
+    /// Share of the kernel below each border.
     pub(super) below: &'a [f64],
 }
 
@@ -56,8 +56,8 @@ impl BivariateNormal {
         }
     }
 
-    /// Shares of the kernel before each of the borders given to [`Self::set`] and before the border `v` of the other
-    /// axis, before which lies a share of `below` in all.
+    /// Shares of the kernel below each of the borders given to [`Self::set`] and below the border `v` of the other
+    /// axis, below which lies a share of `below` in all.
     pub(super) fn shares(&self, borders: Borders, v: f64, below: f64, shares: &mut [f64]) {
         if self.correlation.abs() > STRONG {
             self.strong(borders, v, below, shares);
@@ -66,9 +66,9 @@ impl BivariateNormal {
         }
     }
 
-    /// The product of both axes' distributions, and what correlation adds (Plackett 1954): the integral over r from 0
-    /// to the correlation of the density of two variables of correlation r. Exponentials run along the borders by
-    /// recurrence.
+    /// The product of both axes' distributions plus the contribution of the correlation (Plackett 1954): the integral
+    /// over r from 0 to the correlation of the density of two variables of correlation r. Exponentials run along the
+    /// borders by recurrence.
     fn weak(&self, borders: Borders, v: f64, below: f64, shares: &mut [f64]) {
         for (share, left) in shares.iter_mut().zip(borders.below) {
             *share = left * below;
@@ -89,8 +89,8 @@ impl BivariateNormal {
         }
     }
 
-    /// What the distribution of fully correlated variables is less than: the integral of the same density from the
-    /// correlation to 1, by expansion in √(1 − r²) (Genz 2004, without the remainder that he integrates numerically).
+    /// The distribution of fully correlated variables minus the integral of the same density from the correlation to 1,
+    /// by expansion in √(1 − r²) (Genz 2004, without the remainder that he integrates numerically).
     fn strong(&self, borders: Borders, v: f64, below: f64, shares: &mut [f64]) {
         let square = 1.0 - self.correlation * self.correlation;
         let root = square.sqrt();
@@ -123,7 +123,7 @@ fn missing(u: f64, v: f64, square: f64, root: f64) -> f64 {
     exp(-0.5 * product) * (near - far) * (1.0 / std::f64::consts::TAU)
 }
 
-/// The rule that errs by less than 1e-5 of the kernel at a correlation.
+/// The cheapest rule that errs by less than 1e-5 of the kernel at a correlation.
 fn rule(correlation: f64) -> Rule {
     match correlation {
         c if c < 1e-6 => &[],

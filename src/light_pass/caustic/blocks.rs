@@ -11,14 +11,14 @@ use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::settings::KernelSampling;
 
-/// Splats of a task.
+/// Most splats of a task.
 const MAX_SPLATS: usize = 1024;
 
-/// Side of the tiles whose splats go together, for the narrowest ones [texels]; each further class of splats and their
-/// tiles is twice as wide, so that wide splats do not make large blocks of many narrow ones.
+/// Side of the tiles by which the narrowest splats are grouped [texels]. Each further class of splats has tiles twice
+/// as wide, so that wide splats do not enlarge the blocks of many narrow ones.
 const TILE: u32 = 32;
 
-/// Rows of a map that are locked at once.
+/// Rows of a map that are locked together.
 const ROWS_PER_STRIPE: usize = 16;
 
 /// Texels that a splat may add to, after folding at the map's borders.
@@ -47,7 +47,7 @@ impl SplatBounds {
         }
     }
 
-    /// Class and tile of a splat in one number.
+    /// Class and tile of a splat in one sort key.
     fn key(self, width: usize) -> u64 {
         let side = (self.columns.1 - self.columns.0).max(self.rows.1 - self.rows.0) + 1;
         let class = (2 * side / TILE).checked_ilog2().map_or(0, |class| class + 1);
@@ -57,8 +57,8 @@ impl SplatBounds {
     }
 }
 
-/// Texels of a line of `size` that a kernel over first to last, from a centre, comes to after folding: a kernel that
-/// crosses a border comes back at most to that border's mirror image of its far end.
+/// Range of a line of `size` texels that a kernel over first to last covers after folding: a kernel that crosses a
+/// border is folded back no farther than the mirror image of its far end.
 fn folded((first, last): (i64, i64), centre: f64, size: usize) -> (u32, u32) {
     let size = size as i64;
     let home = fold(centre as i64, size as usize) as i64;
@@ -150,7 +150,7 @@ fn add_all<'a>(
     ledger
 }
 
-/// A rectangle of texels of a map, with what one task adds to them.
+/// A rectangle of a map's texels with what one task adds to them.
 #[derive(Debug, Default)]
 pub struct Block {
     /// Column and row of its first texel.
@@ -172,7 +172,7 @@ impl Block {
         }
     }
 
-    /// Consecutive texels of one of the map's rows. The block holds all texels that its splats reach.
+    /// Consecutive texels of one of the map's rows. The block contains all texels that its splats reach.
     pub(super) fn row_mut(&mut self, column: usize, row: usize, count: usize) -> &mut [FluxCount] {
         let begin = (row - self.origin.1) * self.size.0 + column - self.origin.0;
         &mut self.texels[begin..begin + count]

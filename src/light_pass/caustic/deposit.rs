@@ -17,36 +17,34 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::settings::{BakeSettings, Kernel, KernelSampling, Sigma};
 
-/// How kernels are made from arrivals.
+/// Makes kernels of flux from arrivals and deposits them.
 #[derive(Clone, Copy, Debug)]
 pub struct Depositor<'a> {
-    /// Of the rays.
+    /// Lattice of the rays.
     pub lattice: Lattice<'a>,
-    /// Kernel, footprint, sigma.
     pub settings: &'a BakeSettings,
-    /// Mean footprints of a coarser run, where the settings ask for them.
+    /// Mean footprints of a coarser run, where the settings need them.
     pub statistics: Option<&'a FootprintStatistics>,
-    /// Whether sizes of footprints are wanted.
+    /// Whether sizes of footprints are recorded.
     pub gathers: bool,
 }
 
-/// A traced row with those before and after it.
+/// A traced row with its neighbours.
 #[derive(Clone, Copy, Debug)]
 pub struct RowContext<'a> {
-    /// The row itself.
     pub row: &'a TracedRow,
-    /// Its index in the lattice.
+    /// Index in the lattice.
     pub index: usize,
     pub before: Option<&'a TracedRow>,
     pub after: Option<&'a TracedRow>,
 }
 
-/// Maps of both half sets of rays, or of all in one.
+/// Maps of both half sets of rays, or of all rays together.
 #[derive(Debug)]
 pub struct HalfBuffers<'a> {
-    /// Of every ray, or of every other one.
+    /// Of all rays, or of every other one.
     pub first: &'a mut ReceiverMaps,
-    /// Of the rest.
+    /// Of the remaining rays.
     pub second: Option<&'a mut ReceiverMaps>,
 }
 
@@ -67,7 +65,7 @@ impl HalfBuffers<'_> {
     }
 }
 
-/// What a deposit did.
+/// Result of a deposit.
 #[derive(Clone, Debug, Default)]
 pub struct DepositReport {
     /// Deposited and unresolved flux.
@@ -79,8 +77,8 @@ pub struct DepositReport {
 }
 
 impl Depositor<'_> {
-    /// Deposits rows of one face. Maps must have been touched for every receiver of the arrivals. Of neighbouring rays every
-    /// other one goes to the second half set, where there is one.
+    /// Deposits rows of one face. Maps must have been touched for every receiver of the arrivals. Half sets, if there
+    /// are two, take rays in a checkerboard pattern.
     pub fn deposit(&self, rows: &[RowContext], halves: &mut HalfBuffers) -> DepositReport {
         let parts: Vec<RowSplats> = rows
             .par_iter()
@@ -201,7 +199,7 @@ impl Depositor<'_> {
             flux: self.lattice.unit.count(arrival.flux_w),
             island: map.island(arrival),
         };
-        // Only a gaussian is smooth at every level; point samples are to be the paper's.
+        // Only a Gaussian is smooth at every level. Point samples have to be those of the paper.
         let smooth = self.settings.kernel == Kernel::Gaussian
             && self.settings.kernel_sampling == KernelSampling::Integrated;
         let level = if smooth && map.level_for(splat.narrower_spread()) > 0 {
@@ -221,20 +219,20 @@ impl Depositor<'_> {
     }
 }
 
-/// A splat with where it goes.
+/// A splat with its target.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct PlacedSplat {
     receiver: Receiver,
-    /// Of its map.
+    /// Level of the map.
     level: u32,
     /// Whether its ray belongs to the second half set.
     is_second: bool,
-    /// Where it may add.
+    /// Texels that it may add to.
     pub(super) reach: SplatBounds,
     pub(super) splat: Splat,
 }
 
-/// What one row gave.
+/// Result of one row.
 #[derive(Debug, Default)]
 struct RowSplats {
     splats: Vec<PlacedSplat>,

@@ -8,11 +8,8 @@ use crate::settings::Footprint;
 /// A symmetric 2×2 matrix M in texel coordinates: the footprint is the ellipse dᵀM⁻¹d ≤ 1, of area π√det M texels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ellipse {
-    /// Across, across.
     pub xx: f64,
-    /// Across, down.
     pub xy: f64,
-    /// Down, down.
     pub yy: f64,
 }
 
@@ -34,7 +31,7 @@ impl Ellipse {
         }
     }
 
-    /// Every radius times √factor.
+    /// Scales every radius by √factor.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self {
@@ -44,7 +41,7 @@ impl Ellipse {
         }
     }
 
-    /// With across and down exchanged.
+    /// With x and y exchanged.
     #[must_use]
     pub fn transposed(self) -> Self {
         Self {
@@ -63,7 +60,7 @@ impl Ellipse {
         std::f64::consts::PI * self.determinant().sqrt()
     }
 
-    /// With every radius grown by rounding-proof ε texels, so that a line or a point keeps an inverse.
+    /// Adds a radius in quadrature in all directions, so that a line or a point keeps an inverse.
     pub fn at_least(self, radius_texels: f64) -> Self {
         let floor = radius_texels * radius_texels;
         Self {
@@ -78,7 +75,7 @@ impl Ellipse {
     }
 }
 
-/// Where the neighbours of an arrival arrived, by the same way on the same object.
+/// Arrivals of the neighbouring rays that took the same path to the same receiver.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Neighbours<'a> {
     /// One column before and after.
@@ -90,10 +87,10 @@ pub struct Neighbours<'a> {
 /// Local geometry of the receiver's map: rows of the linear map from metres to texels.
 pub type TexelFromWorld = [DVec3; 2];
 
-/// The footprint of an arrival that stands for one lattice cell.
+/// The footprint of an arrival that represents one lattice cell.
 ///
-/// `unbent_area_m2` is the cell's area were its light never bent: the size for [`Footprint::Distance`], and wherever
-/// no neighbour tells more. `fixed_area_m2` is the size for [`Footprint::Fixed`].
+/// `unbent_area_m2` is the cell's area if its light were never deflected: the size for [`Footprint::Distance`], and the
+/// fallback without neighbours. `fixed_area_m2` is the size for [`Footprint::Fixed`].
 pub fn footprint(
     kind: Footprint,
     arrival: &Arrival,
@@ -128,10 +125,10 @@ pub fn footprint(
     }
 }
 
-/// The ellipse that the neighbours span: with J = [a b] the displacement per column and row of the lattice, the
-/// cell's image has the area |det J|, and M = (aaᵀ + bbᵀ)/π is the ellipse of that area and of its shape. aaᵀ is the
-/// mean over the steps forth and back, which keeps the spread where the wavefront folds and the two cancel. A
-/// direction without neighbours is taken as wide as the other; `None` without any.
+/// The ellipse that the neighbours span. With J = [a b] the displacement per column and row of the lattice, the cell's
+/// image has the area |det J|, and M = (aaᵀ + bbᵀ)/π is the ellipse of this area and shape. aaᵀ is the mean over the
+/// steps forwards and backwards, which preserves the spread where the wavefront folds and the two cancel. A direction
+/// without neighbours is as wide as the other; `None` without any.
 fn spanned(arrival: &Arrival, neighbours: &Neighbours, texel_from_world: &TexelFromWorld) -> Option<Ellipse> {
     let spread = |steps: [Option<&Arrival>; 2]| {
         let mut sum = Ellipse::default();

@@ -8,13 +8,13 @@ use super::footprint::Ellipse;
 use super::kernel::normal_distribution;
 use super::numeric::{exp, floor};
 
-/// Most texels of a window each way.
+/// Most columns or rows of a window.
 pub(super) const MAX_TEXELS: usize = 24;
 
 /// Standard deviations that a window reaches; the outermost texels take what lies beyond, below 1e-4 on each side.
 const REACH: f64 = 3.75;
 
-/// Standard deviation [texels] from which [`Centred`] errs by less than 1e-4 of the peak.
+/// Standard deviation [texels] above which [`Centred`] errs by less than 1e-4 of the peak.
 pub(super) const WIDE_TEXELS: f64 = 2.5;
 
 /// Texels that a small kernel reaches.
@@ -26,7 +26,7 @@ pub(super) struct Block {
     pub(super) size: (usize, usize),
 }
 
-/// Integrates small kernels; reused from one to the next.
+/// Integrates small kernels; reused from kernel to kernel.
 #[derive(Debug, Default)]
 pub(super) struct Cornered {
     across: Axis,
@@ -46,7 +46,7 @@ struct Axis {
 }
 
 impl Axis {
-    /// `step` is 1 / `deviation`. Says whether the kernel is narrow enough.
+    /// `step` is 1 / `deviation`. Returns whether the kernel is narrow enough.
     fn set(&mut self, centre: f64, deviation: f64, step: f64) -> bool {
         let first = floor(centre - REACH * deviation);
         let last = floor(centre + REACH * deviation);
@@ -67,8 +67,8 @@ impl Axis {
 }
 
 impl Cornered {
-    /// Fills `weights`, row by row, with the integrals over the texels of a kernel of the given covariance [texels²];
-    /// they add up to 1. `None` where the kernel is too wide or too thin for this.
+    /// Fills `weights`, row by row, with the integrals of a kernel of the given covariance [texels²] over the texels;
+    /// they sum to 1. `None` where the kernel is too wide or too thin for this method.
     pub(super) fn integrate(
         &mut self,
         centre: DVec2,
@@ -121,7 +121,7 @@ impl Cornered {
     }
 }
 
-/// Values at the texels' centres of a wide kernel that was convolved with a texel, for its own variance of 1/12.
+/// Samples a wide kernel at the texels' centres, after convolution with a texel, which adds a variance of 1/12.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Centred {
     /// Half the inverse of the covariance.
@@ -143,7 +143,7 @@ impl Centred {
         }
     }
 
-    /// Fills the weights of a row of texels whose first centre lies at (x, y) from the kernel's: each is the one before
+    /// Fills the weights of a row of texels whose first centre is at (x, y) from the kernel's: each is the previous one
     /// times a ratio that itself changes by a constant factor.
     pub(super) fn fill_row(&self, x: f64, y: f64, weights: &mut [f64]) {
         let Ellipse { xx, xy, yy } = self.half;
@@ -162,7 +162,7 @@ impl Centred {
 mod tests {
     use super::*;
 
-    /// Midpoint sums over parts of each texel.
+    /// Midpoint sums over subdivisions of each texel.
     fn by_grid(centre: DVec2, covariance: Ellipse, column: i64, row: i64) -> f64 {
         let Ellipse { xx, xy, yy } = covariance;
         let determinant = xx * yy - xy * xy;

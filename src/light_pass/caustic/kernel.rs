@@ -13,21 +13,21 @@ use crate::settings::Kernel;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Profile {
     kernel: Kernel,
-    /// √σ, footprint radii; used by the gaussian.
+    /// √σ of a Gaussian [footprint radii].
     spread: f64,
 }
 
-/// √(π/2), the whole of the half normal integral.
+/// √(π/2), the limit of the half normal integral.
 pub(super) const SQRT_HALF_PI: f64 = 1.253_314_137_315_500_3;
 
-/// Spreads at which the gaussian is cut.
+/// Spreads at which the Gaussian is truncated.
 const CUT_SPREADS: f64 = 4.0;
 
-/// Half side of the box of the unit disc's area.
+/// Half side of the box with the unit disc's area.
 const BOX_HALF_SIDE: f64 = 0.886_226_925_452_758;
 
 impl Profile {
-    /// A kernel; `sigma` > 0 is the gaussian's σ of eq. 4.4, exp(−r²/2σ), r in footprint radii.
+    /// `sigma` > 0 is the Gaussian's σ of eq. 4.4, exp(−r²/2σ), r in footprint radii.
     pub fn new(kernel: Kernel, sigma: f64) -> Self {
         Self {
             kernel,
@@ -56,12 +56,12 @@ impl Profile {
         }
     }
 
-    /// ∫ w ds from 0 to `s` at `t`, unnormalised; odd in s. `s` within the chord.
+    /// ∫ w ds from 0 to `s` at `t`, unnormalised; odd in s. `s` must be within the chord.
     pub fn chord_integral(&self, s: f64, t: f64) -> f64 {
         self.line(t).integral(s)
     }
 
-    /// What is the same along the line at `t`.
+    /// What is constant along the line at `t`.
     pub(super) fn line(&self, t: f64) -> Line {
         match self.kernel {
             Kernel::Disc | Kernel::Box => Line::Constant,
@@ -95,7 +95,7 @@ impl Profile {
         }
     }
 
-    /// Standard deviation of a gaussian [footprint radii]; `None` for the others.
+    /// Standard deviation of a Gaussian [footprint radii]; `None` for other kernels.
     pub fn deviation(&self) -> Option<f64> {
         (self.kernel == Kernel::Gaussian).then_some(self.spread)
     }
@@ -139,7 +139,7 @@ impl Line {
 /// Steps of the table on each side of zero.
 const TABLE_STEPS: usize = 512;
 
-/// ∫₀ˣ exp(−x²/2) dx and exp(−x²/2) at equal steps of [−4, 4]; by Simpson's rule on 16 parts a step.
+/// ∫₀ˣ exp(−x²/2) dx and exp(−x²/2) at equal steps of [−4, 4]; by Simpson's rule on 16 parts per step.
 static HALF_NORMAL: LazyLock<Box<[[f64; 2]; 2 * TABLE_STEPS + 1]>> = LazyLock::new(|| {
     let density = |x: f64| (-0.5 * x * x).exp();
     let step = CUT_SPREADS / TABLE_STEPS as f64;
@@ -159,8 +159,8 @@ static HALF_NORMAL: LazyLock<Box<[[f64; 2]; 2 * TABLE_STEPS + 1]>> = LazyLock::n
     table
 });
 
-/// ∫₀ˣ exp(−x²/2) dx for |x| ≤ 4, odd; beyond, the value at ±4. Taylor's series to third order about the nearest
-/// step: within 1e-10.
+/// ∫₀ˣ exp(−x²/2) dx for |x| ≤ 4, odd; beyond, the value at ±4. Taylor series to third order about the nearest step:
+/// within 1e-10.
 pub(super) fn half_normal_integral(x: f64) -> f64 {
     const STEPS_PER_SPREAD: f64 = TABLE_STEPS as f64 / CUT_SPREADS;
     let x = x.clamp(-CUT_SPREADS, CUT_SPREADS);
@@ -172,9 +172,9 @@ pub(super) fn half_normal_integral(x: f64) -> f64 {
     value + density * d * curve
 }
 
-/// Standard normal distribution function, as though all of it lay within 4.
+/// Standard normal distribution function, truncated to |x| ≤ 4 and normalised.
 pub(super) fn normal_distribution(x: f64) -> f64 {
-    /// At 4.
+    /// Half normal integral at 4.
     const WHOLE: f64 = 1.253_234_749_285_228_5;
     0.5 + half_normal_integral(x) * (0.5 / WHOLE)
 }

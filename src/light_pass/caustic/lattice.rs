@@ -15,41 +15,37 @@ use crate::scene::Scene;
 use crate::settings::RayPlacement;
 use crate::transport::Tracer;
 
-/// All that is needed to trace the lattice of one light.
+/// Everything needed to trace the lattice of one light.
 #[derive(Clone, Copy, Debug)]
 pub struct Lattice<'a> {
-    /// The scene.
     pub tracer: &'a Tracer,
-    /// The wavelength of its rays; `None` of light without one.
+    /// The wavelength of its rays; `None` for RGB.
     pub band: Option<&'a SpectralNode>,
-    /// Where rays start.
     pub launch: &'a Launch,
-    /// Which cells are worth a ray.
+    /// Marks the cells worth tracing.
     pub item_buffer: &'a ItemBuffer,
     /// Columns and rows of each face.
     pub size: (usize, usize),
-    /// Every so many-th column and row alone is traced, its arrivals for as many cells; 1 for the whole lattice. Accounts
-    /// of a thinner lattice are those of its rays alone.
+    /// Only every n-th column and row is traced, and its arrivals represent as many cells; 1 for the whole lattice. The
+    /// ledger covers the traced rays alone.
     pub strides: (usize, usize),
-    /// Where in its cell a ray starts.
+    /// Placement of rays within their cells.
     pub placement: RayPlacement,
-    /// Where that is where all rays start alike, [0, 1)².
+    /// Common place of the rays within their cells for [`RayPlacement::Lattice`], [0, 1)².
     pub centre: DVec2,
-    /// Of the jitter.
+    /// Seed of the jitter.
     pub seed: u64,
     pub limits: PathLimits,
-    /// Of the accounts.
+    /// Unit of the flux counts.
     pub unit: FluxUnit,
 }
 
-/// One traced row: arrivals in ascending order of their column.
+/// One traced row: arrivals in ascending order of their columns.
 #[derive(Clone, Debug, Default)]
 pub struct TracedRow {
     /// Column of each arrival.
     pub columns: Vec<u32>,
-    /// What arrived.
     pub arrivals: Vec<Arrival>,
-    /// Accounts of the row.
     pub ledger: LedgerSum,
     /// Rays launched.
     pub rays: u64,
@@ -58,8 +54,8 @@ pub struct TracedRow {
 }
 
 impl TracedRow {
-    /// What arrived from a column by the same way on the same object as `like`, among the arrivals from `start` on: the
-    /// column's first or beyond it.
+    /// The arrival in a column that took the same path to the same receiver as `like`; `start` is the column's first
+    /// arrival or beyond it.
     pub fn matching_from(&self, start: usize, column: u32, like: &Arrival) -> Option<&Arrival> {
         self.columns[start..]
             .iter()
@@ -70,7 +66,7 @@ impl TracedRow {
     }
 }
 
-/// Says where arrivals are; remembers the last triangle.
+/// Positions of arrivals; caches the last triangle.
 pub(super) struct Points<'a> {
     scene: &'a Scene,
     /// Object, triangle, its corners.
@@ -82,7 +78,7 @@ impl<'a> Points<'a> {
         Self { scene, last: None }
     }
 
-    /// Where an arrival is [m], by nothing but its triangle and barycentric coordinates.
+    /// Position of an arrival [m], a function of its triangle and barycentric coordinates alone.
     pub(super) fn of(&mut self, arrival: &Arrival) -> DVec3 {
         let (object, triangle) = (arrival.receiver.object(), arrival.triangle);
         let [a, b, c] = match self.last {
@@ -99,7 +95,7 @@ impl<'a> Points<'a> {
     }
 }
 
-/// First of the columns (rows) of the whole lattice that a traced one stands for, and the one after the last.
+/// Half-open range of columns (rows) of the whole lattice that a traced one represents.
 fn group(index: usize, stride: usize, size: usize) -> (usize, usize) {
     (index * stride, ((index + 1) * stride).min(size))
 }
@@ -113,7 +109,7 @@ impl Lattice<'_> {
         )
     }
 
-    /// Corners of the part of the unit square of its face that a traced ray stands for.
+    /// Corners of the part of its face's unit square that a traced ray represents.
     pub fn cell(&self, column: usize, row: usize) -> (DVec2, DVec2) {
         let size = DVec2::new(self.size.0 as f64, self.size.1 as f64);
         let (left, right) = group(column, self.strides.0, self.size.0);
@@ -124,7 +120,7 @@ impl Lattice<'_> {
         )
     }
 
-    /// Cells of the whole lattice that a traced ray stands for.
+    /// Number of cells of the whole lattice that a traced ray represents.
     pub fn cells_of(&self, column: usize, row: usize) -> f64 {
         let (left, right) = group(column, self.strides.0, self.size.0);
         let (top, bottom) = group(row, self.strides.1, self.size.1);
@@ -137,20 +133,20 @@ impl Lattice<'_> {
         (top + bottom) / 2
     }
 
-    /// The traced column that a column of the whole lattice is; `None` where it is left out.
+    /// Traced index of a column of the whole lattice; `None` where it is skipped.
     pub fn coarse_column(&self, column: usize) -> Option<usize> {
         let coarse = column / self.strides.0;
         let (left, right) = group(coarse, self.strides.0, self.size.0);
         (column == (left + right) / 2).then_some(coarse)
     }
 
-    /// Upper bound of the rays: lattice cells that touch a marked cell of the item buffer.
+    /// Upper bound on the rays: lattice cells that touch a marked cell of the item buffer.
     pub fn ray_count(&self) -> u64 {
         self.item_buffer
             .lattice_cells(self.launch.face_count(), self.size)
     }
 
-    /// Upper bound of the rays of a traced row.
+    /// Upper bound on the rays of a traced row.
     pub fn row_ray_count(&self, face: usize, row: usize) -> usize {
         let spans = self
             .item_buffer
@@ -208,7 +204,7 @@ impl Lattice<'_> {
         match self.placement {
             RayPlacement::Lattice => self.centre,
             RayPlacement::Jittered => {
-                // A generator per cell: the same whatever the order of tracing.
+                // A generator per cell: independent of the order of tracing.
                 let cell = (face as u64) << 60 ^ (row as u64) << 30 ^ column as u64;
                 let mut generator = Pcg64Mcg::seed_from_u64(self.seed.rotate_left(17) ^ cell);
                 let unit = |bits: u64| (bits >> 11) as f64 * (-53_f64).exp2();

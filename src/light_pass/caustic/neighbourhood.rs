@@ -23,7 +23,7 @@ impl<'a> Cursor<'a> {
         Self { row, index: 0 }
     }
 
-    /// What arrived from a column by the same way as `like`; columns must not fall from call to call.
+    /// The arrival in a column that took the same path as `like`; columns must not decrease from call to call.
     fn matching(&mut self, column: u32, like: &Arrival) -> Option<&'a Arrival> {
         let row = self.row?;
         while row.columns.get(self.index).is_some_and(|&c| c < column) {
@@ -42,11 +42,11 @@ impl<'a> Neighbourhood<'a> {
         }
     }
 
-    /// The neighbours of an arrival of the row; indices must not fall from call to call.
+    /// The neighbours of an arrival of the row; indices must not decrease from call to call.
     pub(super) fn of(&mut self, index: usize) -> Neighbours<'a> {
         let row = self.context.row;
         let (column, arrival) = (row.columns[index], &row.arrivals[index]);
-        // Paths of one ray arrive one after the other.
+        // Arrivals of one ray are consecutive.
         let first = first_of(row, index);
         let last = index + row.columns[index..].iter().take_while(|&&c| c == column).count();
         let left = (first > 0 && row.columns[first - 1] + 1 == column)
@@ -61,7 +61,7 @@ impl<'a> Neighbourhood<'a> {
     }
 }
 
-/// First arrival of the column of an arrival.
+/// First arrival in the column of an arrival.
 fn first_of(row: &TracedRow, index: usize) -> usize {
     let column = row.columns[index];
     index

@@ -1,27 +1,27 @@
 //! Elementary functions for inner loops, without a call into libm.
 
-/// The greatest whole number not above `x`, without a call into the mathematics library.
+/// The greatest integer not above `x`.
 pub(super) fn floor(x: f64) -> i64 {
     let towards_zero = x as i64;
     towards_zero - i64::from(towards_zero as f64 > x)
 }
 
-/// Adding it rounds numbers below 2⁵¹ in magnitude to whole ones, which its lowest bits then hold.
+/// Adding this rounds numbers below 2⁵¹ in magnitude to integers, which the lowest bits of the sum then hold.
 const ROUNDING: f64 = 6_755_399_441_055_744.0;
 
-/// The nearest whole number for |x| < 2⁵¹, halves to the even one.
+/// The nearest integer for |x| < 2⁵¹, ties to even.
 pub(super) fn round(x: f64) -> (f64, i64) {
     let shifted = x + ROUNDING;
     let whole = shifted.to_bits().wrapping_sub(ROUNDING.to_bits()) as i64;
     (shifted - ROUNDING, whole)
 }
 
-/// e^x to within 2e-9 of itself, without a call; 0 < result < ∞ for |x| up to 700, and x is kept to that.
+/// e^x with a relative error below 2e-9; x is clamped to ±700, so that 0 < result < ∞.
 pub(super) fn exp(x: f64) -> f64 {
     let doublings = x.clamp(-700.0, 700.0) * std::f64::consts::LOG2_E;
     let (nearest, whole) = round(doublings);
     let f = doublings - nearest;
-    // Least relative error over |f| ≤ 1/2.
+    // Minimax polynomial of the relative error over |f| ≤ 1/2.
     let power = 1.000_000_000_592_020_4
         + f * (0.693_147_205_600_509_9
             + f * (0.240_226_466_087_137_13

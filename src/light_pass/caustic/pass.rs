@@ -17,17 +17,16 @@ use crate::light_pass::shard_index::ShardIndex;
 use crate::light_pass::wavefront::overshoot::PatchOvershoot;
 use crate::progress::{Control, Progress, Stage};
 
-/// Rays that a band aims at: enough for all cores, and few enough that what they bring stays in their caches.
+/// Target number of rays per band: enough work for all cores, and few enough that the arrivals stay in their caches.
 const RAYS_PER_BAND: usize = 1 << 14;
 
-/// Rows of a band, however few or many rays they hold.
+/// Limits on the rows of a band, whatever their number of rays.
 const MIN_ROWS: usize = 4;
 const MAX_ROWS: usize = 4096;
 
-/// What the pass of one light did.
+/// Result of the pass of one light.
 #[derive(Clone, Debug, Default)]
 pub struct PassReport {
-    /// All accounts.
     pub ledger: LedgerSum,
     /// Rays launched.
     pub rays: u64,
@@ -37,31 +36,31 @@ pub struct PassReport {
     pub splats: u64,
     /// Wavefront cells.
     pub cells: u64,
-    /// Rays between traced ones that were intersected with receivers.
+    /// Interpolated rays that were intersected with receivers.
     pub receiver_queries: u64,
     /// Sizes of footprints.
     pub statistics: FootprintStatistics,
-    /// Patches that reach farther than their rays.
+    /// Patches that reach farther than their traced rays.
     pub overshoots: Vec<PatchOvershoot>,
-    /// Luminous flux of all patches [counts], and of those that hold a part of the spectrum in one place.
+    /// Luminous flux [counts] of all patches, and of those that concentrate a part of the spectrum in one place.
     pub in_one_place: [i128; 2],
-    /// Wall-clock and CPU seconds of tracing.
+    /// Of tracing.
     pub trace_s: Seconds,
-    /// Wall-clock and CPU seconds of depositing.
+    /// Of depositing.
     pub deposit_s: Seconds,
     /// Whether it was stopped before the end.
     pub cancelled: bool,
 }
 
-/// Seconds on the wall and of all cores.
+/// Wall-clock and CPU time [s].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Seconds {
     pub wall: f64,
-    /// Of the whole process.
+    /// Of all threads of the process.
     pub cpu: f64,
 }
 
-/// Both clocks.
+/// Measures wall-clock and CPU time.
 #[derive(Clone, Copy, Debug)]
 pub struct Stopwatch {
     wall: Instant,
@@ -69,7 +68,7 @@ pub struct Stopwatch {
 }
 
 impl Stopwatch {
-    /// Starts both clocks; where the system has no CPU clock, that one stays at zero.
+    /// Starts both clocks. Without a CPU clock on the system, CPU time stays at zero.
     pub fn start() -> Self {
         Self {
             wall: Instant::now(),
@@ -91,7 +90,6 @@ impl Stopwatch {
 }
 
 impl Seconds {
-    /// Adds another span.
     pub fn add(&mut self, other: Self) {
         self.wall += other.wall;
         self.cpu += other.cpu;
@@ -101,30 +99,29 @@ impl Seconds {
 /// Progress callback and cancel token of a pass.
 #[derive(Clone, Copy)]
 pub struct ProgressScope<'a> {
-    /// Hears how far it is.
     pub progress: &'a dyn Progress,
-    /// Asks it to stop.
+    /// Checked for cancellation.
     pub control: &'a Control,
-    /// Rays (arrivals, where they were kept) of passes before this one.
+    /// Rays of previous passes (arrivals, where they were cached).
     pub done: u64,
-    /// Rays (arrivals) of all passes.
+    /// Rays (or arrivals) of all passes.
     pub total: u64,
 }
 
-/// Where the light of a pass comes from.
+/// Source of the light of a pass.
 #[derive(Clone, Copy, Debug)]
 pub enum PassInput<'a> {
-    /// From rays; what arrives is kept while it takes no more than so many bytes.
+    /// Traced rays. Their arrivals are cached while they take at most `keep_bytes`.
     Rays {
-        /// Most memory to keep [bytes].
+        /// Most memory for the cache [bytes].
         keep_bytes: u64,
     },
-    /// From rays of an earlier pass over the same lattice, or one with strides of 1.
+    /// Arrivals of an earlier pass over the same lattice, or over one with strides of 1.
     Cached(&'a ArrivalCache),
 }
 
-/// Traces, or takes as traced before, and deposits the whole lattice of one light. Gives what arrived, where it was
-/// traced to the end and may be kept.
+/// Traces the whole lattice of one light, or takes cached arrivals, and deposits it. Returns the arrivals if they were
+/// traced to the end and fit the cache.
 pub fn run(
     depositor: &Depositor,
     source: PassInput,
@@ -187,9 +184,9 @@ pub fn run(
     (report, recorder.light)
 }
 
-/// Traces and deposits the bands of a share.
+/// Traces and deposits the bands of one shard.
 ///
-/// A band needs its neighbours' rows: they are traced again for it, and booked by their own band only.
+/// A band needs its neighbours' rows: these are traced again for it, and booked only by their own band.
 pub fn run_share(
     depositor: &Depositor,
     share: ShardIndex,
@@ -242,7 +239,7 @@ pub fn run_share(
     report
 }
 
-/// Keeps what arrives, until it is too much.
+/// Caches arrivals until they exceed the limit.
 struct Recorder {
     light: Option<ArrivalCache>,
     most_bytes: u64,
@@ -270,7 +267,7 @@ impl Recorder {
     }
 }
 
-/// The row after a band's last.
+/// End of the band that starts at `first_row`.
 fn band_end(lattice: &Lattice, face: usize, first_row: usize) -> usize {
     let rows = lattice.traced_size().1.min(first_row + MAX_ROWS);
     let (mut end, mut rays) = (first_row, 0);
@@ -281,7 +278,7 @@ fn band_end(lattice: &Lattice, face: usize, first_row: usize) -> usize {
     end
 }
 
-/// Deposits all rows that have a row after them (all at the end of a face); returns the last two rows, which the next
+/// Deposits all rows that have a row after them (all at the end of a face). Returns the last two rows, which the next
 /// band needs. `end` is the lattice index after the last traced row.
 #[allow(
     clippy::too_many_arguments,
@@ -297,7 +294,7 @@ fn deposit_band(
     last: bool,
     report: &mut PassReport,
 ) -> Vec<TracedRow> {
-    // The carried rows: one that is deposited and only lends its neighbours, and one that waits.
+    // The carried rows: one that was deposited and only serves as a neighbour, and one that waits.
     let lent = rows.len().saturating_sub(1);
     rows.extend(traced);
     let first_index = end - rows.len();
@@ -315,7 +312,7 @@ fn deposit_band(
     rows.split_off(keep)
 }
 
-/// Deposits rows on maps that are made where they are missing.
+/// Deposits rows, and allocates the maps that are missing.
 fn deposit_rows(
     depositor: &Depositor,
     contexts: &[RowContext],
@@ -335,7 +332,7 @@ fn deposit_rows(
 }
 
 impl PassReport {
-    /// Adds what another pass did to the same light.
+    /// Adds the result of another pass over the same light.
     pub fn merge(&mut self, other: Self) {
         self.ledger.merge(&other.ledger);
         self.rays += other.rays;

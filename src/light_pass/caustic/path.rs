@@ -9,7 +9,7 @@ use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::transport::{Branch, EffectSet, Event, MediumStack, Microfacets, SurfaceHit, Tracer};
 
-/// Sequence of (object, event) along a path, as a hash: equal for neighbouring rays that took the same way.
+/// Hash of the sequence of (object, event) along a path: equal for neighbouring rays that took the same path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PathSignature(pub u64);
 
@@ -20,7 +20,7 @@ impl PathSignature {
         self.mixed((object as u64) << 3 | event as u64)
     }
 
-    /// At a surface: an object and the smoothing group of it that was met.
+    /// At a surface: an object and the smoothing group that was hit.
     #[must_use]
     pub fn at(self, object: usize, group: u32) -> Self {
         self.mixed((object as u64) << 32 | u64::from(group))
@@ -44,19 +44,17 @@ impl PathSignature {
 /// Flux that reached a diffuse surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Arrival {
-    /// Whose light it becomes.
     pub receiver: Receiver,
     /// Index into the object's triangles.
     pub triangle: u32,
-    /// How it came here.
     pub signature: PathSignature,
-    /// Barycentric coordinates of the triangle's second and third corner.
+    /// Second and third barycentric coordinate.
     pub barycentric: DVec2,
-    /// Where [m].
+    /// [m].
     pub point: DVec3,
     /// Incident flux [W per channel of the light], before the albedo.
     pub flux_w: LinearSrgb,
-    /// From the light to here [m].
+    /// Length of the path from the light [m].
     pub path_m: f64,
 }
 
@@ -64,15 +62,14 @@ pub struct Arrival {
 pub struct PathLimits {
     /// Most specular events.
     pub max_depth: u32,
-    /// Least share of the ray's flux (luminance) that a branch must carry to be followed.
+    /// Smallest share of the ray's flux (luminance) at which a branch is traced.
     pub branch_threshold: f64,
-    /// What paths may need.
     pub effects: EffectSet,
-    /// Which micro-facets rough surfaces show; without, they are smooth.
+    /// Samples of the microfacets of rough surfaces; without them, these are smooth.
     pub microfacets: Option<Microfacets>,
 }
 
-/// What waits to be traced.
+/// A ray that waits to be traced.
 #[derive(Clone, Copy, Debug)]
 struct Segment {
     ray: Ray,
@@ -81,7 +78,7 @@ struct Segment {
     signature: PathSignature,
     depth: u32,
     path_m: f64,
-    /// Whether it is direct light still.
+    /// Whether it is still direct light.
     is_straight: bool,
 }
 
@@ -91,17 +88,17 @@ pub struct PathTracer<'a> {
     tracer: &'a Tracer,
     pub limits: PathLimits,
     unit: FluxUnit,
-    /// From paths to the light's channels.
+    /// From the flux of paths to the light's channels.
     channels: ColourMatrix,
     waiting: Vec<Segment>,
-    /// Accounts of all rays so far.
+    /// Of all rays so far.
     pub ledger: LedgerSum,
     /// Closest-hit queries so far.
     pub segments: u64,
 }
 
 impl<'a> PathTracer<'a> {
-    /// A tracer with empty accounts.
+    /// With an empty ledger, for linear sRGB.
     pub fn new(tracer: &'a Tracer, limits: PathLimits, unit: FluxUnit) -> Self {
         Self {
             tracer,
@@ -114,14 +111,15 @@ impl<'a> PathTracer<'a> {
         }
     }
 
-    /// The same for light of other channels than linear sRGB.
+    /// For light in other channels than linear sRGB.
     #[must_use]
     pub fn with_channels(self, channels: ColourMatrix) -> Self {
         Self { channels, ..self }
     }
 
-    /// Follows a ray that carries `flux_w` from the light, which lies within `media`; arrivals on diffuse surfaces after
-    /// at least one specular event are handed to `arrive`. `Deposited` is not booked here but by who places the flux.
+    /// Traces a ray that carries `flux_w` from the light, which lies within `media`. Arrivals at diffuse surfaces after
+    /// at least one specular event are passed to `arrive`. `Deposited` is not booked here, but by whoever places the
+    /// flux.
     pub fn trace(
         &mut self,
         ray: Ray,
@@ -175,7 +173,7 @@ impl<'a> PathTracer<'a> {
                 .interact_with(effects, &hit, segment.ray.direction, &segment.media, micro);
         let deposit_w = flux_w * interaction.deposit;
         if segment.is_straight {
-            // What a surface takes on the first hit is direct light, and so is what a body around the lamp takes of that.
+            // Flux deposited at the first hit is direct light, and so is what a body around the light absorbs of it.
             let is_specular = self.tracer.scene().material_of(hit.object).surface.is_specular();
             let direct_w = if is_specular { deposit_w } else { segment.flux_w };
             self.book(Account::NotEmitted, direct_w);

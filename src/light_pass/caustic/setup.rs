@@ -16,54 +16,54 @@ use crate::scene::{Light, LightKind, Scene, SurfaceKind};
 use crate::settings::ItemBufferKind;
 use crate::transport::{Tracer, media_at};
 
-/// A light that sees something specular.
+/// A light that sees a caster.
 #[derive(Clone, Debug)]
 pub struct VisibleLight {
     /// Index into `Scene::lights`.
     pub light: usize,
-    /// Where its rays start, as of a white light of unit strength: what the real one gives is a scale of that.
+    /// Launch of its rays, as a white light of unit strength; the real one scales their flux.
     pub launch: Launch,
-    /// Which of them are worth tracing.
+    /// Marks the cells worth tracing.
     pub item_buffer: Arc<ItemBuffer>,
-    /// Where light can matter, if less than that.
+    /// Cells in which light can matter; `None` if these are all of `item_buffer`.
     visible: Option<Arc<ItemBuffer>>,
-    /// Distance from the casters' centre to their farthest receiver [m]: scales the density of suns.
+    /// Distance from the casters' centre to their farthest receiver [m]: scales the ray density of suns.
     pub reach_m: f64,
-    /// What rays are aimed at (indices of specular objects), wherever they start.
+    /// Specular objects that rays are aimed at from any point of the light (indices).
     casters: Arc<[usize]>,
-    /// What photons are aimed at, where the light has a size; found when they are first wanted.
+    /// Spheres that photons are aimed at, for a light with extent; computed on first use.
     spheres: Arc<OnceLock<Spheres>>,
 }
 
 impl VisibleLight {
-    /// Where light can matter: the item buffer, or less where everything is aimed at.
+    /// Cells in which light can matter: those of the item buffer, or fewer with [`CullMode::Everything`].
     pub fn visible(&self) -> &ItemBuffer {
         self.visible.as_ref().unwrap_or(&self.item_buffer)
     }
 
-    /// What rays are aimed at (indices of specular objects), wherever they start.
+    /// Specular objects that rays are aimed at from any point of the light (indices).
     pub fn casters(&self) -> &[usize] {
         &self.casters
     }
 
-    /// What photons are aimed at from all its places; `source` is the light of unit strength.
+    /// Spheres that photons are aimed at from all points of the light; `source` is the light of unit strength.
     pub fn spheres(&self, tracer: &Tracer, source: &Light) -> &Spheres {
         self.spheres
             .get_or_init(|| Spheres::around(tracer, source, &self.casters))
     }
 
-    /// What any place of the light may send [W], but for another strength.
+    /// Upper bound on the power that any point of the light sends [W], at unit strength.
     pub fn power_bound_w(&self, scene: &Scene) -> f64 {
         let own_w = self.launch.power_bound_w();
         if !self.launch.is_fitted() {
             return own_w;
         }
-        // The rectangle around the casters differs from direction to direction.
+        // The rectangle around the casters depends on the direction of the light.
         let (low, high) = scene.bounds().unwrap_or_default();
         own_w.max(self.launch.emitter().strength.max_channel() * (high - low).length_squared())
     }
 
-    /// The same light as if all of it came from one of its places; `None` where that sends nothing to a caster.
+    /// The same light as if one of its points sent all of it; `None` if that point sends nothing to a caster.
     pub fn from_place(
         &self,
         tracer: &Tracer,
@@ -85,25 +85,24 @@ impl VisibleLight {
     }
 }
 
-/// How thoroughly what cannot matter is left out.
+/// Which specular objects are culled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CullMode {
-    /// Specular objects that are sealed off, hidden, or can send no light to a diffuse one are left out.
+    /// Those that are sealed off, hidden, or cannot send light to a diffuse object.
     Reachable,
-    /// Everything specular is aimed at.
+    /// None: rays are aimed at all of them.
     Everything,
 }
 
-/// What it took to look around from one light.
+/// Cost and size of a light's item buffers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ItemBufferStats {
     /// Marked cells of the item buffer.
     pub cells: u64,
     /// Cells that opaque faces cover.
     pub hidden_cells: u64,
-    /// Nodes, triangles and cells that were tested.
+    /// Nodes, triangles and cells tested.
     pub tests: u64,
-    /// Wall-clock and CPU seconds.
     pub seconds: Seconds,
 }
 
@@ -114,14 +113,14 @@ pub struct LightVisibility {
     pub lights: Vec<VisibleLight>,
     /// What each light of the scene sees.
     pub sights: Vec<LightReach>,
-    /// What that took, light by light.
+    /// Cost for each light of the scene.
     pub looks: Vec<ItemBufferStats>,
 }
 
 impl LightVisibility {
-    /// Builds the item buffers of all lights that something specular could call for.
+    /// Builds the item buffers of all lights, if the scene has both casters and receivers.
     ///
-    /// `sizes`: whether lights are as large as they are, or shine from their middles.
+    /// `sizes`: whether lights have their extent, or shine from their middles.
     pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, aiming: CullMode, sizes: bool) -> Self {
         let scene = tracer.scene();
         let has = |wanted: fn(SurfaceKind) -> bool| {
@@ -155,39 +154,39 @@ impl LightVisibility {
 }
 
 impl LightVisibility {
-    /// Nodes, triangles and cells that were tested for all lights.
+    /// Nodes, triangles and cells tested for all lights.
     pub fn tests(&self) -> u64 {
         self.looks.iter().map(|look| look.tests).sum()
     }
 }
 
-/// Places of a light with a size that tell what it sees.
+/// Sample points on a light with extent that determine what it sees.
 const PLACES: u32 = 16;
 
-/// So many more are tried where those see nothing.
+/// Most sample points, tried while the first ones see nothing.
 const MAX_PLACES: u32 = 256;
 
-/// Which places those are.
+/// Seed of the sample points.
 const PLACES_SEED: u64 = 0;
 
-/// Aims at casters from a place.
+/// Aims at casters from a point of a light.
 struct EmissionCuller<'a> {
     tracer: &'a Tracer,
     item_buffer: ItemBufferKind,
     aiming: CullMode,
 }
 
-/// What a place of a light sees.
+/// What a point of a light sees.
 struct View {
     launch: Launch,
     item_buffer: ItemBuffer,
     visible: Option<ItemBuffer>,
-    /// Nodes, triangles and cells that were tested.
+    /// Nodes, triangles and cells tested.
     tests: u64,
 }
 
 impl EmissionCuller<'_> {
-    /// `casters`: specular objects that matter; `None` where nothing could be aimed at.
+    /// `casters`: specular objects that matter. `None` where there is nothing to aim at.
     fn look(&self, emitter: &Emitter, casters: &[usize]) -> Option<View> {
         let visible = self.at_reachable(emitter, casters);
         match self.aiming {
@@ -216,7 +215,7 @@ impl EmissionCuller<'_> {
             Some((launch, item_buffer))
         };
         let (mut launch, mut item_buffer) = build(casters)?;
-        // What parallel light does not see is to have no part in its rectangle.
+        // Casters that parallel light does not see must not enlarge its rectangle.
         if launch.is_fitted()
             && item_buffer.casters.len() < casters.len()
             && let Some(smaller) = build(&item_buffer.casters)
@@ -231,7 +230,7 @@ impl EmissionCuller<'_> {
         })
     }
 
-    /// Rays start from the same lattice, so that its maps are the same; more of its cells are traced.
+    /// Uses the launch of the reachable casters, so that maps are the same; more cells are traced.
     fn at_everything(&self, emitter: &Emitter, visible: Option<View>) -> Option<View> {
         let specular = specular_objects(self.tracer.scene());
         let tests = visible.as_ref().map_or(0, |view| view.tests);
@@ -256,10 +255,10 @@ fn specular_objects(scene: &Scene) -> Vec<usize> {
         .collect()
 }
 
-/// What all places of a light see.
+/// What all points of a light see together.
 #[derive(Default)]
 struct AllSeen {
-    /// The first view of anything specular, or the first one.
+    /// The first view with a caster, or the first view.
     first: Option<View>,
     seen: Vec<usize>,
     visibly: Vec<usize>,
@@ -283,7 +282,7 @@ impl AllSeen {
 
 struct ItemBufferBuilder<'a> {
     aimer: EmissionCuller<'a>,
-    /// Whether lights have sizes.
+    /// Whether lights have extent.
     sizes: bool,
     reach: SceneReach<'a>,
 }
@@ -366,8 +365,8 @@ impl ItemBufferBuilder<'_> {
         }
     }
 
-    /// Where to look from: some places of a light with a size, else its only one. All places of what glows by an image
-    /// are as bright as it is in the mean: any of them may stand for its power, and may be black.
+    /// Emitters to look from: several sample points of a light with extent, otherwise its only one. All points of a
+    /// surface light with an image get its mean radiance: any of them may represent its power, and may be black.
     fn places(&self, light: usize) -> impl Iterator<Item = (u32, Emitter)> {
         let scene = self.aimer.tracer.scene();
         let source = scene.lights[light].of_unit_strength();
@@ -395,7 +394,7 @@ fn bounds_of(scene: &Scene, objects: &[usize]) -> Option<(DVec3, DVec3)> {
         .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-/// At least the casters' own radius, so that it is never zero where they have a size.
+/// Never zero for casters with extent: at least their own radius [m].
 fn reach_m(scene: &Scene, casters: &[usize]) -> f64 {
     let Some((low, high)) = bounds_of(scene, casters) else {
         return 1.0;

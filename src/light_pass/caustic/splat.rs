@@ -10,8 +10,8 @@ use super::numeric::{floor, round};
 use crate::illumination::accumulator::FluxCount;
 use crate::settings::KernelSampling;
 
-/// Footprints thinner than this many texels across are widened to it: far below what a texel can show, and enough for
-/// the inverse of a line or a point (at folds and foci).
+/// Footprints thinner than this [texels] are widened to it: far below what a texel can show, and enough for the inverse
+/// of a line or a point (at folds and foci).
 const THINNEST_TEXELS: f64 = 0.02;
 
 /// A kernel of flux on a map.
@@ -23,9 +23,8 @@ pub struct Splat {
     pub ellipse: Ellipse,
     /// Weight over the footprint.
     pub profile: Profile,
-    /// What it carries.
     pub flux: FluxCount,
-    /// Which island of the chart it lies on; other islands get nothing of it.
+    /// Island of the chart; other islands get none of the flux.
     pub island: u32,
 }
 
@@ -37,13 +36,13 @@ pub trait Coverage: Sync {
     /// Whether every texel is covered.
     fn is_full(&self) -> bool;
 
-    /// Whether an island of the chart covers any of a texel.
+    /// Whether an island of the chart covers any part of a texel.
     fn covers(&self, column: usize, row: usize, island: u32) -> bool;
 }
 
 /// Weights of a splat in the texels that it reaches; reused from splat to splat.
 ///
-/// Texels are held line by line. Lines are rows, or columns where the footprint is wider than high: a line then never
+/// Texels are stored line by line. Lines are rows, or columns where the footprint is wider than high: a line then never
 /// crosses it at more than 45°, however thin it is.
 #[derive(Debug, Default)]
 pub struct Window {
@@ -62,12 +61,12 @@ struct Line {
     index: i64,
     /// Column (row) of the first texel, before folding.
     first: i64,
-    /// Where its weights begin and end.
+    /// Range of its weights.
     span: (usize, usize),
 }
 
 impl Splat {
-    /// Spread of the kernel across its narrowest direction [texels].
+    /// Spread of the kernel in its narrowest direction [texels].
     pub fn narrowest_spread(&self) -> f64 {
         let Ellipse { xx, xy, yy } = self.ellipse;
         let half_difference = 0.5 * (xx - yy);
@@ -75,12 +74,12 @@ impl Splat {
         self.profile.scale() * least.max(0.0).sqrt()
     }
 
-    /// At least [`Self::narrowest_spread`], and quicker to have.
+    /// Upper bound on [`Self::narrowest_spread`], and cheaper.
     pub fn narrower_spread(&self) -> f64 {
         self.profile.scale() * self.ellipse.xx.min(self.ellipse.yy).max(0.0).sqrt()
     }
 
-    /// The same kernel on a map of 2^−level times the size each way.
+    /// The same kernel on a map of 2^−level times the size in both directions.
     #[must_use]
     pub fn at_level(mut self, level: usize) -> Self {
         let scale = (-(level as f64)).exp2();
@@ -89,13 +88,13 @@ impl Splat {
         self
     }
 
-    /// Columns and rows that the kernel reaches at most, before folding: first and last. It is cut off one map's size
-    /// beyond the borders.
+    /// First and last column and row that the kernel may reach, before folding. It is truncated one map's size beyond
+    /// the borders.
     pub fn columns_and_rows(&self) -> ((i64, i64), (i64, i64)) {
         let ellipse = self.ellipse.at_least(THINNEST_TEXELS);
         let range = |centre: f64, along: f64, across: f64| {
-            // Where lines lie across, a box reaches to its slanted corners: with a = |xy|/√across, to
-            // a + √(along − a²), at most √2 √along.
+            // Where lines lie across, a box reaches to its slanted corners: with a = |xy|/√across, to a + √(along −
+            // a²), at most √2 √along.
             let slant = if along < across { 2.0 } else { 1.0 };
             let half = self.profile.reach() * (slant * along).sqrt();
             (floor(centre - half) - 1, floor(centre + half) + 1)
@@ -106,7 +105,8 @@ impl Splat {
         )
     }
 
-    /// Fills `window` with the kernel's weight in each texel. The kernel is cut off one map's size beyond the borders.
+    /// Fills `window` with the kernel's weight in each texel. The kernel is truncated one map's size beyond the
+    /// borders.
     pub fn weigh(&self, sampling: KernelSampling, coverage: &impl Coverage, window: &mut Window) {
         let ellipse = self.ellipse.at_least(THINNEST_TEXELS);
         let smooth = self
@@ -125,7 +125,7 @@ impl Splat {
         window.mask(self, coverage);
     }
 
-    /// Fills `window` line by line; with the covariance [texels²] of a wide gaussian, from its values at the texels'
+    /// Fills `window` line by line; for a wide Gaussian, given by its covariance [texels²], from samples at the texels'
     /// centres.
     fn weigh_by_lines(
         &self,
@@ -160,7 +160,7 @@ impl Splat {
             }
         }
         if window.weights.iter().all(|&weight| weight <= 0.0) {
-            // Between the sample points, or too thin for any: all of it goes where its centre is.
+            // Between the sample points, or too thin for any: all of it goes to the texel of its centre.
             let columns = window.columns;
             window.clear(columns);
             window.push(centre.y.floor() as i64, centre.x.floor() as i64, 1);
@@ -190,7 +190,7 @@ impl Splat {
         }
     }
 
-    /// The kernel's weight at every texel's centre of a line (section 3.2.2 of the paper).
+    /// Samples the kernel at the texels' centres along a line (section 3.2.2 of the paper).
     fn sample(&self, frame: &LineFrame, centre: DVec2, line: usize, window: &mut Window) {
         let Line { index, first, span } = window.lines[line];
         let y = index as f64 + 0.5 - centre.y;
@@ -202,8 +202,8 @@ impl Splat {
         }
     }
 
-    /// The kernel's integral over every texel of a line: exact along it, by two-point Gauss quadrature across it, on as
-    /// many parts as the kernel's shape asks for.
+    /// Integrates the kernel over every texel of a line: exactly along it, by two-point Gauss quadrature across it, on
+    /// as many parts as the kernel's shape requires.
     fn integrate(&self, frame: &LineFrame, centre: DVec2, line: usize, window: &mut Window) {
         let Line { index, first, span } = window.lines[line];
         let (low, high) = LineFrame::within(index as f64 - centre.y, self.profile.reach() * frame.y_radius);
@@ -226,7 +226,7 @@ impl Splat {
         let half_chord = self.profile.half_chord(t);
         let middle = frame.slope * y;
         let reach = half_chord * frame.x_radius;
-        // Casts round towards zero, and are kept to indices.
+        // Casts round towards zero and saturate at it.
         let begin = (middle - reach - first).max(0.0) as usize;
         let end = ((middle + reach - first).max(0.0) as usize + 1).min(weights.len());
         let factor = factor * frame.x_radius;
@@ -245,8 +245,8 @@ impl Splat {
 /// Lower node of the two-point Gauss-Legendre rule on [0, 1]: (1 − 1/√3)/2.
 const GAUSS_LOW: f64 = 0.211_324_865_405_187_1;
 
-/// The ellipse as lines cut it (x along a line, y across): at height y the chord's middle is at slope·y, and (s, t) = ((x − slope·y)/x_radius,
-/// y/y_radius) makes it the unit disc.
+/// The ellipse as lines cut it (x along a line, y across): at height y the chord's middle is at slope·y, and (s, t) =
+/// ((x − slope·y)/x_radius, y/y_radius) maps it to the unit disc.
 struct LineFrame {
     y_radius: f64,
     x_radius: f64,
@@ -254,12 +254,12 @@ struct LineFrame {
 }
 
 impl LineFrame {
-    /// The part of a line from `line` to `line` + 1 that lies within `half` of the centre; empty where low ≥ high.
+    /// The part of the interval from `line` to `line` + 1 within `half` of the centre; empty where low ≥ high.
     fn within(line: f64, half: f64) -> (f64, f64) {
         (line.max(-half), (line + 1.0).min(half))
     }
 
-    /// Whether the kernel changes so little within a row that one line stands for it: the midpoint rule then errs by
+    /// Whether the kernel changes so little within a row that one line represents it: the midpoint rule then errs by
     /// less than 1/24 of the square of the row's height in spreads, below 0.3 %.
     fn is_smooth(&self, scale: f64) -> bool {
         scale * self.y_radius >= 4.0 && self.slope.abs() <= 0.25 * scale * self.x_radius
@@ -267,7 +267,7 @@ impl LineFrame {
 
     fn new(ellipse: Ellipse) -> Self {
         let slope = ellipse.xy / ellipse.yy;
-        // Not below the floor that `at_least` gave both axes, whatever cancels.
+        // Cancellation must not push it below the floor that `at_least` gave both axes.
         let x2 = (ellipse.xx - slope * ellipse.xy).max(0.5 * THINNEST_TEXELS * THINNEST_TEXELS);
         Self {
             y_radius: ellipse.yy.sqrt(),
@@ -276,7 +276,7 @@ impl LineFrame {
         }
     }
 
-    /// Parts of a row's height that resolve both the kernel's change with y and the chord's way across texels.
+    /// Parts of a row's height that resolve both the kernel's change with y and the chord's drift across texels.
     fn parts(&self, height: f64, scale: f64) -> u32 {
         let by_change = height / (1.4 * scale * self.y_radius);
         let by_slant = height * self.slope.abs() / (1.0 + 1.4 * scale * self.x_radius);
@@ -301,7 +301,7 @@ impl Window {
         });
     }
 
-    /// Takes the integrals of a small gaussian over its texels; says whether that could be done.
+    /// Integrates a small Gaussian over its texels; returns whether that was possible.
     fn integrate(&mut self, centre: DVec2, covariance: Ellipse, (width, height): (usize, usize)) -> bool {
         let Some(block) = self.cornered.integrate(centre, covariance, &mut self.weights) else {
             return false;
@@ -323,7 +323,7 @@ impl Window {
         true
     }
 
-    /// Takes the values of a wide gaussian at the texels' centres.
+    /// Samples a wide Gaussian at the texels' centres.
     fn fill(&mut self, kernel: &Centred, centre: DVec2) {
         for Line { index, first, span } in &self.lines {
             let x = *first as f64 + 0.5 - centre.x;
@@ -342,8 +342,8 @@ impl Window {
         }
     }
 
-    /// Takes weights off texels that the splat's island does not cover; what is left is normalised by the sum, so
-    /// that no flux is lost there.
+    /// Removes weights of texels that the splat's island does not cover. The remaining weights are normalised by their
+    /// sum, so that no flux is lost.
     fn mask(&mut self, splat: &Splat, coverage: &impl Coverage) {
         if !coverage.is_full() {
             let (width, height) = coverage.size();
@@ -366,9 +366,10 @@ impl Window {
         self.sum > 0.0
     }
 
-    /// Adds the splat's flux to the texels of a map of the given size, of which `block` holds all that the kernel reaches.
+    /// Adds the splat's flux to the texels of a map of the given size; `block` has to contain all that the kernel
+    /// reaches.
     ///
-    /// Each texel gets the nearest count of its share, and the heaviest one the rest, so that the whole is exact. What
+    /// Each texel gets its share rounded to counts, and the heaviest one the remainder, so that the sum is exact. What
     /// reaches beyond the map's border is folded back: the ray landed on the surface, and so does its light.
     pub fn add(&self, flux: FluxCount, size: (usize, usize), block: &mut Block) {
         let mut rest = flux;
@@ -422,7 +423,7 @@ impl Window {
         }
     }
 
-    /// Column and row of the first texel of a line that lies along a row, wholly between the map's borders.
+    /// Column and row of a line's first texel, if the line is a row segment entirely within the map.
     fn inside(&self, line: &Line, (width, height): (usize, usize)) -> Option<(usize, usize)> {
         let column = usize::try_from(line.first).ok().filter(|_| !self.columns)?;
         let row = usize::try_from(line.index).ok().filter(|&row| row < height)?;
@@ -430,12 +431,12 @@ impl Window {
     }
 }
 
-/// A texel given before folding.
+/// A texel given by its position before folding.
 fn texel_mut(block: &mut Block, (column, row): (i64, i64), size: (usize, usize)) -> &mut FluxCount {
     &mut block.row_mut(fold(column, size.0), fold(row, size.1), 1)[0]
 }
 
-/// Place and value of the first of the largest weights; weights are not negative.
+/// Index and value of the first of the largest weights; weights are not negative.
 fn largest(weights: &[f64]) -> (usize, f64) {
     let mut largest = (0, 0.0);
     for (offset, &weight) in weights.iter().enumerate() {
@@ -446,7 +447,7 @@ fn largest(weights: &[f64]) -> (usize, f64) {
     largest
 }
 
-/// Index in 0..size of an index up to one size beyond either border, mirrored at the border.
+/// Mirrors an index up to one size beyond either border into 0..size.
 pub fn fold(index: i64, size: usize) -> usize {
     let size = size as i64;
     let folded = if index < 0 {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
-/// Flux-weighted sums over footprints, by receiver; and, where that is asked for, where on the maps they lie.
+/// Flux-weighted sums over footprints by receiver, and optionally their positions on the maps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FootprintStatistics {
     receivers: BTreeMap<Receiver, Sums>,
@@ -15,13 +15,12 @@ pub struct FootprintStatistics {
 /// Light on a part of a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FootprintSample {
-    /// Whose map it is.
     pub receiver: Receiver,
-    /// Least and largest map coordinates that it reaches; both within the map.
+    /// Minimum and maximum map coordinates that it reaches; both within the map.
     pub bounds: (DVec2, DVec2),
-    /// What it carries [W].
+    /// [W].
     pub flux_w: f64,
-    /// Share of the whole map that its details cover, > 0.
+    /// Share of the whole map that one of its details covers, > 0.
     pub map_share: f64,
 }
 
@@ -41,14 +40,14 @@ pub struct MeanFootprint {
     pub map_share: f64,
 }
 
-/// Footprints below this share of a map count as this size: a focus must not ask for texels without end.
+/// Footprints below this share of a map are clamped to it: a focus must not demand unlimited texels.
 const MIN_SHARE: f64 = 1e-10;
 
 impl FootprintStatistics {
-    /// One more footprint, with the flux [W] it carries.
+    /// Adds a footprint with its flux [W].
     pub fn add(&mut self, receiver: Receiver, flux_w: f64, area_m2: f64, map_share: f64) {
         let share = map_share.max(MIN_SHARE);
-        // Both areas are cut alike, as their ratio is the map's own.
+        // Both areas are clamped alike, as their ratio is the map's own.
         let area_m2 = if map_share > 0.0 {
             area_m2 * (share / map_share)
         } else {
@@ -60,7 +59,7 @@ impl FootprintStatistics {
         sums.log_area_share += flux_w * share.ln();
     }
 
-    /// Notes where light lies: what covers nothing, or lies off the map, is left out.
+    /// Records the position of light. Ignores light that covers nothing or lies off the map.
     pub fn add_spot(&mut self, spot: FootprintSample) {
         let (low, high) = spot.bounds;
         let bounds = (
@@ -77,7 +76,7 @@ impl FootprintStatistics {
         }
     }
 
-    /// Where light lies on the map of a receiver.
+    /// Samples on the map of a receiver.
     pub fn spots(&self, receiver: Receiver) -> impl Iterator<Item = &FootprintSample> {
         self.spots.iter().filter(move |spot| spot.receiver == receiver)
     }
@@ -93,7 +92,7 @@ impl FootprintStatistics {
         }
     }
 
-    /// The mean footprint on a receiver; `None` where none was seen.
+    /// The mean footprint on a receiver; `None` without one.
     pub fn mean(&self, receiver: Receiver) -> Option<MeanFootprint> {
         let sums = self.receivers.get(&receiver).filter(|sums| sums.flux > 0.0)?;
         Some(MeanFootprint {
@@ -102,7 +101,7 @@ impl FootprintStatistics {
         })
     }
 
-    /// For a lattice with `ratio` times the cells: every footprint shrinks by as much.
+    /// For a lattice with `ratio` times the cells: every footprint shrinks by this factor.
     #[must_use]
     pub fn refined(mut self, ratio: f64) -> Self {
         for sums in self.receivers.values_mut() {

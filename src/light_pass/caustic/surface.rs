@@ -21,7 +21,7 @@ pub(super) struct Surface<'a> {
 }
 
 impl<'a> Surface<'a> {
-    /// `None` without a map, and on a triangle without area.
+    /// `None` without a map, and for a degenerate triangle.
     fn new(scene: &Scene, maps: &'a ReceiverMaps, arrival: &Arrival) -> Option<Self> {
         let triangle = arrival.triangle as usize;
         let map = maps.get(arrival.receiver)?;
@@ -50,7 +50,7 @@ impl<'a> Surface<'a> {
 /// Receiver and triangle.
 type Key = (Receiver, u32);
 
-/// The last few triangles: neighbouring rays mostly arrive on the same ones.
+/// Cache of the last triangles: neighbouring rays mostly arrive on the same ones.
 pub(super) struct Surfaces<'a> {
     scene: &'a Scene,
     maps: &'a ReceiverMaps,

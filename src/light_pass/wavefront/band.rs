@@ -6,28 +6,27 @@ use glam::DVec2;
 
 use super::strand::{LatticeRay, PathSegment};
 
-/// Where a sample is kept.
+/// Address of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SampleId {
     /// Chunk of the band.
     pub chunk: u32,
-    /// Place in the chunk.
+    /// Index in the chunk.
     pub index: u32,
 }
 
-/// A sample with its place in the unit square of its face.
+/// A sample with its position.
 #[derive(Clone, Copy, Debug)]
 pub struct Corner {
-    /// In the unit square.
+    /// In the unit square of its face.
     pub square: DVec2,
-    /// The sample there.
     pub sample: SampleId,
 }
 
 /// Samples by chunk.
 #[derive(Clone, Debug, Default)]
 pub struct Samples {
-    /// Filled in the order of the chunks.
+    /// In the order of the chunks.
     pub chunks: Vec<Vec<LatticeRay>>,
 }
 
@@ -44,20 +43,20 @@ impl Samples {
 /// Samples that tasks may read, and the one chunk that this task adds to.
 #[derive(Debug)]
 pub struct Workspace<'a> {
-    /// What was traced before.
+    /// Samples traced before.
     pub shared: &'a Samples,
     /// Number of the own chunk.
     pub chunk: u32,
-    /// Traced by this task.
+    /// Samples traced by this task.
     pub own: Vec<LatticeRay>,
-    /// Rows of the lattice's own corners, which come first, once for each wavelength.
+    /// Rows of the lattice's own corners, which are the first chunks, once per wavelength.
     corner_rows: u32,
-    /// Where this task traced already, by wavelength: cells share corners and edges.
+    /// Samples traced by this task, by wavelength and position: cells share corners and edges.
     known: HashMap<(u32, [u64; 2]), SampleId>,
 }
 
 impl<'a> Workspace<'a> {
-    /// An empty own chunk.
+    /// With an empty chunk of its own.
     pub fn new(shared: &'a Samples, chunk: usize, corner_rows: usize) -> Self {
         Self {
             shared,
@@ -68,7 +67,7 @@ impl<'a> Workspace<'a> {
         }
     }
 
-    /// The sample at a place of the unit square, of one of the wavelengths; traced unless this task did so before.
+    /// The sample of a wavelength at a point of the unit square; traced unless this task did so before.
     pub fn sample_at(&mut self, node: u32, square: DVec2, trace: impl FnOnce() -> LatticeRay) -> SampleId {
         let key = (node, square.to_array().map(f64::to_bits));
         if let Some(id) = self.known.get(&key) {
@@ -79,13 +78,13 @@ impl<'a> Workspace<'a> {
         id
     }
 
-    /// The sample at a place of the unit square, where this task traced one of that wavelength.
+    /// The sample of a wavelength at a point of the unit square, if this task traced one.
     pub fn known(&self, node: u32, square: DVec2) -> Option<SampleId> {
         let key = (node, square.to_array().map(f64::to_bits));
         self.known.get(&key).copied()
     }
 
-    /// The sample at another wavelength of a corner of the lattice itself; `None` where it is none.
+    /// The sample at another wavelength of a corner of the lattice; `None` for other samples.
     pub fn at_node(&self, id: SampleId, node: usize) -> Option<SampleId> {
         (id.chunk < self.corner_rows).then(|| SampleId {
             chunk: id.chunk + node as u32 * self.corner_rows,
@@ -93,7 +92,7 @@ impl<'a> Workspace<'a> {
         })
     }
 
-    /// A sample, shared or own.
+    /// A shared sample or an own one.
     pub fn get(&self, id: SampleId) -> &LatticeRay {
         if id.chunk == self.chunk {
             &self.own[id.index as usize]

@@ -15,12 +15,12 @@ use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 
-/// How often cells are split whose cuts do not tell what lies in them; what is then left goes on as one small patch per ray.
+/// Limits on splitting cells whose cuts leave open what lies in them. At the limit, each ray becomes one small patch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SubdivisionLimits {
     /// Where cuts are ambiguous.
     pub ambiguous: u32,
-    /// Where light is shattered besides: it leaves the cell in very many ways.
+    /// Where light is also shattered: it leaves the cell along very many paths.
     pub shattered: u32,
 }
 
@@ -31,47 +31,44 @@ impl SubdivisionLimits {
         shattered: 2,
     };
 
-    /// Where rounds of refinement come after: they find better where it is of use to go on with shattered light.
+    /// Before rounds of refinement, which know better where splitting shattered light pays off.
     pub const BEFORE_ROUNDS: Self = Self {
         ambiguous: 2,
         shattered: 1,
     };
 
-    /// Never.
     pub const NONE: Self = Self {
         ambiguous: 0,
         shattered: 0,
     };
 }
 
-/// Mismatch along an edge from which a check ray decides between the cubic and the bilinear patch.
+/// Mismatch along an edge above which a check ray decides between the cubic and the bilinear patch.
 pub(super) const CHECK_MISMATCH: f64 = 0.08;
 
-/// A piece of the wavefront between traced strands.
+/// A piece of the wavefront between traced rays.
 #[derive(Clone, Copy, Debug)]
 pub struct Patch {
-    /// Samples and which of their strands; as many as the shape has corners.
+    /// Samples with the indices of their segments; as many as the shape has corners.
     pub corners: [(SampleId, u16); 4],
-    /// Where they lie in the unit square.
+    /// Corners in the unit square.
     pub squares: [DVec2; 4],
-    /// What it is.
     pub kind: PatchKind,
-    /// What part of the spectrum it carries.
     pub tone: SpectralTag,
 }
 
 /// The part of a light's spectrum that a patch carries.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpectralTag {
-    /// All of a light without wavelengths.
+    /// All of a light in RGB.
     White,
-    /// What one of the traced wavelengths stands for.
+    /// The band of one of the traced wavelengths.
     Node(u8),
     /// All of a spectral light.
     Spectrum {
-        /// Samples at the other wavelengths that have the same strands.
+        /// Samples at the other wavelengths that have the same segments.
         others: [[SampleId; 4]; NODES - 1],
-        /// Whether each wavelength stands for those around it: other light of the cell goes other ways.
+        /// Whether each wavelength stands for those around it, because other light of the cell is dispersed.
         parted: bool,
     },
 }
@@ -79,15 +76,14 @@ pub enum SpectralTag {
 /// Shape of a patch in the unit square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PatchKind {
-    /// Four corners of a rectangle, from its low corner around.
+    /// Four corners of a rectangle, counter-clockwise from its low corner.
     Rectangle,
-    /// The same, by its corners alone.
+    /// A rectangle interpolated without derivatives.
     BilinearRectangle,
-    /// Three corners.
     Triangle,
-    /// The same, by its corners alone.
+    /// A triangle interpolated without derivatives.
     LinearTriangle,
-    /// The rectangle between the second and third square, by the derivatives of a strand at the first.
+    /// The rectangle between the second and third square, from the derivatives of the segment at the first.
     SingleRay,
 }
 
@@ -102,7 +98,7 @@ impl Patch {
         }
     }
 
-    /// Traced corners.
+    /// Number of traced corners.
     pub fn corner_count(&self) -> usize {
         match self.kind {
             PatchKind::Rectangle | PatchKind::BilinearRectangle => 4,
@@ -112,14 +108,13 @@ impl Patch {
     }
 }
 
-/// What cells gave.
+/// Result of cutting cells.
 #[derive(Clone, Debug, Default)]
 pub struct CellOutput {
-    /// All patches.
     pub patches: Vec<Patch>,
-    /// What surfaces on the way took, and the quadrature of what they sent on.
+    /// What surfaces on the way took, and the quadrature of what they passed on.
     pub ledger: LedgerSum,
-    /// Cells, splits included.
+    /// Number of cells, splits included.
     pub cells: u64,
     /// Patches that stand for a single ray.
     pub splats: u64,
@@ -130,32 +125,31 @@ pub struct CellOutput {
 pub struct CellCutter<'a> {
     /// Traces further rays.
     pub edges: EdgeCutter<'a>,
-    /// Of the accounts.
+    /// Unit of the flux counts.
     pub unit: FluxUnit,
-    /// Where cells are divided, if anywhere.
+    /// `None` without refinement.
     pub refinement: Option<&'a Refinement<'a>>,
-    /// What corners alone would miss.
+    /// Features that the corners alone would miss.
     pub bodies: &'a SubcellFeatures,
-    /// How often cells are split.
     pub splits: SubdivisionLimits,
-    /// The light, before its wavelengths part.
+    /// The light, before it is dispersed.
     pub light: LightPart<'a>,
-    /// What patches carry.
+    /// Given to all patches.
     pub tone: SpectralTag,
-    /// From paths to the light's channels.
+    /// From the flux of paths to the light's channels.
     pub channels: ColourMatrix,
-    /// Light that has patches already, ascending.
+    /// Signatures of light that has patches already, ascending.
     pub done: &'a [PathSignature],
-    /// Surfaces whose light is booked already, ascending.
+    /// Signatures of surfaces whose light is booked already, ascending.
     pub booked: &'a [PathSignature],
 }
 
-/// How often a cell was divided.
+/// How often a cell was divided, by reason.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Depth {
-    /// Because it, or a cell around it, holds a small body.
+    /// Because it, or a cell around it, contains a small body.
     pub(super) bodies: u32,
-    /// For detail of the normals.
+    /// For bumps.
     pub(super) bumps: u32,
     /// In rounds of refinement.
     pub(super) rounds: usize,
@@ -163,18 +157,18 @@ pub(super) struct Depth {
     pub(super) ambiguous: u32,
 }
 
-/// A cell with its corners (0,0), (1,0), (1,1), (0,1) and the edges between them, each in the direction of its growing
-/// coordinate; `None` where light goes the same ways at both ends.
+/// A cell with corners (0,0), (1,0), (1,1), (0,1) and the edges between them, each in the direction of its increasing
+/// coordinate; `None` where light takes the same paths at both ends.
 #[derive(Clone, Debug)]
 pub struct Cell {
     pub corners: [Corner; 4],
     /// Bottom (0→1), right (1→2), top (3→2), left (0→3).
     pub edges: [Option<Edge>; 4],
-    /// Rounds that divide the light on the other side of each edge, as far as it is not the cell's own.
+    /// Rounds that divide the light beyond each edge, except the cell's own light.
     pub beside: [RoundSet; 4],
 }
 
-/// Ends of the four edges among the corners.
+/// Corners at the ends of the four edges.
 pub(super) const EDGE_ENDS: [(usize, usize); 4] = [(0, 1), (1, 2), (3, 2), (0, 3)];
 
 impl Cell {
@@ -224,7 +218,7 @@ impl CellCutter<'_> {
             };
         }
         if self.is_ambiguous(cell, work) {
-            // What was divided for one of many small bodies is fine already.
+            // Cells that were divided for one of many small bodies are fine already.
             return if depth.ambiguous + depth.bodies.min(self.bodies.are_many())
                 < self.most_splits(cell, work)
             {
@@ -258,7 +252,7 @@ impl CellCutter<'_> {
         }
         let [low, _, high, _] = cell.corners.map(|corner| corner.square);
         let launch = self.edges.tracer.launch;
-        // What lies behind all that the corners meet is not seen in the cell.
+        // What lies behind everything that the corners hit is not visible in the cell.
         let hidden_beyond_m = cell
             .corners
             .iter()
@@ -268,7 +262,7 @@ impl CellCutter<'_> {
             .ask_for_finer(launch, self.edges.face, (low, high), level, hidden_beyond_m)
     }
 
-    /// Whether the normals of a surface have detail that is fine beside the cell.
+    /// Whether the bumps of a surface are too fine for the cell.
     fn holds_bumps(&self, cell: &Cell, level: u32, work: &Workspace) -> bool {
         let samples = cell.corners.map(|corner| work.get(corner.sample));
         let bumps = &self.edges.tracer.bumps;
@@ -282,7 +276,7 @@ impl CellCutter<'_> {
         let beside = cell.beside.iter().fold(0, |all, rounds| all | rounds);
         let [low, _, high, _] = cell.corners.map(|corner| corner.square);
         let place = (self.edges.face, low, high);
-        // Near a silhouette light goes much farther between the corners than at them.
+        // Near a silhouette light lands much farther away between the corners than at them.
         let along = cell.edges.iter().flatten().flat_map(|edge| &edge.samples);
         let corners = cell.corners.iter().map(|corner| corner.sample);
         let nodes = 1..self.light.node_count();
@@ -296,7 +290,7 @@ impl CellCutter<'_> {
         beside >> depth.rounds & 1 == 1 || refinement.is_too_coarse(place, &samples, depth.rounds)
     }
 
-    /// Rounds that divide the light beside a cell, by samples on that side.
+    /// Rounds that divide the light beside a cell, judged by samples on that side.
     pub fn rounds_beside(&self, own: [Corner; 4], beside: &[Corner], work: &Workspace) -> RoundSet {
         self.refinement.map_or(0, |refinement| {
             let sample = |corner: &Corner| work.get(corner.sample);
@@ -305,13 +299,13 @@ impl CellCutter<'_> {
         })
     }
 
-    /// All corners agree in everything.
+    /// For a cell whose corners agree in everything.
     fn whole(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
         self.patches(cell, work, out);
         self.book_whole(cell, cell.corners.map(|corner| corner.sample), work, out);
     }
 
-    /// The patches of a cell whose corners agree.
+    /// Emits the patches of a cell whose corners agree.
     pub(super) fn patches(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
         let ids = cell.corners.map(|corner| corner.sample);
         for strand in 0..work.get(ids[0]).strands.len() {
@@ -322,7 +316,7 @@ impl CellCutter<'_> {
         }
     }
 
-    /// The patch of one strand that all corners have.
+    /// Emits the patch of one segment that all corners have.
     pub(super) fn patch(
         &self,
         cell: &Cell,
@@ -375,7 +369,7 @@ impl CellCutter<'_> {
         });
     }
 
-    /// Four cells of the given depth in place of one.
+    /// Divides a cell into four of the given depth.
     pub(super) fn split(&self, cell: &Cell, depth: Depth, work: &mut Workspace, out: &mut CellOutput) {
         let [a, b, c, d] = cell.corners;
         let middles: [Corner; 4] = std::array::from_fn(|edge| {
@@ -429,7 +423,7 @@ impl CellCutter<'_> {
             ([left, centre, top, d], [west, up.clone(), t0, l1]),
             ([centre, right, c, top], [east, r1, t1, up]),
         ];
-        // A child's neighbours: its siblings within the cell, the cell's own beyond it.
+        // Neighbours of a child: its siblings within the cell, the cell's own neighbours beyond it.
         const SIBLINGS: [[Option<usize>; 4]; 4] = [
             [None, Some(1), Some(2), None],
             [None, None, Some(3), Some(0)],
@@ -451,7 +445,7 @@ impl CellCutter<'_> {
         }
     }
 
-    /// An edge within a cell, divided `level` times for detail, with pairs of samples on either side of it.
+    /// An edge within a cell, divided `level` times for bumps; `beyond`: pairs of samples on either side of it.
     fn new_edge(
         &self,
         ends: [Corner; 2],
@@ -478,7 +472,7 @@ impl CellCutter<'_> {
         Some(edge)
     }
 
-    /// Each corner stands for its quarter of the cell.
+    /// Represents each quarter of the cell by its corner.
     pub(super) fn scatter(&self, cell: &Cell, work: &Workspace, out: &mut CellOutput) {
         let centre = cell.corners[0].square.lerp(cell.corners[2].square, 0.5);
         for corner in cell.corners {
@@ -486,7 +480,7 @@ impl CellCutter<'_> {
         }
     }
 
-    /// A corner for the quarter of its cell up to the cell's centre.
+    /// Represents the quarter of a cell between a corner and the cell's centre by that corner.
     fn scatter_corner(&self, corner: Corner, centre: DVec2, work: &Workspace, out: &mut CellOutput) {
         let (low, high) = (corner.square.min(centre), corner.square.max(centre));
         let area = (high.x - low.x) * (high.y - low.y);
@@ -510,7 +504,7 @@ impl CellCutter<'_> {
         }
     }
 
-    /// A region's patches.
+    /// Emits a region's patches.
     pub(super) fn emit(
         &self,
         cell: &Cell,
@@ -587,8 +581,8 @@ impl CellCutter<'_> {
         }
     }
 
-    /// Books what a surface did with the light of some samples, each by its area of the unit square. What it passed on
-    /// is booked against what the strands carry.
+    /// Books what a surface did with the light of some samples, each weighted by its area of the unit square. What it
+    /// passed on is booked against the flux of the segments.
     pub(super) fn book(&self, weighted: &[(SampleId, usize, f64)], work: &Workspace, out: &mut CellOutput) {
         let sum = |of: fn(&super::strand::SurfaceFluxRecord) -> LinearSrgb| {
             let sum = weighted.iter().fold(LinearSrgb::BLACK, |sum, &(id, node, area)| {
@@ -610,7 +604,8 @@ impl CellCutter<'_> {
                 self.unit.count(sum(|node| node.switched_off)),
             ),
         ];
-        // Incident flux comes out of the strands that lead here (or out of the light), the rest goes into others.
+        // Incident flux comes from the segments that lead here, or from the light; the remainder goes into other
+        // segments.
         let mut passed: [i64; 3] = std::array::from_fn(|channel| incident[channel] - taken[channel]);
         if first {
             out.ledger.book(Account::Emitted, passed);
@@ -650,7 +645,7 @@ pub(super) fn light_regions(cell: &Cell, signature: PathSignature, work: &Worksp
     )
 }
 
-/// The parts of a cell whose light meets a surface by way of a signature.
+/// The parts of a cell whose light hits a surface along the path of a signature.
 pub(super) fn surface_regions(cell: &Cell, signature: PathSignature, work: &Workspace) -> Vec<Vec<Outline>> {
     let is_there = |corner: usize| {
         let sample = work.get(cell.corners[corner].sample);

@@ -10,17 +10,18 @@ use super::strand::LatticeRay;
 use crate::geometry::Ray;
 use crate::light_pass::caustic::path::PathSignature;
 
-/// Light below this share of the brightest is cut as it comes; what its cuts leave open is booked.
+/// Light below this share of the brightest does not make a cell ambiguous: it is cut as is, and what the cuts leave
+/// open is booked.
 const BRIGHT_SHARE: f64 = 0.1;
 
-/// A patch that is off by more than this share of the cell's width in its middle is of no use.
+/// A patch with a larger error in its middle, relative to the cell's width, is useless.
 const DOUBTFUL_SHARE: f64 = 0.1;
 
-/// Bright light that leaves a cell in more ways than this is shattered: pieces of the cell would be so too.
+/// Bright light that leaves a cell along more paths than this is shattered, and so would be the pieces of the cell.
 const MANY_WAYS: usize = 8;
 
-/// How far patches are off in the middle of a cell, and how wide the cell is there: distances between origins with those
-/// between directions over the way to where they land [m].
+/// Error of both patches in the middle of a cell, and the cell's width there: distances between origins plus those
+/// between directions times the distance to the landing point [m].
 #[derive(Clone, Copy, Debug)]
 struct Check {
     cubic: f64,
@@ -29,7 +30,7 @@ struct Check {
 }
 
 impl CellCutter<'_> {
-    /// A check ray through the middle of the cell decides.
+    /// Decided by a check ray through the middle of the cell.
     pub(super) fn is_bilinear_better(
         &self,
         cell: &Cell,
@@ -41,7 +42,7 @@ impl CellCutter<'_> {
             .is_none_or(|Check { cubic, bilinear, .. }| cubic > bilinear || cubic.is_nan())
     }
 
-    /// Whether no patch over a cell says where the bright light in its middle goes.
+    /// Whether no patch over a cell predicts where the bright light in its middle goes.
     pub(super) fn needs_check_ray(&self, cell: &Cell, work: &mut Workspace) -> bool {
         let ids = cell.corners.map(|corner| corner.sample);
         let brightest_w = ids.iter().map(|id| work.get(*id).brightest_w).fold(0.0, f64::max);
@@ -63,8 +64,7 @@ impl CellCutter<'_> {
         })
     }
 
-    /// Where both shapes of patch send light from the middle, against where it goes; `None` where it does not go that
-    /// way at all.
+    /// Compares both patch shapes with a ray traced through the middle; `None` if that ray does not take the same path.
     fn check(
         &self,
         cell: &Cell,
@@ -91,7 +91,7 @@ impl CellCutter<'_> {
         })
     }
 
-    /// How often a cell is split whose cuts are ambiguous.
+    /// How often an ambiguous cell is split.
     pub(super) fn most_splits(&self, cell: &Cell, work: &Workspace) -> u32 {
         let samples = cell.corners.map(|corner| work.get(corner.sample));
         let least_w = least_bright_w(samples);
@@ -103,14 +103,14 @@ impl CellCutter<'_> {
         }
     }
 
-    /// Whether cuts along the edges do not tell what lies between them.
+    /// Whether cuts along the edges leave open what lies between them.
     pub(super) fn is_ambiguous(&self, cell: &Cell, work: &Workspace) -> bool {
         let samples = cell.corners.map(|corner| work.get(corner.sample));
         let least_w = least_bright_w(samples);
         let mut kinds: Vec<Vec<PathSignature>> =
             samples.iter().map(|sample| bright(sample, least_w)).collect();
         let all = all_bright(kinds.iter().cloned());
-        // A strand that is bright at one corner counts at all where it is.
+        // A path that is bright at one corner counts at every corner that has it.
         for (kind, sample) in kinds.iter_mut().zip(samples) {
             *kind = all
                 .iter()
@@ -120,7 +120,7 @@ impl CellCutter<'_> {
         }
         kinds.sort_unstable();
         kinds.dedup();
-        // Light that only the samples along the edges met lies between the corners.
+        // Light that only samples along the edges found lies between the corners.
         let is_between = |sample: SampleId| {
             let inner = bright(work.get(sample), least_w);
             inner
@@ -146,20 +146,20 @@ impl CellCutter<'_> {
     }
 }
 
-/// Flux from which on light at the corners of a cell is bright [W].
+/// Threshold of bright light at the corners of a cell [W].
 fn least_bright_w(samples: [&LatticeRay; 4]) -> f64 {
     let brightest_w = samples.iter().map(|sample| sample.brightest_w);
     brightest_w.fold(0.0, f64::max) * BRIGHT_SHARE
 }
 
-/// The ways of a sample's bright light.
+/// Signatures of a sample's bright light.
 fn bright(sample: &LatticeRay, least_w: f64) -> Vec<PathSignature> {
     let strands = sample.strands.iter();
     let bright = strands.filter(|strand| strand.flux_w.luminance() > least_w);
     bright.map(|strand| strand.signature).collect()
 }
 
-/// Each way once, ascending.
+/// All signatures, ascending and without duplicates.
 fn all_bright(ways: impl Iterator<Item = Vec<PathSignature>>) -> Vec<PathSignature> {
     let mut all: Vec<PathSignature> = ways.flatten().collect();
     all.sort_unstable();

@@ -9,44 +9,42 @@ use crate::illumination::Receiver;
 use crate::light_pass::caustic::statistics::FootprintSample;
 use crate::optics::LinearSrgb;
 
-/// Deviation from straight that triangles may have [texels].
+/// Largest deviation of triangles from the curve [texels].
 const CHORD_TEXELS: f64 = 0.02;
 
-/// Change of the lit area from one triangle to the next, as a share, that is left where triangles are larger than
-/// texels.
+/// Largest relative change of the lit area from one triangle to the next, where triangles are larger than texels.
 const DENSITY_STEP: f64 = 0.01;
 
-/// How much coarser patches are divided that add next to nothing to their map.
+/// Factor by which patches are coarser that add next to nothing to their map.
 const COARSEST_TOLERANCE: f64 = 10.0;
 
-/// How much coarser the surroundings of a single ray may be divided that are not divided at all.
+/// Tolerance from which on the surroundings of a single ray are not divided at all.
 const DUST_TOLERANCE: f64 = 2.0;
 
-/// Most triangles along a patch.
+/// Most triangles along a side of a patch.
 const MAX_STEPS: usize = 128;
 
-/// Height of a surface over its middle facet, as a share of what the patch lights, from which it is taken for a jump or a
-/// sharp edge.
+/// Height of a surface over its middle facet, relative to the extent of the lit area, above which it counts as a jump
+/// or a sharp edge.
 const JUMP_SHARE: f64 = 0.25;
 
-/// How much the height of a surface above its middle facet counts beside its way along it.
+/// Weight of the height above the middle facet relative to distances along it.
 const HEIGHT_WEIGHT: f64 = 0.5;
 
-/// Steps along a patch whose rays do not all go to one surface.
+/// Steps along a patch whose rays do not all land on one surface.
 const MIXED_STEPS: usize = 6;
 
-/// Texels that such a patch is taken to light.
+/// Texels that such a patch is assumed to light.
 const MIXED_TEXELS: f64 = 16.0;
 
-/// Patches of a wavefront cell that a map resolves details of, along each side: a cubic patch says more than its
-/// corners.
+/// Details of a whole cell's patch that a map resolves, by area: a cubic patch carries more detail than its corners.
 const DETAILS_PER_PATCH: f64 = 64.0;
 
-/// The same of the surroundings of a single ray, a quarter of a cell of light that goes very many ways.
+/// The same for the surroundings of a single ray: a quarter of a cell whose light takes very many paths.
 const DETAILS_AROUND_ONE: f64 = 4.0;
 
 impl Spreader<'_> {
-    /// Whether nine rays of a patch meet a plane within its map.
+    /// Whether nine rays of a patch hit a plane within its map.
     pub(super) fn stays_on_map(&self, shape: &PatchShape, receiver: Receiver) -> bool {
         let Some(surface) = self.receivers.get(receiver) else {
             return false;
@@ -63,7 +61,7 @@ impl Spreader<'_> {
         })
     }
 
-    /// How finely a patch has to be divided, from nine of its rays.
+    /// Steps into which a patch is divided in both directions, from nine of its rays.
     pub(super) fn steps(
         &self,
         shape: &PatchShape,
@@ -84,7 +82,7 @@ impl Spreader<'_> {
                 self.note_part(&probes, (flux_w, details(rays)), out);
             }
             if rays.are_around_one() {
-                // What is not known better need not be cut better.
+                // An approximation need not be cut precisely.
                 return (1, 1);
             }
             let lit = probes.iter().flatten().find_map(|vertex| vertex.place.receiver());
@@ -137,7 +135,7 @@ impl Spreader<'_> {
         let steps = |bend: f64, change: f64, length: f64| {
             let straight = (bend / (CHORD_TEXELS * tolerance)).sqrt();
             let even = change / (DENSITY_STEP * tolerance);
-            // Of triangles below a texel only those at its border are seen.
+            // Of triangles smaller than a texel only those at the border show.
             let even = even.min((even * length).sqrt());
             (straight.max(even).ceil() as usize).clamp(1, MAX_STEPS)
         };
@@ -155,7 +153,7 @@ impl Spreader<'_> {
         )
     }
 
-    /// One step, where a patch is the surroundings of a single ray that adds next to nothing: one of very many.
+    /// A single step, for the surroundings of a single ray that adds next to nothing: one of very many.
     fn steps_around_one(&self, rays: &VirtualRays, flux_w: LinearSrgb) -> Option<(usize, usize)> {
         let tolerance = |receiver| self.tolerance(receiver, flux_w.luminance(), 1.0);
         let tolerance = rays.lit().map_or(COARSEST_TOLERANCE, tolerance);
@@ -163,8 +161,8 @@ impl Spreader<'_> {
         is_dust.then_some((1, 1))
     }
 
-    /// Where rays of a patch meet a receiver, in texels as they lie around the middle one: charts may end and turn between
-    /// them. The third coordinate is the height above that facet.
+    /// Hits of a patch's rays on a receiver, unfolded into the texel frame of the middle facet: charts may end and turn
+    /// between them. The third coordinate is the height above that facet.
     fn laid_flat(&self, receiver: Receiver, probes: &[[VirtualVertex; 3]; 3]) -> [[DVec3; 3]; 3] {
         let middle = probes[1][1].place.facet();
         let flat = self
@@ -192,8 +190,7 @@ impl Spreader<'_> {
         })
     }
 
-    /// How much coarser than the finest a patch may be divided: where it adds little to its map, what it adds need not
-    /// be as exact.
+    /// How much coarser than the finest a patch may be divided: a small contribution to a map need not be as precise.
     fn tolerance(&self, receiver: Receiver, flux_w: f64, lit_texels: f64) -> f64 {
         let Some(surface) = self.receivers.get(receiver) else {
             return 1.0;
@@ -208,7 +205,7 @@ impl Spreader<'_> {
         }
     }
 
-    /// Notes how large an area a patch lights.
+    /// Records the area that a patch lights.
     fn count_area(
         &self,
         receiver: Receiver,
@@ -230,7 +227,7 @@ impl Spreader<'_> {
         }
     }
 
-    /// Notes where a patch lies of which only some rays meet one surface.
+    /// Records the position of a patch of which only some rays land on one surface.
     fn note_part(
         &self,
         probes: &[[VirtualVertex; 3]; 3],
@@ -258,7 +255,7 @@ impl Spreader<'_> {
         );
     }
 
-    /// Notes where light lies of which a detail covers a share of its map.
+    /// Records the position of light with details that cover a share of its map.
     fn note(
         &self,
         receiver: Receiver,
@@ -280,7 +277,8 @@ impl Spreader<'_> {
         });
     }
 
-    /// Finest texels over the texels that a patch falls on: 1, or less where all of it falls on coarser tiles.
+    /// Size of the finest texels relative to those that a patch lights: less than 1 where all of it falls on coarser
+    /// tiles.
     fn detail(&self, receiver: Receiver, probes: &[[VirtualVertex; 3]; 3]) -> f64 {
         let Some(chart) = self.receivers.get(receiver).map(|surface| &surface.chart) else {
             return 1.0;
@@ -298,7 +296,7 @@ impl Spreader<'_> {
     }
 }
 
-/// Details of a patch that a map is to resolve.
+/// Details of a patch that a map should resolve.
 fn details(rays: &VirtualRays) -> f64 {
     if rays.are_around_one() {
         DETAILS_AROUND_ONE
@@ -307,14 +305,14 @@ fn details(rays: &VirtualRays) -> f64 {
     }
 }
 
-/// Least and largest coordinates.
+/// Minimum and maximum coordinates.
 fn bounds(places: impl Iterator<Item = DVec2>) -> (DVec2, DVec2) {
     places.fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), place| {
         (low.min(place), high.max(place))
     })
 }
 
-/// One of nine places over a patch; those of a triangle are drawn together at its last corner.
+/// One of nine points of a patch; those of a triangle converge at its last corner.
 fn probe_place(shape: &PatchShape, i: usize, j: usize) -> DVec2 {
     let at = DVec2::new(i as f64, j as f64) * 0.5;
     if shape.is_rectangle() {
@@ -324,14 +322,14 @@ fn probe_place(shape: &PatchShape, i: usize, j: usize) -> DVec2 {
     }
 }
 
-/// Rays that do not all meet one surface: enough to see the border between.
+/// Steps where rays do not all hit one surface: enough to resolve the border between.
 fn mixed_steps(probes: &[[VirtualVertex; 3]; 3], is_plane: bool, tolerance: f64) -> (usize, usize) {
     let lost = probes
         .iter()
         .flatten()
         .all(|vertex| vertex.place.receiver().is_none());
     let steps = match (is_plane, lost) {
-        // Far off the map with every ray.
+        // Every ray is far off the map.
         (true, true) => 2,
         (true, false) => 2 * MIXED_STEPS,
         (false, _) => MIXED_STEPS,

@@ -7,60 +7,60 @@ use super::strand::{LatticeRay, PathSegment};
 use super::trace::StrandTracer;
 use crate::light_pass::caustic::path::PathSignature;
 
-/// Changes of way along one edge from which on each is cut more coarsely.
+/// An edge with more changes of the path than this is bisected more coarsely.
 const MANY_CHANGES: usize = 12;
 
-/// Bisections then.
+/// Bisections in that case.
 const SHATTERED_BITS: i32 = 3;
 
-/// Bisections that decide whether two ends of the brightest light lie on one sheet of the wavefront; where it goes very
-/// many ways, dimmer light is looked at as much less closely.
+/// Bisections that decide whether both ends of the brightest light lie on one sheet of the wavefront. Where light takes
+/// very many paths, dimmer light gets fewer.
 const JUMP_BITS: i32 = 6;
 
-/// Mismatch of chord and tangents, as a share of the chord, from which derivatives are not to be trusted.
+/// Mismatch of chord and tangents, relative to the chord, above which derivatives are not trusted.
 pub const SUSPICION: f64 = 0.35;
 
-/// How many times longer a step may be than both derivatives say before an edge may hide a jump. Kinks, folds and the
-/// roots at silhouettes stay below.
+/// Ratio of a step's length to that predicted by both derivatives above which an edge may hide a jump. Kinks, folds and
+/// square roots at silhouettes stay below.
 const SUSPICIOUS_STRETCH: f64 = 1.5;
 
-/// The same over the narrowest bracket: the sheet is torn.
+/// Likewise over the narrowest bracket: above it, the sheet is torn.
 const TORN_STRETCH: f64 = 3.0;
 
-/// Samples along an edge, by their place on it [0, 1], both ends included.
+/// Samples along an edge by position [0, 1], both ends included.
 #[derive(Clone, Debug)]
 pub struct Edge {
-    /// In ascending order.
+    /// Ascending by position.
     pub samples: Vec<(f64, SampleId)>,
 }
 
-/// How far a strand reaches along an edge from one of its ends.
+/// How far a segment reaches along an edge from one of its ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EdgeReach {
     /// To the other end, on one sheet.
     Whole,
-    /// Up to a cut: its place on the edge, and the last sample before it.
+    /// Up to a cut.
     Cut {
-        /// Middle of the bracket.
+        /// Middle of the bracket, as a position on the edge.
         place: f64,
-        /// Sample at the bracket's end on this side.
+        /// Last sample before the cut.
         sample: SampleId,
-        /// How many samples lie between the end and that one.
+        /// Number of samples between the end and that one.
         between: usize,
     },
 }
 
-/// The step between two strands, and what each one's derivatives say of it: lengths and differences of origins [m] with
-/// those of directions over the way to where they land.
+/// The step between two segments and the steps that their derivatives predict [m]: lengths combine origins with
+/// directions times the distance to the landing point.
 struct Step {
     chord: f64,
     tangents: [f64; 2],
-    /// From the mean of both tangents.
+    /// Deviation from the mean of both tangents.
     off_mean: f64,
 }
 
 impl Step {
-    /// `step` is the vector between the strands in the unit square.
+    /// `step` is the vector between the segments in the unit square.
     fn between(a: &PathSegment, b: &PathSegment, step: DVec2) -> Self {
         let reach_m = [a, b]
             .map(|strand| strand.landing.distance_m())
@@ -86,8 +86,8 @@ impl Step {
     }
 }
 
-/// Relative mismatch between what two strands' derivatives say about the step between them and the step itself;
-/// `step` is the vector between them in the unit square. 0 where the wavefront is a parabola between them.
+/// Relative mismatch between the step from one segment to another and the mean prediction of their derivatives; `step`
+/// is the vector between them in the unit square. 0 where the wavefront is a parabola between them.
 pub fn mismatch(a: &PathSegment, b: &PathSegment, step: DVec2) -> f64 {
     let Step { chord, off_mean, .. } = Step::between(a, b, step);
     if off_mean <= chord * 1e-12 {
@@ -95,12 +95,12 @@ pub fn mismatch(a: &PathSegment, b: &PathSegment, step: DVec2) -> f64 {
     } else if chord > 0.0 && off_mean.is_finite() {
         off_mean / chord
     } else {
-        // Also where derivatives are not finite.
+        // Also for non-finite derivatives.
         f64::INFINITY
     }
 }
 
-/// How many times longer the step between two strands is than either one's derivatives say.
+/// Ratio of the step between two segments to the longer of the steps that their derivatives predict.
 fn stretch(a: &PathSegment, b: &PathSegment, step: DVec2) -> f64 {
     let Step { chord, tangents, .. } = Step::between(a, b, step);
     let longest = tangents[0].max(tangents[1]);
@@ -115,18 +115,18 @@ fn is_stretched(a: &LatticeRay, b: &LatticeRay, signature: PathSignature, step: 
     }
 }
 
-/// Width of the narrowest bracket of a jump, as a share of its edge, for light of so much of the edge's brightest.
+/// Width of the narrowest bracket of a jump, relative to its edge, for light with this share of the edge's brightest.
 fn narrowest(share: f64) -> f64 {
     let bits = JUMP_BITS + share.log2().floor().max(-60.0) as i32;
     (-f64::from(bits.clamp(0, JUMP_BITS))).exp2()
 }
 
-/// Whether a step of a strand is so long that it may hide a jump.
+/// Whether a segment's step is long enough to hide a jump.
 pub fn is_suspicious(a: &LatticeRay, b: &LatticeRay, signature: PathSignature, step: DVec2) -> bool {
     is_stretched(a, b, signature, step, SUSPICIOUS_STRETCH)
 }
 
-/// Whether two samples saw light go the same ways.
+/// Whether light takes the same paths at two samples.
 pub fn same_ways(a: &LatticeRay, b: &LatticeRay) -> bool {
     a.strands.len() == b.strands.len()
         && a.nodes.len() == b.nodes.len()
@@ -148,7 +148,7 @@ impl Edge {
         }
     }
 
-    /// Whether light goes the same ways at both ends, on one sheet.
+    /// Whether light takes the same paths at both ends, on one sheet.
     pub fn is_plain(a: &LatticeRay, b: &LatticeRay, step: DVec2) -> bool {
         same_ways(a, b)
             && a.strands
@@ -157,7 +157,7 @@ impl Edge {
                 .all(|(a, b)| stretch(a, b, step) <= SUSPICIOUS_STRETCH)
     }
 
-    /// Part of an edge between two places that are samples of it, as an edge of its own.
+    /// Part of an edge between the positions of two of its samples, as an edge of its own.
     pub fn part(&self, from: f64, to: f64) -> Self {
         let width = to - from;
         Self {
@@ -170,7 +170,7 @@ impl Edge {
         }
     }
 
-    /// Two edges of equal length as one.
+    /// Joins two edges of equal length.
     fn followed_by(&self, next: &Self) -> Self {
         let first = self.samples.iter().map(|(place, sample)| (0.5 * place, *sample));
         let second = next.samples.iter().skip(1);
@@ -181,7 +181,7 @@ impl Edge {
         }
     }
 
-    /// Sample at a place, where there is one.
+    /// Sample at a position; `None` without one.
     pub fn at(&self, place: f64) -> Option<SampleId> {
         self.samples
             .iter()
@@ -189,7 +189,7 @@ impl Edge {
             .map(|(_, sample)| *sample)
     }
 
-    /// How far a strand reaches from the first end (or, `backwards`, from the last); the strand must be there.
+    /// How far a segment reaches from the first end (or, `backwards`, from the last), where it has to exist.
     pub fn reach(
         &self,
         work: &Workspace,
@@ -206,8 +206,8 @@ impl Edge {
         )
     }
 
-    /// Flux of a strand at the first end that has it, as a share of the brightest at either; 1 where neither has it, and
-    /// where light goes so few ways that each counts.
+    /// Flux of a segment at the first end that has it, relative to the brightest at either end; 1 where neither has it,
+    /// and where light takes so few paths that each counts.
     fn share(&self, work: &Workspace, signature: PathSignature) -> f64 {
         let ends = [0, self.samples.len() - 1].map(|end| work.get(self.samples[end].1));
         let brightest_w = ends[0].brightest_w.max(ends[1].brightest_w);
@@ -220,7 +220,7 @@ impl Edge {
             .map_or(1.0, |flux_w| flux_w / brightest_w)
     }
 
-    /// How far a surface reaches that light meets.
+    /// How far a surface reaches that light hits.
     pub fn reach_of_node(&self, work: &Workspace, signature: PathSignature, backwards: bool) -> EdgeReach {
         self.reach_where(
             work,
@@ -255,7 +255,7 @@ impl Edge {
         EdgeReach::Whole
     }
 
-    /// So many samples after the first end (or, `backwards`, before the last), the nearest to that end first.
+    /// The `count` samples after the first end (or, `backwards`, before the last), nearest to that end first.
     pub fn inner(
         &self,
         count: usize,
@@ -265,7 +265,7 @@ impl Edge {
         (1..=count).map(move |step| self.samples[if backwards { last - step } else { step }])
     }
 
-    /// How often a strand comes and goes along the edge.
+    /// How often a segment appears or disappears along the edge.
     pub fn changes(&self, work: &Workspace, signature: PathSignature) -> usize {
         self.samples
             .windows(2)
@@ -276,16 +276,16 @@ impl Edge {
     }
 }
 
-/// Light below this share of the brightest does not make a bulge.
+/// Light below this share of the brightest makes no bulge.
 const BULGE_SHARE: f64 = 0.1;
 
-/// Whether a border of some light may bulge over an edge that has it at both ends or at neither, as it lies between the
-/// edge and two samples beyond it.
+/// Whether the border of some light may bulge over an edge that has the light at both ends or at neither, given two
+/// samples beyond the edge.
 pub fn may_bulge(ends: [&LatticeRay; 2], beyond: [&LatticeRay; 2]) -> bool {
     let all = [ends[0], ends[1], beyond[0], beyond[1]];
     let brightest_w = all.iter().map(|sample| sample.brightest_w).fold(0.0, f64::max);
     let has = |sample: &LatticeRay, signature| sample.find(signature).is_some();
-    // The border has the light on one side: one of the ends, or one of those beyond.
+    // One side of the border has the light: one of the ends, or one of the samples beyond.
     [ends[0], beyond[0]].into_iter().any(|sample| {
         let bright = |strand: &&PathSegment| strand.flux_w.luminance() > BULGE_SHARE * brightest_w;
         sample.strands.iter().filter(bright).any(|strand| {
@@ -299,22 +299,21 @@ pub fn may_bulge(ends: [&LatticeRay; 2], beyond: [&LatticeRay; 2]) -> bool {
 /// Bisects edges of one face.
 #[derive(Clone, Copy, Debug)]
 pub struct EdgeCutter<'a> {
-    /// Traces the rays.
     pub tracer: &'a StrandTracer<'a>,
-    /// Of the cells.
+    /// Face of the launch domain.
     pub face: usize,
 }
 
 impl EdgeCutter<'_> {
-    /// Whether the cells on both sides of an edge between two corners will be divided, or scattered, whatever lies on
-    /// it; `level` how often they were divided for detail of normals.
+    /// Whether the cells on both sides of an edge between two corners will be divided or scattered regardless of the
+    /// edge; `level` is how often they were divided for bumps.
     pub fn is_divided(&self, ends: [Corner; 2], level: u32, work: &Workspace) -> bool {
         let samples = ends.map(|corner| work.get(corner.sample));
         let step = ends[1].square - ends[0].square;
         samples.iter().any(|sample| sample.is_rough) || self.tracer.bumps.ask_for_finer(&samples, step, level)
     }
 
-    /// Adds samples until every change of way along an edge between two places of the unit square is bracketed.
+    /// Adds samples until every change of the path along an edge between two points of the unit square is bracketed.
     pub fn resolve(&self, edge: &mut Edge, ends: [DVec2; 2], work: &mut Workspace) {
         let first = work.get(edge.samples[0].1);
         let last = work.get(edge.samples[edge.samples.len() - 1].1);
@@ -342,12 +341,12 @@ impl EdgeCutter<'_> {
             }
         }
         if changes.len() > MANY_CHANGES {
-            // Shattered light: no single cut tells much.
+            // Shattered light: no single cut matters much.
             changes
                 .iter_mut()
                 .for_each(|(_, bits, _)| *bits = (*bits).min(SHATTERED_BITS));
         }
-        // The brightest first: their samples serve the others.
+        // Brightest first: its samples serve the others.
         changes.sort_by_key(|(signature, bits, _)| (std::cmp::Reverse(*bits), *signature));
         for (signature, bits, both) in changes {
             if both {
@@ -358,8 +357,8 @@ impl EdgeCutter<'_> {
         }
     }
 
-    /// An edge between two places of the unit square, cut wherever the way of light changes along it; `None` where it
-    /// does not. `bulges`: whether something may reach over it that its ends do not tell.
+    /// An edge between two corners, cut where the path of light changes along it; `None` where it does not. `bulges`:
+    /// whether something that the ends do not show may reach over the edge.
     pub fn edge(&self, ends: [Corner; 2], bulges: bool, work: &mut Workspace) -> Option<Edge> {
         let [a, b] = ends;
         if bulges {
@@ -385,7 +384,7 @@ impl EdgeCutter<'_> {
         sample.find(signature).is_some() || sample.find_node(signature).is_some()
     }
 
-    /// Narrows the first change of a signature's presence down to 2^−bits of the edge.
+    /// Brackets the first change of a signature's presence to 2^−bits of the edge.
     fn bracket_change(
         &self,
         edge: &mut Edge,
@@ -408,7 +407,8 @@ impl EdgeCutter<'_> {
         }
     }
 
-    /// Narrows the worst mismatch of a strand that both ends have, until it is smooth or 2^−[`JUMP_BITS`] wide.
+    /// Bisects the suspicious steps of a segment that both ends have, until they are smooth or as narrow as the
+    /// narrowest bracket.
     fn bracket_jump(
         &self,
         edge: &mut Edge,
@@ -441,10 +441,10 @@ impl EdgeCutter<'_> {
         edge.samples.insert(index + 1, (place, corner.sample));
     }
 
-    /// What another wavelength's light does where a sample was traced.
+    /// The sample of this tracer's wavelength where another wavelength was traced.
     pub fn again(&self, other: SampleId, work: &mut Workspace) -> SampleId {
         let node = self.tracer.wavelength.unwrap_or(0);
-        // Not where a patch has it: what stands for a border lies beside it.
+        // At the sample's own position: a patch's corner on a border uses a sample beside the border.
         let square = work.get(other).square;
         if let Some(known) = work.known(node, square) {
             return known;
@@ -453,7 +453,7 @@ impl EdgeCutter<'_> {
         work.sample_at(node, square, || sample)
     }
 
-    /// A corner at a place of the unit square.
+    /// The corner at a point of the unit square.
     pub fn corner(&self, square: DVec2, work: &mut Workspace) -> Corner {
         Corner {
             square,

@@ -1,25 +1,25 @@
 //! How closely the wavefront is searched for borders and small features.
 
-/// How closely a wavefront is looked at where its light changes its way.
+/// How closely a wavefront is searched where the path of its light changes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeSearch {
-    /// Bisections of an edge on which the brightest light changes its way; dimmer light is cut as much more coarsely.
+    /// Bisections of an edge along which the path of the brightest light changes; dimmer light gets fewer.
     pub cut_bits: i32,
-    /// How often a cell is divided for a sharp corner in it.
+    /// Most divisions of a cell for a sharp corner in it.
     pub corner_levels: u32,
-    /// Cells across a caster that is smaller than a few cells, once they are fine enough.
+    /// Cells across a caster that is smaller than a few cells, after division.
     pub cells_across_casters: f64,
 }
 
 impl EdgeSearch {
-    /// Each border shows on the map. A corner is cut off in a 1,024th of its cell.
+    /// Every border shows on the map. A corner is cut off in a 1,024th of its cell.
     pub const SHARP: Self = Self {
         cut_bits: 8,
         corner_levels: 5,
         cells_across_casters: 160.0,
     };
 
-    /// Light that hardly shows beside that of others.
+    /// For light that hardly shows next to that of other lights.
     pub const DIM: Self = Self {
         cut_bits: 5,
         corner_levels: 1,

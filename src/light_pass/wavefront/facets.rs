@@ -9,36 +9,36 @@ use crate::illumination::Chart;
 use crate::illumination::parametrisation::coverage::convex_area;
 use crate::scene::{Adjacency, Mesh};
 
-/// Facets that one triangle of rays may reach; beyond it, it has to be cut.
+/// Most facets that a triangle of rays may reach before it has to be cut.
 const MAX_FACETS: usize = 1024;
 
-/// A part of the triangle's area below this is left to its neighbours.
+/// Smaller parts of the triangle's area are left to its neighbours.
 const MIN_SHARE: f64 = 1e-9;
 
-/// How far from its place on the next facet a ray may be expected, as a share of the triangle's size, while facets count
-/// as one [1], and in any case [texels].
+/// How far a ray may land from the place expected on the next facet while both facets count as one: relative to the
+/// distance between the hits [1], plus an absolute part [texels].
 const EVEN_SHARE: f64 = 0.1;
 const EVEN_TEXELS: f64 = 0.25;
 
-/// How far from 1 the shares of the facets may add up to.
+/// Largest deviation from 1 of the sum of the facets' shares.
 const MAX_AMISS: f64 = 0.05;
 
-/// Corners of a triangle cut by the three sides of another.
+/// Corners of a triangle clipped by the three sides of another.
 const MAX_CORNERS: usize = 6;
 
-/// A part of a triangle of rays on one facet.
+/// The part of a triangle of rays on one facet.
 #[derive(Clone, Copy, Debug)]
 pub struct FacetPiece {
     corners: [DVec2; MAX_CORNERS],
     len: usize,
-    /// Island of the chart that the facet lies on.
+    /// Island of the chart that holds the facet.
     pub island: u32,
-    /// Of the triangle's flux.
+    /// Fraction of the triangle's flux.
     pub share: f64,
 }
 
 impl FacetPiece {
-    /// The triangles that it consists of, in texels, with their shares of it.
+    /// Fan of triangles [texels] with their fractions of the piece.
     pub fn triangles(&self) -> impl Iterator<Item = ([DVec2; 3], f64)> + Clone {
         let corners = &self.corners[..self.len];
         let whole = convex_area(corners);
@@ -49,27 +49,23 @@ impl FacetPiece {
     }
 }
 
-/// Where a ray meets a facet.
+/// Where a ray hits a facet.
 #[derive(Clone, Copy, Debug)]
 pub struct FacetPlace {
     /// Index into the mesh's triangles.
     pub triangle: u32,
-    /// Texel coordinates.
     pub texel: DVec2,
 }
 
-/// The facets of one receiver.
 #[derive(Clone, Copy, Debug)]
 pub struct Facets<'a> {
-    /// Its map.
     pub surface: &'a ReceiverSurface,
     pub mesh: &'a Mesh,
-    /// How that hangs together.
     pub adjacency: &'a Adjacency,
 }
 
 impl Facets<'_> {
-    /// Whether rays that meet two facets may be taken to meet one surface that is flat and even in the map between them.
+    /// Whether the surface between two hits is flat and evenly mapped enough to interpolate between them.
     pub fn is_even(&self, a: (FacetPlace, DVec3), b: (FacetPlace, DVec3)) -> bool {
         if a.0.triangle == b.0.triangle {
             return true;
@@ -90,8 +86,9 @@ impl Facets<'_> {
         (met - expected).length() <= EVEN_TEXELS + EVEN_SHARE * met.length()
     }
 
-    /// The parts of a triangle of rays on the facets around those that its rays meet, their shares adding up to 1, and
-    /// whether they cover all of it, once: not where part of it falls beside them, or on surfaces behind each other.
+    /// Parts of a triangle of rays on the facets that its rays hit and on their neighbours, with shares that sum to 1;
+    /// and whether they cover the triangle exactly once. They do not where part of it misses the facets or falls on
+    /// surfaces behind each other.
     pub fn pieces(&self, rays: [Ray; 3], triangles: [u32; 3]) -> (Vec<FacetPiece>, bool) {
         let mut found: Vec<FacetPiece> = Vec::new();
         let mut seen: Vec<u32> = triangles.to_vec();
@@ -119,7 +116,7 @@ impl Facets<'_> {
         }
         let whole: f64 = found.iter().map(|piece| piece.share).sum();
         found.iter_mut().for_each(|piece| piece.share /= whole);
-        // Between facets that bend away from each other light is counted twice, or not at all, by second order.
+        // Between facets with an angle, a second-order part of the light is counted twice or not at all.
         (found, (whole - 1.0).abs() <= MAX_AMISS)
     }
 
@@ -127,7 +124,7 @@ impl Facets<'_> {
         &self.surface.chart
     }
 
-    /// The part on one facet; `None` where there is none.
+    /// The part on one facet; `None` if there is none.
     fn piece(&self, rays: &[Ray; 3], triangle: usize) -> Option<FacetPiece> {
         let chart = self.chart();
         let corners = self.mesh.corners(triangle);
@@ -139,7 +136,7 @@ impl Facets<'_> {
         for (place, ray) in places.iter_mut().zip(rays) {
             let slope = ray.direction.dot(normal);
             let distance = (corners[0] - ray.origin).dot(normal) / slope;
-            // Also for NaN.
+            // Catches NaN too.
             if !(slope < 0.0 && distance > 0.0) {
                 return None;
             }
@@ -164,7 +161,7 @@ impl Facets<'_> {
 }
 
 impl FacetPiece {
-    /// Keeps what lies on one side of a line (Sutherland and Hodgman).
+    /// Clips to one side of a line (Sutherland and Hodgman).
     fn cut(&mut self, from: DVec2, to: DVec2, winding: f64) {
         let distance = |corner: DVec2| (to - from).perp_dot(corner - from) * winding;
         let before = self.corners;
@@ -183,7 +180,7 @@ impl FacetPiece {
     }
 
     fn push(&mut self, corner: DVec2) {
-        // A convex polygon gains at most one corner per line; rounding may repeat a corner, which adds no area.
+        // A convex polygon gains at most one corner per line. Rounding may repeat a corner, which adds no area.
         if self.len < MAX_CORNERS {
             self.corners[self.len] = corner;
             self.len += 1;

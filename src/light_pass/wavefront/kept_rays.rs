@@ -12,8 +12,8 @@ use crate::geometry::Ray;
 use crate::light_pass::caustic::path::PathSignature;
 use crate::transport::RayHit;
 
-/// The start of a light ray: the face of the launch domain, the bits of its place in the unit square, and which of a
-/// spectral light's wavelengths it has.
+/// Start of a light ray: face of the launch domain, bits of the position in the unit square, and number of the
+/// wavelength of a spectral light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct RayKey {
     face: u32,
@@ -21,13 +21,13 @@ pub struct RayKey {
     square: [u64; 2],
 }
 
-/// Memory that a ray of so many segments takes while it is kept [bytes].
+/// Memory of a cached ray with this many segments [bytes].
 fn bytes_of(segments: usize) -> u64 {
     (segments * size_of::<CachedHit>() + size_of::<(RayKey, KeptRay)>()) as u64
 }
 
 impl RayKey {
-    /// Of a ray that starts at a point of the unit square of a face; `node` is 0 where it has no wavelength of its own.
+    /// For a ray that starts at a point of a face's unit square; `node` is 0 without a wavelength.
     pub fn new(face: usize, node: u32, square: DVec2) -> Self {
         Self {
             face: face as u32,
@@ -37,42 +37,41 @@ impl RayKey {
     }
 }
 
-/// What one segment of a path met.
+/// Hit of one segment of a path.
 #[derive(Clone, Copy, Debug)]
 pub struct CachedHit {
-    /// The way to where the segment starts.
+    /// Path up to the start of the segment.
     pub signature: PathSignature,
-    /// `None` where it met nothing.
+    /// `None` where it hit nothing.
     pub place: Option<RayHit>,
 }
 
-/// All that one light ray met, along all its branches.
+/// All hits of one light ray, along all its branches.
 #[derive(Clone, Debug)]
 pub struct TracedRay {
-    /// Where it started.
     pub key: RayKey,
-    /// In the order in which its branches were followed.
+    /// In the order in which its branches were traced.
     pub hits: Box<[CachedHit]>,
 }
 
 #[derive(Clone, Debug)]
 struct KeptRay {
-    /// Edit after which it was traced.
+    /// Number of the last edit before it was traced.
     edit: u32,
     hits: Box<[CachedHit]>,
 }
 
-/// What edits did to an object.
+/// Edits of an object.
 #[derive(Clone, Copy, Debug)]
 struct Edited {
     object: u32,
-    /// Last edit of its shape or place, and the box that it is in since [m].
+    /// Last edit of its shape or placement, and its bounding box since then [m].
     shape: Option<(u32, [DVec3; 2])>,
-    /// Last edit after which light leaves it otherwise.
+    /// Last edit that changed how light leaves it.
     material: Option<u32>,
 }
 
-/// Kept rays of one light.
+/// Cached rays of one light.
 #[derive(Clone, Debug, Default)]
 pub struct RayCache {
     rays: HashMap<RayKey, KeptRay>,
@@ -82,7 +81,7 @@ pub struct RayCache {
     edited: Vec<Edited>,
 }
 
-/// A kept ray, seen from the present scene.
+/// A cached ray in the present scene.
 #[derive(Clone, Copy, Debug)]
 pub struct CachedRay<'a> {
     ray: &'a KeptRay,
@@ -90,22 +89,20 @@ pub struct CachedRay<'a> {
 }
 
 impl RayCache {
-    /// Memory that they take [bytes], roughly.
+    /// Approximate memory [bytes].
     pub fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Number of rays.
     pub fn len(&self) -> usize {
         self.rays.len()
     }
 
-    /// Whether there are none.
     pub fn is_empty(&self) -> bool {
         self.rays.is_empty()
     }
 
-    /// The ray of a start; `None` where it was never traced.
+    /// The ray with a start; `None` if it is not cached.
     pub fn get(&self, key: &RayKey) -> Option<CachedRay<'_>> {
         Some(CachedRay {
             ray: self.rays.get(key)?,
@@ -113,7 +110,7 @@ impl RayCache {
         })
     }
 
-    /// Keeps what a ray met, unless all would then take more than so many bytes.
+    /// Caches a ray's hits unless the total would exceed `most_bytes`.
     pub fn insert(&mut self, fresh: TracedRay, most_bytes: u64) {
         let old = self
             .rays
@@ -130,12 +127,12 @@ impl RayCache {
         }
     }
 
-    /// Begins an edit; calls until the next one belong to it.
+    /// Begins an edit, to which all changes belong until the next one begins.
     pub fn begin_edit(&mut self) {
         self.edit += 1;
     }
 
-    /// An object has another shape or place, within the box between two corners [m].
+    /// An object has a new shape or placement, within the box between two corners [m].
     pub fn shape_changed(&mut self, object: usize, bounds: (DVec3, DVec3)) {
         let edit = self.edit;
         self.edited_mut(object).shape = Some((edit, [bounds.0, bounds.1]));
@@ -163,13 +160,13 @@ impl RayCache {
 }
 
 impl CachedRay<'_> {
-    /// What the segment met that starts after `signature`, as far as it is kept.
+    /// Hit of the segment that starts after `signature`; outer `None` if it is not cached.
     pub fn hit(&self, signature: PathSignature) -> Option<Option<RayHit>> {
         let hit = self.ray.hits.iter().find(|hit| hit.signature == signature)?;
         Some(hit.place)
     }
 
-    /// Whether a segment along the very ray that was traced still meets what it met then.
+    /// Whether a segment along the very ray that was traced still hits the same place.
     pub fn holds(&self, ray: &Ray, place: Option<RayHit>) -> bool {
         let reach_m = place.map_or(f64::INFINITY, |place| place.distance_m);
         let met = place.map(|place| place.object);
@@ -192,10 +189,10 @@ impl CachedRay<'_> {
     }
 }
 
-/// Boxes count as larger by this share of the numbers involved: hits are found with rounding.
+/// Relative margin of boxes, which covers the rounding of hits.
 const BOX_MARGIN: f64 = 1e-9;
 
-/// Whether a ray meets a box before a distance [m], or nearly does; never false where it does.
+/// Whether a ray hits a box before a distance [m]; conservative.
 fn meets_box(ray: &Ray, [low, high]: [DVec3; 2], reach_m: f64) -> bool {
     let margin = BOX_MARGIN * (low.abs().max(high.abs()).max_element() + ray.origin.abs().max_element());
     let (mut enter, mut leave) = (0.0_f64, reach_m * (1.0 + BOX_MARGIN) + margin);

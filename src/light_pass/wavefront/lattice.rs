@@ -16,13 +16,13 @@ use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 
-/// Cells that a band aims at: enough for all cores, and no more memory than some ten megabytes.
+/// Target number of cells per band: enough work for all cores within some ten megabytes of memory.
 const CELLS_PER_BAND: f64 = 4096.0;
 
-/// Cells of a row from which on it is traced in parts.
+/// A row with more cells is traced in parts.
 const MAX_CELLS_OF_ROW: f64 = 4.0 * CELLS_PER_BAND;
 
-/// What is traced together.
+/// Cells that are traced together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LatticeBand {
     /// Half-open range of rows.
@@ -34,28 +34,26 @@ pub struct LatticeBand {
 /// The lattice of one light.
 #[derive(Clone, Copy, Debug)]
 pub struct WavefrontLattice<'a> {
-    /// Traces its rays.
     pub tracer: StrandTracer<'a>,
-    /// Which cells are worth looking at.
+    /// Marks the cells worth tracing.
     pub item_buffer: &'a ItemBuffer,
     /// Columns and rows of cells of each face.
     pub size: (usize, usize),
-    /// Of the accounts.
+    /// Unit of the flux counts.
     pub unit: FluxUnit,
-    /// Where it is finer, if anywhere.
+    /// `None` without refinement.
     pub refinement: Option<&'a Refinement<'a>>,
-    /// What corners alone would miss.
+    /// Features that the corners alone would miss.
     pub bodies: &'a SubcellFeatures,
-    /// How often cells are split.
     pub splits: SubdivisionLimits,
-    /// Of a light whose wavelengths go different ways; `tracer` is then that of its first node.
+    /// If this is a spectral light, `tracer` is that of its first node.
     pub light: LightPart<'a>,
 }
 
 /// Some traced rows of cells of one face.
 #[derive(Clone, Debug, Default)]
 pub struct TracedBand {
-    /// Of the launch domain.
+    /// Face of the launch domain.
     pub face: u32,
     /// All samples that patches refer to.
     pub samples: Samples,
@@ -63,9 +61,9 @@ pub struct TracedBand {
     pub patches: Vec<Vec<Patch>>,
     /// What surfaces did with the light on its way.
     pub ledger: LedgerSum,
-    /// What rays met that were not known before, in no order that matters.
+    /// Hits that were not cached before, in arbitrary order.
     pub fresh: Vec<TracedRay>,
-    /// Light rays for which something had to be searched.
+    /// Light rays that needed a query.
     pub rays: u64,
     /// Closest-hit queries.
     pub segments: u64,
@@ -76,7 +74,7 @@ pub struct TracedBand {
 
 #[derive(Clone, Debug, Default)]
 struct CornerRow {
-    /// Index of each column's sample; `NONE` where there is none.
+    /// Index of each column's sample; `NONE` without one.
     index: Vec<u32>,
     samples: Vec<LatticeRay>,
 }
@@ -84,7 +82,7 @@ struct CornerRow {
 const NONE: u32 = u32::MAX;
 
 impl TracedBand {
-    /// Memory that it holds [bytes], roughly.
+    /// Approximate memory [bytes].
     pub fn bytes(&self) -> u64 {
         let strands: usize = self
             .samples
@@ -101,7 +99,7 @@ impl TracedBand {
 }
 
 impl WavefrontLattice<'_> {
-    /// The same lattice with rays that were traced before.
+    /// The same lattice with a cache of rays that were traced before.
     pub fn knowing<'b>(&'b self, kept: &'b RayCache) -> WavefrontLattice<'b> {
         let mut lattice: WavefrontLattice<'b> = *self;
         lattice.tracer.kept = Some(kept);
@@ -114,7 +112,7 @@ impl WavefrontLattice<'_> {
             .lattice_cells(self.tracer.launch.face_count(), self.size)
     }
 
-    /// The bands of one face, which cover it.
+    /// The bands that cover one face.
     pub fn bands(&self, face: usize) -> Vec<LatticeBand> {
         let mut bands = Vec::new();
         let (mut start, mut cells) = (0, 0.0);
@@ -147,7 +145,7 @@ impl WavefrontLattice<'_> {
         }
     }
 
-    /// About how many cells the lattice cells of a row will become, span by span.
+    /// Approximate number of cells that each lattice cell of a row will become, span by span.
     fn expected_cells(&self, face: usize, row: usize) -> Vec<f64> {
         let spans = self.item_buffer.lattice_spans(face, row, self.size);
         let columns = spans.into_iter().flat_map(|(start, end)| start..end);
@@ -159,7 +157,7 @@ impl WavefrontLattice<'_> {
             .collect()
     }
 
-    /// A row of very many cells, in parts; `expected` cells span by span.
+    /// Divides a row of very many cells into parts; `expected` cells span by span.
     fn parts_of_row(&self, face: usize, row: usize, expected: &[f64]) -> Vec<LatticeBand> {
         let spans = self.item_buffer.lattice_spans(face, row, self.size);
         let columns = spans.into_iter().flat_map(|(start, end)| start..end);
@@ -180,7 +178,7 @@ impl WavefrontLattice<'_> {
         parts.into_iter().map(band).collect()
     }
 
-    /// Spans of columns of a row that belong to a band.
+    /// Spans of a row's columns that belong to a band.
     fn spans(&self, face: usize, row: usize, columns: (usize, usize)) -> Vec<(usize, usize)> {
         let spans = self.item_buffer.lattice_spans(face, row, self.size);
         spans
@@ -199,7 +197,7 @@ impl WavefrontLattice<'_> {
 
     /// Traces a band of a face and cuts its cells into patches.
     ///
-    /// A row of corners between two bands is traced for each: the rays are few, and bands stay independent.
+    /// A row of corners between two bands is traced twice: the extra rays are few, and bands stay independent.
     pub fn trace(&self, face: usize, band: LatticeBand) -> TracedBand {
         let first_row = band.rows.0;
         let rows = band.rows.1 - first_row;
@@ -269,7 +267,7 @@ impl WavefrontLattice<'_> {
         traced
     }
 
-    /// Corners of the cells above and below a row of corners, as far as they belong to the band.
+    /// Traces a row of corners, as far as cells of the band above or below use them.
     fn trace_corners(&self, face: usize, row: usize, band: LatticeBand) -> CornerRow {
         let mut traced = CornerRow {
             index: vec![NONE; self.size.0 + 1],
@@ -302,7 +300,7 @@ impl WavefrontLattice<'_> {
         }
     }
 
-    /// Edges along row `row` of the band's corners; `None` where nothing changes along one.
+    /// Edges along row `row` of the band's corners; `None` where the path of light does not change.
     fn edges_across(
         &self,
         face: usize,
@@ -328,7 +326,7 @@ impl WavefrontLattice<'_> {
             .collect()
     }
 
-    /// A traced corner of a band whose first row is `first_row`; `None` where there is none.
+    /// A traced corner of a band whose first row is `first_row`; `None` where none was traced.
     fn corner_at(&self, first_row: usize, row: usize, column: usize, index: &[Vec<u32>]) -> Option<Corner> {
         let place = *index.get(row)?.get(column)?;
         (place != NONE).then(|| Corner {
@@ -432,7 +430,7 @@ impl WavefrontLattice<'_> {
         output
     }
 
-    /// Flux of a cell that meets nothing specular first.
+    /// Books flux of a cell whose first hit is not specular.
     fn book_not_emitted(&self, cell: &Cell, work: &Workspace, output: &mut CellOutput) {
         let step = cell.corners[2].square - cell.corners[0].square;
         let quarter = 0.25 * step.x * step.y;
@@ -444,7 +442,7 @@ impl WavefrontLattice<'_> {
     }
 }
 
-/// Whether something may bulge over an edge from two corners beyond it.
+/// Whether something may bulge over an edge towards two corners beyond it.
 fn may_bulge_over(ends: [Corner; 2], beyond: [Option<Corner>; 2], work: &Workspace) -> bool {
     let [Some(a), Some(b)] = beyond else {
         return false;

@@ -14,25 +14,25 @@ use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::ledger_sum::Account;
 use crate::optics::LinearSrgb;
 
-/// Bisections of a virtual edge between rays that go to different surfaces.
+/// Bisections of a virtual edge between rays that hit different surfaces.
 const CUT_STEPS: u32 = 10;
 
-/// The same in the surroundings of a single ray, whose own borders are not known better.
+/// Likewise around a single ray, whose own borders are no more precise.
 const CUT_STEPS_AROUND_ONE: u32 = 4;
 
-/// How often a triangle may be divided.
+/// Remaining divisions of a triangle.
 #[derive(Clone, Copy)]
 struct Divisions {
-    /// Since it meets several surfaces.
+    /// Because it hits several surfaces.
     cuts: u32,
-    /// Since light falls on its corners at very different angles.
+    /// Because the angles of incidence at its corners differ too much.
     bends: u32,
 }
 
 impl Divisions {
     const WHOLE: Self = Self { cuts: 4, bends: 4 };
 
-    /// Of the surroundings of a single ray.
+    /// For the surroundings of a single ray.
     const AROUND_ONE: Self = Self { cuts: 2, bends: 1 };
 
     fn after_cut(self) -> Self {
@@ -50,7 +50,7 @@ impl Divisions {
     }
 }
 
-/// The triangles of a whole grid on one plane.
+/// Deposits the triangles of a whole grid on one plane.
 pub(super) fn even_grid(
     receiver: Receiver,
     grid: &[DVec2],
@@ -86,19 +86,19 @@ pub(super) fn even_grid(
     }
 }
 
-/// Largest ratio of the cosines at which light falls on the corners of a triangle.
+/// Largest ratio of the cosines of incidence at the corners of a triangle.
 const MAX_BENT: f64 = 1.2;
 
-/// Cosine below which light grazes a surface: elsewhere a patch is divided finely enough by its nine rays.
+/// Cosine below which incidence is grazing: above it, the nine probe rays of a patch already divide it finely enough.
 const GRAZING: f64 = 0.3;
 
-/// Triangles within this size do not show [texels].
+/// Divisions of triangles within this size do not show [texels].
 const MIN_BENT_TEXELS: f64 = 0.75;
 
-/// Triangles within this size need not be divided between facets that lie alike in the map [texels].
+/// Triangles within this size need not be divided between evenly mapped facets [texels].
 const TINY_TEXELS: f64 = 0.5;
 
-/// One patch while it is spread.
+/// One patch while it is tessellated.
 pub(super) struct PatchMesh<'a, 'b> {
     pub(super) receivers: &'a Receivers<'a>,
     pub(super) shape: &'a PatchShape,
@@ -179,7 +179,7 @@ impl PatchMesh<'_, '_> {
         }
     }
 
-    /// Gives a triangle's flux to where its rays go.
+    /// Deposits a triangle's flux where its rays land, divided until each part has one target.
     fn settle(&mut self, knots: [Knot; 3], flux: FluxCount, budget: Divisions) {
         if flux == [0; 3] {
             return;
@@ -201,8 +201,7 @@ impl PatchMesh<'_, '_> {
             }
         }
         if budget.cuts == 0 {
-            // A corner where many surfaces meet, some thousandth of a patch wide: all of it goes where its first ray
-            // goes.
+            // A corner where many surfaces meet, some thousandth of a patch wide: all of it follows its first ray.
             return self.place(&[knots[0]; 3], None, flux);
         }
         let joined = [0, 1, 2].map(|i| self.is_joined(&knots[(i + 1) % 3], &knots[(i + 2) % 3]));
@@ -225,7 +224,7 @@ impl PatchMesh<'_, '_> {
         self.settle([far1, right, far2], third, budget.after_cut());
     }
 
-    /// Four triangles in place of one.
+    /// Divides a triangle into four.
     fn quarter(&mut self, [a, b, c]: [Knot; 3], flux: FluxCount, budget: Divisions) {
         let mut middle = |a: Knot, b: Knot| self.knot(a.at.lerp(b.at, 0.5));
         let [ab, bc, ca] = [middle(a, b), middle(b, c), middle(c, a)];
@@ -235,8 +234,8 @@ impl PatchMesh<'_, '_> {
         }
     }
 
-    /// Whether light falls on a bent receiver at angles that differ too much between three rays to be spread evenly between
-    /// them: towards the rim of a body the same light covers more and more of it.
+    /// Whether the angles of incidence of three rays on a curved receiver differ too much for an even spread between
+    /// them: towards the rim of a body the same light covers more and more area.
     fn is_bent(&self, knots: &[Knot; 3]) -> bool {
         let facets = (knots[0].vertex.place.receiver()).and_then(|receiver| self.receivers.facets(receiver));
         let Some(facets) = facets else {
@@ -259,7 +258,7 @@ impl PatchMesh<'_, '_> {
         least < GRAZING && most > MAX_BENT * least
     }
 
-    /// Whether two rays meet one surface, with nothing between that would part their light on the map.
+    /// Whether two rays hit one surface, with a map that is continuous between the hits.
     fn is_joined(&self, a: &Knot, b: &Knot) -> bool {
         let (a, b) = (&a.vertex.place, &b.vertex.place);
         let (Some(receiver), true) = (a.receiver(), a.is_same(b)) else {
@@ -271,7 +270,7 @@ impl PatchMesh<'_, '_> {
         }
     }
 
-    /// How the facets between rays that meet one receiver take them.
+    /// How a triangle of rays splits over the facets of its receiver.
     fn over_facets(&self, knots: &[Knot; 3]) -> ReceiverHits {
         let places = knots.map(|knot| knot.vertex.place.facet());
         let facets = (knots[0].vertex.place.receiver()).and_then(|receiver| self.receivers.facets(receiver));
@@ -290,8 +289,8 @@ impl PatchMesh<'_, '_> {
         ReceiverHits::Several(pieces, is_whole)
     }
 
-    /// Where between two knots the rays stop going where the first goes: the place between them [0, 1], the last knot
-    /// on the first's side, and the first on the other.
+    /// Bisects between two knots for where rays stop landing with the first: the position between them [0, 1], the last
+    /// knot on the first's side, and the first knot on the other.
     fn bracket(&mut self, from: Knot, to: Knot) -> (f64, Knot, Knot) {
         let (mut low, mut high) = (0.0, 1.0);
         let (mut near, mut far) = (from, to);
@@ -312,7 +311,7 @@ impl PatchMesh<'_, '_> {
         (0.5 * (low + high), near, far)
     }
 
-    /// All three rays go to the same receiver, or nowhere.
+    /// Deposits the flux of three rays that land on the same receiver or share another fate.
     fn place(&mut self, knots: &[Knot; 3], pieces: Option<&[FacetPiece]>, flux: FluxCount) {
         let mut arrived = flux;
         if self.absorbs {
@@ -325,7 +324,7 @@ impl PatchMesh<'_, '_> {
         }
         match knots[0].vertex.place {
             LandingPoint::Nowhere if self.goes_out => self.out.ledger.book(Account::Escaped, arrived),
-            // No traced ray of the patch left the scene: a ray that was continued too far did.
+            // No traced ray of the patch left the scene, so an extrapolated ray did.
             LandingPoint::Nowhere => self.out.ledger.book(Account::Unresolved, arrived),
             LandingPoint::Onward => self.out.ledger.book(Account::Quadrature, arrived),
             LandingPoint::Refused => self.out.ledger.book(Account::Unresolved, arrived),
@@ -353,15 +352,15 @@ impl PatchMesh<'_, '_> {
     }
 }
 
-/// What a triangle of rays meets of one receiver.
+/// What a triangle of rays hits of one receiver.
 enum ReceiverHits {
     /// Facets that count as one.
     One,
-    /// Parts on several, and whether they take all of it.
+    /// Parts on several facets, and whether they cover the triangle exactly.
     Several(Vec<FacetPiece>, bool),
 }
 
-/// The parts of a triangle's flux on several facets.
+/// Splits a triangle's flux over several facets.
 fn flux_triangles(pieces: &[FacetPiece], flux: FluxCount) -> impl Iterator<Item = FluxTriangle> {
     let triangles = pieces.iter().flat_map(|piece| {
         let triangles = piece.triangles();

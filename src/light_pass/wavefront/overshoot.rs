@@ -6,27 +6,27 @@ use glam::DVec2;
 
 use super::coverage::FluxTriangle;
 
-/// Light may fall so far from where the traced rays do [texels].
+/// Tolerated distance of light from where the traced rays land [texels].
 const TOLERATED_TEXELS: f64 = 8.0;
 
-/// A patch that reaches farther than its rays.
+/// A patch that reaches farther than its traced rays.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PatchOvershoot {
     /// Face of the launch domain.
     pub face: u32,
-    /// Its middle in the unit square.
+    /// Middle of the patch in the unit square.
     pub middle: DVec2,
-    /// Whose map it reaches.
+    /// Receiver of the map that it reaches.
     pub receiver: Receiver,
-    /// Box around its light on the map [texels].
+    /// Low corner of the bounding box of its light on the map [texels].
     pub low: DVec2,
-    /// The other corner.
+    /// High corner of the bounding box [texels].
     pub high: DVec2,
 }
 
 impl PatchOvershoot {
-    /// Of a patch with the given triangles on one map, whose traced rays fall on it at `traced` [texels]; `None` where it
-    /// keeps to them.
+    /// Of a patch with the given triangles on one map, whose traced rays land at `traced` [texels]; `None` where it
+    /// stays close to them.
     pub fn of(
         face: u32,
         middle: DVec2,

@@ -18,19 +18,19 @@ use crate::progress::{Control, Stage};
 /// Patches that one task spreads.
 const PATCHES_PER_TASK: usize = 128;
 
-/// Tasks whose triangles wait together to be deposited: memory does not grow with the light.
+/// Tasks whose triangles are held until they are deposited: bounds the memory.
 const TASKS_AT_ONCE: usize = 64;
 
-/// The same before it is known how many triangles they give.
+/// The same while the number of triangles per task is unknown.
 const FIRST_AT_ONCE: usize = 4;
 
-/// Triangles that wait together, about: 72 bytes each.
+/// Triangles held until they are deposited, roughly: 72 bytes each.
 const MAX_TRIANGLES: usize = 1 << 21;
 
-/// Triangles that are deposited between two looks at whether to stop.
+/// Triangles deposited between two checks for cancellation.
 const TRIANGLES_AT_ONCE: usize = 1 << 13;
 
-/// Traced bands of one light, to be deposited again without a ray.
+/// Traced bands of one light, which can be deposited again without tracing.
 #[derive(Clone, Debug, Default)]
 pub struct TracedLight {
     /// All bands, face by face.
@@ -38,40 +38,38 @@ pub struct TracedLight {
 }
 
 impl TracedLight {
-    /// Memory that it holds [bytes], roughly.
+    /// Approximate memory [bytes].
     pub fn bytes(&self) -> u64 {
         self.bands.iter().map(TracedBand::bytes).sum()
     }
 }
 
-/// Memory that a run may take beyond its end [bytes].
+/// Memory that may be kept after a run [bytes].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Room {
     pub bands_bytes: u64,
-    /// For all rays, those of earlier runs included.
+    /// For all cached rays, those of earlier runs included.
     pub rays_bytes: u64,
 }
 
-/// How patches go to maps.
+/// Traces a lattice and deposits its patches into maps.
 #[derive(Clone, Copy)]
 pub struct WavefrontDepositor<'a> {
-    /// Receivers.
     pub receivers: &'a Receivers<'a>,
-    /// Gives the charts of maps that receive light.
+    /// Charts of the maps that receive light.
     pub chart_for: &'a ChartFor<'a>,
-    /// Traces, or traced.
     pub lattice: WavefrontLattice<'a>,
     /// Flux that all lights send to specular surfaces [W, luminance].
     pub reference_w: f64,
-    /// How much coarser (> 1) or finer triangles may be than is usual.
+    /// Coarseness of triangles relative to the usual one: above 1 is coarser.
     pub coarseness: f64,
-    /// Receivers that a run may ask for; beyond them it ends as if it were cancelled.
+    /// Limit on receiver queries; a run that exceeds it ends as if it were cancelled.
     pub most_queries: u64,
 }
 
 impl WavefrontDepositor<'_> {
-    /// Traces and deposits a lattice, or the bands of a share of it. Bands are given back where they take less than
-    /// `room.bands_bytes`; what rays met is added to `rays`. A cancelled run is to be thrown away, all but its rays.
+    /// Traces and deposits a lattice, or one shard's bands of it. Returns the bands if they take less than
+    /// `room.bands_bytes`; adds the hits of rays to `rays`. A cancelled run is to be discarded, except for its rays.
     pub fn run(
         &self,
         share: Option<ShardIndex>,
@@ -117,7 +115,7 @@ impl WavefrontDepositor<'_> {
         (report, kept)
     }
 
-    /// Deposits kept bands: no light ray is traced.
+    /// Deposits kept bands without tracing.
     pub fn deposit_again(
         &self,
         traced: &TracedLight,
@@ -138,7 +136,7 @@ impl WavefrontDepositor<'_> {
         report
     }
 
-    /// Spreads a band's patches and adds them to the maps; without maps, only counts.
+    /// Spreads a band's patches and adds them to the maps; only counts without maps.
     fn deposit(
         &self,
         band: &TracedBand,
@@ -183,7 +181,7 @@ impl WavefrontDepositor<'_> {
         report.deposit_s.add(watch.elapsed());
     }
 
-    /// Spreads patches, task by task; `gathers`: whether the places of footprints are wanted.
+    /// Spreads patches, task by task; `gathers`: whether positions of footprints are recorded.
     fn spread(
         &self,
         band: &TracedBand,

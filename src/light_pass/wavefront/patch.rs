@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::strand::PathSegment;
 use crate::geometry::Ray;
 
-/// A ray with its derivatives along the patch's own coordinates.
+/// A ray, or a derivative of one along the patch's own coordinates.
 #[derive(Clone, Copy, Debug, Default)]
 struct Node {
     origin: DVec3,
@@ -20,7 +20,7 @@ impl Node {
         }
     }
 
-    /// Derivative of a strand along a step in the unit square.
+    /// Derivative along a step in the unit square.
     fn slope(strand: &PathSegment, step: DVec2) -> Self {
         let d = &strand.differential;
         Self {
@@ -51,18 +51,18 @@ impl Node {
     }
 }
 
-/// How rays between the traced ones are made. Directions are not normalised: the plane or surface they meet does not
+/// Interpolation of rays between the traced ones. Directions are not normalised: the hit on a plane or surface does not
 /// depend on their length.
 #[derive(Clone, Debug)]
 pub enum PatchShape {
     /// Over a rectangle: the linearly blended Coons patch of four cubic Hermite edges, which is the rectangle of Adini,
     /// Clough and Melosh (12 degrees of freedom per coordinate), exact for cubics.
     Coons(Box<CoonsPatch>),
-    /// Over a rectangle, by its corners alone.
+    /// Over a rectangle, from its corner rays without derivatives.
     Bilinear(Box<[Ray; 4]>),
     /// Over a triangle: cubic Bézier with Hermite edges, exact for quadratics.
     Bezier(Box<BezierTriangle>),
-    /// Over a triangle, by its corners alone.
+    /// Over a triangle, from its corner rays without derivatives.
     Linear(Box<[Ray; 3]>),
 }
 
@@ -81,7 +81,7 @@ pub struct BezierTriangle {
 }
 
 impl PatchShape {
-    /// The patch over the rectangle of size `step` between four strands.
+    /// Over the rectangle of size `step` between four segments.
     pub fn coons(strands: [&PathSegment; 4], step: DVec2) -> Self {
         Self::Coons(Box::new(CoonsPatch {
             corners: strands.map(Node::of),
@@ -90,12 +90,12 @@ impl PatchShape {
         }))
     }
 
-    /// The same without derivatives.
+    /// Without derivatives.
     pub fn bilinear(strands: [&PathSegment; 4]) -> Self {
         Self::Bilinear(Box::new(strands.map(|strand| strand.ray)))
     }
 
-    /// The patch over a triangle of the unit square.
+    /// Over a triangle of the unit square.
     pub fn bezier(strands: [&PathSegment; 3], squares: [DVec2; 3]) -> Self {
         let corners = strands.map(Node::of);
         // Control point a third of the way from corner i to corner j.
@@ -119,13 +119,13 @@ impl PatchShape {
         }))
     }
 
-    /// The same without derivatives.
+    /// Without derivatives.
     pub fn linear(strands: [&PathSegment; 3]) -> Self {
         Self::Linear(Box::new(strands.map(|strand| strand.ray)))
     }
 
-    /// The rectangle of size `step` around one strand's own place, by its derivatives alone; `low` is the rectangle's
-    /// corner relative to the strand.
+    /// Over the rectangle of size `step` around one segment, from its derivatives alone; `low` is the rectangle's
+    /// corner relative to the segment.
     pub fn around(strand: &PathSegment, low: DVec2, step: DVec2) -> Self {
         let at = |offset: DVec2| Node::of(strand).plus(Node::slope(strand, offset)).ray();
         Self::Bilinear(Box::new([
@@ -136,12 +136,12 @@ impl PatchShape {
         ]))
     }
 
-    /// Whether its coordinates run over the unit square; else over the triangle below its diagonal.
+    /// Whether the patch's coordinates cover the unit square instead of the triangle below its diagonal.
     pub fn is_rectangle(&self) -> bool {
         matches!(self, Self::Coons(_) | Self::Bilinear(_))
     }
 
-    /// The ray at a place of the patch.
+    /// The interpolated ray at a point of the patch.
     pub fn ray(&self, place: DVec2) -> Ray {
         let (s, t) = (place.x, place.y);
         match self {
@@ -152,7 +152,7 @@ impl PatchShape {
         }
     }
 
-    /// Weights of the corners' flux at a place.
+    /// Weights of the corners' flux at a point of the patch.
     pub fn weights(&self, place: DVec2) -> [f64; 4] {
         let (s, t) = (place.x, place.y);
         if self.is_rectangle() {
@@ -200,7 +200,7 @@ impl CoonsPatch {
 }
 
 impl CoonsPatch {
-    /// Rays over a grid of so many steps, row by row; the curves along rows are made once.
+    /// Evaluates a grid of rays with the given numbers of steps, row by row; the curves along rows are computed once.
     pub fn for_each_row(&self, (across, down): (usize, usize), mut take: impl FnMut(usize, &[Ray])) {
         let share = |index: usize, steps: usize| index as f64 / steps as f64;
         let [a, b, c, d] = self.corners;
@@ -215,7 +215,7 @@ impl CoonsPatch {
         let mut row = Vec::with_capacity(across + 1);
         for j in 0..=down {
             let t = share(j, down);
-            // The side curves, less what the rows' curves already have of them.
+            // The side curves, without the part that the rows' curves contain already.
             let left = hermite(a, self.down[0], d, self.down[3], t)
                 .plus(a.times(t - 1.0))
                 .plus(d.times(-t));

@@ -12,10 +12,10 @@ use crate::light_pass::receiver_maps::ChartFor;
 use crate::scene::{Mesh, SurfaceKind};
 use crate::transport::Tracer;
 
-/// How far from the map's middle light is followed on the extended plane [map sides].
+/// How far from the map's centre light is followed on the extended plane [map sides].
 const FARTHEST_SIDES: f64 = 8.0;
 
-/// Deviation from one plane and one affine parametrisation, relative to the mesh, that counts as rounding.
+/// Deviation from a plane and an affine parametrisation, relative to the mesh, that counts as rounding.
 const FLATNESS: f64 = 1e-7;
 
 /// A receiver that lies in one plane, with affine map coordinates.
@@ -28,13 +28,13 @@ pub struct PlaneChart {
     origin: DVec2,
     middle: DVec2,
     farthest_texels: f64,
-    /// Whether the surface fills its map to the borders, so that the map's border is the surface's.
+    /// Whether the surface fills its map, so that the map's border is the surface's.
     pub fills_map: bool,
 }
 
 impl PlaneChart {
-    /// Texel coordinates where a ray (of any length) meets the extended plane, and the distance in units of the
-    /// direction; `None` where it does not, comes from behind, or too far off the map to matter.
+    /// Texel coordinates where a ray (of any length) hits the extended plane, and the distance in units of the
+    /// direction; `None` if it misses, comes from behind, or hits too far off the map to matter.
     pub fn meet(&self, ray: &Ray) -> Option<(DVec2, f64)> {
         let slope = ray.direction.dot(self.normal);
         if slope > 0.0 {
@@ -44,11 +44,11 @@ impl PlaneChart {
         let point = ray.origin + ray.direction * distance;
         let texel = DVec2::new(self.rows[0].dot(point), self.rows[1].dot(point)) + self.origin;
         let near = (texel - self.middle).abs().max_element() <= self.farthest_texels;
-        // Also false for NaN.
+        // Rejects NaN too.
         (distance > 0.0 && near).then_some((texel, distance))
     }
 
-    /// Whether a point lies behind the plane: light that starts there does not come to this side.
+    /// Whether a point lies behind the plane, so that light from there cannot reach this side.
     pub fn hides(&self, point: DVec3) -> bool {
         point.dot(self.normal) < self.offset_m
     }
@@ -62,7 +62,7 @@ impl PlaneChart {
             .reduce(|a, b| if b.0 > a.0 { b } else { a })?
             .1;
         let corners = mesh.corners(largest);
-        // Light comes against it.
+        // Opposes the incident light.
         let normal = mesh.face_normal(largest) * chart.receiver.side().sign();
         let rows = chart.texel_from_world(largest, corners)?;
         let size = DVec2::new(chart.width as f64, chart.height as f64);
@@ -96,14 +96,13 @@ impl PlaneChart {
 /// A receiver with its parametrisation.
 #[derive(Debug)]
 pub struct ReceiverSurface {
-    /// Of the object.
     pub chart: Arc<Chart>,
     islands: Option<Islands>,
-    /// Where it is flat.
+    /// `None` where it is not flat.
     pub plane: Option<PlaneChart>,
-    /// Whether it takes all light that arrives.
+    /// Whether it takes all incident light.
     pub is_diffuse: bool,
-    /// Of the whole surface [m²].
+    /// Area of the whole surface [m²].
     pub area_m2: f64,
 }
 
@@ -122,9 +121,8 @@ impl ReceiverSurface {
     }
 }
 
-/// All receivers of a scene, prepared when light first looks for them.
+/// All receivers of a scene, prepared on first use.
 pub struct Receivers<'a> {
-    /// The scene.
     pub tracer: &'a Tracer,
     chart_for: &'a ChartFor<'a>,
     slots: Vec<OnceLock<Option<ReceiverSurface>>>,
@@ -139,7 +137,7 @@ impl std::fmt::Debug for Receivers<'_> {
 }
 
 impl<'a> Receivers<'a> {
-    /// None prepared yet.
+    /// With no receiver prepared yet.
     pub fn new(tracer: &'a Tracer, chart_for: &'a ChartFor<'a>) -> Self {
         let scene = tracer.scene();
         let empty = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -158,14 +156,14 @@ impl<'a> Receivers<'a> {
         }
     }
 
-    /// A receiver; `None` where it cannot take a map.
+    /// `None` where the receiver cannot have a map.
     pub fn get(&self, receiver: Receiver) -> Option<&ReceiverSurface> {
         self.slots[receiver.index()]
             .get_or_init(|| self.prepare(receiver))
             .as_ref()
     }
 
-    /// The facets of a receiver that is bent, or whose chart is; `None` of one that is flat and even.
+    /// The facets of a receiver; `None` if it lies in one plane with an affine chart.
     pub fn facets(&self, receiver: Receiver) -> Option<Facets<'_>> {
         let surface = self.get(receiver).filter(|surface| surface.plane.is_none())?;
         Some(Facets {
@@ -189,8 +187,8 @@ impl<'a> Receivers<'a> {
         })
     }
 
-    /// Whether a beam, by the ends of its traced rays, may meet any object but the given ones: their boxes against boxes
-    /// around parts of it.
+    /// Whether a beam, given by its traced rays, may hit any object except the given ones: tests bounding boxes of
+    /// objects against boxes around parts of the beam.
     pub fn meets_others(&self, beam: &PatchBeam, except: [u32; 2]) -> bool {
         let whole = beam.bounds(0.0, 1.0);
         self.bounds.iter().enumerate().any(|(object, bounds)| {
@@ -200,7 +198,7 @@ impl<'a> Receivers<'a> {
         })
     }
 
-    /// Where a ray leaves the scene's box; its origin where it is already outside [m].
+    /// Where a ray leaves the scene's bounding box; its origin if it is already outside [m].
     pub fn exit_point(&self, ray: &Ray) -> DVec3 {
         let (low, high) = self.scene_bounds;
         let mut distance_m = f64::INFINITY;
@@ -219,13 +217,13 @@ impl<'a> Receivers<'a> {
     }
 }
 
-/// How often a beam is halved to look closer.
+/// Halvings of a beam for a closer test.
 const BEAM_HALVINGS: u32 = 5;
 
-/// Light between traced rays may run this share of their distance beside them.
+/// How far light between traced rays may stray from them, relative to their distance from each other.
 const BEAM_MARGIN: f64 = 0.25;
 
-/// The traced rays of a patch, from where they start to where they end [m].
+/// Start and end points of a patch's traced rays [m].
 #[derive(Clone, Copy, Debug)]
 pub struct PatchBeam {
     ends: [[DVec3; 2]; 4],
@@ -246,7 +244,7 @@ impl PatchBeam {
         beam
     }
 
-    /// Box around the part between two shares of the way [m].
+    /// Bounding box of the part between two fractions of the way [m].
     fn bounds(&self, from: f64, to: f64) -> (DVec3, DVec3) {
         let mut bounds = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         for share in [from, to] {

@@ -19,18 +19,18 @@ pub const TILE_SIDE: usize = 16;
 /// Light below this share of a cell's brightest does not divide it.
 const MIN_SHARE: f64 = 0.02;
 
-/// Tiles of one map.
+/// Selected tiles of one map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TileSet {
     columns: usize,
     chosen: Vec<bool>,
 }
 
-/// Tiles of all maps, by object.
+/// Selected tiles of all maps.
 pub type RoughTiles = BTreeMap<Receiver, TileSet>;
 
 impl TileSet {
-    /// No tile of a map of the given size [texels].
+    /// With no tile selected, for a map of the given size [texels].
     pub fn none(width: usize, height: usize) -> Self {
         let (columns, rows) = tile_counts(width, height);
         Self {
@@ -39,17 +39,17 @@ impl TileSet {
         }
     }
 
-    /// Chooses a tile, counted row by row.
+    /// Selects a tile by its row-major index.
     pub fn choose(&mut self, tile: usize) {
         self.chosen[tile] = true;
     }
 
-    /// Whether a tile, counted row by row, is chosen.
+    /// Whether a tile is selected, by its row-major index.
     pub fn is_chosen(&self, tile: usize) -> bool {
         self.chosen[tile]
     }
 
-    /// Whether any tile is chosen between two points of the map [texels].
+    /// Whether any selected tile meets the box between two points of the map [texels].
     fn meets(&self, low: DVec2, high: DVec2) -> bool {
         let side = TILE_SIDE as f64;
         let rows = self.chosen.len() / self.columns;
@@ -63,7 +63,7 @@ impl TileSet {
     }
 }
 
-/// Tiles across and down a map of the given size [texels].
+/// Number of tiles across and down a map of the given size [texels].
 pub fn tile_counts(width: usize, height: usize) -> (usize, usize) {
     (
         width.div_ceil(TILE_SIDE).max(1),
@@ -74,15 +74,15 @@ pub fn tile_counts(width: usize, height: usize) -> (usize, usize) {
 /// What one round refines.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Round {
-    /// Cells whose light falls here.
+    /// Cells are divided if their light falls on these tiles.
     pub tiles: RoughTiles,
-    /// Cells that hold one of these places of the launch domain: face and point of the unit square, ascending. Their
-    /// patches reach the tiles, though their rays do not.
+    /// Cells are divided if they contain one of these points of the launch domain: face and point of the unit square,
+    /// ascending. Their patches reach the tiles though their rays do not.
     places: Vec<(u32, DVec2)>,
 }
 
 impl Round {
-    /// For these tiles, after a level with these patches.
+    /// For tiles selected after a level with these overshoots.
     pub fn new(tiles: RoughTiles, overshoots: &[PatchOvershoot]) -> Self {
         let meets = |patch: &&PatchOvershoot| {
             let tiles = tiles.get(&patch.receiver);
@@ -101,7 +101,7 @@ impl Round {
         Self { tiles, places }
     }
 
-    /// Whether one of the places lies between two corners of the unit square.
+    /// Whether one of the points lies between two corners of the unit square.
     fn has_place(&self, face: u32, low: DVec2, high: DVec2) -> bool {
         let begin = self
             .places
@@ -116,19 +116,17 @@ impl Round {
 /// Rounds of refinement so far.
 #[derive(Clone, Copy, Debug)]
 pub struct Refinement<'a> {
-    /// Receivers.
     pub receivers: &'a Receivers<'a>,
-    /// What each round refines.
+    /// Ascending: each round divides the cells of the previous ones once more.
     pub rounds: &'a [Round],
 }
 
-/// Rounds as a set: bit r stands for round r.
+/// A set of rounds: bit r stands for round r.
 pub type RoundSet = u32;
 
 impl Refinement<'_> {
-    /// Whether a cell has to be divided that was divided in so many rounds before, by the samples at its corners and along
-    /// its edges.
-    /// `low` and `high` are corners of the cell in the unit square of its face.
+    /// Whether a cell that was divided in `rounds_before` rounds has to be divided again, judged by the samples at its
+    /// corners and along its edges. `low` and `high` are corners of the cell in the unit square of its face.
     pub fn is_too_coarse(
         &self,
         (face, low, high): (usize, DVec2, DVec2),
@@ -147,8 +145,8 @@ impl Refinement<'_> {
         })
     }
 
-    /// Rounds that divide light beside a cell which not all of its corners have: the border of that light may reach into
-    /// the cell, between its corners.
+    /// Rounds that divide neighbouring light which not all corners of a cell have: the border of that light may reach
+    /// into the cell between its corners.
     pub fn rounds_beside(&self, own: [&LatticeRay; 4], beside: &[&LatticeRay]) -> RoundSet {
         if self.rounds.is_empty() {
             return 0;
@@ -168,7 +166,8 @@ impl Refinement<'_> {
         rounds
     }
 
-    /// Whether a strand's light may fall on chosen tiles: they meet the box around the places that its corners light.
+    /// Whether a segment's light may fall on selected tiles: they meet the bounding box of the points that its corners
+    /// light.
     fn falls_on(&self, corners: &[&PathSegment], tiles: &RoughTiles) -> bool {
         let mut lit: Vec<(Receiver, DVec2, DVec2)> = Vec::new();
         for strand in corners {
@@ -195,7 +194,7 @@ impl Refinement<'_> {
     }
 }
 
-/// Signatures of all strands that are not dim beside the brightest.
+/// Signatures of all segments that are not dim relative to the brightest.
 fn bright_signatures(samples: &[&LatticeRay]) -> Vec<PathSignature> {
     let brightest_w = samples
         .iter()

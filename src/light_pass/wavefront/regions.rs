@@ -11,12 +11,11 @@ use super::edge::EdgeReach;
 pub(super) struct Outline {
     /// In the unit square.
     pub(super) square: DVec2,
-    /// What was traced there.
     pub(super) sample: SampleId,
 }
 
-/// Outlines of the parts of a cell that a signature fills: its corners, joined along edges that it reaches from end to
-/// end, with the cuts between.
+/// Outlines of the parts of a cell that a signature fills: the corners that have it, joined along edges that it fills
+/// from end to end, and bounded by the cuts between.
 pub(super) fn regions(
     cell: &Cell,
     reach: &impl Fn(usize, bool) -> EdgeReach,
@@ -41,7 +40,7 @@ pub(super) fn regions(
     }
     let mut used = [false; 4];
     for start in 0..4 {
-        // A region starts at a corner that is not joined to the one before.
+        // A region starts at a corner that is not joined to the previous one.
         if !there[start] || used[start] || joined[(start + 3) % 4] {
             continue;
         }
@@ -74,8 +73,8 @@ fn outline_of(corner: Corner) -> Outline {
     }
 }
 
-/// Samples along a side from a corner up to the cut, and the cut: near a silhouette the wavefront bends like a root, and
-/// bisection left samples just where they are needed.
+/// Samples along a side from a corner up to the cut, and the cut. Near a silhouette the wavefront bends like a square
+/// root, and bisection left samples just where they are needed.
 fn up_to_cut(cell: &Cell, side: usize, backwards: bool, reach: EdgeReach) -> Vec<Outline> {
     let EdgeReach::Cut {
         place,
@@ -99,7 +98,7 @@ fn up_to_cut(cell: &Cell, side: usize, backwards: bool, reach: EdgeReach) -> Vec
         .collect()
 }
 
-/// An outline as a strip of triangles between its two ends, always over the shorter diagonal.
+/// Splits an outline into a strip of triangles between its two ends, always across the shorter diagonal.
 pub(super) fn triangles(region: &[Outline]) -> Vec<[Outline; 3]> {
     let (mut first, mut last) = (0, region.len().saturating_sub(1));
     let mut strip = Vec::with_capacity(region.len());

@@ -18,12 +18,11 @@ pub fn scaled(flux: FluxCount, factor: LinearSrgb) -> FluxCount {
     })
 }
 
-/// Channel by channel.
 pub fn difference(a: FluxCount, b: FluxCount) -> FluxCount {
     std::array::from_fn(|channel| a[channel] - b[channel])
 }
 
-/// A count in parts of given shares, which add up to 1, whose sum is exact but for rounding of the last.
+/// Splits a count by shares that sum to 1; the parts add up exactly.
 pub fn parted(flux: FluxCount, shares: impl Iterator<Item = f64>) -> impl Iterator<Item = FluxCount> {
     let (mut given, mut sum) = ([0; 3], 0.0);
     shares.map(move |share| {
@@ -35,22 +34,22 @@ pub fn parted(flux: FluxCount, shares: impl Iterator<Item = f64>) -> impl Iterat
     })
 }
 
-/// Hands out a count in parts whose sum is exact.
+/// Splits a count into parts whose sum is exact.
 pub struct Shares {
     flux: FluxCount,
     given: FluxCount,
-    /// Per channel: share of the whole so far.
+    /// Cumulative share, by channel.
     sum: [f64; 3],
-    /// Per channel: share of the whole of a part of unit colour.
+    /// Share of a part of unit colour, by channel.
     scale: [f64; 3],
     left: usize,
-    /// Whether all channels were alike so far.
+    /// Whether all channels were equal so far.
     is_grey: bool,
 }
 
 impl Shares {
-    /// For so many parts of equal area whose mean colour is known; the last part takes what rounding, and a mean that
-    /// is not exact, leave.
+    /// For `parts` parts of equal area whose mean colour is known. The last part absorbs rounding and any error of the
+    /// mean.
     pub fn new(flux: FluxCount, parts: usize, mean: LinearSrgb) -> Self {
         let scale = mean.to_array().map(|mean| {
             if mean > 0.0 {
@@ -69,7 +68,7 @@ impl Shares {
         }
     }
 
-    /// The next part, of a colour.
+    /// The next part, of the given colour.
     pub fn next(&mut self, colour: LinearSrgb) -> FluxCount {
         self.left -= 1;
         let colour = colour.to_array();
@@ -77,7 +76,7 @@ impl Shares {
         if is_grey {
             return [self.next_of(0, colour[0]); 3];
         }
-        // Greys are summed in the first channel alone.
+        // Grey parts are summed in the first channel alone.
         if self.is_grey {
             self.is_grey = false;
             self.sum = [self.sum[0]; 3];
@@ -91,7 +90,7 @@ impl Shares {
         let upto = if self.left == 0 {
             self.flux[channel]
         } else {
-            // Cumulative: no rounding adds up. Not negative, so that cutting rounds down.
+            // Cumulative, so that rounding errors do not accumulate. Non-negative, so that truncation rounds down.
             ((self.flux[channel] as f64 * self.sum[channel].min(1.0) + 0.5) as i64).min(self.flux[channel])
         };
         let part = upto - self.given[channel];

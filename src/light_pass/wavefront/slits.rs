@@ -9,60 +9,61 @@ use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::launch::Launch;
 use crate::transport::Tracer;
 
-/// An opening counts as narrow while it is less than this many cells wide: wider ones hold corners of cells.
+/// Openings narrower than this many cells are narrow: wider ones contain corners of cells.
 const NARROW_CELLS: f64 = 2.0;
 
 /// Narrower openings are not found [cells].
 const NARROWEST_CELLS: f64 = 1e-4;
 
-/// Bisections of an opening's width, after it was bracketed to a factor of two.
+/// Bisections of an opening's width once it is bracketed to a factor of two.
 const WIDTH_BITS: u32 = 4;
 
-/// Samples along an edge lie half a cell apart, but an edge has these at least.
+/// Fewest samples along an edge, where they are otherwise half a cell apart.
 const MIN_SAMPLES: usize = 3;
 
-/// Samples of one light's edges at most: beyond, they lie farther apart.
+/// Most samples along all edges of one light; beyond that they are farther apart.
 const MAX_SAMPLES: f64 = 8_192.0;
 
-/// Least and most cells across an opening: of the least, corners lie in it; of the most, its own corners are resolved.
+/// Fewest and most cells across an opening: with the fewest, cell corners lie inside it; with the most, its own corners
+/// are resolved.
 const CELLS_ACROSS: (f64, f64) = (4.0, 32.0);
 
-/// Cells that openings aim at, and what they may have with the least across, where no other light reaches casters; else
-/// as large a share of these as of the light.
+/// Target number of cells in openings, and its limit at the fewest cells across, where no other light reaches casters;
+/// otherwise in proportion to the openings' share of the light.
 const CELLS: (f64, f64) = (8_192.0, 16_384.0);
 
-/// Rays per side of a face that ask how much light reaches casters.
+/// Rays per side of a face that estimate how much light reaches casters.
 const PROBES_PER_SIDE: usize = 64;
 
 /// A part of a narrow opening, beside a part of an edge.
 #[derive(Clone, Copy, Debug)]
 pub struct Slit {
-    /// Ends of its middle line [m].
+    /// Ends of its centre line [m].
     pub ends: [DVec3; 2],
-    /// Across, as the light sees it [m].
+    /// As seen from the light [m].
     pub width_m: f64,
-    /// What of the launch domain goes through it, at most [sr, or m² of a sun].
+    /// Upper bound on the measure of the launch domain that passes through it [sr, or m² of a sun].
     measure: f64,
 }
 
 impl Slit {
-    /// As how many squares it is long, and the half ones around its ends.
+    /// Its length in squares of its width, including half a square at each end.
     fn squares(&self) -> f64 {
         1.0 + self.ends[0].distance(self.ends[1]) / self.width_m
     }
 }
 
-/// One light's look at a scene with a lattice of cells of some size.
+/// One light's search of a scene with a lattice of a given cell size.
 struct Search<'a> {
     tracer: &'a Tracer,
     launch: &'a Launch,
     visible: &'a ItemBuffer,
-    /// In the unit square.
+    /// Cell size in the unit square.
     cell: DVec2,
 }
 
-/// The openings through which a light sees casters, that are narrow beside cells of the given size in the unit square and
-/// let through a share of its light that is worth their cells; and how many cells lie across each.
+/// Openings through which a light sees casters that are narrow relative to cells of the given size in the unit square,
+/// and let through enough light to be worth their cells; and the number of cells across each.
 pub fn narrow_openings(
     tracer: &Tracer,
     launch: &Launch,
@@ -87,7 +88,8 @@ pub fn narrow_openings(
     widest(openings, through / (through + search.seen_measure()))
 }
 
-/// The widest openings that there are cells for, and how many cells lie across each; `share` of all light goes through them.
+/// Selects the widest openings that fit the cell budget, and the number of cells across each; `share` of all light
+/// passes through them.
 fn widest(mut openings: Vec<Slit>, share: f64) -> (Vec<Slit>, f64) {
     openings.sort_by(|a, b| b.width_m.total_cmp(&a.width_m));
     let mut squares = 0.0;
@@ -103,7 +105,7 @@ fn widest(mut openings: Vec<Slit>, share: f64) -> (Vec<Slit>, f64) {
 }
 
 impl Search<'_> {
-    /// Sharp edges of what blocks light, in directions that casters are in.
+    /// Sharp edges of occluders in directions in which casters lie.
     fn edges(&self) -> Vec<[DVec3; 2]> {
         let scene = self.tracer.scene();
         let blocks = |&object: &usize| {
@@ -130,14 +132,14 @@ impl Search<'_> {
         area_m2.sqrt()
     }
 
-    /// Of the launch domain, per area across the light at a distance [1/m² of sr or m²].
+    /// Measure of the launch domain per area across the light at a distance [sr/m², or m²/m² of a sun].
     fn measure_per_m2(&self, path_m: f64) -> f64 {
         let middle = DVec2::splat(0.5);
         let to = middle + self.cell;
         self.launch.cell_measure(middle, to) / self.launch.cell_area_at_m2(middle, to, path_m)
     }
 
-    /// Of the launch domain, what reaches casters, by a grid of rays [sr, or m² of a sun].
+    /// Measure of the launch domain that reaches casters, by a grid of rays [sr, or m² of a sun].
     fn seen_measure(&self) -> f64 {
         let size = (PROBES_PER_SIDE, PROBES_PER_SIDE);
         let cell = DVec2::splat(1.0 / PROBES_PER_SIDE as f64);
@@ -163,7 +165,7 @@ impl Search<'_> {
             .sum()
     }
 
-    /// Two a cell, along an edge as it appears from the light.
+    /// Two per cell, along an edge as seen from the light.
     fn samples_wanted(&self, edge: &[DVec3; 2]) -> f64 {
         let middle = edge[0] * 0.5 + edge[1] * 0.5;
         let cells = edge[0].distance(edge[1]) / self.cell_m(middle);
@@ -192,8 +194,8 @@ impl Search<'_> {
         (0..samples).filter_map(of_sample).collect()
     }
 
-    /// How far light goes past beside a point of an edge, in a direction across it [m]; `None` where it does not, or where
-    /// the way is wide.
+    /// Width of the opening beside a point of an edge, in a direction across it [m]; `None` if there is none or it is
+    /// wide.
     fn width_m(&self, edge: DVec3, across: DVec3) -> Option<f64> {
         let cell_m = self.cell_m(edge);
         let is_open = |aside_m: f64| self.sees_caster(edge + across * aside_m);
@@ -219,13 +221,13 @@ impl Search<'_> {
         Some(closed_m)
     }
 
-    /// Whether the light's ray through a point meets a caster behind it before anything else.
+    /// Whether the light's ray through a point hits a caster behind it before anything else.
     fn sees_caster(&self, point: DVec3) -> bool {
         let (ray, path_m) = self.launch.ray_through(point);
         self.meets_caster(&ray, path_m)
     }
 
-    /// Whether the first thing that a ray meets is a caster, and farther away than that.
+    /// Whether the closest hit of a ray is a caster farther away than `beyond_m`.
     fn meets_caster(&self, ray: &Ray, beyond_m: f64) -> bool {
         let scene = self.tracer.scene();
         self.tracer.intersect(ray).is_some_and(|place| {

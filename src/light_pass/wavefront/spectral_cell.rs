@@ -13,15 +13,15 @@ use super::strand::LatticeRay;
 use super::subcell_features::SubcellFeatures;
 use crate::light_pass::caustic::path::PathSignature;
 
-/// Samples at a cell's corners, wavelength by wavelength.
+/// Samples at a cell's corners by wavelength.
 type NodeCorners = [[SampleId; 4]; NODES];
 
-/// What of a cell is dealt with for all wavelengths at once.
+/// What all wavelengths of a cell share.
 #[derive(Default)]
 struct Shared {
-    /// Light that has patches, ascending.
+    /// Signatures of light that has patches, ascending.
     done: Vec<PathSignature>,
-    /// Surfaces whose light is booked, ascending.
+    /// Signatures of surfaces whose light is booked, ascending.
     booked: Vec<PathSignature>,
 }
 
@@ -82,7 +82,7 @@ impl CellCutter<'_> {
         }
     }
 
-    /// Each corner stands for its quarter of the cell.
+    /// Represents each quarter of the cell by its corner.
     pub(super) fn scatter_spectrum(
         &self,
         spectrum: &LightSpectrum,
@@ -94,7 +94,7 @@ impl CellCutter<'_> {
         self.scatter_nodes(spectrum, cell, (&nodes, &[]), work, out);
     }
 
-    /// The same but for light that has patches already: dust, of each wavelength on its own.
+    /// Scatters the light that has no patches yet, each wavelength on its own.
     fn scatter_nodes(
         &self,
         spectrum: &LightSpectrum,
@@ -129,7 +129,7 @@ impl CellCutter<'_> {
         })
     }
 
-    /// The sample of a wavelength where one of the first was traced.
+    /// The sample of a wavelength where the first one was traced.
     fn sample_of(&self, node: usize, first: SampleId, work: &mut Workspace) -> SampleId {
         match (node, work.at_node(first, node)) {
             (0, _) => first,
@@ -145,8 +145,8 @@ impl CellCutter<'_> {
         }
     }
 
-    /// Patches and accounts of what all wavelengths share up to the same borders, as those of surfaces that light meets
-    /// before it parts.
+    /// Emits patches and books fluxes that all wavelengths share up to the same borders, such as those of surfaces that
+    /// light hits before it is dispersed.
     fn cut_shared(
         &self,
         spectrum: &LightSpectrum,
@@ -181,8 +181,8 @@ impl CellCutter<'_> {
         }
     }
 
-    /// The patches of light that all wavelengths have in the same parts of the cell; false, and none, where that is not
-    /// so.
+    /// Emits patches for light that fills the same parts of the cell at all wavelengths. Returns false, and emits none,
+    /// where that is not so.
     fn emit_shared(
         &self,
         cell: &Cell,
@@ -204,7 +204,7 @@ impl CellCutter<'_> {
         true
     }
 
-    /// Samples of the other wavelengths at a patch's corners; `None` where not all have its light.
+    /// Samples of the other wavelengths at a patch's corners; `None` unless all have its light.
     fn others_of(
         &self,
         patch: &Patch,
@@ -221,8 +221,8 @@ impl CellCutter<'_> {
         Some(others)
     }
 
-    /// Books what a surface did with light that meets it in the same parts of the cell at all wavelengths; false, and
-    /// nothing is booked, where that is not so.
+    /// Books what a surface did with light that hits it in the same parts of the cell at all wavelengths. Returns
+    /// false, and books nothing, where that is not so.
     fn book_shared(
         &self,
         spectrum: &LightSpectrum,
@@ -259,7 +259,7 @@ impl CellCutter<'_> {
         true
     }
 
-    /// Cuts the cell as one wavelength sees it, but for the light that all wavelengths share.
+    /// Cuts the cell as one wavelength sees it, without the light that all wavelengths share.
     #[allow(
         clippy::too_many_arguments,
         reason = "one call site; a cell's state travels through it"
@@ -321,7 +321,7 @@ impl CellCutter<'_> {
 /// Light below this share of the brightest is not cut wavelength by wavelength.
 const DIM_SHARE: f64 = 0.01;
 
-/// What corners have beside what all wavelengths share.
+/// Light of a cell's corners that not all wavelengths share.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum UnsharedLight {
     Nothing,
@@ -352,7 +352,7 @@ impl UnsharedLight {
     }
 }
 
-/// Whether something is there at the same corners at all wavelengths.
+/// Whether something exists at the same corners at all wavelengths.
 fn is_at_the_same_corners(
     nodes: &NodeCorners,
     work: &Workspace,
@@ -365,7 +365,7 @@ fn is_at_the_same_corners(
     })
 }
 
-/// Whether light of all wavelengths goes the same ways at all corners, on one sheet.
+/// Whether light of all wavelengths takes the same paths at all corners, on one sheet.
 fn is_one(cell: &Cell, nodes: &NodeCorners, work: &Workspace) -> bool {
     let is_plain = |corners: &[SampleId; 4]| {
         EDGE_ENDS.iter().enumerate().all(|(edge, &(from, to))| {
@@ -380,7 +380,7 @@ fn is_one(cell: &Cell, nodes: &NodeCorners, work: &Workspace) -> bool {
             .all(|corners| same_ways(first, work.get(corners[0])) && is_plain(corners))
 }
 
-/// Light that goes the same way at all corners at all wavelengths, on one sheet; ascending.
+/// Signatures of light that takes the same path at all corners and wavelengths, on one sheet; ascending.
 fn alike(cell: &Cell, nodes: &NodeCorners, work: &Workspace) -> Vec<PathSignature> {
     let is_alike = |signature: &PathSignature| {
         let is_everywhere = nodes

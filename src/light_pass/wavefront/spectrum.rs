@@ -13,21 +13,22 @@ use crate::optics::spectrum::{Spectrum, xyz_bar};
 use crate::optics::{ColourMatrix, LinearSrgb, Nanometres};
 use crate::transport::{RayDerivative, Tracer};
 
-/// Wavelengths that every ray of a spectral light is traced at.
+/// Wavelengths at which every ray of a spectral light is traced.
 pub const NODES: usize = 3;
 
 /// Most slices of a spectrum, as a power of two.
 const MAX_SLICES_LOG2: u32 = 9;
 
-/// Share of a lamp's colour, at either end, beyond the outermost nodes: Chebyshev's places over the rest.
+/// Fraction of a lamp's colour that is cut off at either end of the spectrum to place the nodes: they are the Chebyshev
+/// nodes of the rest.
 const TAIL: f64 = 0.002;
 
 /// Light of a narrow band.
 #[derive(Clone, Copy, Debug)]
 pub struct Slice {
-    /// Of the three nodes: Lagrange's.
+    /// Lagrange weights of the three nodes.
     weights: [f64; NODES],
-    /// From what arrives at each node to CIE XYZ, where light is interpolated between them.
+    /// From the flux at each node to CIE XYZ, where light is interpolated between them.
     interpolated: [ColourMatrix; NODES],
     /// The same where each node stands for the wavelengths around it.
     own: [ColourMatrix; NODES],
@@ -38,29 +39,29 @@ pub struct Slice {
 pub struct LightSpectrum {
     /// The middle one first: what does not depend on wavelength is traced there alone.
     pub nodes: [SpectralNode; NODES],
-    /// What each node counts for where light is interpolated.
+    /// From the flux at each node to CIE XYZ of the whole lamp, where light is interpolated.
     pub interpolated: [ColourMatrix; NODES],
-    /// By the logarithm of their number.
+    /// Slices of the whole spectrum, by the logarithm of their number.
     ladder: Vec<Vec<Slice>>,
-    /// Length of the whole spectrum over that between the outer nodes, along 1/λ².
+    /// Length of the whole spectrum relative to the distance between the outer nodes, along 1/λ².
     reach: f64,
-    /// Of the whole lamp.
+    /// From emitted light in RGB to CIE XYZ, over all wavelengths of the lamp.
     pub channels: ColourMatrix,
 }
 
-/// What of a light's spectrum one lattice traces.
+/// The part of a light's spectrum that one lattice traces.
 #[derive(Clone, Copy, Debug)]
 pub enum LightPart<'a> {
-    /// All of a light without wavelengths.
+    /// All of a light in RGB.
     White,
-    /// All of a light whose wavelengths part.
+    /// All of a light that may be dispersed.
     Spectrum(&'a LightSpectrum),
-    /// What one wavelength stands for.
+    /// The band that one wavelength stands for.
     Band(&'a SpectralNode),
 }
 
 impl<'a> LightPart<'a> {
-    /// The whole spectrum.
+    /// The whole spectrum; `None` for other parts.
     pub fn spectrum(self) -> Option<&'a LightSpectrum> {
         match self {
             Self::Spectrum(spectrum) => Some(spectrum),
@@ -68,7 +69,7 @@ impl<'a> LightPart<'a> {
         }
     }
 
-    /// One of its wavelengths; `None` of light without.
+    /// One of the wavelengths; `None` for a light in RGB.
     pub fn node(self, node: usize) -> Option<&'a SpectralNode> {
         match self {
             Self::White => None,
@@ -77,12 +78,12 @@ impl<'a> LightPart<'a> {
         }
     }
 
-    /// How many wavelengths every ray is traced at; 1 of light without.
+    /// Number of wavelengths at which every ray is traced; 1 for a light in RGB.
     pub fn node_count(self) -> usize {
         self.spectrum().map_or(1, |spectrum| spectrum.nodes.len())
     }
 
-    /// From light that met nothing yet to the light's channels.
+    /// From light that has hit nothing yet to the light's channels.
     pub fn channels(self) -> ColourMatrix {
         match self {
             Self::White => ColourMatrix::IDENTITY,
@@ -125,7 +126,7 @@ impl LightSpectrum {
         }
     }
 
-    /// Slices that lie at most one unit apart, where the outer nodes are so far apart.
+    /// Slices that are at most one unit apart, given the distance `apart` between the outer nodes in this unit.
     pub fn slices(&self, apart: f64) -> &[Slice] {
         let wanted = (apart * self.reach).max(1.0).log2().ceil();
         let step = (wanted as usize).min(self.ladder.len() - 1);
@@ -133,7 +134,7 @@ impl LightSpectrum {
     }
 }
 
-/// The wavelengths between which all but the tails of a lamp's colour lie.
+/// The wavelengths that enclose a lamp's colour except for its tails.
 fn ends(lamp: &Spectrum) -> (Nanometres, Nanometres) {
     let brightness = |range: RangeInclusive<Nanometres>| {
         let xyz = lamp.xyz_within(range);
@@ -156,7 +157,7 @@ fn ends(lamp: &Spectrum) -> (Nanometres, Nanometres) {
     (quantile(TAIL), quantile(1.0 - TAIL))
 }
 
-/// The band at an index among so many of equal width along 1/λ²; the outermost hold the tails.
+/// The band at an index among `count` of equal width along 1/λ²; the outermost contain the tails.
 fn band(lamp: &Spectrum, (low, high): (f64, f64), index: usize, count: usize) -> RangeInclusive<Nanometres> {
     let border = |index: usize| {
         if index == 0 {
@@ -191,7 +192,7 @@ fn finest(lamp: &Spectrum, ends: (f64, f64), nodes: [f64; NODES]) -> Vec<Slice> 
     (0..count).map(slice).collect()
 }
 
-/// Half as many.
+/// Merges pairs of slices.
 fn coarser(lamp: &Spectrum, ends: (f64, f64), nodes: [f64; NODES], finer: &[Slice]) -> Vec<Slice> {
     let count = finer.len() / 2;
     let sum = |pair: &[Slice], of: fn(&Slice, usize) -> ColourMatrix| {
@@ -210,7 +211,7 @@ fn coarser(lamp: &Spectrum, ends: (f64, f64), nodes: [f64; NODES], finer: &[Slic
         .collect()
 }
 
-/// Where the light of a band lies on average, as the eye weighs it [nm⁻²].
+/// Mean position of a band's light along 1/λ², weighted by the matching functions [nm⁻²].
 fn centre(lamp: &Spectrum, range: RangeInclusive<Nanometres>) -> f64 {
     let weight = |wavelength: Nanometres| xyz_bar(wavelength).iter().sum::<f64>();
     let [weighted, weights] = lamp.integral_times(range.clone(), |wavelength| {
@@ -239,9 +240,10 @@ fn nearest(nodes: [f64; NODES], place: f64) -> usize {
 }
 
 impl Slice {
-    /// The strand of its wavelength between those of one signature at the nodes; its flux is in the light's channels.
+    /// The slice's segment, interpolated between the nodes' segments of one signature; its flux is in the light's
+    /// channels.
     ///
-    /// `parted`: whether each node stands for the wavelengths around it, as where the others of its light do.
+    /// `parted`: whether each node stands for the wavelengths around it, because other light of its cell is dispersed.
     pub fn strand(&self, nodes: [&PathSegment; NODES], parted: bool) -> PathSegment {
         let mix = |of: &dyn Fn(&PathSegment) -> glam::DVec3| {
             let weighted = nodes.iter().zip(self.weights);
@@ -267,12 +269,13 @@ impl Slice {
         };
         strand.differential.across = derivative(&|strand| strand.differential.across);
         strand.differential.down = derivative(&|strand| strand.differential.down);
-        // Beyond the outer nodes a share that falls to nothing would go on below it; the ledger's quadrature has the rest.
+        // Extrapolated beyond the outer nodes, a share that falls to zero would become negative; the ledger's
+        // quadrature takes the difference.
         strand.flux_w = flux_w.map(|channel| channel.max(0.0));
         strand
     }
 
-    /// What a factor in RGB on the light of such strands is in each of the light's channels.
+    /// Maps an RGB factor on the light of such segments to the light's channels.
     pub fn factors(&self, nodes: [&PathSegment; NODES], parted: bool) -> ColourMatrix {
         let parts = nodes.iter().zip(self.matrices(parted));
         let parts = parts.map(|(strand, matrix)| matrix.weighing(strand.flux_w));
@@ -284,7 +287,7 @@ impl Slice {
     }
 }
 
-/// Whether the same light lands on one surface at all nodes.
+/// Whether light of one signature lands on one surface at all nodes.
 pub fn lands_alike(nodes: [&PathSegment; NODES]) -> bool {
     let first = &nodes[0].landing;
     nodes.iter().all(|strand| match (first, &strand.landing) {

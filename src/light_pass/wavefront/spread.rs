@@ -20,60 +20,57 @@ use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 
-/// Slices of the brightest light over a texel that its wavelengths part over, at least: beams may be thinner than texels.
+/// Fewest slices of the brightest light per texel over which its wavelengths spread: beams may be thinner than texels.
 /// Dim light has fewer.
 const SLICES_PER_TEXEL: f64 = 4.0;
 
-/// How far wavelengths count as parted of which some leave the scene [texels].
+/// Spread of wavelengths of which some leave the scene [texels].
 const FAR_TEXELS: f64 = 32.0;
 
-/// Spreads patches.
 #[derive(Clone, Copy, Debug)]
 pub struct Spreader<'a> {
-    /// Receivers.
     pub receivers: &'a Receivers<'a>,
-    /// Of the launch domain.
+    /// Face of the launch domain.
     pub face: u32,
-    /// The patches' strands.
+    /// Samples that the patches refer to.
     pub samples: &'a Samples,
-    /// Of the accounts.
+    /// Unit of the flux counts.
     pub unit: FluxUnit,
     /// Whether bodies absorb light along the way.
     pub absorption: bool,
-    /// Flux that all lights send to specular surfaces [W, luminance]: over a map, about its mean irradiance.
+    /// Flux that all lights send to specular surfaces [W, luminance]: over a map, roughly its mean irradiance.
     pub reference_w: f64,
-    /// How much coarser (> 1) or finer triangles may be than is usual.
+    /// Coarseness of triangles relative to the usual one: above 1 is coarser.
     pub coarseness: f64,
-    /// Whether the places of footprints are wanted.
+    /// Whether positions of footprints are recorded.
     pub gathers: bool,
     pub light: LightPart<'a>,
 }
 
-/// What patches became.
+/// Result of spreading patches.
 #[derive(Clone, Debug, Default)]
 pub struct SpreadOutput {
-    /// By receiver: triangles on its map.
+    /// Triangles on each receiver's map.
     pub triangles: Vec<(Receiver, Vec<FluxTriangle>)>,
     /// Escaped, absorbed on the way, passed on.
     pub ledger: LedgerSum,
-    /// Rays between traced ones that were intersected with receivers.
+    /// Interpolated rays that were intersected with receivers.
     pub queries: u64,
     /// Sizes of lit areas.
     pub statistics: FootprintStatistics,
-    /// Patches that reach farther than their rays.
+    /// Patches that reach farther than their traced rays.
     pub overshoots: Vec<PatchOvershoot>,
-    /// Luminous flux of all patches [counts], and of those that hold a part of the spectrum in one place: light of other
-    /// wavelengths goes other ways there.
+    /// Luminous flux [counts] of all patches, and of those that concentrate a part of the spectrum in one place because
+    /// other wavelengths take other paths.
     pub in_one_place: [i128; 2],
 }
 
 impl SpreadOutput {
-    /// Triangles on all maps.
+    /// Number of triangles on all maps.
     pub fn triangle_count(&self) -> usize {
         self.triangles.iter().map(|(_, list)| list.len()).sum()
     }
 
-    /// Triangles on a map.
     pub(super) fn list(&mut self, receiver: Receiver) -> &mut Vec<FluxTriangle> {
         // A handful of receivers, most often the last one.
         match self.triangles.iter().rposition(|(of, _)| *of == receiver) {
@@ -87,16 +84,16 @@ impl SpreadOutput {
     }
 }
 
-/// What part of a light a patch is.
+/// Colour transform of a patch, by the part of the spectrum that it carries.
 #[derive(Clone, Copy)]
 struct PatchColour {
-    /// From strands to the light's channels.
+    /// From the flux of segments to the light's channels.
     channels: ColourMatrix,
-    /// What factors in RGB are in those.
+    /// From RGB factors to the light's channels.
     factors: ColourMatrix,
-    /// Whether it has a wavelength.
+    /// Whether it is for a wavelength instead of RGB.
     is_spectral: bool,
-    /// Whether all that it is made from lands on one surface.
+    /// Whether all samples that it combines land on one surface.
     lands_alike: bool,
 }
 
@@ -108,7 +105,7 @@ impl PatchColour {
         lands_alike: true,
     };
 
-    /// Of what one wavelength stands for.
+    /// For a band of which one wavelength is traced.
     fn of_node(channels: ColourMatrix, strands: &[&PathSegment]) -> Self {
         let grey_w = mean(strands.iter().map(|strand| strand.flux_w));
         Self {
@@ -120,7 +117,7 @@ impl PatchColour {
     }
 }
 
-/// Where all of a patch goes, as its traced corners say.
+/// Where a whole patch goes, judged by its traced corners.
 enum PatchFate {
     /// On to other specular surfaces.
     Onward,
@@ -128,12 +125,11 @@ enum PatchFate {
     Escapes,
     /// Onto one plane, or past its border.
     Plane(Receiver),
-    /// The hierarchy has to tell.
+    /// The interpolated rays have to be intersected with the scene.
     Mixed,
 }
 
 impl Spreader<'_> {
-    /// Spreads one patch.
     pub fn spread(&self, patch: &Patch, out: &mut SpreadOutput) {
         let strands: [&PathSegment; 4] = patch
             .corners
@@ -197,7 +193,7 @@ impl Spreader<'_> {
         }
     }
 
-    /// How far the outer wavelengths of a patch land from each other [texels].
+    /// Distance between the landing points of a patch's outer wavelengths [texels].
     fn smear(&self, nodes: &[[&PathSegment; NODES]; 4]) -> f64 {
         let of_corner = |nodes: &[&PathSegment; NODES]| {
             let texel_m = nodes.iter().find_map(|strand| {
@@ -208,7 +204,7 @@ impl Spreader<'_> {
             let ends = [nodes[1], nodes[2]].map(PathSegment::landing_point);
             match (texel_m, ends) {
                 (Some(texel_m), [Some(a), Some(b)]) => a.distance(b) / texel_m,
-                // Some leave, some land: past the horizon of what is lit.
+                // Some leave, some land: past the horizon of the lit surface.
                 (Some(_), _) => FAR_TEXELS,
                 (None, _) => 0.0,
             }
@@ -230,7 +226,7 @@ impl Spreader<'_> {
         let channels_w = mean(colours.iter().copied()) * patch.area();
         let flux = self.unit.count(channels_w);
         let flux_w = if tint.is_spectral {
-            // As bright as it looks: Y.
+            // Y of CIE XYZ: as bright as it looks.
             LinearSrgb::grey(channels_w.g)
         } else {
             channels_w
@@ -255,12 +251,12 @@ impl Spreader<'_> {
         self.note_overshoot(patch, strands, &before, out);
     }
 
-    /// Whether the light of a strand is absorbed on its way from the surface it left.
+    /// Whether the light of a segment is absorbed on the way from the surface it left.
     pub(super) fn absorbs(&self, strand: &PathSegment) -> bool {
         self.absorption && strand.media.absorbs(self.receivers.tracer.scene())
     }
 
-    /// Notes where the patch's triangles, those beyond the given counts, lie far from its traced rays.
+    /// Records the patch's triangles, those beyond the given counts, if they lie far from its traced rays.
     fn note_overshoot(
         &self,
         patch: &Patch,
@@ -335,7 +331,7 @@ impl Spreader<'_> {
         }))
     }
 
-    /// All of it goes on; volumes take their share.
+    /// Passes all of it on, except for absorption.
     fn onward(&self, strands: &[&PathSegment], flux: FluxCount, tint: PatchColour, out: &mut SpreadOutput) {
         let mut passed = flux;
         if self.absorbs(strands[0]) {
@@ -359,7 +355,7 @@ impl Spreader<'_> {
         out: &mut SpreadOutput,
     ) {
         let shape = shape_of(patch, strands);
-        // Light past the border of a plane goes out only where traced light does.
+        // Light past the border of a plane may escape only where traced light does.
         let goes_out = goes_out(strands);
         let plane = plane.filter(|&receiver| goes_out || self.stays_on_map(&shape, receiver));
         let mut rays = VirtualRays::new(self, &shape, strands, plane, tint.factors);
@@ -389,7 +385,7 @@ impl Spreader<'_> {
         out.queries += queries;
     }
 
-    /// Texel coordinates of a grid of rays, row by row, where all of them meet one plane.
+    /// Texel coordinates of a grid of rays, row by row; `None` unless all of them hit the plane.
     fn plane_grid(
         &self,
         coons: &CoonsPatch,

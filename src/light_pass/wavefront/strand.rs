@@ -13,9 +13,8 @@ use crate::transport::{MediumStack, RayDifferential};
 /// An outgoing ray after a specular event. Flux is per unit area of the launch domain's unit square.
 #[derive(Clone, Copy, Debug)]
 pub struct PathSegment {
-    /// The way up to and with the event; where the ray goes from here is no part of it.
+    /// The path up to and including the event; where the ray goes from here is not part of it.
     pub signature: PathSignature,
-    /// Starts at the specular surface.
     pub ray: Ray,
     /// Derivatives of the ray by the coordinates of the unit square.
     pub differential: RayDifferential,
@@ -27,16 +26,14 @@ pub struct PathSegment {
     pub from: u32,
     /// Smoothing group of the object that it leaves.
     pub from_group: u32,
-    /// Where it goes.
     pub landing: SegmentEnd,
 }
 
-/// What an outgoing ray meets next.
+/// What an outgoing ray hits next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SegmentEnd {
-    /// Nothing.
     Escaped,
-    /// A surface that sends all of it on or absorbs it.
+    /// A surface without a map: it only scatters or absorbs.
     Specular {
         /// Index into `Scene::objects`.
         object: u32,
@@ -45,11 +42,10 @@ pub enum SegmentEnd {
     },
     /// A surface with an illumination map.
     Receiver {
-        /// Which.
         receiver: Receiver,
         /// Index into the object's triangles.
         triangle: u32,
-        /// Of the triangle's second and third corner.
+        /// Second and third barycentric coordinate.
         barycentric: DVec2,
         /// From the ray's origin [m].
         distance_m: f64,
@@ -57,7 +53,7 @@ pub enum SegmentEnd {
 }
 
 impl SegmentEnd {
-    /// Distance to what is met [m]; infinite where it is nothing.
+    /// Distance to the hit [m]; infinite without one.
     pub fn distance_m(&self) -> f64 {
         match *self {
             Self::Escaped => f64::INFINITY,
@@ -65,7 +61,7 @@ impl SegmentEnd {
         }
     }
 
-    /// The receiver that is met.
+    /// The receiver hit.
     pub fn receiver(&self) -> Option<Receiver> {
         match *self {
             Self::Escaped | Self::Specular { .. } => None,
@@ -73,7 +69,7 @@ impl SegmentEnd {
         }
     }
 
-    /// The object that is met.
+    /// The object hit.
     pub fn object(&self) -> Option<u32> {
         match *self {
             Self::Escaped => None,
@@ -84,74 +80,72 @@ impl SegmentEnd {
 }
 
 impl PathSegment {
-    /// The point that is met [m].
+    /// The hit point [m]; `None` without a hit.
     pub fn landing_point(&self) -> Option<DVec3> {
         let distance_m = self.landing.distance_m();
         distance_m.is_finite().then(|| self.ray.at(distance_m))
     }
 }
 
-/// What a specular surface did with the light of one path [W per unit square, per channel]: what is not in the
-/// accounts goes on in strands, or into a map.
+/// How a specular surface split the light of one path [W per unit square, per channel]: what no field accounts for
+/// continues in outgoing segments or goes into a map.
 #[derive(Clone, Copy, Debug)]
 pub struct SurfaceFluxRecord {
-    /// The way here, with the surface.
+    /// The path up to and including the surface.
     pub signature: PathSignature,
-    /// Whether it is the first surface that the light meets.
+    /// Whether it is the first surface that the light hits.
     pub first: bool,
-    /// Arrived here.
     pub incident: LinearSrgb,
-    /// Became heat.
     pub absorbed: LinearSrgb,
-    /// Would have gone on beyond the depth limit.
+    /// Beyond the depth limit.
     pub depth: LinearSrgb,
-    /// Would have gone on below the branch threshold.
+    /// Below the branch threshold.
     pub threshold: LinearSrgb,
-    /// Would have made too many branches of one ray.
+    /// Of a ray with too many branches.
     pub unresolved: LinearSrgb,
-    /// Met a number that is not finite.
+    /// Of branches with non-finite numbers.
     pub non_finite: LinearSrgb,
-    /// Would have needed an effect that is switched off.
+    /// Of effects that are switched off.
     pub switched_off: LinearSrgb,
-    /// Taken by the surface itself as direct light (first hits) or, later, by its map.
+    /// Taken by the surface itself: as direct light at first hits, later by its map.
     pub taken: LinearSrgb,
 }
 
 /// One traced light ray.
 #[derive(Clone, Debug, Default)]
 pub struct LatticeRay {
-    /// Where it was traced, in the unit square of its face.
+    /// Start in the unit square of its face.
     pub square: DVec2,
-    /// Outgoing rays, in ascending order of their signatures.
+    /// Outgoing rays, ascending by signature.
     pub strands: Vec<PathSegment>,
-    /// Specular surfaces met, in ascending order of their signatures.
+    /// Specular surfaces hit, ascending by signature.
     pub nodes: Vec<SurfaceFluxRecord>,
-    /// Distance to its first hit [m], where no light goes through what it met.
+    /// Distance to the first hit [m], if that is opaque.
     pub stopped_m: Option<f64>,
     /// Flux whose first hit is not specular [W per unit square, per channel].
     pub not_emitted: LinearSrgb,
-    /// Largest flux of any strand, luminance [W per unit square].
+    /// Largest luminance of any segment's flux [W per unit square].
     pub brightest_w: f64,
-    /// Cells across and down the unit square that detail of the normals on its way asks for.
+    /// Cells across and down the unit square that the bumps along its path require.
     pub bump_cells: DVec2,
-    /// Whether detail of the normals is finer than any cell.
+    /// Whether bumps along its path are finer than any cell.
     pub is_rough: bool,
-    /// Closest-hit queries; 0 where all that it met was known.
+    /// Closest-hit queries; 0 where the cache had every hit.
     pub segments: u32,
-    /// What it met, where not all of that was known.
+    /// Its hits, unless the cache had all of them.
     pub fresh: Option<Box<TracedRay>>,
 }
 
 impl LatticeRay {
-    /// Index of the strand of a signature.
+    /// Index of the segment with a signature.
     pub fn find(&self, signature: PathSignature) -> Option<usize> {
-        // A handful of strands: a plain search is fastest.
+        // With so few segments, linear search is fastest.
         self.strands
             .iter()
             .position(|strand| strand.signature == signature)
     }
 
-    /// Index of the node of a signature.
+    /// Index of the surface record with a signature.
     pub fn find_node(&self, signature: PathSignature) -> Option<usize> {
         self.nodes.iter().position(|node| node.signature == signature)
     }

@@ -12,34 +12,34 @@ use crate::light_pass::item_buffer::{self, CELLS_PER_SIDE, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::transport::Tracer;
 
-/// A body counts as small while it is less than this many cells across.
+/// A body is small while it is less than this many cells across.
 const SMALL_CELLS: f64 = 2.0;
 
-/// Cells across what only stands in the way: enough to find its silhouette.
+/// Cells across small bodies that only occlude: enough to find their silhouettes.
 const CELLS_ACROSS_OTHERS: f64 = 8.0;
 
-/// How often a cell is divided at most for a body in it.
+/// Most divisions of a cell for a body in it.
 const DEEPEST_BODY_LEVEL: u32 = 18;
 
 /// Cells across each of very many casters: enough for their flux.
 const MIN_ACROSS_CASTERS: f64 = 12.0;
 
-/// Small casters from which on each is looked at less closely.
+/// Number of small casters from which on each of them is resolved less.
 const MANY_CASTERS: usize = 8;
 
-/// The sphere around an object, or what lies around a part of a slit.
+/// Bounding sphere of an object, or a capsule around a part of a slit.
 #[derive(Clone, Copy, Debug)]
 struct Body {
-    /// Ends of the line that it lies around [m]; the same for a sphere.
+    /// Ends of the capsule's line [m]; equal for a sphere.
     ends: [DVec3; 2],
-    /// About that line [m].
+    /// [m].
     radius_m: f64,
-    /// Cells across it once they are fine enough.
+    /// Cells across it after division.
     cells_across: f64,
 }
 
 impl Body {
-    /// With so many cells across the opening.
+    /// With `across` cells across the opening.
     fn of(opening: &Slit, across: f64) -> Self {
         Self {
             ends: opening.ends,
@@ -53,7 +53,7 @@ impl Body {
         (a.min(b) - self.radius_m, a.max(b) + self.radius_m)
     }
 
-    /// The point of its line that is nearest to a ray, or to the line that the ray lies on [m].
+    /// Point of its line that is nearest to the line of a ray [m].
     fn nearest(&self, ray: &Ray) -> DVec3 {
         let [a, b] = self.ends;
         let along = |v: DVec3| v - ray.direction * ray.direction.dot(v);
@@ -67,7 +67,7 @@ impl Body {
     }
 }
 
-/// Where something is to be looked for, by cells of the item buffer: face, column, row.
+/// Features by cells of the item buffer: face, column, row.
 type Bins<T> = HashMap<(u32, u32, u32), Vec<T>>;
 
 /// Small bodies and openings as one light sees them.
@@ -76,15 +76,15 @@ pub struct SubcellFeatures {
     bodies: Bins<Body>,
     /// Sharp corners [m].
     corners: Bins<DVec3>,
-    /// How often a cell is divided for one of these.
+    /// Most divisions of a cell for one of these corners.
     corner_levels: u32,
     /// Casters among the bodies.
     casters: usize,
 }
 
 impl SubcellFeatures {
-    /// The objects that are small beside cells of the given size in the unit square, and sharp corners of those that
-    /// the light sees: both only where they can bend light or stand in its way, as `visible` tells.
+    /// Objects that are small relative to cells of the given size in the unit square, and sharp corners of casters that
+    /// the light sees. Both only where they can deflect light or occlude it, according to `visible`.
     pub fn find(
         tracer: &Tracer,
         launch: &Launch,
@@ -127,11 +127,11 @@ impl SubcellFeatures {
                         CELLS_ACROSS_OTHERS
                     },
                 };
-                // The cheap question first: the other one searches the scene.
+                // The cheap test first: the other one searches the scene.
                 (is_small(&body) && visible.may_concern(launch, tracer, index)).then_some((body, (low, high)))
             })
             .collect();
-        // Each of many shows less on the maps: all together have as many cells as one alone.
+        // Each of many shows less on the maps: all together get as many cells as a single one.
         let casters = small
             .iter()
             .filter(|(body, _)| body.cells_across > CELLS_ACROSS_OTHERS);
@@ -158,19 +158,17 @@ impl SubcellFeatures {
         }
     }
 
-    /// 1 where no single body shows much beside the others, else 0.
+    /// 1 if there are so many casters that no single one shows much, otherwise 0.
     pub fn are_many(&self) -> u32 {
         u32::from(self.casters >= MANY_CASTERS)
     }
 
-    /// Whether there is nothing to look for.
     pub fn is_empty(&self) -> bool {
         self.bodies.is_empty() && self.corners.is_empty()
     }
 
-    /// Whether a cell of a face, between two corners of the unit square, may hold a body that is small beside it, or a
-    /// sharp corner, no farther than `hidden_beyond_m` from where rays start [m]; `level` how often it was divided for
-    /// such.
+    /// Whether a cell of a face, between two corners of the unit square, may contain a small body or a sharp corner
+    /// within `hidden_beyond_m` of the ray origins [m]; `level` is how often it was divided for such features.
     pub fn ask_for_finer(
         &self,
         launch: &Launch,
@@ -183,7 +181,7 @@ impl SubcellFeatures {
             return false;
         }
         let beam = CellBeam::new(launch, face, (low, high));
-        // A little farther than the cell: bodies reach beyond what they are booked under.
+        // Slightly larger than the cell: bodies reach beyond the bins that they are booked in.
         let margin = (high - low) * 0.5;
         let (low, high) = (low - margin, high + margin);
         let holds_corner = level < self.corner_levels
@@ -200,7 +198,7 @@ impl SubcellFeatures {
             })
     }
 
-    /// About how many cells a cell of a lattice becomes for the small bodies in it; at least 1.
+    /// Approximate number of cells that a cell of a lattice becomes for the small bodies in it; at least 1.
     pub fn cells_within(&self, launch: &Launch, face: usize, (low, high): (DVec2, DVec2)) -> f64 {
         if self.bodies.is_empty() {
             return 1.0;
@@ -209,7 +207,7 @@ impl SubcellFeatures {
         let mut cells = 1.0;
         for_each(&self.bodies, face, (low, high), |body| {
             if let Some(reach_m) = beam.reach_at_m(body, f64::INFINITY) {
-                // The whole cell, or the body and what is divided to get there.
+                // The whole cell, or the body plus the divisions on the way to it.
                 let across = body.cells_across * (reach_m / body.radius_m).min(1.0);
                 let length_m = body.ends[0].distance(body.ends[1]).min(2.0 * reach_m);
                 cells += across.powi(2) * (1.0 + 0.5 * length_m / body.radius_m);
@@ -219,7 +217,7 @@ impl SubcellFeatures {
     }
 }
 
-/// What a cell of a lattice sees: its middle ray and those through its corners.
+/// Beam of a lattice cell: its middle ray and those through its corners.
 struct CellBeam {
     middle: Ray,
     corners: [Ray; 4],
@@ -247,7 +245,7 @@ impl CellBeam {
             .fold(0.0, f64::max)
     }
 
-    /// Half the width of the beam at a body that it may hold [m]; `None` where it does not.
+    /// Half the width of the beam at a body that it may contain [m]; `None` if it cannot.
     fn reach_at_m(&self, body: &Body, hidden_beyond_m: f64) -> Option<f64> {
         let nearest = body.nearest(&self.middle);
         let along_m = self.along_m(nearest);
@@ -261,7 +259,7 @@ impl CellBeam {
     }
 }
 
-/// Books something under all cells of the item buffer that its box may touch.
+/// Adds a feature to all cells of the item buffer that its bounding box may touch.
 fn book<T: Copy>(launch: &Launch, bounds: Bounds, what: T, bins: &mut Bins<T>) {
     for face in 0..launch.face_count() {
         let Some((columns, rows)) = item_buffer::cells_towards(launch, face, bounds) else {
@@ -276,12 +274,12 @@ fn book<T: Copy>(launch: &Launch, bounds: Bounds, what: T, bins: &mut Bins<T>) {
     }
 }
 
-/// Whether anything that is booked between two corners of the unit square of a face passes a test.
+/// Whether any feature in the bins between two corners of a face's unit square passes a test.
 fn found<T>(bins: &Bins<T>, face: usize, square: (DVec2, DVec2), test: impl Fn(&T) -> bool) -> bool {
     bins_between(face, square).any(|bin| bins.get(&bin).is_some_and(|booked| booked.iter().any(&test)))
 }
 
-/// All that is booked between two corners of the unit square of a face, what lies in several bins as often.
+/// Visits all features in the bins between two corners of a face's unit square; once per bin.
 fn for_each<T>(bins: &Bins<T>, face: usize, square: (DVec2, DVec2), mut act: impl FnMut(&T)) {
     for bin in bins_between(face, square) {
         bins.get(&bin).into_iter().flatten().for_each(&mut act);

@@ -18,35 +18,32 @@ use crate::transport::{
     SurfaceHit, SurfaceScale, Tracer,
 };
 
-/// Strands that one light ray may have waiting: a closed mirror box with glass in it doubles them without end.
+/// Most branches of one light ray: a closed mirror box with glass inside would double them without end.
 const MAX_BRANCHES: usize = 512;
 
-/// Rays start this far within the border of the domain's unit square.
+/// Rays start at least this far inside the border of the unit square.
 const DOMAIN_MARGIN: f64 = 1e-9;
 
 /// Traces light rays of one light.
 #[derive(Clone, Copy, Debug)]
 pub struct StrandTracer<'a> {
-    /// The scene.
     pub tracer: &'a Tracer,
-    /// Where rays start.
     pub launch: &'a Launch,
     pub limits: PathLimits,
     /// Distance between neighbouring rays, in units of the unit square.
     pub steps: [f64; 2],
-    /// What becomes of detail of normals.
     pub bumps: BumpCells,
-    /// Which wavelength of a spectral light; `None` of light without.
+    /// Number of the wavelength of a spectral light; `None` for RGB.
     pub wavelength: Option<u32>,
-    /// What was traced before.
+    /// Rays traced before.
     pub kept: Option<&'a RayCache>,
-    /// How closely borders are looked for.
+    /// How closely borders are searched for.
     pub closeness: EdgeSearch,
-    /// Asks to stop: then rays end at once, and what they give is to be thrown away.
+    /// Checked for cancellation: rays then end at once, and their results are to be discarded.
     pub control: &'a Control,
 }
 
-/// A ray that waits to be followed.
+/// A ray that waits to be traced.
 #[derive(Clone, Copy, Debug)]
 struct QueuedRay {
     ray: Ray,
@@ -55,18 +52,18 @@ struct QueuedRay {
     media: MediumStack,
     signature: PathSignature,
     depth: u32,
-    /// Index of its strand; none for the light's own ray.
+    /// Index of its segment; `None` for the light's own ray.
     strand: Option<usize>,
-    /// Whether it is the very ray that a kept one was, as long as there is a kept one.
+    /// Whether it is identical to a ray in the cache, where there is one.
     is_known: bool,
-    /// Whether no dispersive surface bent it yet: then it is the same at all wavelengths.
+    /// Whether no dispersive surface has refracted it yet, so that it is the same at all wavelengths.
     is_common: bool,
 }
 
-/// What a light ray meets: as it is kept, or as a search finds it.
+/// Hits of a light ray, from the cache or from queries.
 struct Search<'a> {
     known: Option<CachedRay<'a>>,
-    /// What the same light ray met at another wavelength.
+    /// Hits of the same light ray at another wavelength.
     common: &'a [CachedHit],
     hits: Vec<CachedHit>,
     /// Closest-hit queries.
@@ -74,7 +71,7 @@ struct Search<'a> {
 }
 
 impl<'a> StrandTracer<'a> {
-    /// A tracer without kept rays; `steps`: distance between neighbouring rays, in units of the unit square.
+    /// Without a ray cache; `steps`: distance between neighbouring rays, in units of the unit square.
     pub fn new(
         tracer: &'a Tracer,
         launch: &'a Launch,
@@ -95,13 +92,13 @@ impl<'a> StrandTracer<'a> {
         }
     }
 
-    /// The same, but for how closely borders are looked for.
+    /// Replaces how closely borders are searched for.
     #[must_use]
     pub fn with_closeness(self, closeness: EdgeSearch) -> Self {
         Self { closeness, ..self }
     }
 
-    /// The same at one wavelength of a light.
+    /// The same tracer at one wavelength of a light.
     #[must_use]
     pub fn at_node(&self, part: LightPart<'a>, node: usize) -> Self {
         match part.node(node) {
@@ -114,13 +111,12 @@ impl<'a> StrandTracer<'a> {
         }
     }
 
-    /// Traces the ray that starts at a point of the unit square of a face.
+    /// Traces the ray that starts at a point of a face's unit square.
     pub fn trace(&self, face: usize, square: DVec2) -> LatticeRay {
         self.follow(face, square, None)
     }
 
-    /// The same where it was traced at another wavelength: the stretch before the first dispersive surface is not
-    /// searched again.
+    /// Traces a ray again at another wavelength. Segments before the first dispersive surface need no queries.
     pub fn trace_again(&self, face: usize, other: &LatticeRay) -> LatticeRay {
         self.follow(face, other.square, other.fresh.as_deref())
     }
@@ -130,7 +126,7 @@ impl<'a> StrandTracer<'a> {
             square,
             ..LatticeRay::default()
         };
-        // Just within the domain: its border may be the very border of a surface.
+        // Just within the domain, whose border may coincide with that of a surface.
         let square = square.clamp(DVec2::splat(DOMAIN_MARGIN), DVec2::splat(1.0 - DOMAIN_MARGIN));
         if self.control.is_cancelled() {
             return sample;
@@ -250,7 +246,7 @@ impl<'a> StrandTracer<'a> {
         let is_dispersive = self.tracer.scene().material_of(hit.object).is_dispersive();
         let group = self.tracer.smoothing_group(hit.object, hit.triangle);
         let at_surface = from.signature.at(hit.object, group);
-        // Patches book what is taken between surfaces; there are none before the first.
+        // Patches book absorption between surfaces; before the first surface there is no patch.
         let taken_before = match from.strand {
             Some(_) => LinearSrgb::BLACK,
             None => from.flux_w - incident,
@@ -315,7 +311,8 @@ impl<'a> StrandTracer<'a> {
         sample.nodes.push(node);
     }
 
-    /// Notes what a surface's normals ask of the lattice, and whether no cell is fine enough for them.
+    /// Records the lattice resolution that a surface's bumps require, and returns whether no cell is fine enough for
+    /// them.
     fn is_too_fine(&self, hit: &SurfaceHit, at_hit: &RayDifferential, sample: &mut LatticeRay) -> bool {
         let detail_m = self.tracer.finest_bump_m(hit.object);
         if detail_m == f64::INFINITY {
@@ -368,7 +365,7 @@ fn push(
 }
 
 impl Search<'_> {
-    /// Where a segment ends, and whether what goes on from there is as it was when it was kept.
+    /// Where a segment ends, and whether its continuation is identical to the one in the cache.
     fn closest(&mut self, tracer: &Tracer, from: &QueuedRay) -> (Option<RayHit>, bool) {
         let known = self.known.filter(|_| from.is_known);
         let kept = known.and_then(|known| known.hit(from.signature));
@@ -412,7 +409,7 @@ fn landing(hit: &SurfaceHit, direction: DVec3, is_receiver: bool) -> SegmentEnd 
 
 impl Launch {
     /// The ray of a point of the domain with its derivatives by the coordinates of the unit square, from central
-    /// differences: in double precision they are good to some 1e-9, far below any surface's.
+    /// differences: accurate to some 1e-9 in double precision, far below the error of any surface's derivatives.
     fn ray_with_differential(&self, face: usize, square: DVec2) -> (Ray, RayDifferential) {
         const STEP: f64 = 1e-5;
         let derivative = |step: DVec2| {

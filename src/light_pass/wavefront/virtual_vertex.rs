@@ -16,27 +16,26 @@ use crate::transport::{MediumStack, SurfaceHit};
 /// Where a ray lands.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LandingPoint {
-    /// Outside the scene, or off the map by far.
+    /// Outside the scene, or far off the map.
     Nowhere,
-    /// On a surface that only sends on or absorbs.
+    /// On a surface without a map, which only scatters or absorbs.
     Onward,
-    /// On a receiver that cannot take a map, or where no light of the patch can come.
+    /// On a receiver that cannot have a map, or that the patch's light cannot reach.
     Refused,
     /// On a map.
     On {
-        /// Whose.
         receiver: Receiver,
-        /// Of the chart.
+        /// Island of the chart.
         island: u32,
         /// Texel coordinates.
         texel: DVec2,
-        /// Facet of the mesh that is met, and where [m]; `None` on an extended plane, which is one facet.
+        /// Facet of the mesh and hit point [m]; `None` on an extended plane, which counts as one facet.
         facet: Option<(u32, DVec3)>,
     },
 }
 
 impl LandingPoint {
-    /// Whether two rays land on the same receiver, or share another fate.
+    /// Whether two rays land on the same receiver or share another fate.
     pub fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::On { receiver, .. }, Self::On { receiver: other, .. }) => receiver == other,
@@ -44,7 +43,7 @@ impl LandingPoint {
         }
     }
 
-    /// The facet that is met, with where [m]; `None` off the maps and on extended planes.
+    /// Facet and hit point [m]; `None` off the maps and on extended planes.
     pub fn facet(&self) -> Option<(FacetPlace, DVec3)> {
         match *self {
             Self::On {
@@ -64,7 +63,7 @@ impl LandingPoint {
         }
     }
 
-    /// Whose map it is.
+    /// The receiver; `None` off the maps.
     pub fn receiver(&self) -> Option<Receiver> {
         match self {
             Self::On { receiver, .. } => Some(*receiver),
@@ -73,44 +72,43 @@ impl LandingPoint {
     }
 }
 
-/// A virtual ray's end.
+/// End of an interpolated ray.
 #[derive(Clone, Copy, Debug)]
 pub struct VirtualVertex {
-    /// Where it lands.
     pub place: LandingPoint,
-    /// The ray, not normalised.
+    /// Not normalised.
     pub ray: Ray,
-    /// Share of the light that is left on arrival [0, 1].
+    /// Fraction of the light that arrives [0, 1].
     pub transmittance: LinearSrgb,
-    /// Share that the surface takes into its map [0, 1].
+    /// Fraction that the surface takes into its map [0, 1].
     pub deposit: f64,
 }
 
-/// Makes rays of one patch and lets them land.
+/// Interpolates rays of one patch and intersects them with the scene.
 pub struct VirtualRays<'a> {
     receivers: &'a Receivers<'a>,
     shape: &'a PatchShape,
-    /// Whose extended plane all rays are for.
+    /// Receiver whose extended plane all rays are intersected with.
     plane: Option<Receiver>,
-    /// What factors in RGB are in the light's channels.
+    /// From RGB factors to the light's channels.
     factors: ColourMatrix,
     media: MediumStack,
     /// Whether light is absorbed on the way.
     absorbs: bool,
     /// Object and smoothing group that the rays leave.
     from: (u32, u32),
-    /// Within this distance of its origin a ray may meet the surface it leaves, since its origin is interpolated [m].
+    /// Within this distance, hits on the surface that a ray leaves are artefacts of its interpolated origin [m].
     skin_m: f64,
-    /// Where the traced rays start [m].
+    /// Origins of the traced rays [m].
     origins: Vec<DVec3>,
-    /// What a traced ray lights.
+    /// Receiver that a traced ray lights.
     lit: Option<Receiver>,
-    /// Rays so far.
+    /// Number of rays so far.
     pub queries: u64,
 }
 
 impl<'a> VirtualRays<'a> {
-    /// For one patch between strands of one signature.
+    /// For one patch between segments of one signature.
     pub fn new(
         spreader: &Spreader<'a>,
         shape: &'a PatchShape,
@@ -123,7 +121,7 @@ impl<'a> VirtualRays<'a> {
             .iter()
             .map(|strand| strand.ray.origin.distance(first.ray.origin))
             .fold(0.0, f64::max);
-        // A traced ray that comes back sooner is no artefact.
+        // A traced ray that returns sooner is no artefact.
         let nearest_own_m = strands
             .iter()
             .filter_map(|strand| match strand.landing {
@@ -146,17 +144,17 @@ impl<'a> VirtualRays<'a> {
         }
     }
 
-    /// What a traced ray of the patch lights.
+    /// Receiver that a traced ray of the patch lights.
     pub fn lit(&self) -> Option<Receiver> {
         self.lit
     }
 
-    /// Whether all are taken from one traced ray.
+    /// Whether all rays are extrapolated from one traced ray.
     pub fn are_around_one(&self) -> bool {
         self.origins.len() == 1
     }
 
-    /// The ray at a place of the patch, landed.
+    /// The ray at a point of the patch, with its hit.
     pub fn vertex(&mut self, at: DVec2) -> VirtualVertex {
         self.queries += 1;
         let ray = self.shape.ray(at);
@@ -229,7 +227,7 @@ impl<'a> VirtualRays<'a> {
         }
     }
 
-    /// The nearest surface, but for the one that the ray leaves, which its interpolated origin may lie behind.
+    /// Closest hit, ignoring the surface that the ray leaves, behind which its interpolated origin may lie.
     fn closest_hit(&self, mut ray: Ray) -> Option<(SurfaceHit, f64)> {
         let mut before_m = 0.0;
         for _ in 0..4 {
@@ -248,7 +246,7 @@ impl<'a> VirtualRays<'a> {
 
     fn place_on(&self, hit: &SurfaceHit, direction: DVec3) -> LandingPoint {
         let receiver = Receiver::new(hit.object, Side::met(direction, hit.geometric_normal));
-        // Interpolated rays may start behind a plane that no traced one starts behind.
+        // Interpolated rays may start behind a plane that all traced ones start in front of.
         let is_astray = |surface: &ReceiverSurface| {
             let mut origins = self.origins.iter();
             surface

@@ -8,7 +8,6 @@ use crate::optics::{key, nearest};
 
 struct Entry {
     glass: Glass,
-    /// Other names it goes by.
     aliases: Vec<&'static str>,
 }
 
@@ -25,9 +24,9 @@ pub fn all() -> impl Iterator<Item = &'static Glass> {
     ENTRIES.iter().map(|entry| &entry.glass)
 }
 
-/// The glass of a name, in any case and with or without its punctuation: `N-BK7`, `nbk7`. Some go by another name
-/// too, as `PMMA` for Acrylic; `BK7` and `LASF9` find the lead-free N-BK7 and N-LASF9, whose index and Abbe number
-/// are the same to every digit that is published. Other old names find nothing, as those glasses differ from the new.
+/// Finds a glass by name, ignoring case and punctuation: `N-BK7`, `nbk7`. Some have aliases, such as `PMMA` for
+/// Acrylic; `BK7` and `LASF9` find the lead-free N-BK7 and N-LASF9, whose index and Abbe number agree to every
+/// published digit. Other old names are unknown, as those glasses differ from the new ones.
 ///
 /// # Errors
 /// [`GlassError::UnknownName`] with the nearest names.
@@ -45,7 +44,7 @@ fn names(entry: &Entry) -> impl Iterator<Item = &str> {
     std::iter::once(entry.glass.name.as_str()).chain(entry.aliases.iter().copied())
 }
 
-/// `name;aliases;formula;constants;first µm;last µm;source`, with blanks between constants and commas between aliases.
+/// `name;aliases;formula;constants;first µm;last µm;source`, with spaces between constants and commas between aliases.
 fn entry(row: &'static str) -> Option<Entry> {
     let mut fields = row.split(';').map(str::trim);
     let name = fields.next()?.into();
@@ -71,8 +70,8 @@ fn entry(row: &'static str) -> Option<Entry> {
     Some(Entry { glass, aliases })
 }
 
-/// `sellmeier`: the constant, then pairs of strength and square of resonance [µm²]; `resonances`: the same with
-/// resonances [µm] that are yet to be squared; `cauchy`: a, b, c, d.
+/// `sellmeier`: the constant, then pairs of strength and squared resonance [µm²]; `resonances`: the same with
+/// resonances not yet squared [µm]; `cauchy`: a, b, c, d.
 fn dispersion(formula: &str, constants: &[f64]) -> Option<Dispersion> {
     if let ("cauchy", &[a, b, c, d]) = (formula, constants) {
         return Some(Dispersion::Cauchy { a, b, c, d });

@@ -8,59 +8,59 @@ use super::GlassError;
 use crate::optics::Nanometres;
 use crate::optics::wavelength::{C_LINE, D_LINE, F_LINE, VISIBLE};
 
-/// λ0 of Herzberger's formula [µm], as its author set it.
+/// λ0 of Herzberger's formula [µm], as its author chose it.
 const HERZBERGER_UM: f64 = 0.168;
-/// More than any transparent material has, by far.
+/// Far above the index of any transparent material.
 const MAX_INDEX: f64 = 10.0;
 
-/// Refractive index n against vacuum or air [1] by wavelength λ [µm], as one of the formulas that people publish.
+/// Refractive index n against vacuum or air [1] by wavelength λ [µm], as one of the formulas in common use.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Dispersion {
-    /// The same at every wavelength.
     Constant(f64),
     /// n = A + B/λ² with the given `n_d` and Abbe number V_d = (n_d − 1)/(n_F − n_C): the curve of glTF's
-    /// KHR_materials_dispersion. Its text rounds two numbers that are exact here, which moves n by less than 1e-6.
+    /// KHR_materials_dispersion. The extension rounds two constants that are exact here, which changes n by less than
+    /// 1e-6.
     Abbe {
         /// Index at 587.56 nm.
         n_d: f64,
-        /// Abbe number, above 0; larger disperses less.
+        /// Abbe number, above 0; a larger one disperses less.
         v_d: f64,
     },
     /// n = a + b/λ² + c/λ⁴ + d λ²; Cauchy's formula where `d` is 0.
     Cauchy {
-        /// [1]
+        /// [1].
         a: f64,
-        /// [µm²]
+        /// [µm²].
         b: f64,
-        /// [µm⁴]
+        /// [µm⁴].
         c: f64,
-        /// [1/µm²]
+        /// [1/µm²].
         d: f64,
     },
-    /// n² = 1 + constant + Σ b λ²/(λ² − c); Sellmeier's formula where `constant` is 0. Terms not needed have b = 0.
+    /// n² = 1 + constant + Σ b λ²/(λ² − c); Sellmeier's formula where `constant` is 0. Unused terms have b = 0.
     Sellmeier {
-        /// What resonances far away add [1].
+        /// Contribution of distant resonances [1].
         constant: f64,
         /// Strengths [1].
         b: [f64; 4],
-        /// Squares of the resonances' wavelengths [µm²].
+        /// Squared wavelengths of the resonances [µm²].
         c_um2: [f64; 4],
     },
     /// n = a + b λ² + c L + d L², L = 1/(λ² − 0.168²) (M. Herzberger, Opt. Acta 6, 197, 1959).
     Herzberger {
-        /// [1]
+        /// [1].
         a: f64,
-        /// [1/µm²]
+        /// [1/µm²].
         b: f64,
-        /// [µm²]
+        /// [µm²].
         c: f64,
-        /// [µm⁴]
+        /// [µm⁴].
         d: f64,
     },
 }
 
 impl Dispersion {
-    /// By glTF's `ior` and KHR_materials_dispersion's `dispersion` = 20/V_d, both finite; 0 is no dispersion.
+    /// From glTF's `ior` and KHR_materials_dispersion's `dispersion` = 20/V_d, both finite; 0 means no dispersion.
     pub fn from_gltf(ior: f64, dispersion: f64) -> Self {
         if dispersion > 0.0 {
             Self::Abbe {
@@ -72,7 +72,7 @@ impl Dispersion {
         }
     }
 
-    /// The same formula, if its constants can be those of a transparent material.
+    /// The same formula, if its constants are plausible for a transparent material.
     ///
     /// # Errors
     /// [`GlassError::Value`] for a constant that is not finite or an Abbe number that is not above 0,
@@ -102,14 +102,14 @@ impl Dispersion {
         }
     }
 
-    /// Refractive index, 1 or more and finite: where the formula gives less, or nothing, it is 1
-    /// ([`falls_below_one`](Self::falls_below_one) tells).
+    /// Refractive index, finite and at least 1: clamped to 1 where the formula gives less, and 1 where it gives no
+    /// number (see [`falls_below_one`](Self::falls_below_one)).
     pub fn index(&self, wavelength: Nanometres) -> f64 {
         let n = self.formula(wavelength.micrometres().powi(2));
         if n.is_finite() { n.max(1.0) } else { 1.0 }
     }
 
-    /// Slope of [`index`](Self::index) [1/nm]: below 0 wherever dispersion is normal, 0 where 1 stands for less.
+    /// Slope of [`index`](Self::index) [1/nm]: negative for normal dispersion, 0 where the index is clamped to 1.
     pub fn slope_per_nm(&self, wavelength: Nanometres) -> f64 {
         let um = wavelength.micrometres();
         let square = um * um;
@@ -117,7 +117,7 @@ impl Dispersion {
         if !n.is_finite() || n < 1.0 {
             return 0.0;
         }
-        // Each formula by λ² first.
+        // Derivative of each formula with respect to λ².
         let by_square = match *self {
             Self::Constant(_) => 0.0,
             Self::Abbe { n_d, v_d } => -abbe_b(n_d, v_d) / (square * square),
@@ -134,12 +134,11 @@ impl Dispersion {
         by_square * 2.0 * um * 1e-3
     }
 
-    /// Index at 587.56 nm.
     pub fn n_d(&self) -> f64 {
         self.index(D_LINE)
     }
 
-    /// Abbe number V_d = (n_d − 1)/(n_F − n_C); infinite where there is no dispersion.
+    /// Abbe number V_d = (n_d − 1)/(n_F − n_C); infinite without dispersion.
     pub fn abbe_number(&self) -> f64 {
         let spread = self.index(F_LINE) - self.index(C_LINE);
         if spread == 0.0 {
@@ -149,13 +148,13 @@ impl Dispersion {
         }
     }
 
-    /// Whether the index differs at all between visible wavelengths.
+    /// Whether the index varies between visible wavelengths.
     pub fn is_dispersive(&self) -> bool {
         let ends = [*VISIBLE.start(), F_LINE, C_LINE, *VISIBLE.end()].map(|line| self.index(line));
         ends.iter().any(|n| *n != ends[0])
     }
 
-    /// Whether the formula gives less than 1 at some whole nanometre of a range, where 1 is taken for it.
+    /// Whether the formula gives less than 1, or no number, at some whole nanometre of a range.
     pub fn falls_below_one(&self, range: &RangeInclusive<Nanometres>) -> bool {
         let whole = range.start().0.ceil() as u32..=range.end().0.floor() as u32;
         whole
@@ -163,7 +162,7 @@ impl Dispersion {
             .any(|n| n.is_nan() || n < 1.0)
     }
 
-    /// What the formula says, whatever it is, by the square of the wavelength [µm²].
+    /// Unclamped value of the formula, by squared wavelength [µm²].
     fn formula(&self, square: f64) -> f64 {
         match *self {
             Self::Constant(n) => n,
@@ -183,7 +182,7 @@ impl Dispersion {
         }
     }
 
-    /// The formula's name and its constants.
+    /// Name and constants of the formula.
     fn constants(&self) -> (&'static str, Vec<f64>) {
         match *self {
             Self::Constant(n) => ("a constant index", vec![n]),

@@ -2,51 +2,49 @@
 
 use crate::error::Error;
 
-/// A fault in how a glass was asked for; [`remedy`](Self::remedy) says what to do.
+/// An invalid specification of a glass; [`remedy`](Self::remedy) says what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GlassError {
-    /// A name that the catalogue does not have.
+    /// The catalogue has no such name.
     #[error("no glass is named `{name}`; the nearest names are {nearest}")]
     UnknownName {
-        /// What was asked for.
+        /// The name asked for.
         name: String,
-        /// Names most like it.
+        /// The most similar names.
         nearest: String,
     },
-    /// Digits that are no glass number.
+    /// Digits that are not a glass number.
     #[error("`{number}` is not a glass number of six digits")]
     NotANumber {
-        /// What was asked for.
+        /// The text given.
         number: String,
     },
-    /// A formula's name that is none.
+    /// No formula has this name.
     #[error("no formula is named `{formula}`")]
     UnknownFormula {
-        /// What was asked for.
+        /// The name asked for.
         formula: String,
     },
-    /// Too few, too many, or something that is no number.
+    /// Too few or too many constants, or not numbers.
     #[error("`{constants}` are not constants for {formula}, which takes {takes}")]
     Constants {
-        /// The formula.
         formula: &'static str,
-        /// What was given.
+        /// The text given.
         constants: String,
-        /// What it takes.
+        /// The constants that the formula takes.
         takes: &'static str,
     },
-    /// A constant that is infinite or not a number, or an Abbe number that is not above 0.
+    /// A constant that is not finite, or an Abbe number that is not above 0.
     #[error("{value} cannot be a constant of {formula}")]
     Value {
-        /// The formula.
+        /// Name of the formula.
         formula: &'static str,
-        /// The constant.
         value: f64,
     },
-    /// A resonance where it can be seen: the index would be infinite.
+    /// A resonance at a visible wavelength, where the index would be infinite.
     #[error("the index is infinite at {wavelength_nm:.1} nm")]
     Resonance {
-        /// Where [nm].
+        /// Its wavelength [nm].
         wavelength_nm: f64,
     },
     /// An index that no transparent material has.
@@ -58,7 +56,6 @@ pub enum GlassError {
 }
 
 impl GlassError {
-    /// What the user can do about it.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::UnknownName { .. } => "choose one of them, a six-digit glass number or a formula",
@@ -70,7 +67,7 @@ impl GlassError {
         }
     }
 
-    /// The same fault as an error of the command: where it was met, what it is, what to do.
+    /// As a usage error of the command, with the location of the fault.
     pub fn at(self, location: impl Into<String>) -> Error {
         Error::usage(location, self.to_string(), self.remedy())
     }

@@ -17,18 +17,18 @@ pub use error::GlassError;
 /// A transparent material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Glass {
-    /// Its name in the catalogue, or what it was asked for by.
+    /// Name in the catalogue, or the text that specified it.
     pub name: String,
     /// Refractive index by wavelength.
     pub dispersion: Dispersion,
-    /// Wavelengths that the formula was fitted to; outside of them it is continued. `None` where nobody said.
+    /// Wavelengths that the formula was fitted to; it is extrapolated outside of them. `None` if unknown.
     pub range: Option<RangeInclusive<Nanometres>>,
-    /// Who measured it; empty where the user did.
+    /// Source of the measurement; empty for formulas of the user.
     pub source: String,
 }
 
 impl Glass {
-    /// A glass by its index at 587.56 nm and its Abbe number; none that disperses where that is infinite.
+    /// A glass by its index at 587.56 nm and its Abbe number; an infinite one means no dispersion.
     pub fn with_abbe_number(n_d: f64, v_d: f64) -> Self {
         Self {
             name: format!("abbe:{n_d:.4},{v_d:.2}"),
@@ -38,15 +38,15 @@ impl Glass {
         }
     }
 
-    /// Whether the formula was fitted to a wavelength; any wavelength will do where nobody said.
+    /// Whether the formula was fitted to a wavelength; true where the range is unknown.
     pub fn is_within(&self, wavelength: Nanometres) -> bool {
         self.range
             .as_ref()
             .is_none_or(|range| range.contains(&wavelength))
     }
 
-    /// What to tell the user before light of a range of wavelengths is traced through it: that the formula is used
-    /// beyond the range it was fitted to, or that it falls below 1, where 1 is taken.
+    /// Warnings for the user before light of a range of wavelengths is traced through it: the formula is used beyond
+    /// its fitted range, or falls below 1, where 1 is used.
     pub fn warnings(&self, light: &RangeInclusive<Nanometres>, location: &str) -> Vec<Warning> {
         let (Nanometres(first), Nanometres(last)) = (*light.start(), *light.end());
         let beyond = self
@@ -79,18 +79,18 @@ impl Glass {
     }
 }
 
-/// What each formula takes.
+/// Constants of each formula, for messages.
 const ABBE: &str = "n_d and V_d";
 const CAUCHY: &str = "A, B and perhaps C, in µm";
 const SELLMEIER: &str = "B1, B2, B3, C1, C2 and C3, in µm²";
 const HERZBERGER: &str = "A, B, C and D, in µm";
 
 impl Glass {
-    /// A glass by its number of six digits, its name in the [`catalogue`], or a formula for wavelengths in µm:
+    /// Parses a glass number of six digits, a name of the [`catalogue`], or a formula for wavelengths in µm:
     /// `abbe:1.523,58.8`, `cauchy:A,B[,C]`, `sellmeier:B1,B2,B3,C1,C2,C3`, `herzberger:A,B,C,D`.
     ///
     /// # Errors
-    /// [`GlassError`], with the nearest names for one that is unknown.
+    /// [`GlassError`], with the most similar names for an unknown one.
     pub fn parse(text: &str) -> Result<Self, GlassError> {
         let text = text.trim();
         if let Some((formula, constants)) = text.split_once(':') {
@@ -143,7 +143,7 @@ fn by_formula(formula: &str, text: &str) -> Result<Dispersion, GlassError> {
     dispersion.checked()
 }
 
-/// The dispersion of a glass number: 523588 means n_d = 1.523 and V_d = 58.8.
+/// Dispersion of a glass number: 523588 means n_d = 1.523 and V_d = 58.8.
 ///
 /// # Errors
 /// [`GlassError::NotANumber`] for anything but six digits, and for an Abbe number of 000.

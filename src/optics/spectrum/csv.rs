@@ -3,14 +3,15 @@
 use super::{Spectrum, SpectrumError};
 use crate::optics::Nanometres;
 
-/// A lamp's spectrum from the text of a CSV file.
+/// Reads the spectrum of a lamp from the text of a CSV file.
 ///
-/// Two columns, wavelength [nm] and value (relative, or W/nm); further columns are left alone. Commas, semicolons or
-/// tabs between them, `#` before a comment, one line of headings at most. Wavelengths increase, values are 0 or more.
+/// Two columns, wavelength [nm] and value (relative, or W/nm); further columns are ignored. Separators are commas,
+/// semicolons or tabs; `#` begins a comment; one line of headings is allowed. Wavelengths increase, values are 0 or
+/// more.
 ///
 /// # Errors
-/// [`SpectrumError`] names the line and what is wrong with it; [`SpectrumError::Dark`] and
-/// [`SpectrumError::Invisible`] where nobody could see the lamp.
+/// [`SpectrumError`] with the line at fault; [`SpectrumError::Dark`] and [`SpectrumError::Invisible`] where the lamp
+/// has no visible light.
 pub fn read_lamp(text: &str) -> Result<Spectrum, SpectrumError> {
     let mut knots = Vec::new();
     let mut lines = Vec::new();
@@ -40,7 +41,7 @@ pub fn read_lamp(text: &str) -> Result<Spectrum, SpectrumError> {
     Ok(spectrum)
 }
 
-/// Wavelength and value of a line, where it has them.
+/// Wavelength and value of a line; `None` if it has none.
 fn row(content: &str) -> Option<(Nanometres, f64)> {
     let separator = [';', '\t', ','].into_iter().find(|c| content.contains(*c))?;
     let mut fields = content
@@ -49,7 +50,7 @@ fn row(content: &str) -> Option<(Nanometres, f64)> {
     Some((Nanometres(fields.next()??), fields.next()??))
 }
 
-/// A fault of a table's row as one of the line that the row stands on.
+/// Replaces the row number of an error by its line in the file.
 fn with_line(mut error: SpectrumError, lines: &[usize]) -> SpectrumError {
     if let SpectrumError::NotFinite { line, .. }
     | SpectrumError::Negative { line, .. }
@@ -60,7 +61,7 @@ fn with_line(mut error: SpectrumError, lines: &[usize]) -> SpectrumError {
     error
 }
 
-/// The rows of a table of our own, all numbers, without its headings.
+/// Rows of a built-in table of numbers, without its headings.
 pub(in crate::optics) fn columns(text: &str) -> impl Iterator<Item = Vec<f64>> {
     text.lines().skip(1).map(|line| {
         line.split(',')

@@ -2,15 +2,15 @@
 
 use crate::error::Error;
 
-/// A fault in a spectrum, in the user's terms; [`remedy`](Self::remedy) says what to do.
+/// An invalid spectrum; [`remedy`](Self::remedy) says what to do.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SpectrumError {
-    /// A row of a file is no pair of numbers.
+    /// A row of a file that is not a pair of numbers.
     #[error("line {line}: `{text}` is not a wavelength and a value")]
     NotARow {
         /// Line of the file, from 1.
         line: usize,
-        /// What stands there.
+        /// Text of the line.
         text: String,
     },
     /// A wavelength or value that is not finite.
@@ -18,34 +18,32 @@ pub enum SpectrumError {
     NotFinite {
         /// Line of the file, or row of the table, from 1.
         line: usize,
-        /// The number.
         value: f64,
     },
-    /// Less than no light.
+    /// A negative wavelength or value.
     #[error("line {line}: {value} is negative")]
     Negative {
         /// Line of the file, or row of the table, from 1.
         line: usize,
-        /// The value.
         value: f64,
     },
-    /// A wavelength that does not come after the one before.
+    /// A wavelength that is not above the previous one.
     #[error("line {line}: {wavelength_nm} nm does not come after {before_nm} nm")]
     NotIncreasing {
         /// Line of the file, or row of the table, from 1.
         line: usize,
-        /// The wavelength of this row [nm].
+        /// Wavelength of this row [nm].
         wavelength_nm: f64,
-        /// That of the row before [nm].
+        /// Wavelength of the previous row [nm].
         before_nm: f64,
     },
     /// A table of fewer than two rows.
     #[error("a spectrum of {rows} rows says nothing between wavelengths")]
     TooFewRows {
-        /// How many there are.
+        /// Number of rows.
         rows: usize,
     },
-    /// Every wavelength lies where nobody sees.
+    /// All wavelengths are outside the visible range.
     #[error("its wavelengths {first_nm} to {last_nm} nm lie outside of the visible 360 to 830 nm")]
     Invisible {
         /// The shortest [nm].
@@ -56,27 +54,25 @@ pub enum SpectrumError {
     /// No light at any visible wavelength.
     #[error("it has no light between 360 and 830 nm")]
     Dark,
-    /// A name that no spectrum has.
+    /// No spectrum has this name.
     #[error("no spectrum is named `{name}`; the nearest names are {nearest}")]
     UnknownName {
-        /// What was asked for.
+        /// The name asked for.
         name: String,
-        /// Names most like it.
+        /// The most similar names.
         nearest: String,
     },
-    /// A temperature or wavelength in a name that is no number or lies outside of its range.
+    /// A temperature or wavelength in a name that is not a number or out of range.
     #[error("`{text}` is not a number from {least} to {most} {unit}")]
     OutOfRange {
-        /// What was asked for.
+        /// The text given.
         text: String,
-        /// Least value.
         least: f64,
-        /// Largest value.
         most: f64,
-        /// What they are counted in.
+        /// Unit of the number.
         unit: &'static str,
     },
-    /// A colour with a negative or non-finite channel, or a factor above 1, has no spectrum.
+    /// A colour with a negative or non-finite channel, which has no spectrum.
     #[error("the colour {r}, {g}, {b} {fault}")]
     NoSuchColour {
         /// Red, linear.
@@ -91,7 +87,6 @@ pub enum SpectrumError {
 }
 
 impl SpectrumError {
-    /// What the user can do about it.
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::NotARow { .. } => "write two columns, wavelength in nm and value, between commas",
@@ -106,7 +101,7 @@ impl SpectrumError {
         }
     }
 
-    /// The same fault as an error of the command: where it was met, what it is, what to do.
+    /// As a usage error of the command, with the location of the fault.
     pub fn at(self, location: impl Into<String>) -> Error {
         Error::usage(location, self.to_string(), self.remedy())
     }

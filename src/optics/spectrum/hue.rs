@@ -5,23 +5,24 @@ use std::sync::LazyLock;
 use super::{Xyz, xyz_bar};
 use crate::optics::{LinearSrgb, Nanometres};
 
-/// Between these the chromaticities of single wavelengths go around white one way; beyond they hardly move [nm].
+/// Range in which the chromaticities of single wavelengths move around white in one direction; outside it they hardly
+/// move [nm].
 const ENDS_NM: (u32, u32) = (390, 700);
-/// Colours whose chromaticity is nearer to white than this look white [1].
+/// Colours with a chromaticity closer to white than this look white [1].
 const WHITISH: f64 = 0.01;
 
-/// What a colour looks like beside white.
+/// Hue of a colour as seen next to white.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Hue {
     /// White or grey.
     White,
     /// White mixed with light of one wavelength.
     Spectral(Nanometres),
-    /// A mixture of both ends of the spectrum: no single wavelength looks like it.
+    /// A mixture of both ends of the spectrum, which no single wavelength looks like.
     Purple,
 }
 
-/// Chromaticity of each wavelength, as seen from that of D65.
+/// Chromaticity of each wavelength, relative to that of D65.
 static LOCUS: LazyLock<Vec<(f64, [f64; 2])>> = LazyLock::new(|| {
     let of = |nm: u32| {
         let nm = f64::from(nm);
@@ -31,8 +32,8 @@ static LOCUS: LazyLock<Vec<(f64, [f64; 2])>> = LazyLock::new(|| {
     (ENDS_NM.0..=ENDS_NM.1).filter_map(of).collect()
 });
 
-/// The dominant wavelength of a colour against D65: where the line from white through its chromaticity meets that of single
-/// wavelengths (CIE 15:2018, 10). `None` for black.
+/// Dominant wavelength of a colour against D65: where the line from white through its chromaticity meets the spectral
+/// locus (CIE 15:2018, 10). `None` for black.
 pub fn dominant(colour: LinearSrgb) -> Option<Hue> {
     let wanted = from_white(Xyz::from(colour)).filter(|_| colour.luminance() > 0.0)?;
     if wanted[0].hypot(wanted[1]) < WHITISH {
@@ -48,7 +49,7 @@ pub fn dominant(colour: LinearSrgb) -> Option<Hue> {
     Some(crossed.map_or(Hue::Purple, |nm| Hue::Spectral(Nanometres(nm))))
 }
 
-/// Chromaticity from that of white.
+/// Chromaticity relative to white; `None` for black.
 fn from_white(colour: Xyz) -> Option<[f64; 2]> {
     let [x, y] = colour.chromaticity()?;
     let [white_x, white_y] = Xyz::from(LinearSrgb::WHITE).chromaticity()?;

@@ -8,30 +8,30 @@ use super::{Spectrum, SpectrumError};
 use crate::optics::Nanometres;
 use crate::optics::{key, nearest};
 
-/// Names of CIE that need a table or formula, apart from the tables in [`TABLES`].
+/// CIE illuminants with a table or formula of their own, apart from those in [`TABLES`].
 const OWN: [&str; 3] = ["A", "D65", "E"];
-/// Tables every nanometre from 380 to 780 (CIE 15:2018; see assets/SOURCES.md).
+/// Tables at every nanometre from 380 to 780 (CIE 15:2018; see assets/SOURCES.md).
 const TABLES: &str = include_str!("../../../assets/spectra/illuminants.csv");
-/// Temperatures [K] of `blackbody:`.
+/// Range of `blackbody:` [K].
 const KELVIN: [f64; 2] = [500.0, 25_000.0];
-/// Wavelengths [nm] of `line:`, whose whole width is visible.
+/// Range of `line:` [nm], whose whole width is visible.
 const LINE_NM: [f64; 2] = [361.0, 829.0];
 
-/// Every name without a number in it; `blackbody:KELVIN` and `line:NM` (or `laser:NM`) come besides.
+/// Every name without a number. `blackbody:KELVIN` and `line:NM` (or `laser:NM`) exist besides.
 pub fn names() -> impl Iterator<Item = &'static str> {
     let headings = TABLES.lines().next().unwrap_or_default();
     OWN.into_iter().chain(headings.split(',').skip(1))
 }
 
-/// A lamp by name, which it keeps, scaled to one luminous-equivalent watt (∫ Φ ȳ dλ = 1, which is 683 lm).
+/// A lamp by name, scaled to one luminous-equivalent watt (∫ Φ ȳ dλ = 1, which is 683 lm).
 ///
-/// One of [`names`], in any case and with or without its hyphen: CIE illuminants A, D50, D65, E (equal energy),
-/// fluorescent FL2, FL7, FL11, and LED-B1 to B5, BH1, RGB1, V1, V2. Or `blackbody:KELVIN` (500 to 25,000 K), or
-/// `line:NM` and `laser:NM` (361 to 829 nm): a triangle ±1 nm wide. A, D65, E and black bodies reach from 360 to
-/// 830 nm, the others from 380 to 780 nm, as published.
+/// One of [`names`], ignoring case and hyphens: CIE illuminants A, D50, D65, E (equal energy), fluorescent FL2, FL7,
+/// FL11, and LED-B1 to B5, BH1, RGB1, V1, V2. Or `blackbody:KELVIN` (500 to 25,000 K), or `line:NM` and `laser:NM` (361
+/// to 829 nm): a triangle ±1 nm wide. A, D65, E and black bodies range from 360 to 830 nm, the others from 380 to 780
+/// nm, as published.
 ///
 /// # Errors
-/// [`SpectrumError::UnknownName`] with the nearest names, [`SpectrumError::OutOfRange`] for a number.
+/// [`SpectrumError::UnknownName`] with the most similar names, [`SpectrumError::OutOfRange`] for a number.
 pub fn illuminant(name: &str) -> Result<Spectrum, SpectrumError> {
     let name = name.trim();
     let relative = match name.split_once(':') {
@@ -67,13 +67,13 @@ fn plain(name: &str) -> Result<Spectrum, SpectrumError> {
     }
 }
 
-/// Illuminant A by its formula, whose constants are kept from 1931 (CIE 15:2018), relative to 560 nm.
+/// Illuminant A by its formula, which keeps the constants of 1931 (CIE 15:2018), relative to 560 nm.
 fn illuminant_a(Nanometres(nm): Nanometres) -> f64 {
     let exponent = |nm: f64| (1.435e7 / (2848.0 * nm)).exp_m1();
     (560.0 / nm).powi(5) * exponent(560.0) / exponent(nm)
 }
 
-/// A kind of lamp with a number; `None` where there is no such kind.
+/// A lamp of a kind that takes a number; `None` where there is no such kind.
 fn with_number(kind: &str, number: &str) -> Option<Result<Spectrum, SpectrumError>> {
     match kind {
         "blackbody" | "planck" => Some(parse(number, KELVIN, "K").and_then(black_body)),

@@ -7,13 +7,14 @@ use super::{Spectrum, SpectrumError, xyz_bar};
 use crate::optics::Nanometres;
 use crate::optics::wavelength::VISIBLE;
 
-/// Where the colours of the rainbow meet [nm]: violet, indigo, blue, green, yellow, orange, red. The limits between
-/// the six spectral colours are those in common use (T. J. Bruno and P. D. N. Svoronos, CRC Handbook of Fundamental
-/// Spectroscopic Correlation Charts, 2005); indigo is the half of their violet that is next to blue.
+/// Limits of the colours of the rainbow [nm]: violet, indigo, blue, green, yellow, orange, red. Those between the six
+/// spectral colours are in common use (T. J. Bruno and P. D. N. Svoronos, CRC Handbook of Fundamental Spectroscopic
+/// Correlation Charts, 2005); indigo is the half of their violet that adjoins blue.
 const RAINBOW_NM: [f64; 8] = [360.0, 415.0, 450.0, 495.0, 570.0, 590.0, 620.0, 830.0];
 
-/// Wavelengths by importance: their density is proportional to Φ(λ) (x̄ + 2ȳ + z̄)/4, half by luminous efficiency and
-/// half by what red and blue are made of, so that no colour is starved; linear between the knots of the two tables.
+/// Importance sampling of wavelengths: the pdf is proportional to Φ(λ) (x̄ + 2ȳ + z̄)/4, half luminous efficiency and
+/// half the matching functions of red and blue, so that no colour is undersampled. Linear between the knots of both
+/// tables.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WavelengthSampler {
     knots_nm: Vec<f64>,
@@ -21,12 +22,12 @@ pub struct WavelengthSampler {
     cumulative: Vec<f64>,
 }
 
-/// One of several wavelengths that stand for a whole spectrum.
+/// One of several wavelengths that together represent a spectrum.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WavelengthBand {
-    /// The wavelengths that it stands for; bands of one set meet without gap.
+    /// The wavelengths that it represents; bands of one set meet without gaps.
     pub range: RangeInclusive<Nanometres>,
-    /// The one that is followed: the median of the band's importance.
+    /// The wavelength traced: the median of the band's importance.
     pub place: Nanometres,
 }
 
@@ -34,7 +35,7 @@ impl WavelengthSampler {
     /// By importance for the light of one lamp.
     ///
     /// # Errors
-    /// [`SpectrumError::Dark`] or [`SpectrumError::Invisible`] for one that nobody sees.
+    /// [`SpectrumError::Dark`] or [`SpectrumError::Invisible`] for a lamp without visible light.
     pub fn for_lamp(lamp: &Spectrum) -> Result<Self, SpectrumError> {
         lamp.check_visible()?;
         let knots_nm = knots_within(lamp.range(), lamp.wavelengths_nm());
@@ -69,7 +70,7 @@ impl WavelengthSampler {
         &EQUAL
     }
 
-    /// The wavelength below which the share `u` [0, 1] of importance lies, and its density there [1/nm].
+    /// Wavelength at which the cdf of the importance is `u` [0, 1], and the pdf there [1/nm].
     pub fn sample(&self, u: f64) -> (Nanometres, f64) {
         let above = self.cumulative.partition_point(|share| *share <= u);
         let above = above.clamp(1, self.knots_nm.len() - 1);
@@ -87,7 +88,7 @@ impl WavelengthSampler {
         (Nanometres(self.knots_nm[above - 1] + step), density)
     }
 
-    /// Density of [`sample`](Self::sample) at a wavelength [1/nm]; 0 where the lamp has no light.
+    /// Pdf of [`sample`](Self::sample) at a wavelength [1/nm]; 0 where the lamp has no light.
     pub fn density_per_nm(&self, wavelength: Nanometres) -> f64 {
         self.piece(wavelength).map_or(0.0, |(index, along)| {
             let (from, to) = (self.density_per_nm[index], self.density_per_nm[index + 1]);
@@ -95,7 +96,7 @@ impl WavelengthSampler {
         })
     }
 
-    /// Share [0, 1] of importance below a wavelength, the inverse of [`sample`](Self::sample).
+    /// Cdf of the importance at a wavelength [0, 1], the inverse of [`sample`](Self::sample).
     pub fn cumulative(&self, wavelength: Nanometres) -> f64 {
         match self.piece(wavelength) {
             Some((index, along)) => {
@@ -108,13 +109,13 @@ impl WavelengthSampler {
         }
     }
 
-    /// `count` bands of equal importance, in order of wavelength; together they are all the light of the lamp.
+    /// `count` bands of equal importance, in order of wavelength, that together cover all light of the lamp.
     pub fn bands(&self, count: usize) -> Vec<WavelengthBand> {
         let edge = |i: usize| i as f64 / count as f64;
         (0..count).map(|i| self.band([edge(i), edge(i + 1)])).collect()
     }
 
-    /// Seven bands, one for each colour of the rainbow, violet first. One that this lamp has no light in is left out.
+    /// Seven bands, one per colour of the rainbow, violet first. Colours in which the lamp has no light are left out.
     pub fn rainbow_seven(&self) -> Vec<WavelengthBand> {
         let shares = RAINBOW_NM.map(|nm| self.cumulative(Nanometres(nm)));
         let lit = shares.windows(2).filter(|edge| edge[0] < edge[1]);
@@ -129,7 +130,7 @@ impl WavelengthSampler {
         }
     }
 
-    /// The piece a wavelength lies in, and how far along it [0, 1].
+    /// Index of the segment that contains a wavelength, and the position along it [0, 1].
     fn piece(&self, Nanometres(nm): Nanometres) -> Option<(usize, f64)> {
         let last = self.knots_nm.len() - 1;
         if !(self.knots_nm[0]..=self.knots_nm[last]).contains(&nm) {
@@ -141,7 +142,7 @@ impl WavelengthSampler {
     }
 }
 
-/// ∫ f dλ over pieces between increasing knots [nm]; in the unit of `f` times nm.
+/// ∫ f dλ over segments between increasing knots [nm]; in the unit of `f` times nm.
 pub fn integrate<const N: usize>(knots_nm: &[f64], f: impl Fn(Nanometres) -> [f64; N]) -> [f64; N] {
     let mut sum = [0.0; N];
     for (wavelength, weight_nm) in points(knots_nm) {
@@ -152,7 +153,7 @@ pub fn integrate<const N: usize>(knots_nm: &[f64], f: impl Fn(Nanometres) -> [f6
     sum
 }
 
-/// Where the rule looks, with the weight of each place [nm].
+/// Quadrature points with their weights [nm]: two Gauss points per segment.
 pub fn points(knots_nm: &[f64]) -> impl Iterator<Item = (Nanometres, f64)> + '_ {
     knots_nm.windows(2).flat_map(|piece| {
         let half = 0.5 * (piece[1] - piece[0]);
@@ -162,8 +163,8 @@ pub fn points(knots_nm: &[f64]) -> impl Iterator<Item = (Nanometres, f64)> + '_ 
     })
 }
 
-/// The knots of the colour-matching functions, every whole nanometre, within a range and with its ends, and those of
-/// a table as well; increasing, each once. Empty where the range lies outside of the visible.
+/// Increasing knots within a range, without duplicates: its ends, the whole nanometres of the colour-matching
+/// functions, and the knots of a table. Empty where the range is outside the visible one.
 pub fn knots_within(range: RangeInclusive<Nanometres>, own_nm: &[f64]) -> Vec<f64> {
     let first = range.start().0.max(VISIBLE.start().0);
     let last = range.end().0.min(VISIBLE.end().0);
@@ -178,7 +179,7 @@ pub fn knots_within(range: RangeInclusive<Nanometres>, own_nm: &[f64]) -> Vec<f6
     knots
 }
 
-/// Every whole nanometre that is visible.
+/// Every visible whole nanometre.
 pub fn visible_knots() -> Vec<f64> {
     knots_within(VISIBLE, &[])
 }

@@ -13,8 +13,7 @@ use crate::units::LUMENS_PER_WATT;
 
 /// Light, or a factor on light, by wavelength: linear between rows, and zero outside of them.
 ///
-/// As light its values are W/nm (or that per m², per sr), unless they are said to be relative; as a factor they have
-/// no unit.
+/// The values of light are in W/nm (or per m², per sr) unless stated to be relative; a factor has no unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Rows", into = "Rows")]
 pub struct Spectrum {
@@ -23,7 +22,7 @@ pub struct Spectrum {
     values: Vec<f64>,
 }
 
-/// A spectrum as it is written down.
+/// Serialised form of a spectrum.
 #[derive(Serialize, Deserialize)]
 struct Rows {
     name: Option<String>,
@@ -56,8 +55,8 @@ impl Spectrum {
     /// From rows of wavelength and value.
     ///
     /// # Errors
-    /// Where there are fewer than two rows, where wavelengths do not increase, or where a number is not finite or a
-    /// value is negative; the line in the error is the row, counted from 1.
+    /// Fewer than two rows, wavelengths that do not increase, or a number that is not finite or negative. The line in
+    /// the error is the row, counted from 1.
     pub fn new(rows: Vec<(Nanometres, f64)>) -> Result<Self, SpectrumError> {
         if rows.len() < 2 {
             return Err(SpectrumError::TooFewRows { rows: rows.len() });
@@ -91,7 +90,7 @@ impl Spectrum {
         })
     }
 
-    /// The same with a name: of an illuminant, or of the file that it was read from.
+    /// With a name: of an illuminant, or of the file that it was read from.
     #[must_use]
     pub fn named(self, name: &str) -> Self {
         Self {
@@ -100,15 +99,14 @@ impl Spectrum {
         }
     }
 
-    /// What it is called, where it has a name.
     pub fn name(&self) -> Option<&str> {
         self.name.as_deref()
     }
 
-    /// A function of wavelength, finite and not negative, as a table of every visible whole nanometre.
+    /// Tabulates a finite, non-negative function of wavelength at every visible whole nanometre.
     ///
     /// # Errors
-    /// Where a value is negative or not finite.
+    /// A value that is negative or not finite.
     pub fn from_fn(f: impl Fn(Nanometres) -> f64) -> Result<Self, SpectrumError> {
         let knots = knots_within(VISIBLE, &[]);
         Self::new(
@@ -142,7 +140,7 @@ impl Spectrum {
         self.values[above - 1] + along * (self.values[above] - self.values[above - 1])
     }
 
-    /// ∫ Φ(λ) w(λ) dλ over the visible part of a range, by the rule of [`quadrature`](super::luminous): exact
+    /// ∫ Φ(λ) w(λ) dλ over the visible part of a range, at the quadrature [`points`](super::luminous::points): exact
     /// where `weight` is linear or quadratic between whole nanometres.
     pub fn integral_times<const N: usize>(
         &self,
@@ -175,15 +173,15 @@ impl Spectrum {
         self.xyz_within(VISIBLE)
     }
 
-    /// The part of [`xyz`](Self::xyz) that a range of wavelengths gives. Ranges that meet add up to the whole.
+    /// Contribution of a range of wavelengths to [`xyz`](Self::xyz). Adjacent ranges add up to the whole.
     pub fn xyz_within(&self, range: RangeInclusive<Nanometres>) -> Xyz {
         Xyz::from(self.integral_times(range, xyz_bar))
     }
 
-    /// Every value times a factor, finite and 0 or more; the name stays.
+    /// Every value times a factor, finite and 0 or more; keeps the name.
     ///
     /// # Errors
-    /// Where a product is negative or not finite.
+    /// A product that is negative or not finite.
     pub fn scaled(&self, factor: f64) -> Result<Self, SpectrumError> {
         let rows = self.wavelengths_nm.iter().zip(&self.values);
         let scaled = Self::new(
@@ -196,17 +194,17 @@ impl Spectrum {
         })
     }
 
-    /// The same light, made as bright as so many luminous-equivalent watts: ∫ Φ ȳ dλ = `watts`, 683 times that in lm.
+    /// The same light, scaled to a flux in luminous-equivalent watts: ∫ Φ ȳ dλ = `watts`, 683 times that in lm.
     ///
     /// # Errors
-    /// [`SpectrumError::Dark`] where nobody sees it, and where `watts` is negative or not finite.
+    /// [`SpectrumError::Dark`] or [`SpectrumError::Invisible`] without visible light; a negative or non-finite `watts`.
     pub fn to_luminous_equivalent(&self, watts: f64) -> Result<Self, SpectrumError> {
         self.check_visible()?;
         let luminous = self.xyz().y;
         if luminous.is_normal() {
             return self.scaled(watts / luminous);
         }
-        // Values near the ends of what numbers can hold: as shares of the largest they add up.
+        // Values near the limits of floating point: normalised by the largest they can be summed.
         let largest = self.values.iter().copied().fold(0.0, f64::max);
         let rows = self.wavelengths_nm.iter().zip(&self.values);
         let shares = Self::new(
@@ -216,7 +214,7 @@ impl Spectrum {
         shares.scaled(watts / shares.xyz().y)
     }
 
-    /// Whether anybody sees it as light.
+    /// Checks that the spectrum has visible light.
     ///
     /// # Errors
     /// [`SpectrumError::Invisible`] by its wavelengths, [`SpectrumError::Dark`] by its values.

@@ -6,20 +6,20 @@ use crate::optics::Nanometres;
 
 /// hc/k [nm K], exact in the SI of 2019.
 const SECOND_RADIATION_CONSTANT_NM_K: f64 = 1.438_776_877e7;
-/// A lamp farther than this from every black body has no correlated temperature (CIE 15:2018).
+/// Colours farther than this from every black body have no correlated temperature (CIE 15:2018).
 const MAX_DISTANCE_UV: f64 = 0.05;
-/// Temperatures [K] among which the nearest is looked for, as reciprocals [1/K].
+/// Search range of the correlated temperature, as reciprocals [1/K].
 const RECIPROCALS: [f64; 2] = [1.0 / 100_000.0, 1.0 / 500.0];
-/// Places of the first, coarse search; colours move evenly with the reciprocal of temperature.
+/// Steps of the coarse search, uniform in the reciprocal of temperature, by which colours move evenly.
 const PLACES: u32 = 64;
 
-/// Temperatures [K] that light can be said to have: black bodies from the first on, daylight to the second.
+/// Range of colour temperatures [K]: from a black body at the lower end to daylight at the upper one.
 pub const CAMERA_KELVIN: [f64; 2] = [1000.0, 25_000.0];
-/// From here on [K] such light is daylight; CIE has none that is redder.
+/// Daylight from here on [K]: CIE defines none that is redder.
 const DAYLIGHT_KELVIN: f64 = 4000.0;
 
-/// The colour of light of a temperature [K], Y = 1: a phase of daylight by its correlated temperature from 4000 K on
-/// (CIE 15:2018), below that a black body. 6504 K is D65.
+/// Colour of light of a temperature [K], Y = 1: a phase of daylight by its correlated temperature from 4000 K on (CIE
+/// 15:2018), a black body below that. 6504 K is D65.
 pub fn white_of_kelvin(kelvin: f64) -> Xyz {
     if kelvin < DAYLIGHT_KELVIN {
         let body = black_body(kelvin);
@@ -44,7 +44,7 @@ fn daylight_chromaticity(kelvin: f64) -> [f64; 2] {
     [x, (-3.000 * x + 2.870) * x - 0.275]
 }
 
-/// Radiance of a black body by wavelength, relative to that at 560 nm (Planck's law).
+/// Spectral radiance of a black body, relative to 560 nm (Planck's law).
 pub fn planck(wavelength: Nanometres, kelvin: f64) -> f64 {
     let exponent = |nm: f64| (SECOND_RADIATION_CONSTANT_NM_K / (nm * kelvin)).exp_m1();
     (560.0 / wavelength.0).powi(5) * exponent(560.0) / exponent(wavelength.0)
@@ -53,14 +53,14 @@ pub fn planck(wavelength: Nanometres, kelvin: f64) -> f64 {
 /// The black body nearest to a colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CorrelatedTemperature {
-    /// Its temperature [K].
+    /// [K].
     pub kelvin: f64,
-    /// How far the colour lies from it in (u, v) of CIE 1960 [1].
+    /// Distance of the colour from it in (u, v) of CIE 1960 [1].
     pub distance_uv: f64,
 }
 
-/// Correlated colour temperature by its definition: the black body of 500 to 100,000 K nearest in (u, v) of CIE 1960.
-/// `None` for a colour without chromaticity, farther than 0.05 from all of them, or nearest to an end.
+/// Correlated colour temperature by definition: the black body of 500 to 100,000 K nearest in (u, v) of CIE 1960.
+/// `None` for a colour without chromaticity, farther than 0.05 from all of them, or nearest to an end of the range.
 pub fn correlated_temperature(colour: Xyz) -> Option<CorrelatedTemperature> {
     let wanted = uv(colour)?;
     let distance = |reciprocal: f64| {
@@ -102,7 +102,7 @@ fn uv(Xyz { x, y, z }: Xyz) -> Option<[f64; 2]> {
     (sum > 0.0).then(|| [4.0 * x / sum, 6.0 * y / sum])
 }
 
-/// Where a function with one minimum has it, to 1e-9 of the interval (golden section).
+/// Minimum of a unimodal function, to 1e-9 of the interval (golden-section search).
 fn least_between(mut from: f64, mut to: f64, f: impl Fn(f64) -> f64) -> f64 {
     let golden = 0.5 * (5f64.sqrt() - 1.0);
     let (mut left, mut right) = (to - golden * (to - from), from + golden * (to - from));

@@ -12,11 +12,11 @@ use super::{Spectrum, SpectrumError, Xyz, illuminants, xyz_bar};
 use crate::optics::wavelength::VISIBLE;
 use crate::optics::{LinearSrgb, Nanometres};
 
-/// A channel may be off by this, relative to the brightest.
+/// Residual of a channel at which the solver stops, relative to the brightest.
 const TOLERANCE: f64 = 1e-12;
-/// No colour of the sRGB cube was seen to need half as many.
+/// More than twice what any colour of the sRGB cube was seen to need.
 const MAX_STEPS: usize = 600;
-/// Above this no more damping helps.
+/// Above this, more damping does not help.
 const MAX_DAMPING: f64 = 1e12;
 
 /// A smooth factor on light: `scale` times a sigmoid of a parabola, 0 to `scale` at every wavelength.
@@ -25,20 +25,20 @@ pub struct SmoothSpectrum {
     /// Coefficients of t², t and 1, where t runs from −1 at 360 nm to 1 at 830 nm. The last is ±∞ where the factor is
     /// `scale` or 0 throughout.
     pub coefficients: [f64; 3],
-    /// What the sigmoid, between 0 and 1, is multiplied by [1].
+    /// Factor on the sigmoid, which is between 0 and 1 [1].
     pub scale: f64,
 }
 
 impl SmoothSpectrum {
-    /// The factor whose colour under D65, relative to a perfect white, is the one given. Grey is flat; where no channel
-    /// is above 1, neither is the factor at any wavelength.
+    /// The factor with the given colour under D65, relative to a perfect white. Grey is flat. If no channel is above 1,
+    /// neither is the factor at any wavelength.
     ///
     /// # Errors
     /// [`SpectrumError::NoSuchColour`] for a channel that is negative or not finite.
     pub fn from_colour(colour: LinearSrgb) -> Result<Self, SpectrumError> {
         check(colour)?;
         let most = colour.max_channel();
-        // Dark colours are bright ones, scaled: near the foot of the sigmoid the equations would say little.
+        // Dark colours are scaled up: near the foot of the sigmoid the equations are ill-conditioned.
         let scale = if most > 1.0 || most == 0.0 {
             most
         } else {
@@ -66,18 +66,18 @@ impl SmoothSpectrum {
     }
 }
 
-/// The light of a lamp that has a colour and no spectrum: a [`SmoothSpectrum`] times D65, as a table of every visible
-/// nanometre.
+/// Light of a lamp that is given by colour instead of a spectrum: a [`SmoothSpectrum`] times D65, tabulated at every
+/// visible nanometre.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emission {
-    /// What D65 of one luminous-equivalent watt is multiplied by at whole nanometres.
+    /// Factor on D65 of one luminous-equivalent watt at whole nanometres.
     pub factor: SmoothSpectrum,
     /// The light [unit of the colour's luminance, per nm].
     pub light: Spectrum,
 }
 
 impl Emission {
-    /// The light whose XYZ is that of the colour: [W], [W/m²] or whatever its luminance is counted in.
+    /// Light with the XYZ of the colour, in the unit of its luminance, such as [W] or [W/m²].
     ///
     /// # Errors
     /// [`SpectrumError::NoSuchColour`] for a channel that is negative or not finite.
@@ -111,7 +111,7 @@ fn check(colour: LinearSrgb) -> Result<(), SpectrumError> {
     Err(SpectrumError::NoSuchColour { r, g, b, fault })
 }
 
-/// −1 at the blue end of the visible, 1 at the red end.
+/// −1 at the blue end of the visible range, 1 at the red end.
 fn normalised(Nanometres(nm): Nanometres) -> f64 {
     let (first, last) = (VISIBLE.start().0, VISIBLE.end().0);
     (2.0 * nm - first - last) / (last - first)
@@ -129,16 +129,15 @@ fn sigmoid_inverse(value: f64) -> f64 {
     (value - 0.5) / (value * (1.0 - value)).sqrt()
 }
 
-/// Wavelengths, and what a factor of 1 at each adds to the channels of linear sRGB under D65 of one luminous-equivalent
-/// watt.
+/// Wavelengths, and what a factor of 1 at each contributes to linear sRGB under D65 of one luminous-equivalent watt.
 type UpsamplingBasis = Vec<(Nanometres, DVec3)>;
 
 struct Weights {
-    /// For factors that are smooth: the points of the quadrature.
+    /// For smooth factors: the quadrature points.
     of_curves: UpsamplingBasis,
-    /// For light that is linear between whole nanometres: those.
+    /// For light that is linear between whole nanometres: the whole nanometres.
     of_tables: UpsamplingBasis,
-    /// Channels of D65 itself: white but for the table's last digits.
+    /// Channels of D65 itself: white up to the last digits of the table.
     white: DVec3,
 }
 
@@ -154,7 +153,7 @@ impl Weights {
                 let colour = Xyz::from(xyz_bar(wavelength)).to_linear_srgb();
                 let channels = DVec3::from_array(colour.to_array()) * weight_nm;
                 of_curves.push((wavelength, channels * d65(wavelength)));
-                // Two points to a piece, each with a share of the knots at its ends.
+                // Two points per segment, each shared by the knots at its ends.
                 let piece = index / 2;
                 let along = wavelength.0 - knots[piece];
                 of_tables[piece].1 += channels * (1.0 - along) * d65(Nanometres(knots[piece]));
@@ -171,7 +170,7 @@ impl Weights {
     }
 }
 
-/// Channels of the sigmoid with some coefficients, less those wanted, and how they change with each coefficient.
+/// Residual of the sigmoid's channels against those wanted, and its Jacobian with respect to the coefficients.
 fn residual(places: &UpsamplingBasis, coefficients: DVec3, wanted: DVec3) -> (DVec3, DMat3) {
     let mut residual = -wanted;
     let mut jacobian = DMat3::ZERO;
@@ -185,8 +184,8 @@ fn residual(places: &UpsamplingBasis, coefficients: DVec3, wanted: DVec3) -> (DV
     (residual, jacobian)
 }
 
-/// Coefficients of the sigmoid whose channels under D65 are the ones wanted, by Levenberg and Marquardt from a flat
-/// grey of their mean.
+/// Coefficients of the sigmoid with the wanted channels under D65, by Levenberg–Marquardt from a flat grey of their
+/// mean.
 fn solve(places: &UpsamplingBasis, wanted: DVec3) -> [f64; 3] {
     let mean = wanted.element_sum() / 3.0;
     let mut coefficients = DVec3::new(0.0, 0.0, sigmoid_inverse(mean.clamp(TOLERANCE, 1.0 - TOLERANCE)));
@@ -208,7 +207,7 @@ fn solve(places: &UpsamplingBasis, wanted: DVec3) -> [f64; 3] {
     coefficients.to_array()
 }
 
-/// The step of (JᵀJ + damping · its diagonal) δ = Jᵀ e, with the unknowns scaled so that the diagonal is 1.
+/// Solves (JᵀJ + damping · its diagonal) δ = Jᵀ e, with the unknowns scaled so that the diagonal is 1.
 fn damped_step(error: DVec3, jacobian: DMat3, damping: f64) -> DVec3 {
     let scales = DVec3::new(
         jacobian.x_axis.length(),

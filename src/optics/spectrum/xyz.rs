@@ -8,14 +8,14 @@ use super::luminous::{integrate, visible_knots};
 use crate::optics::wavelength::VISIBLE;
 use crate::optics::{LinearSrgb, Nanometres};
 
-/// Rows of three.
+/// Row-major.
 pub type Matrix3 = [[f64; 3]; 3];
 
-/// Leaves every colour as it is.
+/// Leaves every colour unchanged.
 pub const IDENTITY: Matrix3 = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// Linear sRGB to XYZ, Y = 1 for white (IEC 61966-2-1, to double precision from its primaries and D65 at
-/// (0.3127, 0.3290)); the second row is [`LinearSrgb::luminance`].
+/// Linear sRGB to XYZ, Y = 1 for white (IEC 61966-2-1, to double precision from its primaries and D65 at (0.3127,
+/// 0.3290)). The second row is [`LinearSrgb::luminance`].
 const XYZ_FROM_SRGB: Matrix3 = [
     [
         0.412_390_799_265_959_5,
@@ -34,7 +34,7 @@ const XYZ_FROM_SRGB: Matrix3 = [
     ],
 ];
 
-/// Its inverse.
+/// The inverse of [`XYZ_FROM_SRGB`].
 const SRGB_FROM_XYZ: Matrix3 = [
     [
         3.240_969_941_904_521,
@@ -53,15 +53,15 @@ const SRGB_FROM_XYZ: Matrix3 = [
     ],
 ];
 
-/// XYZ to the cone-like responses in which Bradford adapts (linear, as in ICC.1:2010, annex E).
+/// XYZ to the cone-like responses of the Bradford adaptation (linear, as in ICC.1:2010, annex E).
 const BRADFORD_FROM_XYZ: Matrix3 = [
     [0.8951, 0.2664, -0.1614],
     [-0.7502, 1.7135, 0.0367],
     [0.0389, -0.0685, 1.0296],
 ];
 
-/// A colour of light as CIE 1931 tristimulus values without the factor 683: Y is the luminous-equivalent value of
-/// the quantity [W, W/m², …] that the spectrum was one of.
+/// A colour of light as CIE 1931 tristimulus values without the factor 683: Y is the luminous-equivalent value of the
+/// quantity [W, W/m², …] of the spectrum.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Xyz {
     /// ∫ Φ x̄ dλ.
@@ -73,12 +73,12 @@ pub struct Xyz {
 }
 
 impl Xyz {
-    /// In linear sRGB, with the same luminance; a colour outside of the gamut keeps its negative channels.
+    /// Linear sRGB of the same luminance; out-of-gamut colours keep their negative channels.
     pub fn to_linear_srgb(self) -> LinearSrgb {
         LinearSrgb::from(times(&SRGB_FROM_XYZ, self.into()))
     }
 
-    /// x and y of its chromaticity; `None` where X + Y + Z is not positive, as for black.
+    /// Chromaticity x, y; `None` where X + Y + Z is not positive, as for black.
     pub fn chromaticity(self) -> Option<[f64; 2]> {
         let sum = self.x + self.y + self.z;
         (sum > 0.0).then(|| [self.x / sum, self.y / sum])
@@ -117,8 +117,8 @@ impl std::ops::Mul<f64> for Xyz {
     }
 }
 
-/// The colour that a factor on light [1], by wavelength, has under D65, relative to the factor 1, which is exactly
-/// white: a reflectance's or transmittance's colour.
+/// Colour of a reflectance or transmittance [1] by wavelength under D65, relative to the factor 1, which is exactly
+/// white.
 pub fn colour_under_d65(factor: impl Fn(Nanometres) -> f64) -> LinearSrgb {
     let lamp = illuminants::d65();
     let [x, y, z, white_x, white_y, white_z] = integrate(&visible_knots(), |wavelength| {
@@ -136,8 +136,8 @@ pub fn colour_under_d65(factor: impl Fn(Nanometres) -> f64) -> LinearSrgb {
     LinearSrgb::new(colour.r / white.r, colour.g / white.g, colour.b / white.b)
 }
 
-/// Matrix on linear sRGB that makes light of the colour `white` as bright as it was and white (Bradford); the identity
-/// where it is of D65 already. `None` where `white` has no response of some kind of cone to divide by.
+/// Matrix on linear sRGB that makes light of the colour `white` white at the same luminance (Bradford); the identity
+/// for D65. `None` where a cone response of `white` is not positive.
 pub fn white_balance(white: Xyz) -> Option<Matrix3> {
     let target = Xyz::from(LinearSrgb::WHITE);
     let from = times(&BRADFORD_FROM_XYZ, (white * (1.0 / white.y)).into());
@@ -160,13 +160,12 @@ pub fn white_balance(white: Xyz) -> Option<Matrix3> {
     chain.into_iter().copied().reduce(|a, b| product(&a, &b))
 }
 
-/// A matrix times a colour.
 pub fn transformed(matrix: &Matrix3, colour: LinearSrgb) -> LinearSrgb {
     times(matrix, colour.to_array()).into()
 }
 
-/// The nearest a display comes to a colour outside of its gamut: mixed with the grey of the same luminance until no
-/// channel is negative; colours inside stay as they are. Light of no luminance is black. For display only.
+/// The nearest displayable colour: one outside the gamut is mixed with the grey of its luminance until no channel is
+/// negative, one inside is unchanged. Light without luminance becomes black. For display only.
 pub fn to_display_gamut(colour: LinearSrgb) -> LinearSrgb {
     let least = colour.r.min(colour.g).min(colour.b);
     if least >= 0.0 {
@@ -177,7 +176,7 @@ pub fn to_display_gamut(colour: LinearSrgb) -> LinearSrgb {
         return LinearSrgb::BLACK;
     }
     let kept = luminance / (luminance - least);
-    // The least channel comes out as 0 but for rounding, which must not leave it below.
+    // The least channel is 0 except for rounding, which must not make it negative.
     colour.map(|channel| (luminance + kept * (channel - luminance)).max(0.0))
 }
 
@@ -190,7 +189,7 @@ fn product(a: &Matrix3, b: &Matrix3) -> Matrix3 {
 }
 
 fn inverse(matrix: &Matrix3) -> Matrix3 {
-    // glam keeps columns: a matrix from rows is the transpose, and so is its inverse.
+    // glam stores columns: a matrix from rows is the transpose, and so is its inverse.
     glam::DMat3::from_cols_array_2d(matrix)
         .inverse()
         .to_cols_array_2d()
@@ -203,8 +202,8 @@ static TABLE: LazyLock<Vec<[f64; 3]>> = LazyLock::new(|| {
         .collect()
 });
 
-/// Colour-matching functions x̄, ȳ, z̄ [1] of CIE 1931, linear between whole nanometres; 0 outside 360 to 830 nm.
-/// ȳ is V(λ), the luminous efficiency that 683 lm/W goes with.
+/// Colour-matching functions x̄, ȳ, z̄ [1] of CIE 1931, linear between whole nanometres; 0 outside 360 to 830 nm. ȳ is
+/// V(λ), the luminous efficiency to which 683 lm/W applies.
 pub fn xyz_bar(wavelength: Nanometres) -> [f64; 3] {
     if !VISIBLE.contains(&wavelength) {
         return [0.0; 3];

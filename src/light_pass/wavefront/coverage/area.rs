@@ -8,7 +8,7 @@ use super::row::{RowShares, Sink, Span};
 use super::shape::{cells, least, most};
 use super::sides::{SideCut, Sides};
 
-/// The order of the corners from top to bottom, by which of a > b, b > c, a > c hold of their heights (1, 2, 4).
+/// Order of the corners from top to bottom, indexed by which of a > b, b > c, a > c hold for their y (bits 1, 2, 4).
 const ORDERS: [[usize; 3]; 8] = [
     [0, 1, 2],
     [1, 0, 2],
@@ -20,12 +20,12 @@ const ORDERS: [[usize; 3]; 8] = [
     [2, 1, 0],
 ];
 
-/// A triangle that has area; x counts from the map's first column that it reaches, where numbers are finer.
+/// A triangle with area; x is relative to the first column of the map that it reaches, where precision is higher.
 #[derive(Clone, Copy, Debug)]
 pub struct Area {
-    /// Column that x = 0 stands for.
+    /// Column of x = 0.
     origin: usize,
-    /// Columns that it reaches from there on, and whether it leaves the map on either side.
+    /// Number of columns that it reaches, and whether it crosses the map's left or right border.
     columns: usize,
     crosses_border: bool,
     sides: Sides,
@@ -46,7 +46,7 @@ impl Area {
         }
     }
 
-    /// Gives the shares of each of some rows that the triangle reaches.
+    /// Passes the shares of some rows that the triangle reaches to a sink.
     #[inline(always)]
     pub fn for_each_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
         match self.columns {
@@ -59,8 +59,8 @@ impl Area {
         }
     }
 
-    /// For triangles of `N` columns, without any decision that depends on the
-    /// triangle's shape, as mistaken guesses of the processor would cost more than texels that get nothing.
+    /// For triangles of `N` columns. Has no branch that depends on the triangle's shape: mispredictions would cost more
+    /// than texels that get nothing.
     #[inline(always)]
     fn for_each_narrow_row<const N: usize>(&self, rows: Range<usize>, sink: &mut impl Sink) {
         let mut y = rows.start as f64;
@@ -99,7 +99,7 @@ impl Area {
         }
     }
 
-    /// The row between two cuts, on those texels only that it reaches.
+    /// The row between two cuts, restricted to the texels that it reaches.
     #[inline(always)]
     fn wide_span<'a>(&self, from: &SideCut, to: &SideCut, shares: &'a mut RowShares) -> Option<Span<'a>> {
         let pieces = self.sides.between(from, to);

@@ -11,19 +11,19 @@ use super::shape::{Shape, is_finite};
 use super::{CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
 
-/// Triangles that are sorted by bands in one go.
+/// Triangles sorted by bands at a time.
 const TRIANGLES_PER_CHUNK: usize = 8192;
 
-/// Fewer triangles are not worth dividing.
+/// Fewer triangles are not worth dividing among threads.
 const MIN_TRIANGLES: usize = 1024;
 
-/// Bands per thread, so that none waits long for the last.
+/// Bands per thread, for load balance.
 const BANDS_PER_THREAD: usize = 4;
 
-/// Where flux may go.
+/// Restricts which texels take flux.
 pub trait TexelAccess: Sync {
-    /// Adds a span of a triangle's flux to the texels of its row, where that may be; returns what was added, and
-    /// whether it was all.
+    /// Adds a span of a triangle's flux to the texels of its row where allowed. Returns what was added, and whether
+    /// that was all.
     fn add(
         &self,
         flux: &PreparedTriangle,
@@ -34,7 +34,7 @@ pub trait TexelAccess: Sync {
     ) -> (FluxCount, bool);
 }
 
-/// All texels may grow.
+/// All texels take flux.
 pub struct AllTexels;
 
 impl TexelAccess for AllTexels {
@@ -51,16 +51,16 @@ impl TexelAccess for AllTexels {
     }
 }
 
-/// What one task did.
+/// Result of one task.
 #[derive(Debug, Default)]
 struct TaskOutput {
     added: [i128; 3],
-    /// Triangles of which not all could be added.
+    /// Triangles that were not added completely.
     incomplete: Vec<usize>,
 }
 
-/// Adds triangles to the texels of a map of `size`; says what went where, all that was not added counting as outside,
-/// and of which triangles not all could be added, in ascending order.
+/// Adds triangles to the texels of a map of `size`. Returns what went where, with everything not added counted as
+/// outside, and the triangles that were not added completely, ascending.
 pub fn deposit(
     triangles: &[FluxTriangle],
     size: (usize, usize),
@@ -82,7 +82,7 @@ pub fn deposit(
     (report, done.incomplete)
 }
 
-/// Books all flux as outside, but for that of triangles without place.
+/// Books all flux as outside, except that of non-finite triangles.
 pub(super) fn book_outside(triangles: &[FluxTriangle], report: &mut CoverageReport) {
     for triangle in triangles {
         let account = if is_finite(&triangle.corners) {
@@ -94,7 +94,7 @@ pub(super) fn book_outside(triangles: &[FluxTriangle], report: &mut CoverageRepo
     }
 }
 
-/// Adds triangles, each band of rows in a task of its own.
+/// Adds triangles with one task per band of rows.
 fn add_in_bands(
     triangles: &[FluxTriangle],
     size: (usize, usize),

@@ -5,27 +5,26 @@ use std::ops::Range;
 use super::FluxTriangle;
 use super::shape::rows_and_columns;
 
-/// Work of making a triangle ready, in that of a texel.
+/// Cost of preparing a triangle, in texels.
 const TRIANGLE_WORK: i64 = 8;
 
-/// Work of beginning a row, in that of a texel.
+/// Cost of starting a row, in texels.
 const ROW_WORK: i64 = 4;
 
-/// Some triangles, sorted by the bands that they reach.
+/// Triangles sorted by the bands that they reach.
 #[derive(Debug)]
 pub struct Bins {
-    /// First row and row after the last, by triangle.
+    /// First row and end of the rows, by triangle.
     rows: Vec<(u32, u32)>,
-    /// How much work each row adds to that of the row before: one more than there are rows.
+    /// Difference between the work of each row and that of the previous one; one more than there are rows.
     changes: Vec<i64>,
-    /// Where the triangles of each band begin, and end.
+    /// Where the triangles of each band begin; the last entry is the end.
     begins: Vec<usize>,
     /// Triangles, band by band.
     indices: Vec<u32>,
 }
 
 impl Bins {
-    /// Finds the rows of triangles.
     pub fn new(triangles: &[FluxTriangle], size: (usize, usize)) -> Self {
         let mut changes = vec![0_i64; size.1 + 1];
         let rows = triangles
@@ -55,7 +54,7 @@ impl Bins {
         let mut here = 0;
         for (sum, change) in work.iter_mut().zip(&self.changes) {
             here += change;
-            // Never negative: what ends began before.
+            // Never negative: each decrease follows its increase.
             *sum += here as u64;
         }
     }
@@ -98,7 +97,7 @@ impl Bins {
     }
 }
 
-/// Divides all rows into at most `count` bands of about the same work.
+/// Divides all rows into at most `count` bands of about equal work.
 pub fn split_rows(work: &[u64], count: usize) -> Vec<Range<usize>> {
     let total: u64 = work.iter().sum();
     let mut bands = Vec::new();

@@ -11,10 +11,10 @@ use super::shape::Shape;
 use super::{Coverage, CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
 
-/// How far a share goes at most to a texel that its triangle does not touch [texels, either way].
+/// Farthest that a share moves to a texel that its triangle does not touch [texels, in both directions].
 const REACH: usize = 2;
 
-/// Texels of a chart may grow where the triangle's island covers them.
+/// Restricts flux to texels that the triangle's island covers.
 struct CoveredOnly<'a, C>(&'a C);
 
 impl<C: Coverage> TexelAccess for CoveredOnly<'_, C> {
@@ -43,7 +43,7 @@ impl<C: Coverage> TexelAccess for CoveredOnly<'_, C> {
     }
 }
 
-/// Adds triangles to those texels that `coverage` lets grow.
+/// Adds triangles to the texels that `coverage` allows.
 pub fn deposit(
     triangles: &[FluxTriangle],
     coverage: &impl Coverage,
@@ -76,14 +76,14 @@ fn add(texel: &mut FluxCount, share: &FluxCount) {
     }
 }
 
-/// The share of a texel that is not covered, and the texel that takes it.
+/// The share of an uncovered texel, and the texel that takes it.
 struct Move {
     to: Option<usize>,
     share: FluxCount,
 }
 
-/// Where the shares of the uncovered texels of a triangle go: to a nearest covered one that the triangle touches, counted
-/// in steps to any of the eight texels around; else to the nearest around.
+/// Targets for the shares of a triangle's uncovered texels: the nearest covered texel that the triangle touches,
+/// counted in steps to any of the eight neighbours, or else the nearest covered texel around.
 fn moves(triangle: &FluxTriangle, coverage: &impl Coverage) -> Vec<Move> {
     let width = coverage.size().0;
     let mut touched = Touched::new(triangle, coverage.size());
@@ -102,8 +102,7 @@ fn moves(triangle: &FluxTriangle, coverage: &impl Coverage) -> Vec<Move> {
     moves
 }
 
-/// The nearest texel around an uncovered one that an island covers, the first in the order of rows and columns where
-/// several are as near.
+/// Nearest texel within [`REACH`] that an island covers; the first in row-major order among equals.
 fn nearest(texel: usize, coverage: &impl Coverage, island: u32) -> Option<usize> {
     let (width, height) = coverage.size();
     let (column, row) = (texel % width, texel / width);
@@ -120,18 +119,18 @@ fn nearest(texel: usize, coverage: &impl Coverage, island: u32) -> Option<usize>
 struct Touched {
     width: usize,
     flux: PreparedTriangle,
-    /// The map's row that is the first.
+    /// Row of the map that `rows` starts at.
     first: usize,
     rows: Vec<TouchedRow>,
 }
 
-/// Those of one row.
+/// The touched texels of one row.
 #[derive(Default)]
 struct TouchedRow {
     /// The first texel.
     texel: usize,
     shares: Vec<FluxCount>,
-    /// The covered texel that is nearest, once it is known.
+    /// Nearest covered texel of each, once known.
     homes: Vec<Option<usize>>,
 }
 
@@ -162,7 +161,7 @@ impl Touched {
         touched
     }
 
-    /// Finds the homes of all texels, outwards from the covered ones that got a share.
+    /// Finds the home of every texel by a search outwards from the covered texels with a share.
     fn spread(&mut self, covered: impl Fn(usize) -> bool) {
         let mut queue = VecDeque::new();
         for (row, texels) in self.rows.iter_mut().enumerate() {
@@ -177,7 +176,7 @@ impl Touched {
         while let Some((row, texel)) = queue.pop_front() {
             let home = self.home(row, texel).and_then(|home| *home);
             for beside in row.saturating_sub(1)..(row + 2).min(self.rows.len()) {
-                // The texel of that row in the same column, and those left and right of it.
+                // The texel of that row in the same column, and its left and right neighbours.
                 let middle = texel + beside * self.width - row * self.width;
                 for place in [middle, middle.wrapping_sub(1), middle + 1] {
                     if let Some(unknown @ None) = self.home(beside, place) {
@@ -189,7 +188,7 @@ impl Touched {
         }
     }
 
-    /// The home of a texel of a row, if the triangle touches it.
+    /// The home of a texel in a row, if the triangle touches it.
     fn home(&mut self, row: usize, texel: usize) -> Option<&mut Option<usize>> {
         let row = &mut self.rows[row];
         row.homes.get_mut(texel.checked_sub(row.texel)?)

@@ -5,14 +5,14 @@ use glam::DVec2;
 use super::row::{RowShares, Span};
 use super::shape::{cells, tent};
 
-/// A triangle seen along its longest side.
+/// A degenerate triangle along its longest side.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     /// Upper end.
     from: DVec2,
-    /// To the lower end.
+    /// Vector to the lower end.
     way: DVec2,
-    /// Fraction of the way at which the middle corner lies.
+    /// Position of the middle corner, as a fraction of the side.
     middle: f64,
     /// Columns of the map.
     width: usize,
@@ -36,7 +36,7 @@ impl Line {
         Self {
             from,
             way,
-            // Not a number for a point, where it does not matter.
+            // NaN for a point, where it does not matter.
             middle: if middle.is_nan() {
                 0.0
             } else {
@@ -46,7 +46,7 @@ impl Line {
         }
     }
 
-    /// Fractions of the way at which a row begins and ends.
+    /// Fractions of the side at which a row begins and ends.
     fn part_in_row(&self, row: usize) -> (f64, f64) {
         if self.way.y == 0.0 {
             return (0.0, 1.0);
@@ -55,7 +55,7 @@ impl Line {
         (at(row as f64), at((row + 1) as f64))
     }
 
-    /// The shares of a row within its rows.
+    /// The shares of one of the line's rows; `None` where it misses the map.
     pub fn span<'a>(&self, row: usize, shares: &'a mut RowShares) -> Option<Span<'a>> {
         let width = self.width;
         let (from, to) = self.part_in_row(row);

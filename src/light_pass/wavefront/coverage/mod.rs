@@ -27,15 +27,15 @@ pub use report::CoverageReport;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxTriangle {
     /// Texel coordinates: x across, y down; texel (i, j) covers [i, i + 1] × [j, j + 1]. May lie partly or wholly
-    /// outside the map, either way round. Should be finite.
+    /// outside the map, with either winding. Should be finite.
     pub corners: [DVec2; 3],
-    /// Counts, not negative, spread evenly over the triangle's area.
+    /// Non-negative counts, spread evenly over the triangle's area.
     pub flux: FluxCount,
-    /// Island of the chart that the triangle lies on (`ReceiverMap::island`), 0 where there is only one.
+    /// Island of the chart that the triangle lies on (`ReceiverMap::island`); 0 where there is only one.
     pub island: u32,
 }
 
-/// Adds triangles to a map; says what became of their flux.
+/// Adds triangles to a map and reports what became of their flux.
 ///
 /// The counts in the map depend neither on the order of the triangles, nor on how they are divided into calls, nor on
 /// the number of threads. The sums of all flux must stay below 2⁶³ counts, as [`FluxUnit`] sees to.
@@ -49,11 +49,11 @@ pub fn deposit_triangles(triangles: &[FluxTriangle], map: &mut ReceiverMap) -> C
     deposit_covered(triangles, flux, &covered)
 }
 
-/// [`deposit_triangles`] onto counts, of which `coverage` says where they may grow.
+/// [`deposit_triangles`] into counts, restricted to the texels that `coverage` allows.
 ///
 /// # Panics
 ///
-/// If `coverage` has another size than `flux`.
+/// If `coverage` and `flux` differ in size.
 pub fn deposit_covered(
     triangles: &[FluxTriangle],
     flux: &mut FluxAccumulator,

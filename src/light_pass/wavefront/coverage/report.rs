@@ -2,21 +2,21 @@
 
 use crate::illumination::accumulator::FluxCount;
 
-/// What became of the flux of triangles; the four sums together are exactly the flux that they carried.
+/// What became of the flux of triangles. The four sums add up exactly to the flux of the triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CoverageReport {
-    /// Counts that texels got.
+    /// Counts on texels.
     pub deposited: [i128; 3],
-    /// Counts that fell beside the map's rectangle: light past the receiver's edge.
+    /// Counts beside the map's rectangle: light past the receiver's edge.
     pub outside: [i128; 3],
-    /// Counts that fell where the chart covers nothing, too far from anything that it covers.
+    /// Counts on texels that the chart does not cover, with no covered texel near enough.
     pub unplaced: [i128; 3],
-    /// Counts of triangles with a corner that is not finite.
+    /// Counts of triangles with a non-finite corner.
     pub non_finite: [i128; 3],
 }
 
 impl CoverageReport {
-    /// Adds what another deposit did.
+    /// Adds the sums of another deposit.
     pub fn merge(&mut self, other: &Self) {
         for channel in 0..3 {
             self.deposited[channel] += other.deposited[channel];

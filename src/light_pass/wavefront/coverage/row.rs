@@ -3,28 +3,27 @@
 use super::shape::most;
 use crate::illumination::accumulator::FluxCount;
 
-/// The texels of one row that a triangle reaches, with cumulative shares of the triangle: what lies in the rows above,
-/// and in this row to the left of a texel's border. From 0 to 1; they may fall by as much as rounding.
+/// The texels of one row that a triangle reaches, with cumulative shares of the triangle: the part in the rows above,
+/// and in this row left of a texel's border. From 0 to 1; rounding may make them decrease slightly.
 #[derive(Clone, Copy, Debug)]
 pub struct Span<'a> {
     /// Column of the first texel.
     pub first: usize,
     /// Share before the first texel.
     pub start: f64,
-    /// Share up to the right border of each texel; as many as texels.
+    /// Share up to the right border of each texel, one per texel.
     pub ends: &'a [f64],
 }
 
-/// Takes the rows of a triangle.
+/// Receives the rows of a triangle.
 pub trait Sink {
-    /// Takes a row.
     fn add(&mut self, row: usize, span: Span);
 }
 
-/// Room for the shares of a row, reused from row to row.
+/// Buffer for the shares of a row, reused from row to row.
 #[derive(Debug)]
 pub struct RowShares {
-    /// What becomes [`Span::ends`], in whole fours.
+    /// Storage of [`Span::ends`], padded to a multiple of four.
     pub ends: Vec<f64>,
 }
 
@@ -37,7 +36,7 @@ impl RowShares {
     }
 }
 
-/// A triangle's flux, made ready to be divided.
+/// A triangle's flux, prepared for division.
 #[derive(Clone, Copy, Debug)]
 pub struct PreparedTriangle {
     flux: FluxCount,
@@ -47,29 +46,29 @@ pub struct PreparedTriangle {
 
 #[derive(Clone, Copy, Debug)]
 enum RowMethod {
-    /// All channels alike.
+    /// All channels are equal.
     Grey,
     Colour,
-    /// More counts than the quick rounding can tell apart.
+    /// Counts too large for the fast rounding.
     Careful,
 }
 
-/// Counts up to this can be rounded the quick way.
+/// Smallest count that is too large for the fast rounding.
 const QUICK: i64 = 1 << 48;
 
-/// Adding it leaves the nearest whole number of a value of up to 2⁵⁰ in the lowest bits.
+/// Adding this puts the nearest integer of a value up to 2⁵⁰ into the lowest bits.
 const ROUNDER: f64 = (3_u64 << 51) as f64;
 
-/// The nearest whole number, as bits above those of [`ROUNDER`]: only differences make sense.
+/// The nearest integer in the bits of a double offset by [`ROUNDER`]: only differences are meaningful.
 #[inline(always)]
 fn quick_round(value: f64) -> i64 {
     (value + ROUNDER).to_bits() as i64
 }
 
-/// Cumulative shares from here on are all, but for rounding.
+/// Cumulative shares from here on are 1 up to rounding.
 const NEARLY_ALL: f64 = 1.0 - 2e-15;
 
-/// Counts of a cumulative share; any flux.
+/// Counts of a cumulative share, for any flux.
 fn careful_round(flux: i64, share: f64) -> i64 {
     if share >= NEARLY_ALL {
         flux
@@ -79,7 +78,6 @@ fn careful_round(flux: i64, share: f64) -> i64 {
 }
 
 impl PreparedTriangle {
-    /// Any flux.
     #[inline(always)]
     pub fn new(flux: FluxCount) -> Self {
         let quick = flux.iter().all(|channel| (0..QUICK).contains(channel));
@@ -97,8 +95,8 @@ impl PreparedTriangle {
 
     /// Adds the flux of a span to the texels of its row; returns what was added.
     ///
-    /// Each texel gets the difference between the rounded cumulative fluxes at its borders, so that all texels of all
-    /// rows together get exactly the triangle's flux.
+    /// Each texel gets the difference of the rounded cumulative fluxes at its borders, so that all texels of all rows
+    /// together get exactly the triangle's flux.
     #[inline(always)]
     pub fn add(&self, span: Span, row: &mut [FluxCount]) -> FluxCount {
         let texels = &mut row[span.first..span.first + span.ends.len()];

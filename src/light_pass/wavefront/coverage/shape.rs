@@ -8,29 +8,29 @@ use super::area::Area;
 use super::line::Line;
 use super::row::{RowShares, Sink, Span};
 
-/// Triangles less high than this over their longest side [texels] are lines: the rounding of their borders would be as
-/// much as 10⁻⁹ of their flux, and no texel is that fine.
+/// Triangles with a smaller height over their longest side [texels] are lines: the rounding of their borders would
+/// reach 10⁻⁹ of their flux, and no texel is that fine.
 const LINE_HEIGHT_TEXELS: f64 = 1e-6;
 
-/// Triangles that reach further than this [texels] leave less than 10⁻¹⁴ of their flux on any map.
+/// Triangles that extend farther [texels] leave less than 10⁻¹⁴ of their flux on any map.
 const FARTHEST_TEXELS: f64 = 1e18;
 
-/// A triangle, made ready for one map.
+/// A triangle, prepared for one map.
 #[derive(Clone, Debug)]
 pub enum Shape {
     /// A corner is not finite.
     NonFinite,
-    /// No part of it on the map.
+    /// No part of it is on the map.
     Outside,
-    /// Wholly within one texel: column, row.
+    /// Entirely within one texel: column, row.
     Texel(usize, usize),
-    /// A triangle that has area, and its rows on the map.
+    /// A triangle with area, and its rows on the map.
     Area(Area, Range<usize>),
-    /// A triangle without.
+    /// A degenerate triangle, and its rows on the map.
     Line(Line, Range<usize>),
 }
 
-/// Borders of a triangle, and those rows of the map that it reaches.
+/// Bounding box of a triangle [texels].
 #[derive(Clone, Copy, Debug)]
 struct Bounds {
     low: DVec2,
@@ -52,7 +52,7 @@ impl Bounds {
         self.high.x < 0.0 || self.high.y < 0.0 || self.low.x > width as f64 || self.low.y > height as f64
     }
 
-    /// The only texel, if there is but one.
+    /// The only texel that it reaches; `None` if there are several.
     fn texel(&self, (width, height): (usize, usize)) -> Option<(usize, usize)> {
         let (column, row) = (self.low.x as i32, self.low.y as i32);
         let (left, top) = (f64::from(column), f64::from(row));
@@ -107,7 +107,7 @@ impl Shape {
         }
     }
 
-    /// Gives the shares of each of some rows, all within [`Shape::rows`].
+    /// Passes the shares of some rows, all within [`Shape::rows`], to a sink.
     #[inline(always)]
     pub fn for_each_row(&self, rows: Range<usize>, shares: &mut RowShares, sink: &mut impl Sink) {
         match self {
@@ -132,10 +132,10 @@ impl Shape {
     }
 }
 
-/// Whether all corners are finite numbers.
+/// Whether all corners are finite.
 #[inline(always)]
 pub fn is_finite([a, b, c]: &[DVec2; 3]) -> bool {
-    // Zero times anything that is not finite is not a number, and neither is a sum with one.
+    // Zero times a non-finite number is NaN, and so is any sum with it.
     let sum = *a * 0.0 + *b * 0.0 + *c * 0.0;
     sum.x + sum.y == 0.0
 }
@@ -153,22 +153,22 @@ pub fn rows_and_columns(corners: &[DVec2; 3], size: (usize, usize)) -> (Range<us
     )
 }
 
-/// The smaller one; the second of numbers that do not compare.
+/// The smaller number; the second one if they do not compare.
 #[inline(always)]
 pub fn least(a: f64, b: f64) -> f64 {
     if a < b { a } else { b }
 }
 
-/// The larger one; the second of numbers that do not compare.
+/// The larger number; the second one if they do not compare.
 #[inline(always)]
 pub fn most(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Rows (columns) of a map of `count` that the interval `low..=high` reaches; that of `low` where it is a point.
+/// Rows (or columns) of a map of `count` that the interval `low..=high` reaches; that of `low` for a point.
 #[inline(always)]
 pub fn cells(low: f64, high: f64, count: usize) -> Range<usize> {
-    // Casts of doubles end at 2³¹; what lies on the last border belongs to the last cell.
+    // Casts from doubles saturate below 2³¹; what lies on the last border belongs to the last cell.
     let count = i32::try_from(count).unwrap_or(i32::MAX);
     let first = (most(0.0, low) as i32).min(count - 1);
     let last = most(0.0, high) as i32;
@@ -180,8 +180,8 @@ pub fn cells(low: f64, high: f64, count: usize) -> Range<usize> {
     first as usize..end.min(count).max(first + 1) as usize
 }
 
-/// The part of a triangle's flux below a fraction `t` of its extent along a direction, where the middle corner is at
-/// the fraction `middle`: half a tent each side of it. Rises with `t`.
+/// Fraction of a triangle's flux below a fraction `t` of its extent along a direction, with the middle corner at the
+/// fraction `middle`: the integral of a tent. Increases with `t`.
 pub fn tent(t: f64, middle: f64) -> f64 {
     if t <= 0.0 {
         0.0

@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::shape::{least, most};
 
-/// Sides less high than this [texels] are level: they bound no area.
+/// Sides with a smaller height [texels] are level: they bound no area.
 const LEVEL_TEXELS: f64 = 1e-30;
 
 /// The sides of a triangle: x as functions of y.
@@ -19,9 +19,10 @@ pub struct Sides {
     start_x: [f64; 4],
     start_y: [f64; 4],
     slope: [f64; 4],
-    /// What the areas to their right count, as shares of the triangle per area.
+    /// Weight of the area to the right of each side, as share of the triangle per area.
     sign: [f64; 4],
-    /// Share of the triangle above y, per squared distance from the top, and below, from the bottom.
+    /// Share of the triangle above y per squared distance from the top, and below y per squared distance from the
+    /// bottom.
     upper_square: f64,
     lower_square: f64,
     /// Share below the middle corner.
@@ -31,10 +32,10 @@ pub struct Sides {
 /// The triangle cut at one height.
 #[derive(Clone, Copy, Debug)]
 pub struct SideCut {
-    /// Height of the cut on each side, held within the side.
+    /// Height of the cut on each side, clamped to the side.
     y: [f64; 4],
     x: [f64; 4],
-    /// Share of the triangle above, from 0 to 1 but for rounding.
+    /// Share of the triangle above, from 0 to 1 up to rounding.
     pub above: f64,
 }
 
@@ -49,7 +50,7 @@ pub struct Pieces {
     per_square: [f64; 4],
 }
 
-/// One of them.
+/// One side between two cuts.
 #[derive(Clone, Copy, Debug)]
 pub struct CutPiece {
     low: f64,
@@ -58,7 +59,7 @@ pub struct CutPiece {
     per_square: f64,
 }
 
-/// Runs below this [texels] count as this: the factor stays finite, and no area is lost that a number could hold.
+/// Smallest run [texels]: keeps the factor finite without losing a representable area.
 const MIN_RUN: f64 = 1e-100;
 
 fn four(f: impl Fn(usize) -> f64) -> [f64; 4] {
@@ -66,7 +67,7 @@ fn four(f: impl Fn(usize) -> f64) -> [f64; 4] {
 }
 
 impl Sides {
-    /// The sides of a triangle whose corners go from top to bottom.
+    /// Expects the corners from top to bottom.
     #[inline(always)]
     pub fn new([a, b, c]: [DVec2; 3]) -> Self {
         let start_x = [a.x, a.x, b.x, 0.0];
@@ -96,7 +97,7 @@ impl Sides {
         }
     }
 
-    /// Cuts at a height, or at the end that is nearest to it.
+    /// Cuts at a height, clamped to the triangle.
     #[inline(always)]
     pub fn cut(&self, y: f64) -> SideCut {
         let y = most(self.top, least(self.bottom, y));
@@ -121,14 +122,13 @@ impl Sides {
             high,
             run,
             height,
-            // Without a run there is no area along it: anything finite will do as a factor.
+            // Without a run there is no area along it, so any finite factor will do.
             per_square: four(|side| 0.5 * height[side] / most(run[side], MIN_RUN)),
         }
     }
 }
 
 impl Pieces {
-    /// One piece.
     #[inline(always)]
     pub fn piece(&self, index: usize) -> CutPiece {
         CutPiece {
@@ -139,7 +139,7 @@ impl Pieces {
         }
     }
 
-    /// Which of the two short sides there is, if but one.
+    /// Index of the short side, if there is only one.
     #[inline(always)]
     pub fn only_short(&self) -> Option<usize> {
         match (self.height[1] != 0.0, self.height[2] != 0.0) {
@@ -149,7 +149,7 @@ impl Pieces {
         }
     }
 
-    /// Smallest and largest x of what has height.
+    /// Smallest and largest x of the sides that have height.
     #[inline(always)]
     pub fn extent(&self) -> (f64, f64) {
         let [mut low, mut high] = [self.low[0], self.high[0]];
@@ -161,7 +161,7 @@ impl Pieces {
         (low, high)
     }
 
-    /// Share of the triangle between the cuts, to the left of `x`; but for rounding.
+    /// Share of the triangle between the cuts and left of `x`, up to rounding.
     #[inline(always)]
     pub fn share_up_to(&self, x: f64) -> f64 {
         let shares = four(|piece| self.piece(piece).share_up_to(x));
@@ -170,7 +170,7 @@ impl Pieces {
 }
 
 impl CutPiece {
-    /// What it adds to the share to the left of `x`.
+    /// Contribution of the piece to the share left of `x`.
     #[inline(always)]
     pub fn share_up_to(&self, x: f64) -> f64 {
         let x = x - self.low;

@@ -16,7 +16,7 @@ use super::{CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
 use crate::illumination::tiles::{SIDE, Tile, TileLayout};
 
-/// Rows of texels of a band.
+/// Texel rows of a band.
 const BAND_ROWS: usize = 16;
 
 /// Bands of the finest tiles; coarser ones have fewer.
@@ -30,15 +30,15 @@ struct Visit {
     triangle: u32,
 }
 
-/// What a triangle that lies on several tiles, or past the map's border, left on a band.
+/// What a triangle that lies on several tiles, or crosses the map's border, deposited in a band.
 struct PartialDeposit {
     triangle: u32,
     added: FluxCount,
-    /// The largest share that one texel took, and the texel.
+    /// Largest share in one texel, and the texel.
     largest: (f64, usize),
 }
 
-/// Adds triangles to the texels of a map in tiles.
+/// Adds triangles to the texels of a tiled map.
 pub fn deposit(triangles: &[FluxTriangle], layout: &TileLayout, texels: &mut [FluxCount]) -> CoverageReport {
     let mut report = CoverageReport::default();
     book_outside(triangles, &mut report);
@@ -107,7 +107,7 @@ fn visits<'a>(
     })
 }
 
-/// Of each band: its tile, its rows among the tile's, and its texels.
+/// Tile, rows within the tile, and texels of each band.
 fn split_texels<'a>(
     mut texels: &'a mut [FluxCount],
     layout: &TileLayout,
@@ -146,7 +146,7 @@ fn add(
     let first_texel = tile.texels.start + rows.start * tile.size.0;
     for visit in visits {
         let triangle = &triangles[visit.triangle as usize];
-        // Both are exact for all that lies on the tile.
+        // Both operations are exact for everything on the tile.
         let corners = triangle.corners.map(|corner| (corner - origin) * scale);
         let shape = Shape::new(&corners, tile.size);
         let reached = shape.rows();
@@ -177,7 +177,7 @@ fn add(
     (added, parts)
 }
 
-/// Whether a triangle lies on one tile alone.
+/// Whether a triangle lies within one tile.
 fn is_on_tile(triangle: &FluxTriangle, tile: &Tile) -> bool {
     let low = DVec2::new(tile.origin.0 as f64, tile.origin.1 as f64);
     let size = DVec2::new(
@@ -188,7 +188,7 @@ fn is_on_tile(triangle: &FluxTriangle, tile: &Tile) -> bool {
     triangle.corners.iter().all(is_on)
 }
 
-/// Whether a triangle lies on the map with all corners.
+/// Whether all corners of a triangle lie on the map.
 fn is_inside(triangle: &FluxTriangle, layout: &TileLayout) -> bool {
     let (width, height) = layout.size();
     let size = DVec2::new(width as f64, height as f64);
@@ -196,7 +196,7 @@ fn is_inside(triangle: &FluxTriangle, layout: &TileLayout) -> bool {
     triangle.corners.iter().all(is_on)
 }
 
-/// Gives what rounding down left of a triangle to its largest share, the first of equals.
+/// Adds what rounding down left of a triangle to its largest share, the first among equals.
 fn place_rest(
     triangle: &FluxTriangle,
     parts: &[PartialDeposit],
@@ -228,9 +228,9 @@ struct Rows<'a> {
     flux: FluxCount,
     divided: PreparedTriangle,
     added: FluxCount,
-    /// Whether all of the triangle lies on this tile.
+    /// Whether the whole triangle lies on this tile.
     is_whole: bool,
-    /// The largest share of one texel, and the texel.
+    /// Largest share in one texel, and the texel.
     largest: (f64, usize),
 }
 
@@ -251,7 +251,7 @@ impl Sink for Rows<'_> {
 }
 
 impl Rows<'_> {
-    /// Of a triangle that lies on other tiles too.
+    /// For a triangle that lies on other tiles too.
     fn add_part(&mut self, begin: usize, span: Span) -> FluxCount {
         let mut added = [0; 3];
         let mut before = span.start;
