@@ -40,7 +40,7 @@ fn no_branch() -> Branch {
     return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0, 0.0);
 }
 
-// Angle between the reflections off microfacets tilted one way and the other by the angle of the GGX α; half of all
+// Angle between the reflections off microfacets that are tilted by atan α (GGX) one way and the other; half of all
 // microfacets are tilted less.
 fn lobe_rad(roughness: f32) -> f32 {
     return 4.0 * atan(roughness * roughness);

@@ -1,5 +1,5 @@
-// The nearest triangle on a ray, in local coordinates: the scene's radius is at most one. Twin of transport/hierarchy.rs,
-// geometry/bvh.rs and geometry/triangle.rs in single precision.
+// The nearest triangle on a ray, in local coordinates: the scene's radius is at most one. Twin, in single precision, of
+// transport/hierarchy.rs, geometry/bvh.rs and geometry/triangle.rs.
 
 struct Node {
     low: vec3f,
@@ -27,7 +27,7 @@ const NO_OBJECT: u32 = 0xffffffffu;
 // Stands for no instance: nodes and triangles are in local coordinates.
 const LOCAL: u32 = 0xffffffffu;
 
-// A placed mesh.
+// A mesh and its placement in the scene.
 struct Instance {
     // From local coordinates to those of its nodes, and from mesh to local coordinates.
     to_nodes: mat4x3f,

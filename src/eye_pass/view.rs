@@ -32,7 +32,7 @@ pub enum ToneMap {
     AgX,
     /// ACES, in the fit of Stephen Hill: more contrast, darker middle tones.
     Aces,
-    /// Exact in dark and middle tones, logarithmic above: what is up to 16 times as bright as white can be told apart.
+    /// Exact in dark and middle tones, logarithmic above: preserves detail up to 16 times white.
     #[default]
     Soft,
 }

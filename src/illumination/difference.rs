@@ -163,7 +163,7 @@ mod tests {
     use crate::illumination::{Layer, UvSet};
     use crate::settings::LayerKind;
 
-    /// A grey map over a surface, all texels alike in area.
+    /// A grey map over a surface, with texels of equal area.
     fn map(object: usize, [width, height]: [usize; 2], area_m2: f64, grey: &[f32]) -> IlluminationMap {
         assert_eq!(grey.len(), width * height);
         IlluminationMap {

@@ -66,7 +66,7 @@ impl IlluminationMap {
         sum
     }
 
-    /// The map without tiles, row by row at its finest size; each texel's values are repeated wherever it covers.
+    /// The map without tiles, row by row at its finest size; each texel's values are repeated over its area.
     pub fn dense(&self) -> Cow<'_, Self> {
         let Some(layout) = &self.chart.layout else {
             return Cow::Borrowed(self);

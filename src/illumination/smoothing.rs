@@ -250,9 +250,9 @@ fn smooth_lines(texels: &mut [FluxCount], length: usize, spread: f64) {
 
 /// Weights of a texel's neighbourhood.
 struct Kernel {
-    /// Texels before the centre that the kernel begins.
+    /// Distance of the first weight before the centre [texels].
     reach: usize,
-    /// From the first texel on; they add up to 1.
+    /// In order; they add up to 1.
     weights: Vec<f64>,
 }
 

@@ -149,7 +149,7 @@ impl TileLayout {
         })
     }
 
-    /// Expands values to the finest size, row by row: each texel's value is repeated wherever it covers.
+    /// Expands values to the finest size, row by row: each texel's value is repeated over its area.
     pub fn dense<T: Copy>(&self, values: &[T]) -> Vec<T> {
         let rows = (0..self.height).flat_map(|row| self.row_texels(row));
         rows.map(|texel| values[texel]).collect()

@@ -3,9 +3,9 @@
 //!
 //! Over blocks of 8×8 texels of all maps, it is √(Σ w (ΔE/n)² / Σ w). E is the luminance of all layers, C that of
 //! caustic and indirect light together, and ΔE the error of C. n is E in lit blocks, √(E·white) in dark ones, and
-//! white/16 in black ones. w is the block's area times min(1, C/n), so that missing light counts in full, however small
-//! its place in the room. The square root is that of Dammertz et al., "A Hierarchical Automatic Stopping Condition for
-//! Monte Carlo Global Illumination" (WSCG 2010), as used for adaptive sampling in path tracers.
+//! white/16 in the darkest. w is the block's area times min(1, C/n), so that missing light counts in full, however
+//! small its place in the room. The square root is that of Dammertz et al., "A Hierarchical Automatic Stopping
+//! Condition for Monte Carlo Global Illumination" (WSCG 2010), as used for adaptive sampling in path tracers.
 
 use super::{Chart, IlluminationMap};
 use crate::optics::luminance;
@@ -23,7 +23,7 @@ const TRIMMED: f64 = 0.1;
 /// Exposure maps the log-average luminance to this fraction of white.
 const MIDDLE_GREY: f64 = 0.18;
 
-/// Fraction of white below which a block counts as black.
+/// Luminance, relative to white, below which errors are relative to a constant: see [`BlockLight::scale`].
 const DARKEST: f64 = 1.0 / 256.0;
 
 /// The block that contains each texel of a map.
@@ -111,8 +111,8 @@ impl BlockLight {
     }
 }
 
-/// Luminance of E that exposure maps to white [W/m²], from the log-average over the area that is neither black nor
-/// among the darkest or brightest tenth. `None` without light.
+/// Luminance of E that exposure maps to white [W/m²], from the log-average over the area without its darkest and
+/// brightest tenth, and without blocks below `NIGHT`. `None` without light.
 pub fn white(blocks: impl Iterator<Item = BlockLight>) -> Option<f64> {
     let mut blocks: Vec<BlockLight> = blocks.filter(|block| block.area_m2 > 0.0).collect();
     let (sum, area_m2) = blocks.iter().fold((0.0, 0.0), |(sum, area_m2), block| {
@@ -213,7 +213,7 @@ mod tests {
         assert_eq!(white(std::iter::empty()), None);
     }
 
-    /// A tenth of the area at either end is left out, and so are black blocks.
+    /// A tenth of the area at either end is left out, and so are blocks in the night.
     #[test]
     fn the_ends_tell_nothing() {
         let mut blocks = vec![even(0.18, 0.0); 8];

@@ -114,7 +114,7 @@ impl Geometry {
         let limit = limits.max_buffer_size.min(bindable).min(PAGE_BYTES) as usize;
         let mut packing = Packing {
             gpu,
-            // There is at most one index per corner of this limit, and indices are smaller.
+            // Indices have the same limit in number; as they are smaller, they fit, too.
             page_corners: (limit / size_of::<Corner>()).max(3),
             pages: Vec::new(),
             corners: Vec::new(),

@@ -1,13 +1,13 @@
 //! The eye pass on the device: rasterised triangles with radiance from the illumination maps, chains traced where a
 //! specular surface is nearest, then tone mapping.
 //!
-//! Diffuse surfaces show L = ρE/π. Where a mirror, polish, glass or water is the nearest surface of a pixel, its chain
-//! is followed through the scene's hierarchy as the CPU eye pass follows it, in single precision. Two things are
-//! approximated: after the first surfaces of a chain only the stronger way on is followed, and images are looked up by
-//! an isotropic footprint. [`EyeQuality`] sets both.
+//! Diffuse surfaces show L = ρE/π. Where the nearest surface of a pixel is a mirror, a coat, glass or water, its chain
+//! is traced through the scene's hierarchy as in the CPU eye pass, but in single precision and with two approximations:
+//! after the first surfaces of a chain only the stronger branch is followed, and images are read with an isotropic
+//! footprint. [`EyeQuality`] controls both.
 //!
-//! Only what a view calls for is made: pipelines when an object that needs them first comes into view, and so what
-//! chains are traced through.
+//! Resources are created when a view first needs them: pipelines when an object that uses them comes into view, and
+//! likewise what chains are traced through.
 
 mod accumulation;
 mod bindings;
