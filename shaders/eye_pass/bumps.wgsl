@@ -32,7 +32,7 @@ fn table_float(at: u32) -> f32 {
 
 // Slope that a texel of the normal map encodes: -x/z and -y/z.
 fn texel_slope(texel: vec2i, layer: i32, scale: f32) -> vec2f {
-    // The sampler decodes sRGB, but normals are linear: recover the stored code.
+    // Texture loads decode sRGB, but normals are linear: recovers the stored code.
     let code = round(255.0 * srgb_from_linear(textureLoad(texture_tiles, texel, layer, 0).rgb));
     let normal = code / 127.5 - 1.0;
     let along = normal.xy * scale;

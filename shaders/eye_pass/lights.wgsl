@@ -10,7 +10,7 @@ struct LightRecord {
     // Axis of a spot or normal of an emissive facet, away from the light.
     axis: vec3f,
     cos_outer: f32,
-    // Absorption coefficient of the medium around the light, which its light does not leave [1/m].
+    // Absorption coefficient of the medium around the light [1/m]; unoccluded light stays in it.
     absorption_per_m: vec3f,
     ior: f32,
 }

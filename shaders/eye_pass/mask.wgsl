@@ -1,6 +1,6 @@
 // Alpha masks: surfaces are cut out where alpha is below the cutoff.
 
-// Whether the surface has one; for chains, whether anything in the scene has.
+// Whether the surface has an alpha mask; for chains, whether any surface of the scene has.
 override HAS_MASK: bool;
 
 // Whether a surface is present at a position. Uses the finest level of the texture, as the light pass does.

@@ -1,4 +1,4 @@
-// Chains of scenes in which all light goes the same ways; stands in for eye_pass/wavelengths.wgsl.
+// Chains of scenes without dispersion; stands in for eye_pass/wavelengths.wgsl.
 
 // Paths that may wait: one for each surface at which both branches are followed.
 const MAX_WAITING: u32 = MAX_BRANCHING;

@@ -10,7 +10,7 @@ fn scaled_cos2_transmitted(cos_incident: f32, eta: f32) -> f32 {
     return (eta - 1.0) * (eta + 1.0) + cos_incident * cos_incident;
 }
 
-// Snell's law; `normal` is unit and on the side of the incoming ray, eta = n_t / n_i. Not for total internal
+// Snell's law; `normal` is unit and on the side of the incoming ray, eta = n_t / n_i. Invalid for total internal
 // reflection.
 fn refracted(incident: vec3f, normal: vec3f, eta: f32) -> vec3f {
     let cos_i = clamp(-dot(incident, normal), 0.0, 1.0);

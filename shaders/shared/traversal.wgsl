@@ -130,7 +130,7 @@ struct Slabs {
 }
 
 fn slabs(origin: vec3f, direction: vec3f, margin: f32) -> Slabs {
-    // Avoids division by zero. The sign does not matter.
+    // Avoids division by zero; the sign does not matter, as both planes of the slab are then far away.
     let safe = select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
     return Slabs(origin + margin, origin - margin, 1.0 / safe);
 }
