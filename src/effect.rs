@@ -24,21 +24,21 @@ use strum::{EnumMessage, IntoStaticStr, VariantArray};
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Effect {
-    /// Light pass of the caustic layer at all.
+    /// The caustic layer as a whole.
     LightPass,
-    /// Light that goes through a surface: solid bodies and panes.
+    /// Light transmitted by solid bodies and panes.
     Refraction,
-    /// Refraction by wavelength: spectra.
+    /// Refraction that depends on wavelength: spectra.
     Dispersion,
-    /// Light that a surface sends back.
+    /// Light reflected by surfaces.
     Reflection,
-    /// Beer and Lambert's absorption within bodies.
+    /// Absorption within bodies (Beer and Lambert).
     Absorption,
-    /// Base-colour textures of surfaces that light goes on from.
+    /// Base colour textures of specular surfaces.
     Textures,
-    /// Lobes of rough surfaces that light goes on from.
+    /// Lobes of rough specular surfaces.
     Roughness,
-    /// Waves and other bumps in the normals of surfaces that light goes on from.
+    /// Waves and other bumps in the normals of specular surfaces.
     Bumps,
     /// Size of lamps, suns and the environment.
     AreaLights,
@@ -46,22 +46,22 @@ pub enum Effect {
     Direct,
     /// The indirect layer.
     Indirect,
-    /// Waves that run, and what keyframes move.
+    /// Running waves and keyframe animation.
     Motion,
-    /// What the eye sees in mirrors and through glass.
+    /// Reflections and refractions in the eye pass.
     Chains,
 }
 
 impl Effect {
-    /// All of them, as they are listed.
+    /// All effects, in display order.
     pub const ALL: [Self; 13] = *Self::VARIANTS.as_array().expect("thirteen effects");
 
-    /// Its name on the command line and in files.
+    /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// What it is, in one sentence for people.
+    /// Description for users, in one sentence.
     pub fn description(self) -> &'static str {
         match self {
             Self::LightPass => {
@@ -107,16 +107,16 @@ impl Effect {
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum EffectSwitch {
-    /// On where the scene calls for it.
+    /// On if the scene needs it.
     #[default]
     Auto,
-    /// Always: what the scene does not call for is looked for all the same.
+    /// Always on, even if the scene does not need it.
     On,
-    /// Never: light that would need it is booked as switched off.
+    /// Always off: light that needs it is booked as switched off.
     Off,
 }
 
-/// The switches of all effects; those that are not named are at [`EffectSwitch::Auto`].
+/// The switches of all effects; those not listed are at [`EffectSwitch::Auto`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct EffectSwitches(BTreeMap<Effect, EffectSwitch>);
@@ -135,13 +135,13 @@ impl EffectSwitches {
     /// Sets the switch of an effect.
     pub fn set(&mut self, effect: Effect, switch: EffectSwitch) {
         match switch {
-            // One form for the same switches.
+            // Equal switches have a single representation.
             EffectSwitch::Auto => self.0.remove(&effect),
             EffectSwitch::On | EffectSwitch::Off => self.0.insert(effect, switch),
         };
     }
 
-    /// The same with one effect switched.
+    /// A copy with one effect switched.
     #[must_use]
     pub fn with(mut self, effect: Effect, switch: EffectSwitch) -> Self {
         self.set(effect, switch);

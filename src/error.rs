@@ -2,24 +2,24 @@
 
 use serde::Serialize;
 
-/// Whether the command was wrong (exit code 2) or the work failed (exit code 1).
+/// Kind of a failure, which determines the exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ErrorKind {
-    /// The command line or a setting was wrong: exit code 2.
+    /// The command line or a setting is wrong: exit code 2.
     Usage,
-    /// The input or the system failed us: exit code 1.
+    /// The input or the system is at fault: exit code 1.
     Failure,
     /// The user or the system asked to stop: exit code 130 or 143.
     Cancelled,
 }
 
-/// One failure, reported once, as one sentence: `location: what; remedy`.
+/// A failure, reported once, in one sentence: `location: what; remedy`.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{location}: {what}; {remedy}")]
 pub struct Error {
-    /// Decides the exit code.
+    /// Determines the exit code.
     pub kind: ErrorKind,
-    /// A file, a node, an option: where it happened.
+    /// Where it happened: a file, a node, an option.
     pub location: String,
     /// What is wrong, in the user's terms.
     pub what: String,
@@ -27,12 +27,12 @@ pub struct Error {
     pub remedy: String,
 }
 
-/// Most characters of a part of a sentence, and those of its end that are kept where there are more: what files and
-/// users call things may have any length.
+/// Maximum number of characters of each part of the sentence, and how many of them are kept from its end if there are
+/// more. Names in files and from users may have any length.
 const MAX_CHARACTERS: usize = 600;
 const KEPT_END: usize = 150;
 
-/// The text without its middle, where it is too long for a sentence.
+/// Elides the middle of a text that is too long for a sentence.
 fn shortened(text: String) -> String {
     let count = text.chars().count();
     if count <= MAX_CHARACTERS {
@@ -43,11 +43,11 @@ fn shortened(text: String) -> String {
     format!("{start} … {end}")
 }
 
-/// Shorthand for a result with our [`Error`].
+/// A result with this crate's [`Error`].
 pub type Result<T> = std::result::Result<T, Error>;
 
 impl Error {
-    /// The input or the system failed us (exit code 1).
+    /// A fault of the input or the system (exit code 1).
     pub fn failure(location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             kind: ErrorKind::Failure,
@@ -57,7 +57,7 @@ impl Error {
         }
     }
 
-    /// The command line or a setting was wrong (exit code 2).
+    /// A mistake in the command line or a setting (exit code 2).
     pub fn usage(location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             kind: ErrorKind::Usage,
@@ -67,7 +67,7 @@ impl Error {
         }
     }
 
-    /// The work was cancelled before it gave a result.
+    /// The work was cancelled before it produced a result.
     pub fn cancelled(location: impl Into<String>) -> Self {
         Self {
             kind: ErrorKind::Cancelled,
@@ -78,19 +78,19 @@ impl Error {
     }
 }
 
-/// Something repaired or ignored, that the user should know of: never an error, never silent.
+/// Something that was repaired or ignored and that the user should know about: never an error, never silent.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize)]
 pub struct Warning {
-    /// A file, a node, an option: where it was met.
+    /// Where it was found: a file, a node, an option.
     pub location: String,
-    /// What was met and what was done about it.
+    /// What was found and what was done about it.
     pub what: String,
     /// What the user can do about it.
     pub remedy: String,
 }
 
 impl Warning {
-    /// A warning of what was met, where, and what to do.
+    /// A warning of what was found, where, and what to do.
     pub fn new(location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self {
             location: shortened(location.into()),

@@ -22,7 +22,7 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// A word for people.
+    /// Name for display.
     pub fn name(self) -> &'static str {
         match self {
             Self::Build => "build",
@@ -35,26 +35,26 @@ impl Stage {
     }
 }
 
-/// Listens to a bake. Called from its threads; must return quickly.
+/// Receives the progress of a bake. Called from its threads; must return quickly.
 pub trait Progress: Sync {
-    /// `done` of `total` of a stage; totals of different stages are not comparable.
+    /// `done` of `total` of a stage are done. Totals of different stages are not comparable.
     fn advance(&self, _stage: Stage, _done: u64, _total: u64) {}
 
-    /// What the target is expected to take by now, in one line; comes with every level.
+    /// Current forecast of the cost of the target, in one line; sent with every level.
     fn expect(&self, _line: &str) {}
 }
 
-/// Hears nothing.
+/// Ignores all progress.
 impl Progress for () {}
 
-/// Hears of stages alone.
+/// Receives stages only.
 impl<F: Fn(Stage, u64, u64) + Sync> Progress for F {
     fn advance(&self, stage: Stage, done: u64, total: u64) {
         self(stage, done, total);
     }
 }
 
-/// A request to stop, or to wait: any thread may set it, or a time may be set for it.
+/// A request to stop or to wait. Any thread may make it, or a deadline may be set.
 #[derive(Debug, Default)]
 pub struct Control {
     request: Arc<Request>,
@@ -65,9 +65,9 @@ pub struct Control {
 struct Request {
     cancelled: AtomicBool,
     made: Instant,
-    /// Until when the bake waits [ms since it was made].
+    /// The bake waits until then [ms since `made`].
     held_until_ms: AtomicU64,
-    /// Until when nobody looks at its levels [ms since it was made].
+    /// Nobody watches its levels until then [ms since `made`].
     unseen_until_ms: AtomicU64,
 }
 
@@ -94,11 +94,11 @@ impl Request {
     }
 }
 
-/// A bake that waits looks so often whether it may go on.
+/// Polling interval of a bake that waits.
 const LOOK_AGAIN: Duration = Duration::from_millis(5);
 
 impl Control {
-    /// The same request, that also comes by itself at a given time.
+    /// The same request, which also takes effect at a deadline.
     #[must_use]
     pub fn with_deadline(&self, deadline: Instant) -> Self {
         Self {
@@ -107,7 +107,7 @@ impl Control {
         }
     }
 
-    /// The same request, whatever the time.
+    /// The same request without a deadline.
     #[must_use]
     pub fn without_deadline(&self) -> Self {
         Self {
@@ -116,33 +116,33 @@ impl Control {
         }
     }
 
-    /// Until the time that was set for it [s]; `None` without one.
+    /// Time until the deadline [s]; `None` without one.
     pub fn time_left_s(&self) -> Option<f64> {
         let deadline = self.deadline?;
         Some(deadline.saturating_duration_since(Instant::now()).as_secs_f64())
     }
 
-    /// Asks the bake to stop soon; what it has is still returned, marked partial.
+    /// Asks the bake to stop soon; what it has is still returned, marked as partial.
     pub fn cancel(&self) {
         self.request.cancelled.store(true, Ordering::Relaxed);
     }
 
-    /// Asks the bake to wait for so long from now on: something else needs the processor.
+    /// Asks the bake to wait for this long, as something else needs the CPU.
     pub fn hold(&self, time: Duration) {
         self.request.set_until(&self.request.held_until_ms, time);
     }
 
-    /// Tells the bake that nobody looks at its levels for so long from now on.
+    /// Tells the bake that nobody watches its levels for this long.
     pub fn look_away(&self, time: Duration) {
         self.request.set_until(&self.request.unseen_until_ms, time);
     }
 
-    /// Whether somebody looks at the levels of the bake.
+    /// Whether somebody watches the levels of the bake.
     pub fn is_watched(&self) -> bool {
         !self.request.is_before(&self.request.unseen_until_ms)
     }
 
-    /// Whether it was asked to stop. Returns only when it need not wait any more.
+    /// Whether it was asked to stop, or the deadline has passed. Blocks as long as the bake is to wait.
     pub fn is_cancelled(&self) -> bool {
         let is_cancelled = || self.request.cancelled.load(Ordering::Relaxed);
         while self.request.is_before(&self.request.held_until_ms) && !is_cancelled() {

@@ -8,8 +8,8 @@ use strum::{EnumMessage, IntoStaticStr, VariantArray};
 use crate::effect::EffectSwitches;
 use crate::error::{Error, Result};
 
-/// Enumerations whose values have the names of its variants in files and on the command line, and their documentation
-/// as texts.
+/// Enumerations whose variants name their values in files and on the command line. Users read the documentation of the
+/// variants.
 macro_rules! choices {
     ($($(#[$meta:meta])* pub enum $name:ident { $($variants:tt)* })*) => {
         $(
@@ -24,7 +24,7 @@ macro_rules! choices {
 }
 
 choices! {
-    /// Which light a layer holds. The order is that of the files' channels.
+    /// Kind of light in a layer. The order is that of the channels in files.
     #[derive(PartialOrd, Ord, Hash)]
     pub enum LayerKind {
         /// LS+D: light that met at least one specular surface.
@@ -37,10 +37,10 @@ choices! {
 }
 
 impl LayerKind {
-    /// All of them, in their order.
+    /// All kinds, in order.
     pub const ALL: [Self; 3] = [Self::Caustic, Self::Direct, Self::Indirect];
 
-    /// Its name in files and on the command line.
+    /// Name in files and on the command line.
     pub fn name(self) -> &'static str {
         self.into()
     }
@@ -60,7 +60,7 @@ choices! {
         Splat,
     }
 
-    /// What a target for the error means.
+    /// How the error is measured.
     #[derive(Default)]
     pub enum ErrorMetric {
         /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
@@ -70,8 +70,8 @@ choices! {
         Rmse,
     }
 
-    /// Shape of a splat. All have the same area at the same footprint: disc r = 1, box side √π, cone base √3 (footprint
-    /// radii), gaussian exp(−r²/2σ).
+    /// Shape of a splat. All shapes have the same area for the same footprint: disc r = 1, box side √π, cone base √3
+    /// (footprint radii), Gaussian exp(−r²/2σ).
     pub enum Kernel {
         /// exp(−r²/2σ), cut at 4√σ (eq. 4.4).
         Gaussian,
@@ -83,7 +83,7 @@ choices! {
         Box,
     }
 
-    /// How a kernel is taken into texels.
+    /// How texels sample a kernel.
     pub enum KernelSampling {
         /// Its integral over each texel.
         Integrated,
@@ -91,7 +91,7 @@ choices! {
         Point,
     }
 
-    /// What sets the size and shape of a splat.
+    /// What determines the size and shape of a splat.
     pub enum Footprint {
         /// The ellipse that the neighbouring rays span.
         Ellipse,
@@ -120,14 +120,14 @@ choices! {
     }
 }
 
-/// Spread of the gaussian in squared footprint radii (eq. 4.4). The wavefront estimator deposits exactly and smooths
-/// afterwards, each texel as a footprint of its own area; 0 leaves that out.
+/// Width σ of the Gaussian exp(−r²/2σ), in squared footprint radii (eq. 4.4). The wavefront estimator deposits exactly
+/// and smooths afterwards, with each texel's own area as the footprint; 0 disables this.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sigma {
     /// The same for every splat, > 0.
     Constant(f64),
-    /// Scaled by how the footprint compares with the map's mean footprint.
+    /// Scaled by the size of the footprint relative to the map's mean footprint.
     Adaptive,
 }
 
@@ -137,7 +137,7 @@ pub enum Sigma {
 pub enum MapResolution {
     /// Starts coarse and doubles while footprints are finer than texels.
     Auto,
-    /// Texels across and down, of every map.
+    /// The same for every map.
     Fixed {
         /// Texels across, 1 to 16384.
         width: usize,
@@ -146,22 +146,22 @@ pub enum MapResolution {
     },
 }
 
-/// Which wavelengths are traced of light that meets dispersive glass.
+/// Wavelengths that are traced when light meets dispersive glass.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Wavelengths {
-    /// The whole spectrum without bands: the wavefront is interpolated between wavelengths; splats have
-    /// [`CONTINUOUS_BANDS`] of them.
+    /// The whole spectrum without bands. The wavefront is interpolated between wavelengths; splats use
+    /// [`CONTINUOUS_BANDS`] bands.
     #[default]
     Continuous,
     /// Seven, one for each colour of the rainbow (section 4.1 of the paper).
     Rainbow,
-    /// So many, 1 to [`MAX_WAVELENGTHS`], each for a band of equal importance to the eye.
+    /// This many, 1 to [`MAX_WAVELENGTHS`], each for a band of equal importance to the eye.
     Fixed(u32),
 }
 
 choices! {
-    /// How rays and wavelengths go together (section 4.1 of the paper).
+    /// How rays and wavelengths combine (section 4.1 of the paper).
     pub enum SpectralSampling {
         /// Every ray is traced at every wavelength.
         Split,
@@ -169,7 +169,7 @@ choices! {
         Stochastic,
     }
 
-    /// How carefully to bake, by name.
+    /// Named targets for the error.
     #[derive(Default)]
     pub enum Preset {
         /// An error of 10 % (splat: 12,500 rays per steradian).
@@ -183,15 +183,15 @@ choices! {
 }
 
 impl Preset {
-    /// From the coarsest on.
+    /// All presets, from the coarsest on.
     pub const ALL: [Self; 3] = [Self::Draft, Self::Preview, Self::Final];
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// Error that it aims at [1].
+    /// Target error [1].
     pub fn max_error(self) -> f64 {
         match self {
             Self::Draft => 0.10,
@@ -200,7 +200,7 @@ impl Preset {
         }
     }
 
-    /// Density of splats that stands for it [rays/sr].
+    /// Equivalent density of splats [rays/sr].
     pub fn splat_density_per_sr(self) -> f64 {
         let times = match self {
             Self::Draft => 0.125,
@@ -211,93 +211,94 @@ impl Preset {
     }
 }
 
-/// All bake options. [`validate`](Self::validate) states the ranges.
+/// All bake options. [`validate`](Self::validate) checks their ranges.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BakeSettings {
     /// How rays become irradiance.
     pub estimator: Estimator,
-    /// Light rays per steradian [1/sr]; for suns density/D² rays per m². Sigma's radius follows it, refined or not.
+    /// Light rays per steradian [1/sr]; for suns density/D² rays per m², with D the distance from the casters' centre
+    /// to their farthest receiver. The footprint radius that sigma refers to is that of this density, refined or not.
     pub density_per_sr: f64,
-    /// Target for the estimated error of maps, [`MIN_MAX_ERROR`] to 1: light goes on from `density_per_sr` until it is
-    /// met (not splat). `None`: exactly that density.
+    /// Target for the estimated error of maps, [`MIN_MAX_ERROR`] to 1: the bake refines from `density_per_sr` on until
+    /// it is met (not splat). `None`: exactly that density.
     pub max_error: Option<f64>,
-    /// What that error is.
+    /// How that error is measured.
     #[serde(default)]
     pub error_metric: ErrorMetric,
-    /// Ends the bake after so many seconds of wall-clock time, > 0, with the finest maps that were complete.
+    /// Time limit [s of wall-clock time], > 0. The bake then ends with the finest maps that are complete.
     pub max_time_s: Option<f64>,
-    /// Lattice or jittered.
+    /// Placement of light rays in their lattice cells.
     pub rays: RayPlacement,
-    /// Spread of the gaussian.
+    /// Width of the Gaussian.
     pub sigma: Sigma,
     /// Shape of a splat.
     pub kernel: Kernel,
-    /// Integrated over texels, or the paper's point samples.
+    /// How texels sample a kernel.
     pub kernel_sampling: KernelSampling,
-    /// What sets a splat's size.
+    /// What determines a splat's size and shape.
     pub footprint: Footprint,
-    /// Whether the noise of photons is filtered where that lowers the error (auto and photon). `None`: with a target; who
-    /// asks for a density wants to see its grain.
+    /// Whether photon noise is filtered where that lowers the error (auto and photon). `None`: if there is a target,
+    /// since a fixed density is chosen to see its noise.
     #[serde(default)]
     pub filter: Option<bool>,
     /// How the item buffer divides directions.
     pub item_buffer: ItemBufferKind,
     /// Size of the maps.
     pub map_resolution: MapResolution,
-    /// Largest number of specular surfaces on a path, ≥ 1. `None`: as suits what carries the light, see [`Self::depth`] and
-    /// [`Self::photon_depth`].
+    /// Maximum number of specular surfaces on a path, ≥ 1. `None`: depends on what carries the light, see
+    /// [`Self::depth`] and [`Self::photon_depth`].
     pub max_depth: Option<u32>,
-    /// Branches that carry less than this share of their light ray's flux are not followed; booked as truncated. `None`:
-    /// as the target allows, see [`Self::path_threshold`].
+    /// Branches that carry less than this share of their light ray's flux are not followed, but booked as truncated.
+    /// `None`: depends on the target, see [`Self::path_threshold`].
     pub branch_threshold: Option<f64>,
     /// Layers to bake.
     pub layers: Vec<LayerKind>,
-    /// Whether files hold each light's part of each layer beside their sum.
+    /// Whether files also hold each light's share of each layer.
     pub per_light: bool,
-    /// Which wavelengths are traced where glass is dispersive.
+    /// Wavelengths that are traced at dispersive glass.
     pub wavelengths: Wavelengths,
-    /// How rays and wavelengths go together; `None`: each ray is split, but by splats over the whole spectrum.
+    /// How rays and wavelengths combine. `None`: every ray is split, except by splats over the whole spectrum.
     pub spectral_sampling: Option<SpectralSampling>,
-    /// Whether files hold the light of each wavelength beside the colour it makes; for a number of wavelengths.
+    /// Whether files also hold the light of each wavelength; needs a number of wavelengths.
     pub keep_spectrum: bool,
     /// Effects that are forced on or off.
     pub effects: EffectSwitches,
-    /// Of everything random.
+    /// Seed of all random numbers.
     pub seed: u64,
     /// Worker threads; 0 = one per core.
     pub threads: usize,
-    /// Largest memory for maps [bytes].
+    /// Memory limit for maps [bytes].
     pub memory_bytes: u64,
 }
 
-/// Least density that refinement begins from [rays/sr].
+/// Minimum density that refinement starts from [rays/sr].
 const COARSEST_START_PER_SR: f64 = 1_600.0;
 
-/// Least share of a light ray's flux that is followed without a target [1].
+/// Branch threshold without a target: share of a light ray's flux [1].
 const USUAL_THRESHOLD: f64 = 1e-4;
 
-/// Surfaces on a path without a limit of its own: of all branches, and of one.
+/// Default limits of the specular surfaces on a path: if every branch is followed, and if only one is.
 const USUAL_DEPTH: u32 = 16;
 const USUAL_PHOTON_DEPTH: u32 = 256;
 
-/// Least share that is followed, over the error that is aimed at. More would save segments and cost more rays
-/// than that: where branches end for their weakness alone, borders appear that the wavefront looks for.
+/// Branch threshold relative to the target error. A larger one would save segments, but cost more rays than that: where
+/// branches end only because they are weak, borders appear that the wavefront refines.
 const THRESHOLD_PER_ERROR: f64 = 0.003;
 
-/// Least target for the error [1].
+/// Minimum target for the error [1].
 pub const MIN_MAX_ERROR: f64 = 1e-4;
 
-/// Most wavelengths of a bake.
+/// Maximum number of wavelengths of a bake.
 pub const MAX_WAVELENGTHS: u32 = 1000;
 
-/// Wavelengths that splats take for the whole spectrum.
+/// Bands that splats divide the whole spectrum into.
 pub const CONTINUOUS_BANDS: u32 = 64;
 
-/// Largest map side [texels].
+/// Maximum map side [texels].
 pub const MAX_MAP_SIDE: usize = 16384;
 
 impl Default for BakeSettings {
-    /// Both carriers at their preview density, without smoothing.
+    /// Preview density, without a target and without smoothing.
     fn default() -> Self {
         Self {
             estimator: Estimator::Auto,
@@ -329,7 +330,7 @@ impl Default for BakeSettings {
 }
 
 impl Estimator {
-    /// Light rays per steradian of a preview [1/sr]: patches need fewer than splats.
+    /// Light rays per steradian of a preview [1/sr]; patches need fewer than splats.
     pub fn preview_density_per_sr(self) -> f64 {
         match self {
             Self::Auto | Self::Wavefront => 25_000.0,
@@ -338,7 +339,7 @@ impl Estimator {
         }
     }
 
-    /// Whether it goes on until a target is reached.
+    /// Whether it refines until a target is reached.
     pub fn refines(self) -> bool {
         self != Self::Splat
     }
@@ -353,7 +354,7 @@ impl Estimator {
 }
 
 impl ErrorMetric {
-    /// The one of two errors that is meant.
+    /// Selects the error that is meant from the two.
     pub fn of<T>(self, visible: T, rmse: T) -> T {
         match self {
             Self::Visible => visible,
@@ -363,7 +364,7 @@ impl ErrorMetric {
 }
 
 impl BakeSettings {
-    /// An estimator with its defaults.
+    /// Defaults of an estimator.
     pub fn of(estimator: Estimator) -> Self {
         Self {
             estimator,
@@ -373,23 +374,23 @@ impl BakeSettings {
         }
     }
 
-    /// The paper's estimator with its defaults.
+    /// Defaults of the paper's estimator.
     pub fn splat() -> Self {
         Self::of(Estimator::Splat)
     }
 
-    /// Density that refinement towards an error begins from [rays/sr]: coarse enough that refinement decides, fine
-    /// enough that no caster falls through.
+    /// Density that refinement towards an error starts from [rays/sr]: coarse enough to leave the decisions to
+    /// refinement, fine enough to miss no caster.
     pub fn starting_density_per_sr(target: f64) -> f64 {
         if target <= MIN_MAX_ERROR {
-            // Not a target but as much as time allows.
+            // This target stands for as much as time allows.
             return COARSEST_START_PER_SR;
         }
         (40.0 / target).clamp(COARSEST_START_PER_SR, 40_000.0)
     }
 
-    /// Least share of a light ray's flux (luminance) that a branch must carry to be followed: as it is set, else so small
-    /// that what is left out is far below the target.
+    /// Minimum share of a light ray's flux (luminance) that a branch must carry to be followed: as set, or so small
+    /// that the loss is far below the target.
     pub fn path_threshold(&self) -> f64 {
         self.branch_threshold.unwrap_or_else(|| match self.max_error {
             Some(target) if target > MIN_MAX_ERROR => (target * THRESHOLD_PER_ERROR).clamp(1e-6, 1e-3),
@@ -398,22 +399,22 @@ impl BakeSettings {
         })
     }
 
-    /// Largest number of specular surfaces on a path, where every branch is followed.
+    /// Maximum number of specular surfaces on a path if every branch is followed.
     pub fn depth(&self) -> u32 {
         self.max_depth.unwrap_or(USUAL_DEPTH)
     }
 
-    /// The same where one branch is: light that is caught in a body for long is followed until it comes out.
+    /// The same if only one branch is followed: light trapped in a body is then followed until it leaves.
     pub fn photon_depth(&self) -> u32 {
         self.max_depth.unwrap_or(USUAL_PHOTON_DEPTH)
     }
 
-    /// Whether photons are filtered.
+    /// Whether photon noise is filtered.
     pub fn filters(&self) -> bool {
         self.filter.unwrap_or(self.max_error.is_some())
     }
 
-    /// How rays and wavelengths go together: as it is set, or as suits the estimator.
+    /// How rays and wavelengths combine: as set, or as suits the estimator.
     pub fn ray_sampling(&self) -> SpectralSampling {
         self.spectral_sampling
             .unwrap_or(match (self.estimator, self.wavelengths) {
@@ -422,7 +423,7 @@ impl BakeSettings {
             })
     }
 
-    /// Memory that maps may take but for those of bands [bytes].
+    /// Memory limit for maps, without those of bands [bytes].
     pub fn map_memory_bytes(&self) -> u64 {
         if !self.keep_spectrum {
             return self.memory_bytes;
@@ -432,12 +433,12 @@ impl BakeSettings {
             Wavelengths::Rainbow => 7,
             Wavelengths::Fixed(count) => u64::from(count),
         };
-        // A texel takes 24 of 56 bytes while it is summed.
+        // A band takes 24 bytes per texel, a map 56 (`BYTES_PER_TEXEL`).
         self.memory_bytes / (1 + bands.div_ceil(2))
     }
 
-    /// How fine what no estimate rules is to be: 0 for the target of a draft, 1 beyond it and without a target, 2 for that of
-    /// a final bake.
+    /// Level of detail of what no error estimate controls: 0 for the target of a draft, 2 for that of a final bake, 1
+    /// between them and without a target.
     pub fn detail(&self) -> u32 {
         match self.max_error {
             Some(target) if target >= 0.1 => 0,
@@ -446,12 +447,12 @@ impl BakeSettings {
         }
     }
 
-    /// Memory that traced light may take until the next bake [bytes]: a quarter of all.
+    /// Memory limit for traced light that is kept for the next bake [bytes]: a quarter of the total.
     pub fn kept_light_bytes(&self) -> u64 {
         self.memory_bytes / 4
     }
 
-    /// Refuses settings outside their ranges.
+    /// Checks that all settings are within their ranges.
     ///
     /// # Errors
     /// A usage error that names the option, its value and its range.

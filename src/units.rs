@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Luminous efficacy at 540 THz [lm/W]: glTF's candela, lux and cd/m² are divided by it.
+/// Luminous efficacy at 540 THz [lm/W], by which glTF's candela, lux and cd/m² are divided.
 pub const LUMENS_PER_WATT: f64 = 683.0;
 
 macro_rules! quantity {
@@ -59,7 +59,7 @@ macro_rules! product {
 }
 
 quantity!(
-    /// Flux Φ [W]: what a light ray carries.
+    /// Flux Φ [W] of a light ray.
     Flux
 );
 quantity!(
@@ -67,11 +67,11 @@ quantity!(
     RadiantIntensity
 );
 quantity!(
-    /// Irradiance E [W/m²]: what a texel receives; measured across the beam for a sun.
+    /// Irradiance E [W/m²] of a texel; for suns, measured across the beam.
     Irradiance
 );
 quantity!(
-    /// Radiance L [W/(m² sr)]: what the eye sees.
+    /// Radiance L [W/(m² sr)] that reaches the eye.
     Radiance
 );
 quantity!(
@@ -87,7 +87,7 @@ product!(RadiantIntensity * SolidAngle = Flux);
 product!(Irradiance * Area = Flux);
 
 impl Irradiance {
-    /// Radiance that a diffuse surface of the given albedo [0, 1] sends to the eye: L = ρE/π.
+    /// Radiance of a diffuse surface with the given albedo [0, 1]: L = ρE/π.
     pub fn diffuse_radiance(self, albedo: f64) -> Radiance {
         Radiance(albedo * self.0 / std::f64::consts::PI)
     }

@@ -1,7 +1,7 @@
-// The mean of several pictures of the same view, each looked at through other places of its pixels.
+// Running mean of frames of the same view, each with its own subpixel offset.
 
 struct Accumulation {
-    // Share of the new picture in the mean.
+    // Weight of the new frame.
     share: f32,
     padding0: f32,
     padding1: f32,

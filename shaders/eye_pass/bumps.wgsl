@@ -1,28 +1,28 @@
-// Normals bent by waves and by an image of normals; twin of transport/bend.rs, transport/normal_texture.rs and
-// scene/waves.rs. A record in the table of images is
-//   look of the image of normals, scale of its normals, number of waves,
+// Normals perturbed by waves and by a normal map; twin of transport/bend.rs, transport/normal_texture.rs and
+// scene/waves.rs. A record in the image table consists of
+//   texture reference of the normal map, scale of its normals, number of waves,
 // and for each wave
 //   wave vector x, y, z [rad/m], phase [rad], amplitude [m].
 
-// Whether any surface that is drawn has bumps.
+// Whether any surface to be drawn has bumps.
 override HAS_BUMPS: bool;
 
 const BUMP_WORDS: u32 = 3u;
 const WAVE_WORDS: u32 = 5u;
 const STEEPEST_TEXEL: f32 = 8.0;
 
-// A piece of a surface: two steps along it, of any unit, with the changes of texture coordinates along them.
+// A patch of a surface: two vectors along it, in any unit, and the changes of texture coordinates along them.
 struct Piece {
     steps: array<vec3f, 2>,
     changes: array<vec4f, 2>,
     uvs: vec4f,
 }
 
-// What a height over a surface does at a place.
+// Derivatives of a height field at a point of a surface.
 struct Bump {
-    // Its gradient [1].
+    // Gradient [1].
     gradient: vec3f,
-    // Sum of its second derivatives along the surface [1/m]; of waves alone.
+    // Laplacian along the surface [1/m]; waves only.
     laplacian: f32,
 }
 
@@ -30,9 +30,9 @@ fn table_float(at: u32) -> f32 {
     return bitcast<f32>(image_table[at]);
 }
 
-// Slope that a texel of normals stands for: -x/z and -y/z.
+// Slope that a texel of the normal map encodes: -x/z and -y/z.
 fn texel_slope(texel: vec2i, layer: i32, scale: f32) -> vec2f {
-    // Tiles are decoded as colours are; the code itself is what counts.
+    // Texture loads decode sRGB, but normals are linear: recovers the stored code.
     let code = round(255.0 * srgb_from_linear(textureLoad(texture_tiles, texel, layer, 0).rgb));
     let normal = code / 127.5 - 1.0;
     let along = normal.xy * scale;
@@ -40,7 +40,7 @@ fn texel_slope(texel: vec2i, layer: i32, scale: f32) -> vec2f {
     return select(vec2f(0.0), -along / up, up > 0.0);
 }
 
-// Gradient of the height that an image of normals stands for, on a piece of a surface with a unit normal.
+// Gradient of the height that a normal map encodes, on a patch with a unit normal.
 fn image_gradient(look: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f {
     let first = placed(look, piece.changes[0], true);
     let second = placed(look, piece.changes[1], true);
@@ -70,7 +70,7 @@ fn image_gradient(look: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f {
     return x * slope.x + y * slope.y;
 }
 
-// Of all bumps at a place in scene coordinates [m], on a piece of a surface with a unit normal.
+// Sum of all bumps at a position in scene coordinates [m], on a patch with a unit normal.
 fn bump_at(record: u32, place_m: vec3f, piece: Piece, normal: vec3f) -> Bump {
     var bump = Bump(vec3f(0.0), 0.0);
     let look = image_table[record];

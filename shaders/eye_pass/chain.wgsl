@@ -1,14 +1,14 @@
-// Radiance along a gaze that goes on over mirrors and through glass until it ends on something diffuse; twin of
-// eye_pass/reference/radiance.rs. All lengths are local but where they say so.
+// Radiance along a path that continues over mirrors and through glass until it ends on a diffuse surface; twin of
+// eye_pass/reference/radiance.rs. All lengths are local unless noted.
 
-// Whether a mirror, a pane or a body has a base colour texture.
+// Whether any mirror or clear surface has a base colour texture.
 override HAS_TINTED_GLASS: bool;
-// Whether light straight from the lamps is traced, and not in the maps.
+// Whether direct light is traced, and not in the maps.
 override TRACES_LIGHTS: bool;
 
-// Surfaces at which both ways on can be followed.
+// Maximum number of surfaces at which both branches are followed.
 const MAX_BRANCHING: u32 = 4u;
-// Holes and backs of single-sided surfaces that a gaze passes before it is taken to have left the scene.
+// Maximum number of holes and backs of single-sided surfaces that a ray passes; beyond, it counts as leaving the scene.
 const MAX_BACKS: u32 = 64u;
 
 struct Gaze {
@@ -16,19 +16,19 @@ struct Gaze {
     // Specular surfaces met so far.
     depth: u32,
     direction: vec3f,
-    // Footprint: its width here, and how much it widens per length. Isotropic, to first order in the angles: it chooses
-    // the level of images and nothing else.
+    // Footprint: its width here, and its growth per length. Isotropic, to first order in the angles; it only selects
+    // the mip level of images.
     width: f32,
     weight: vec3f,
     spread: f32,
     media: vec4u,
-    // The one that it is followed at; 0 where it stands for all.
+    // Number of the wavelength that is traced; 0 for all of them.
     wavelength: u32,
 }
 
 struct Seen {
     hit: Hit,
-    // From the gaze's origin.
+    // From the ray's origin.
     distance: f32,
 }
 
@@ -36,12 +36,12 @@ fn is_clear(surface: u32) -> bool {
     return surface == SURFACE_DIELECTRIC || surface == SURFACE_THIN_WALL;
 }
 
-// Whether a gaze goes through a hole of a surface.
+// Whether a hit lies in a hole of an alpha-masked surface.
 fn is_hole(hit: Hit, object: ObjectRecord) -> bool {
     return HAS_MASK && object.alpha_cutoff > 0.0 && !is_there(object, surface_point(hit).uvs);
 }
 
-// The nearest surface that is drawn: backs of single-sided opaque ones and holes are not.
+// The nearest visible surface: skips holes and backs of single-sided opaque surfaces.
 fn nearest(gaze: Gaze) -> Seen {
     var origin = gaze.origin;
     var passed = 0.0;
@@ -63,7 +63,7 @@ fn nearest(gaze: Gaze) -> Seen {
     return Seen(Hit(NO_TRIANGLE, 0.0, vec3f(0.0), 0u), 0.0);
 }
 
-// The level of an image at which a texel is as large as the footprint, seen at an angle.
+// Level at which a texel is as large as the footprint at an oblique angle.
 fn footprint_level(record: u32, density: f32, width: f32, cos_view: f32) -> f32 {
     if record == NO_IMAGE {
         return 0.0;
@@ -73,7 +73,7 @@ fn footprint_level(record: u32, density: f32, width: f32, cos_view: f32) -> f32 
     return log2(max(texels, 1e-10));
 }
 
-// The same of what a look finds; densities of both sets of coordinates.
+// The same for a texture reference, given the densities of both coordinate sets.
 fn footprint_look_level(look: u32, densities: vec2f, width: f32, cos_view: f32) -> f32 {
     if look == NO_IMAGE {
         return 0.0;
@@ -108,7 +108,7 @@ fn is_followed(gaze: Gaze) -> bool {
     return gaze.depth <= start.max_depth && carried > 0.0 && carried >= start.branch_threshold;
 }
 
-// A gaze on its way, with those that wait.
+// The current path, the radiance gathered so far, and the number of waiting paths.
 struct Walk {
     gaze: Gaze,
     radiance: vec3f,
@@ -117,7 +117,8 @@ struct Walk {
 
 var<private> waiting: array<Gaze, MAX_WAITING>;
 
-// Goes on from a surface, both ways at the first ones and then the stronger; false where the gaze ends here.
+// Continues from a surface: along both branches at the first ones, then along the stronger. False if the path ends
+// here.
 fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> bool {
     let gaze = (*walk).gaze;
     let reflected = onward(gaze, point, next.reflection);
@@ -147,7 +148,7 @@ fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
     return object.base_colour * point.colour * looked_up(object.texture, point.uvs, level).rgb;
 }
 
-// The side of a point that is seen from somewhere.
+// The visible side of a point, for direct light.
 fn lit_point(point: SurfacePoint, is_front: bool, gaze: Gaze) -> LitPoint {
     let object = objects[point.object];
     var mixture: Mixture;
@@ -168,7 +169,8 @@ fn lit_point(point: SurfacePoint, is_front: bool, gaze: Gaze) -> LitPoint {
 fn chain_radiance(first: Gaze) -> vec3f {
     var walk = Walk(first, vec3f(0.0), 0u);
     loop {
-        // Over what is only specular until something else is met: neighbouring gazes then look up maps together.
+        // Passes purely specular surfaces until another one is hit, so that neighbouring paths look up maps at the same
+        // time.
         var point: SurfacePoint;
         var arrives = false;
         loop {

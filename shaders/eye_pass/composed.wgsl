@@ -1,13 +1,13 @@
-// Specular surfaces in the picture, from what was traced for their pixels: coarser or finer than the picture.
+// Composes the traced image, which may be coarser or finer, into the frame.
 
 @group(1) @binding(0) var traced_picture: texture_2d<f32>;
 
 const MARKS: u32 = 2000u;
 
-// Whether the traced picture has other pixels than the picture.
+// Whether the resolution of the traced image differs from that of the frame.
 override IS_SCALED: bool;
 
-// Adds what was traced at a pixel where it shows the wanted object; the sum of weights in w.
+// Adds a pixel of the traced image if it shows the wanted object; w sums the weights.
 fn add_traced(sum: vec4f, pixel: vec2i, weight: f32, wanted: f32) -> vec4f {
     let last = vec2i(textureDimensions(traced_picture)) - 1;
     let found = textureLoad(traced_picture, clamp(pixel, vec2i(0), last), 0);
@@ -15,7 +15,7 @@ fn add_traced(sum: vec4f, pixel: vec2i, weight: f32, wanted: f32) -> vec4f {
     return sum + counts * vec4f(found.rgb, 1.0);
 }
 
-// The mean of what was found; at the border of an object, where nothing was, a pixel of it near by stands in.
+// The mean of what was found. At the border of an object nothing may have been: a nearby pixel of it stands in.
 fn beside(found: vec4f, corner: vec2i, wanted: f32) -> vec4f {
     var sum = found;
     for (var place = 0; place < 16 && sum.w <= 1e-4; place += 1) {

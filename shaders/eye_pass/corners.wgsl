@@ -1,35 +1,35 @@
-// What is known of a point of a surface from the corners of its triangle.
+// Attributes of a surface point, interpolated from the corners of its triangle.
 
-// Six per corner: floats of position, normal and two sets of texture coordinates, and a colour of 16 bits a channel.
+// Six word pairs per corner: position, normal and two texture coordinate sets in floats, and a colour of 16 bits per
+// channel.
 @group(1) @binding(3) var<storage, read> corners: array<vec2u>;
 @group(1) @binding(4) var<storage, read> corner_map_uvs: array<vec2f>;
-// Three for each triangle.
+// Three per triangle.
 @group(1) @binding(5) var<storage, read> corner_indices: array<u32>;
 
-// Coordinates are local.
+// All lengths are local.
 struct SurfacePoint {
     place: vec3f,
-    // Bound of its rounding error.
+    // Bound of the rounding error.
     error: vec3f,
     object: u32,
     // Unit, by the triangle's winding.
     geometric_normal: vec3f,
-    // Unit, interpolated: what a matte surface takes light by.
+    // Unit, interpolated: the normal by which a diffuse surface receives light.
     interpolated_normal: vec3f,
-    // The same, bent where the surface has bumps.
+    // The same, perturbed by bumps.
     shading_normal: vec3f,
-    // How much the normals spread per length, > 0 where the surface is convex.
+    // Divergence of the normals per length, > 0 where the surface is convex.
     curvature: f32,
     uvs: vec4f,
     map_uv: vec2f,
-    // What the base colour is multiplied by.
+    // Vertex colour, a factor of the base colour.
     colour: vec3f,
-    // Coordinates over area, square root: their change along a line of length one.
+    // Square root of coordinate area per surface area: change of coordinates per unit length.
     uv_densities: vec2f,
     map_density: f32,
 }
 
-// Unit.
 fn corner_normal(corner: u32, object: ObjectRecord) -> vec3f {
     let normal = bitcast<vec3f>(vec3u(corners[6u * corner + 1u].y, corners[6u * corner + 2u]));
     return normal_in_scene(normal, object.row_x.xyz, object.row_y.xyz, object.row_z.xyz);
@@ -50,7 +50,7 @@ fn area_ratio(a: vec2f, b: vec2f, c: vec2f, twice_area: f32) -> f32 {
     return sqrt(abs(ab.x * ac.y - ab.y * ac.x) / max(twice_area, 1e-30));
 }
 
-// Change of the normal along an edge over its length.
+// Change of the normal along an edge, per length.
 fn bend(from_place: vec3f, to_place: vec3f, from_normal: vec3f, to_normal: vec3f) -> f32 {
     let edge = to_place - from_place;
     return dot(to_normal - from_normal, edge) / max(dot(edge, edge), 1e-30);
@@ -112,10 +112,10 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     return point;
 }
 
-// Where a ray starts that leaves a point: beyond the rounding error, on the side of its direction.
+// Origin of a ray that leaves a point: offset beyond the rounding error, to the side of its direction.
 fn leave(point: SurfacePoint, direction: vec3f) -> vec3f {
     let step = dot(abs(point.geometric_normal), point.error);
-    // Rounding of the sum itself is covered by twice the step.
+    // Twice the step also covers the rounding of the sum itself.
     let side = select(2.0 * step, -2.0 * step, dot(direction, point.geometric_normal) < 0.0);
     return point.place + point.geometric_normal * side;
 }

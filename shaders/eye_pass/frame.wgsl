@@ -1,4 +1,4 @@
-// One picture: the camera and how radiance is written.
+// Camera and output of one frame.
 
 struct Frame {
     clip_from_camera: mat4x4f,
@@ -17,7 +17,7 @@ struct Frame {
     traced_offset: vec2f,
     colour_scale: vec2f,
     fault: f32,
-    // Radiance that mirrors show while what they reflect cannot be traced.
+    // Radiance of mirrors while chains are switched off.
     stand_in: f32,
     padding0: f32,
     padding1: f32,
@@ -28,7 +28,7 @@ struct Frame {
 // Largest value written [scaled radiance]: half floats end at 65504.
 const LARGEST: f32 = 32768.0;
 
-// Shown in place of what is no number: magenta, whatever the exposure.
+// Magenta at any exposure, in place of values that are not finite.
 fn fault_colour() -> vec3f {
     return vec3f(frame.fault, 0.0, frame.fault);
 }

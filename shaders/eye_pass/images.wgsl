@@ -1,20 +1,19 @@
 // Illumination maps and textures, in tiles through a page table.
 
-// All images: a record each, then where their tiles are. A record is
-//   finest level that is held, number of levels, scale, how coordinates wrap (2 bits each way) and whether texels are not
-//   blended (1 bit),
+// The table holds a record for each image, followed by its pages. A record consists of
+//   finest resident level, number of levels, scale, wrap modes (2 bits each) and nearest filtering (1 bit),
 // and for each level
-//   texels across and down, texels of the unit square across and down, index of its first page, pages across.
-// How a material looks up one of them is
-//   its record, set of coordinates, two rows of what transforms those (KHR_texture_transform).
+//   texels across and down, texels that the unit square spans across and down, index of the first page, pages across.
+// A texture reference consists of
+//   index of the image's record, texture coordinate set, two rows of the transform (KHR_texture_transform).
 @group(0) @binding(2) var<storage, read> image_table: array<u32>;
 @group(0) @binding(3) var map_tiles: texture_2d_array<f32>;
 @group(0) @binding(4) var texture_tiles: texture_2d_array<f32>;
 
-// In place of a record where there is no image.
+// Stands for a missing image.
 const NO_IMAGE: u32 = 0xffffffffu;
 const EMPTY: u32 = 0xffffffffu;
-// A tile that is no finer than the next level.
+// Page of a tile that is no finer than the next level.
 const COARSER: u32 = 0xfffffffeu;
 const TILE: i32 = 64;
 const STORED: i32 = 65;
@@ -28,7 +27,7 @@ const WRAP_REPEAT: u32 = 1u;
 const WRAP_MIRROR: u32 = 2u;
 const IS_NEAREST: u32 = 16u;
 
-// Four texels of a pool, and where between them.
+// Position of a bilinear lookup in a tile pool: its first texel, and the weights of the next ones.
 struct Spot {
     texel: vec2i,
     layer: i32,
@@ -42,7 +41,7 @@ fn level_extent(record: u32, level: u32) -> vec2f {
     return vec2f(bitcast<f32>(image_table[at + 2u]), bitcast<f32>(image_table[at + 3u]));
 }
 
-// Distances between texel centres below the place, brought into the image.
+// Wraps a position, in texels from the first texel centre.
 fn wrapped(position: f32, size: f32, wrap: u32) -> f32 {
     if wrap == WRAP_REPEAT {
         return position - size * floor(position / size);
@@ -50,7 +49,7 @@ fn wrapped(position: f32, size: f32, wrap: u32) -> f32 {
     return clamp(position, 0.0, size - 1.0);
 }
 
-// Mirrored coordinates are folded: at the fold both neighbours are the same texel.
+// Folds mirrored coordinates: at the fold, both neighbours are the same texel.
 fn folded(uv: f32, wrap: u32) -> f32 {
     if wrap == WRAP_MIRROR {
         let turn = uv - 2.0 * floor(0.5 * uv);
@@ -76,7 +75,7 @@ fn locate(record: u32, level: u32, uv: vec2f) -> Spot {
     return Spot(corner + cell - tile * TILE, i32(page / per_layer), page == EMPTY, page == COARSER, position - low);
 }
 
-// Bilinear between texel centres of one level.
+// Bilinear lookup in one level.
 fn level_value(tiles: texture_2d_array<f32>, record: u32, level: u32, uv: vec2f) -> vec4f {
     var spot = locate(record, level, uv);
     for (var next = level + 1u; spot.is_coarser && next < image_table[record + 1u]; next++) {
@@ -86,7 +85,7 @@ fn level_value(tiles: texture_2d_array<f32>, record: u32, level: u32, uv: vec2f)
         return vec4f(0.0);
     }
     let is_nearest = (image_table[record + 3u] & IS_NEAREST) != 0u;
-    // Weights in full precision: the steps of the 8-bit weights that samplers use show at the edge of a caustic.
+    // Blended in full precision: the 8-bit weights of samplers show as steps at the edge of a caustic.
     let weight = select(spot.weight, step(vec2f(0.5), spot.weight), is_nearest);
     let top = mix(
         textureLoad(tiles, spot.texel, spot.layer, 0),
@@ -101,7 +100,7 @@ fn level_value(tiles: texture_2d_array<f32>, record: u32, level: u32, uv: vec2f)
     return mix(top, bottom, weight.y);
 }
 
-// The two levels to blend, and the share of the coarser one.
+// The two levels to blend, and the weight of the coarser one.
 struct Levels {
     fine: u32,
     coarse: u32,
@@ -116,7 +115,7 @@ fn levels(record: u32, level: f32) -> Levels {
     return Levels(u32(fine), u32(min(fine + 1.0, coarsest)), wanted - fine);
 }
 
-// Blended between the two levels that are nearest to the wanted one.
+// Trilinear lookup.
 fn value_at(tiles: texture_2d_array<f32>, record: u32, uv: vec2f, level: f32) -> vec4f {
     let at = levels(record, level);
     var value = level_value(tiles, record, at.fine, uv);
@@ -126,8 +125,7 @@ fn value_at(tiles: texture_2d_array<f32>, record: u32, uv: vec2f, level: f32) ->
     return value;
 }
 
-// E [W/m²] at a place of a map, seen at a level, and how much of what it is blended from is no number; black without
-// a map.
+// E [W/m²] of a map at a level, and the weight of texels that are not finite; black without a map.
 fn irradiance(record: u32, uv: vec2f, level: f32) -> vec4f {
     if record == NO_IMAGE {
         return vec4f(0.0);
@@ -140,7 +138,7 @@ fn look_number(at: u32) -> f32 {
     return bitcast<f32>(image_table[at]);
 }
 
-// What a look makes of both sets of coordinates, or of changes of them.
+// Transforms the coordinates that a texture reference selects, or a difference of them.
 fn placed(look: u32, uvs: vec4f, is_change: bool) -> vec2f {
     let uv = select(uvs.xy, uvs.zw, image_table[look + 1u] != 0u);
     let shift = vec2f(look_number(look + 4u), look_number(look + 7u));
@@ -151,7 +149,7 @@ fn placed(look: u32, uvs: vec4f, is_change: bool) -> vec2f {
     return turned + select(shift, vec2f(0.0), is_change);
 }
 
-// Linear colour and alpha where a look finds them, seen at a level; white without one.
+// Linear colour and alpha of a texture reference at a level; white without one.
 fn looked_up(look: u32, uvs: vec4f, level: f32) -> vec4f {
     if look == NO_IMAGE {
         return vec4f(1.0);
@@ -159,7 +157,7 @@ fn looked_up(look: u32, uvs: vec4f, level: f32) -> vec4f {
     return value_at(texture_tiles, image_table[look], placed(look, uvs, false), level);
 }
 
-// The level of a look at which a texel is as large as a parallelogram of coordinates.
+// Level at which a texel of a texture reference is as large as a parallelogram of coordinates.
 fn look_level(look: u32, across: vec4f, down: vec4f) -> f32 {
     if look == NO_IMAGE {
         return 0.0;
@@ -167,7 +165,7 @@ fn look_level(look: u32, across: vec4f, down: vec4f) -> f32 {
     return level_of(image_table[look], placed(look, across, true), placed(look, down, true));
 }
 
-// The level at which a texel is as large as a parallelogram of coordinates.
+// Level at which a texel is as large as a parallelogram of coordinates.
 fn level_of(record: u32, across: vec2f, down: vec2f) -> f32 {
     if record == NO_IMAGE {
         return 0.0;

@@ -1,4 +1,4 @@
-// Surfaces by something else than their light: display colours in linear light.
+// Surfaces that show a property instead of their radiance: display colours in linear light.
 
 // What is shown, one of INSPECTED_*.
 override INSPECTED: u32;
@@ -12,12 +12,12 @@ const INSPECTED_NORMALS: u32 = 3u;
 const INSPECTED_UV: u32 = 4u;
 const INSPECTED_MAP_UV: u32 = 5u;
 
-// Of surfaces without a map, where maps are shown.
+// Colour of surfaces without a map.
 const NO_MAP: vec3f = vec3f(0.01);
-// Luminance of linear sRGB.
+// Luminance weights of linear sRGB.
 const LUMINANCE: vec3f = vec3f(0.2126, 0.7152, 0.0722);
 
-// Colour of a quantity; frame.colour_scale is where the scale begins and by what its steps are multiplied.
+// False colour of a quantity; frame.colour_scale holds the start of the scale and the factor of distances from it.
 fn false_colour(quantity: f32) -> vec3f {
     var value = quantity;
     if IS_LOGARITHMIC {
@@ -26,7 +26,7 @@ fn false_colour(quantity: f32) -> vec3f {
     return linear_from_srgb(viridis((value - frame.colour_scale.x) * frame.colour_scale.y));
 }
 
-// Texels of the unit square, across and down, at a place: those of the tile that is there.
+// Texels that the unit square spans at a position, at the resolution of its tile.
 fn texels_at(record: u32, uv: vec2f) -> vec2f {
     var level = image_table[record];
     while level + 1u < image_table[record + 1u] && locate(record, level, uv).is_coarser {
@@ -37,7 +37,7 @@ fn texels_at(record: u32, uv: vec2f) -> vec2f {
 
 @fragment
 fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
-    // How the map's coordinates and the place change by a pixel.
+    // Derivatives of map coordinates and position over a pixel, taken before any discard.
     let across = dpdx(fragment.map_uv);
     let down = dpdy(fragment.map_uv);
     let pixel_m2 = length(cross(dpdx(fragment.from_camera), dpdy(fragment.from_camera)));
@@ -75,7 +75,7 @@ fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
         let pixel_texels = abs(step_across.x * step_down.y - step_across.y * step_down.x);
         return vec4f(false_colour(sqrt(pixel_texels / max(pixel_m2, 1e-30))), 1.0);
     }
-    // A checkerboard, grey where its squares are smaller than pixels.
+    // A checkerboard that fades to grey where its squares are smaller than pixels.
     let cell = floor(fragment.map_uv * texels);
     let is_odd = fract(0.5 * (cell.x + cell.y)) > 0.25;
     let widest = max(max(abs(step_across.x), abs(step_across.y)), max(abs(step_down.x), abs(step_down.y)));

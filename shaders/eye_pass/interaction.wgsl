@@ -1,27 +1,28 @@
-// What becomes of a gaze that meets a surface; twin of transport/interaction.rs.
+// How a ray of a chain interacts with a surface; twin of transport/interaction.rs.
 
-// Orientation of a point: normals on the side of the gaze.
+// Normals of a point, oriented towards the side that the ray comes from.
 struct Facing {
     front: bool,
     geometric: vec3f,
-    // The geometric one where the shading normal faces away.
+    // The geometric normal where the shading normal faces away from the ray.
     shading: vec3f,
 }
 
-// A way on. Its share is of radiance; 0 where there is none.
+// A continuation of the path. `share` is the fraction of radiance; 0 for no branch.
 struct Branch {
     direction: vec3f,
     share: vec3f,
     media: vec4u,
-    // Change of the angle across the footprint, over the footprint's width and by its own spread.
+    // The new spread is the old one times `spread_factor`, plus the width times `spread_per_width`, plus
+    // `spread_added`.
     spread_per_width: f32,
     spread_factor: f32,
-    // By what roughness adds to it: an approximation, which blurs maps and textures but no edges.
+    // Spread due to roughness: an approximation that blurs maps and textures, but no edges.
     spread_added: f32,
 }
 
 struct Interaction {
-    // Share of the light of the map that comes back along the gaze.
+    // Share of the diffuse radiance that leaves along the ray.
     own: f32,
     reflection: Branch,
     transmission: Branch,
@@ -39,13 +40,13 @@ fn no_branch() -> Branch {
     return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0, 0.0);
 }
 
-// Angle between the directions in which a surface reflects light where its microfacets are tilted by the GGX α one way
-// and the other; half of them are tilted less.
+// Angle between the reflections off microfacets that are tilted by atan α (GGX) one way and the other; half of all
+// microfacets are tilted less.
 fn lobe_rad(roughness: f32) -> f32 {
     return 4.0 * atan(roughness * roughness);
 }
 
-// What images multiply transmission, roughness and metallic by, as the gaze sees them.
+// Factors of transmission, roughness and metallic from an image, at the footprint of the ray.
 fn factors_at(point: SurfacePoint, gaze: Gaze) -> vec3f {
     let look = objects[point.object].variation;
     if look == NO_IMAGE {
@@ -87,7 +88,8 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe
     let media = gaze.media;
     let ior = ior_of(point.object, gaze.wavelength);
     var beyond = left(media, point.object);
-    // Where bodies overlap, the one that was entered last is the medium until it is left; an open sheet was never entered.
+    // Where bodies overlap, the one entered last is the medium until the ray leaves it. An open sheet was never
+    // entered.
     var ior_near = select(medium_ior(media, gaze.wavelength), ior, all(beyond == media));
     var ior_far = medium_ior(beyond, gaze.wavelength);
     if facing.front {
@@ -111,13 +113,13 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe
         direction = refracted(incident, facing.geometric, eta);
     }
     let reflectance = dielectric_reflectance(cos_incident, eta);
-    // Radiance grows by the square of n on the gaze's side over n on the far side.
+    // Radiance scales by the square of n on the ray's side over n on the far side.
     let share = tint * ((1.0 - reflectance) / (eta * eta));
     let curvature = select(-point.curvature, point.curvature, facing.front);
     return Interaction(
         0.0,
         reflection(point, facing, gaze, vec3f(reflectance), lobe),
-        // A tilted facet turns a refracted ray by |1/eta - 1| of its tilt, and a reflected one by twice that tilt.
+        // A facet's tilt turns a refracted ray by |1/eta - 1| times the tilt, and a reflected one by twice the tilt.
         Branch(
             direction,
             share,
@@ -129,7 +131,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe
     );
 }
 
-// Each share of a mixture as the class that it is of. Nothing is both clear and has holes.
+// Sum of the interactions of a mixture's shares. No surface is both clear and perforated.
 fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors: vec3f) -> Interaction {
     let object = objects[point.object];
     let lobe = lobe_rad(object.roughness * factors.y);
@@ -151,7 +153,7 @@ fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors:
     let polish = mixture.polish * dielectric_reflectance(cos_incident, eta);
     let back = mixture.metal * metal_reflectance(cos_incident, tint) + vec3f(mixture.body * polish);
     met.reflection = reflection(point, facing, gaze, met.reflection.share + back, lobe);
-    // The map has the body's share already.
+    // The map already accounts for the body's share.
     met.own = 1.0 - polish;
     return met;
 }

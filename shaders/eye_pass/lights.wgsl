@@ -1,17 +1,16 @@
-// Light straight from the lamps, by a shadow ray each; twin of light_pass/direct/lighting.rs. Lengths are local but
-// where they say so.
+// Direct light, with one shadow ray per light; twin of light_pass/direct/lighting.rs. Lengths are local unless noted.
 
 struct LightRecord {
-    // Where it is; the way its light travels for suns.
+    // Position; for suns, the direction in which their light travels.
     place: vec3f,
     kind: u32,
-    // W/sr per channel, or W/m² for suns.
+    // W/sr per channel, W/m² for suns.
     strength: vec3f,
     cos_inner: f32,
-    // Of a spot or of what glows, away from the lamp.
+    // Axis of a spot or normal of an emissive facet, away from the light.
     axis: vec3f,
     cos_outer: f32,
-    // Of what is around the lamp: the light stays within that [1/m].
+    // Absorption coefficient of the medium around the light [1/m]; unoccluded light stays in it.
     absorption_per_m: vec3f,
     ior: f32,
 }
@@ -19,24 +18,24 @@ struct LightRecord {
 const LIGHT_POINT: u32 = 0u;
 const LIGHT_SPOT: u32 = 1u;
 const LIGHT_SUN: u32 = 2u;
-// A piece of a surface that glows: by the cosine, on one side.
+// A facet of an emissive surface: one-sided, with a cosine falloff.
 const LIGHT_FACET: u32 = 3u;
-// Share of its way that a shadow ray stops before such a piece, so as not to meet the surface itself.
+// Fraction of the distance by which a shadow ray stops short of a facet, so as not to hit the emissive surface itself.
 const BEFORE_FACET: f32 = 1e-4;
 
 @group(1) @binding(6) var<storage, read> lights: array<LightRecord>;
 
-// Where light may arrive.
+// A point that receives direct light.
 struct LitPoint {
     place: vec3f,
-    // How far off the surface a shadow ray starts.
+    // Offset of shadow rays off the surface.
     margin: f32,
     geometric_normal: vec3f,
     shading_normal: vec3f,
     taking: Taking,
 }
 
-// Share of its strength that a spot sends along a direction (KHR_lights_punctual), or a surface; 1 for the others.
+// Fraction of the intensity along a direction: the cone of a spot (KHR_lights_punctual), the cosine of a facet, else 1.
 fn falloff(light: LightRecord, direction: vec3f) -> f32 {
     if light.kind == LIGHT_FACET {
         return max(dot(light.axis, direction), 0.0);
@@ -52,8 +51,7 @@ fn falloff(light: LightRecord, direction: vec3f) -> f32 {
     return ramp * ramp;
 }
 
-// E [W/m²] that a surface of an object takes there, on the side that its normals point to. What polish reflects is not
-// taken.
+// E [W/m²] that a surface receives on the side of the point's normals, without what its coat reflects.
 fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
     var sum = vec3f(0.0);
     for (var index = 0u; index < start.light_count; index += 1u) {
@@ -82,7 +80,7 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
         let share = across_beam * cosine * taken;
         if share > 0.0 {
             let origin = point.place + point.geometric_normal * point.margin;
-            // Every surface stops it, clear ones included: what comes through those is in the caustic layer.
+            // Every surface is an occluder, clear ones included: light through those is in the caustic layer.
             if closest_hit(origin, to_light, distance).triangle == NO_TRIANGLE {
                 sum += light.strength * left * share;
             }

@@ -1,9 +1,9 @@
-// Surfaces with holes: an alpha mask takes away what lies below its cutoff.
+// Alpha masks: surfaces are cut out where alpha is below the cutoff.
 
-// Whether the surface has one; for chains, whether anything in the scene has.
+// Whether the surface has an alpha mask; for chains, whether any surface of the scene has.
 override HAS_MASK: bool;
 
-// Whether an object's surface is there at a place of its base colour texture, at its finest: so does light find it.
+// Whether a surface is present at a position. Uses the finest level of the texture, as the light pass does.
 fn is_there(object: ObjectRecord, uvs: vec4f) -> bool {
     var alpha = 1.0;
     if object.texture != NO_IMAGE {
@@ -13,7 +13,7 @@ fn is_there(object: ObjectRecord, uvs: vec4f) -> bool {
     return alpha >= object.alpha_cutoff;
 }
 
-// Leaves holes as they are; derivatives are to be taken before.
+// Discards fragments in holes. Derivatives must be taken before.
 fn cut_out(fragment: Fragment) {
     if HAS_MASK && !is_there(objects[fragment.object], fragment.uvs) {
         discard;

@@ -1,5 +1,5 @@
-// The bodies that a chain is inside of, innermost first: eight 16-bit numbers, object index + 1 each, 0 for none. Twin
-// of transport/medium.rs.
+// The stack of bodies that a path is inside of, innermost first: eight 16-bit numbers, object index + 1 each, 0 for
+// none. Twin of transport/medium.rs.
 
 const MEDIA: u32 = 8u;
 
@@ -7,12 +7,12 @@ fn medium_at(media: vec4u, place: u32) -> u32 {
     return (media[place / 2u] >> (16u * (place % 2u))) & 0xffffu;
 }
 
-// Number of the innermost body, 0 outside of all.
+// Number of the innermost body; 0 outside of all.
 fn innermost(media: vec4u) -> u32 {
     return media.x & 0xffffu;
 }
 
-// Beyond the capacity a body is not remembered.
+// A body beyond the stack's capacity is not recorded.
 fn entered(media: vec4u, object: u32) -> vec4u {
     if medium_at(media, MEDIA - 1u) != 0u {
         return media;
@@ -25,7 +25,7 @@ fn entered(media: vec4u, object: u32) -> vec4u {
     );
 }
 
-// Its innermost entry is taken out; unchanged where the chain was not inside it.
+// Removes the innermost entry of a body; unchanged if the path was not inside it.
 fn left(media: vec4u, object: u32) -> vec4u {
     var place = 0u;
     while place < MEDIA && medium_at(media, place) != object + 1u {
@@ -52,7 +52,7 @@ fn medium_ior(media: vec4u, wavelength: u32) -> f32 {
     return ior_of(number - 1u, wavelength);
 }
 
-// Share of light that is left after a distance [m] in the innermost body (Beer and Lambert).
+// Transmittance over a distance [m] in the innermost body (Beer and Lambert).
 fn medium_transmittance(media: vec4u, distance_m: f32) -> vec3f {
     let number = innermost(media);
     if number == 0u {

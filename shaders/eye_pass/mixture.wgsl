@@ -1,20 +1,20 @@
-// What a place of a surface is made of; twin of scene/mixture.rs.
+// Composition of a surface at a point; twin of scene/mixture.rs.
 
-// Polish on what is rougher is matte, and so are metals that are rougher than the second.
+// Above these roughnesses, coats and metals are treated as diffuse.
 const SPECULAR_ROUGHNESS_LIMIT: f32 = 0.3;
 const METAL_ROUGHNESS_LIMIT: f32 = 0.6;
 
-// Shares of a surface, which add up to one.
+// Shares of a surface that add up to one.
 struct Mixture {
     metal: f32,
     clear: f32,
     body: f32,
     hole: f32,
-    // Part of the body that is polished.
+    // Coverage of the body by the coat.
     polish: f32,
 }
 
-// Where images multiply transmission, roughness and metallic, and base colour has an alpha.
+// Composition with factors of transmission, roughness and metallic from an image, and the alpha of the base colour.
 fn mixture_of(object: ObjectRecord, factors: vec3f, alpha: f32) -> Mixture {
     let there = select(object.coverage * alpha, 1.0, object.coverage < 0.0);
     let roughness = object.roughness * factors.y;
@@ -25,7 +25,7 @@ fn mixture_of(object: ObjectRecord, factors: vec3f, alpha: f32) -> Mixture {
     return Mixture(metal, clear, max(there - metal - clear, 0.0), 1.0 - there, polish);
 }
 
-// What the body of a surface takes of light: part of it, and how much of that polish covers.
+// What the body receives of incident light: its share of the surface, and its coverage by the coat.
 struct Taking {
     share: f32,
     polish: f32,

@@ -1,4 +1,4 @@
-// What objects look like, all of them in one buffer.
+// Material and transform of all objects, in one buffer.
 
 struct ObjectRecord {
     base_colour: vec3f,
@@ -13,23 +13,23 @@ struct ObjectRecord {
     bumps: u32,
     polish: f32,
     back_map: u32,
-    // Number of its glass, where that parts wavelengths; else 0.
+    // Number of its glass if that is dispersive; else 0.
     glass: u32,
-    // Alpha of the texture from which on the surface is there; 0 where it always is.
+    // Alpha of the texture below which the surface is cut out; 0 without a mask.
     alpha_cutoff: f32,
-    // Image that multiplies transmission, roughness and metallic.
+    // Texture reference of the image that multiplies transmission, roughness and metallic.
     variation: u32,
     metallic: f32,
     transmission: f32,
-    // Alpha that the texture's multiplies; negative where all of the surface is there.
+    // Coverage, to be multiplied by the texture's alpha; negative if all of the surface is there.
     coverage: f32,
     // Whether it bounds a body.
     solid: u32,
-    // Image of what it emits.
+    // Texture reference of its emission.
     glow: u32,
     padding0: u32,
     padding1: u32,
-    // Rows of the way from its mesh's coordinates to the scene.
+    // Rows of the transform from mesh to scene coordinates.
     row_x: vec4f,
     row_y: vec4f,
     row_z: vec4f,
@@ -46,8 +46,8 @@ const PI: f32 = 3.14159265358979;
 
 @group(0) @binding(1) var<storage, read> objects: array<ObjectRecord>;
 
-// The unit normal that a normal of a mesh becomes, by the rows of its way into the scene. Outside stays outside where that
-// mirrors.
+// Transforms a mesh normal to the scene and normalises it, given the rows of the transform. Outside stays outside under
+// mirroring.
 fn normal_in_scene(normal: vec3f, x: vec3f, y: vec3f, z: vec3f) -> vec3f {
     let across = cross(y, z);
     let turned = vec3f(dot(across, normal), dot(cross(z, x), normal), dot(cross(x, y), normal));
@@ -56,7 +56,7 @@ fn normal_in_scene(normal: vec3f, x: vec3f, y: vec3f, z: vec3f) -> vec3f {
     return select(vec3f(0.0), outwards * inverseSqrt(squared), squared > 0.0);
 }
 
-// Record of the map of the side that is seen.
+// Record of the map of the visible side.
 fn map_of(object: ObjectRecord, is_front: bool) -> u32 {
     return select(object.back_map, object.map, is_front);
 }

@@ -1,6 +1,6 @@
-// Chains of scenes in which all light goes the same ways; stands in for eye_pass/wavelengths.wgsl.
+// Chains of scenes without dispersion; stands in for eye_pass/wavelengths.wgsl.
 
-// Gazes that may wait: one for each surface at which both ways on are followed.
+// Paths that may wait: one for each surface at which both branches are followed.
 const MAX_WAITING: u32 = MAX_BRANCHING;
 
 fn ior_of(object: u32, wavelength: u32) -> f32 {

@@ -1,4 +1,4 @@
-// Opaque surfaces without what they reflect.
+// Opaque surfaces without their reflections.
 @fragment
 fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     var radiance = own_emission(fragment);
@@ -9,7 +9,7 @@ fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0
         let diffuse = own_base_colour(fragment) * lit.rgb / PI;
         radiance += (1.0 - own_polish(fragment)) * diffuse;
     } else {
-        // Lighter above, so that a bent surface has a shape.
+        // Brighter towards the top, so that the shape of curved mirrors is visible.
         let up = reflect(normalize(fragment.from_camera), normalize(fragment.normal)).y;
         radiance += objects[fragment.object].base_colour * (frame.stand_in * (1.0 + 0.5 * up));
     }
@@ -17,7 +17,7 @@ fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0
     return vec4f(select(scaled(radiance), fault_colour(), is_fault), 1.0);
 }
 
-// Maps as they are, neither lit nor reflected.
+// Values of maps, neither lit nor reflected.
 @fragment
 fn map_value(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     let value = own_irradiance(fragment, is_front);
@@ -25,7 +25,7 @@ fn map_value(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
     return vec4f(select(scaled(value.rgb), fault_colour(), value.a > 0.0), 1.0);
 }
 
-// Depths of surfaces with holes.
+// Depth prepass of surfaces with an alpha mask.
 @fragment
 fn masked_depth(fragment: Fragment) {
     cut_out(fragment);

@@ -1,15 +1,15 @@
-// Opaque surfaces without what they reflect, lit by their maps and, by shadow rays, straight from the lamps.
+// Opaque surfaces without their reflections, lit by their maps and by traced direct light.
 
 @fragment
 fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     let object = objects[fragment.object];
-    // The plane of the triangle; both derivatives lie in it.
+    // Normal of the triangle's plane, which contains both derivatives.
     let across = cross(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
     let towards_eye = select(1.0, -1.0, dot(across, fragment.from_camera) > 0.0);
     let shading_normal = select(-1.0, 1.0, is_front) * normalize(fragment.normal);
     let offset = fragment.from_camera / start.unit_m;
     let place = start.eye + offset;
-    // Rasterisers interpolate to some 2⁻²⁰ of what they see.
+    // Rasterisers interpolate positions to a relative precision of about 2⁻²⁰.
     let margin = 4e-6 * (1.0 + length(offset));
     var mixture: Mixture;
     if SURFACE == SURFACE_VARIED {

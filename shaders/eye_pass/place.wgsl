@@ -1,13 +1,13 @@
-// Corners of triangles in the picture.
+// Vertex stage of surfaces.
 
 struct Corner {
-    // In coordinates of the mesh.
+    // In mesh coordinates.
     @location(0) position: vec3f,
     @location(1) normal: vec3f,
-    // Both sets of texture coordinates.
+    // Both texture coordinate sets.
     @location(2) uvs: vec4f,
     @location(3) map_uv: vec2f,
-    // From there to the scene, of the object's record.
+    // Rows of the transform to the scene, from the object's record.
     @location(4) row_x: vec4f,
     @location(5) row_y: vec4f,
     @location(6) row_z: vec4f,
@@ -15,7 +15,7 @@ struct Corner {
 }
 
 struct Fragment {
-    // The same bits in every pass: what is drawn twice is compared for equal depth.
+    // Bit-identical in every pass, as the passes compare for equal depth.
     @builtin(position) @invariant clip: vec4f,
     @location(0) from_camera: vec3f,
     @location(1) normal: vec3f,
@@ -29,7 +29,7 @@ struct Fragment {
 fn place(corner: Corner, @builtin(instance_index) object: u32) -> Fragment {
     let position = vec4f(corner.position, 1.0);
     let in_scene = vec3f(dot(corner.row_x, position), dot(corner.row_y, position), dot(corner.row_z, position));
-    // Relative to the camera first: differences of nearby numbers lose nothing.
+    // Subtracts the camera first: this is exact for nearby positions.
     let from_camera = in_scene - frame.camera_position;
     var clip = frame.clip_from_camera * vec4f(from_camera, 1.0);
     clip.x -= frame.jitter.x * clip.w;

@@ -1,4 +1,4 @@
-// What is seen where nothing stands in the way: the same in all directions.
+// Uniform background radiance.
 
 fn background(direction: vec3f) -> vec3f {
     return frame.background;

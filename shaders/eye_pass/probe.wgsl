@@ -1,4 +1,4 @@
-// Rays traced for their own sake: what each of them meets.
+// Traces single rays for tests and returns their hits.
 
 struct ProbeRay {
     origin: vec3f,

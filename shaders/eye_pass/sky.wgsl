@@ -1,12 +1,12 @@
-// What is seen where nothing stands in the way: an equirectangular image; twin of scene/environment.rs, smooth_radiance.
+// Radiance of an equirectangular environment; twin of scene/environment.rs, smooth_radiance.
 
-// Radiance times what frame.background multiplies it by.
+// Radiance, to be multiplied by frame.background.
 @group(2) @binding(0) var sky: texture_2d<f32>;
 
 const TAU: f32 = 6.2831855;
 
 fn sky_pixel(column: i32, row: i32, size: vec2i) -> vec3f {
-    // Around the image, not over its poles.
+    // Wraps around horizontally, clamps at the poles.
     let place = vec2i((column + size.x) % size.x, clamp(row, 0, size.y - 1));
     return textureLoad(sky, place, 0).rgb;
 }

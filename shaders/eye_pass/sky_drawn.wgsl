@@ -1,12 +1,12 @@
-// The sky behind all surfaces of the picture.
+// Draws the environment behind all surfaces.
 
 struct Behind {
     @builtin(position) clip: vec4f,
-    // Of the picture, −1 to 1, right and up.
+    // Position in the image, −1 to 1, right and up.
     @location(0) within: vec2f,
 }
 
-// One triangle that covers the picture.
+// A single triangle that covers the image.
 @vertex
 fn behind(@builtin(vertex_index) index: u32) -> Behind {
     let corner = vec2f(f32((index << 1u) & 2u), f32(index & 2u)) * 2.0 - 1.0;

@@ -1,4 +1,4 @@
-// Where rays begin that go through the scene's hierarchy, and how far they are followed.
+// Start and limits of rays through the scene's hierarchy.
 
 struct ChainStart {
     eye: vec3f,

@@ -1,6 +1,6 @@
-// What surfaces send by themselves: radiance from their illumination maps, and emission.
+// Emission and diffuse radiance of surfaces.
 //
-// Radiance is written times frame.radiance_scale, so that it fits half floats.
+// Radiance is written times frame.radiance_scale, to fit half floats.
 
 // Kind of the surface, one of SURFACE_*.
 override SURFACE: u32;
@@ -29,7 +29,7 @@ fn own_irradiance(fragment: Fragment, is_front: bool) -> vec4f {
     return irradiance(record, fragment.map_uv, level);
 }
 
-// Share of light that a polish sends back, as seen from vacuum; 0 without one.
+// Share of light that the coat reflects towards the eye, seen from vacuum; 0 without one.
 fn own_polish(fragment: Fragment) -> f32 {
     if SURFACE == SURFACE_MIXED {
         var normal = normalize(fragment.normal);

@@ -1,12 +1,12 @@
-// Last pass: the picture's exposed radiance, resolved, to the target's colour.
+// Last pass: tone-maps the resolved, exposed radiance to the target's colour.
 
 // One of TONE_MAP_*.
 override TONE_MAP: u32;
-// False for formats that encode by themselves: they take linear light.
+// False for sRGB formats, which take linear light.
 override ENCODE_SRGB: bool;
 
 struct DisplayWhite {
-    // From radiance to radiance whose white is the display's.
+    // Multiplies radiance, so that the chosen white becomes the display's.
     balance: mat3x3f,
 }
 

@@ -1,6 +1,6 @@
-// What is seen where a specular surface is nearest: the pixel's chain, from the eye on.
+// Traces the chain of each pixel whose nearest surface is specular.
 
-// Objects are told apart by this many marks, which half floats hold.
+// Number of distinct marks of objects; half floats represent them exactly.
 const MARKS: u32 = 2000u;
 
 fn mark(object: u32) -> f32 {

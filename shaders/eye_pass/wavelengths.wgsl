@@ -1,12 +1,12 @@
-// Chains that go on by wavelength from where they meet glass that parts light; twin of eye_pass/wavelengths.rs.
+// Chains that split into wavelengths at dispersive surfaces; twin of eye_pass/wavelengths.rs.
 
-// Wavelengths of a picture.
+// Wavelengths per frame.
 const MAX_WAVELENGTHS: u32 = 4u;
-// Gazes that may wait: one for each surface at which both ways on are followed, and those of the other wavelengths.
+// Paths that may wait: one for each surface at which both branches are followed, and those of the other wavelengths.
 const MAX_WAITING: u32 = MAX_BRANCHING + MAX_WAVELENGTHS - 1u;
 
 struct SeenWavelengths {
-    // From radiance in linear sRGB to what is seen of it at each wavelength.
+    // Matrices from radiance in linear sRGB to its part at each wavelength.
     shares: array<mat3x3f, 4>,
     count: u32,
     padding0: u32,
@@ -18,7 +18,7 @@ struct SeenWavelengths {
 
 @group(1) @binding(7) var<uniform> wavelengths: SeenWavelengths;
 
-// A wavelength is its number from 1; 0 is all of them, by the index at 587.56 nm.
+// Wavelengths are numbered from 1; 0 stands for all of them, with the index at 587.56 nm.
 fn ior_of(object: u32, wavelength: u32) -> f32 {
     let glass = objects[object].glass;
     if wavelength == 0u || glass == 0u {
@@ -27,7 +27,7 @@ fn ior_of(object: u32, wavelength: u32) -> f32 {
     return wavelengths.indices[glass - 1u][wavelength - 1u];
 }
 
-// What is seen of a radiance.
+// The part of a radiance at a wavelength.
 fn shown(radiance: vec3f, wavelength: u32) -> vec3f {
     if wavelength == 0u {
         return radiance;
@@ -48,8 +48,8 @@ fn is_within_parting_glass(media: vec4u) -> bool {
     return false;
 }
 
-// Where light goes on from a surface another way at another wavelength, the gaze goes on at the first one; those at the
-// others wait, and will meet the surface again.
+// Splits a path into wavelengths where its continuation depends on them. It continues at the first one; those at the
+// others wait, and will hit the same surface again.
 fn part(walk: ptr<function, Walk>, object: u32) {
     let surface = objects[object].surface;
     let goes_by_index = is_clear(surface) || surface == SURFACE_MIXED || surface == SURFACE_VARIED;
@@ -68,7 +68,7 @@ fn part(walk: ptr<function, Walk>, object: u32) {
     }
 }
 
-// One wavelength of many is no colour of a display: channels may be negative until all are together.
+// A single wavelength is outside the display's gamut: channels may be negative until all wavelengths are added.
 fn written(radiance: vec3f) -> vec3f {
     return clamp(radiance * frame.radiance_scale, vec3f(-LARGEST), vec3f(LARGEST));
 }

@@ -1,4 +1,4 @@
-// One triangle that covers the target.
+// A single triangle that covers the target.
 @vertex
 fn cover(@builtin(vertex_index) index: u32) -> @builtin(position) vec4f {
     let corner = vec2f(f32((index << 1u) & 2u), f32(index & 2u));

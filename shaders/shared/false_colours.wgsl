@@ -1,6 +1,6 @@
 // False colours; twin of illumination/false_colours.rs.
 
-// Display colour (sRGB) of a place in [0, 1] of the scale.
+// sRGB-encoded colour of a position in [0, 1] on the scale.
 fn viridis(place: f32) -> vec3f {
     let t = clamp(place, 0.0, 1.0);
     var colour = vec3f(-5.435455855934631, 4.645852612178535, 26.3124352495832);
@@ -13,7 +13,7 @@ fn viridis(place: f32) -> vec3f {
     return clamp(colour, vec3f(0.0), vec3f(1.0));
 }
 
-// Linear light of a display colour (IEC 61966-2-1).
+// Decodes an sRGB colour to linear light (IEC 61966-2-1).
 fn linear_from_srgb(display: vec3f) -> vec3f {
     let power = pow((display + 0.055) / 1.055, vec3f(2.4));
     return select(power, display / 12.92, display <= vec3f(0.04045));

@@ -6,7 +6,7 @@ const TONE_MAP_AGX: u32 = 2u;
 const TONE_MAP_ACES: u32 = 3u;
 const TONE_MAP_SOFT: u32 = 4u;
 
-// Khronos PBR Neutral: exact below its shoulder, hue kept above it.
+// Khronos PBR Neutral: exact below its shoulder, preserves hue above it.
 fn tone_map_neutral(exposed: vec3f) -> vec3f {
     let shoulder = 0.8 - 0.04;
     let desaturation = 0.15;
@@ -23,9 +23,9 @@ fn tone_map_neutral(exposed: vec3f) -> vec3f {
     return mix(colour * (new_peak / peak), vec3f(new_peak), whiteness);
 }
 
-// The matrices below are written row by row: a colour is multiplied from the left.
+// The matrices below are written row by row, so a colour is multiplied from the left.
 
-// AgX's working space: primaries of BT.709 drawn in by a fifth of their distance to D65; and back.
+// From linear sRGB to AgX's working space, with the primaries of BT.709 moved a fifth of the way towards D65; and back.
 const AGX_INSET = mat3x3f(
     0.842398929049531, 0.078430165104864, 0.079170905845605,
     0.042398929049531, 0.878430165104864, 0.079170905845605,
@@ -37,7 +37,7 @@ const AGX_OUTSET = mat3x3f(
     -0.052998661311914, -0.098037706381080, 1.151036367692994,
 );
 
-// The sigmoid of AgX in its closed form: slope 2 and value 1/2 at middle grey, other powers below and above.
+// AgX's sigmoid in closed form: middle grey maps to 1/2 with slope 2; the exponents below and above it differ.
 fn agx_contrast(position: vec3f) -> vec3f {
     let rise = 2.0 * (position - 10.0 / 16.5);
     let is_toe = rise < vec3f(0.0);
@@ -46,11 +46,11 @@ fn agx_contrast(position: vec3f) -> vec3f {
     return 0.5 + rise * pow(1.0 + pow(abs(rise) / scale, power), -1.0 / power);
 }
 
-// Troy Sobotka's AgX without a look: ten stops below middle grey to 6.5 above.
+// Troy Sobotka's AgX without a look: from ten stops below middle grey to 6.5 above it.
 fn tone_map_agx(exposed: vec3f) -> vec3f {
     let least = -12.473931188332413;
     let most = 4.026068811667587;
-    // Black has no logarithm.
+    // Keeps black away from the logarithm's pole.
     let stops = clamp(log2(max(exposed * AGX_INSET, vec3f(1e-5))), vec3f(least), vec3f(most));
     let codes = agx_contrast((stops - least) / (most - least)) * AGX_OUTSET;
     return pow(max(codes, vec3f(0.0)), vec3f(2.2));
@@ -67,14 +67,14 @@ const ACES_OUTPUT = mat3x3f(
     -0.00327, -0.07276, 1.07602,
 );
 
-// ACES in the fit of Stephen Hill.
+// Stephen Hill's fit of ACES.
 fn tone_map_aces(exposed: vec3f) -> vec3f {
     let v = exposed * ACES_INPUT;
     let fitted = (v * (v + 0.0245786) - 0.000090537) / (v * (0.983729 * v + 0.4329510) + 0.238081);
     return fitted * ACES_OUTPUT;
 }
 
-// Exact up to its shoulder, then logarithmic up to 16; hue kept, but for the brightest.
+// Exact up to its shoulder, logarithmic up to 16; preserves hue, except in the brightest colours.
 fn tone_map_soft(exposed: vec3f) -> vec3f {
     let shoulder = 0.4;
     let step = 0.12387274177484112;

@@ -1,5 +1,5 @@
-// The nearest triangle on a ray, in local coordinates: the scene's radius is at most one. Twin of transport/hierarchy.rs,
-// geometry/bvh.rs and geometry/triangle.rs in single precision.
+// The nearest triangle on a ray, in local coordinates: the scene's radius is at most one. Twin, in single precision, of
+// transport/hierarchy.rs, geometry/bvh.rs and geometry/triangle.rs.
 
 struct Node {
     low: vec3f,
@@ -20,30 +20,30 @@ struct Triangle {
 @group(1) @binding(1) var<storage, read> nodes: array<Node>;
 @group(1) @binding(2) var<storage, read> triangles: array<Triangle>;
 
-// Count of a node that is an instance.
+// `count` of a node that is an instance.
 const INSTANCE: u32 = 0xffffffffu;
-// In place of an object; of triangles that were moved away.
+// Stands for no object: on triangles that were moved away, and on those of instanced meshes.
 const NO_OBJECT: u32 = 0xffffffffu;
-// In place of an instance: triangles and nodes are local.
+// Stands for no instance: nodes and triangles are in local coordinates.
 const LOCAL: u32 = 0xffffffffu;
 
-// A mesh where it stands.
+// A mesh and its placement in the scene.
 struct Instance {
-    // From local coordinates to those of its nodes, and from those of the mesh to local ones.
+    // From local coordinates to those of its nodes, and from mesh to local coordinates.
     to_nodes: mat4x3f,
     from_mesh: mat4x3f,
     root: u32,
-    // None where its triangles are local and have their own numbers.
+    // NO_OBJECT if its triangles are local and have their own numbers.
     object: u32,
-    // Added to those of its triangles.
+    // Offsets added to the numbers of its triangles.
     first_index: u32,
     first_order: u32,
-    // By which boxes are widened, in coordinates of the nodes: what rounding on the way there moves rays.
+    // Margin of boxes in node coordinates: bounds the rounding error of the ray's transform.
     margin: f32,
     is_mirrored: bool,
 }
 
-// It takes four nodes.
+// Reads an instance from the four nodes that it occupies.
 fn instance_at(index: u32) -> Instance {
     let a = nodes[index];
     let b = nodes[index + 1u];
@@ -61,13 +61,13 @@ fn instance_at(index: u32) -> Instance {
     );
 }
 
-// In place of a triangle where nothing is met.
+// Stands for no triangle: the ray missed.
 const NO_TRIANGLE: u32 = 0xffffffffu;
-// Farther than anything [local].
+// Beyond every distance [local].
 const FAR_AWAY: f32 = 3e38;
-// By which boxes are too large [local]: rounding of distances to them stays below.
+// Margin of boxes [local], which covers the rounding of distances to them.
 const BOX_MARGIN: f32 = 1.9073486e-6;
-// Nodes that may wait: hierarchies are at most this deep.
+// Capacity of the traversal stack; hierarchies are less deep.
 const STACK: u32 = 64u;
 
 struct Hit {
@@ -77,16 +77,16 @@ struct Hit {
     instance: u32,
 }
 
-// A ray as all triangles need it.
+// A ray, prepared for intersection with triangles.
 struct Sheared {
     origin: vec3f,
     shear: vec3f,
-    // Which axis is the largest of the direction, and whether it points down it.
+    // Largest axis of the direction, and whether the direction is negative along it.
     axis: u32,
     is_down: bool,
 }
 
-// The ray's largest axis as z, handedness kept.
+// Permutes axes so that the ray's largest one becomes z, preserving handedness.
 fn turned(v: vec3f, ray: Sheared) -> vec3f {
     let along = select(select(v.xyz, v.zxy, ray.axis == 1u), v.yzx, ray.axis == 0u);
     return select(along, along.yxz, ray.is_down);
@@ -107,7 +107,7 @@ fn sheared(origin: vec3f, direction: vec3f) -> Sheared {
     return ray;
 }
 
-// p.x q.y - p.y q.x, computed alike for both triangles of an edge whatever the compiler makes of it.
+// p.x q.y - p.y q.x, evaluated identically for both triangles at an edge, whatever the compiler does.
 fn edge_function(p: vec2f, q: vec2f) -> f32 {
     let is_ordered = p.x < q.x || (p.x == q.x && p.y < q.y);
     let low = select(q, p, is_ordered);
@@ -121,28 +121,28 @@ fn gamma(n: f32) -> f32 {
     return n * 5.9604645e-8 / (1.0 - n * 5.9604645e-8);
 }
 
-// A ray as boxes need it.
+// A ray, prepared for intersection with boxes.
 struct Slabs {
-    // Of the lower and the upper planes: boxes are widened by what lies between.
+    // Origins for the lower and upper planes; their difference widens the boxes.
     low_origin: vec3f,
     high_origin: vec3f,
     inverse: vec3f,
 }
 
 fn slabs(origin: vec3f, direction: vec3f, margin: f32) -> Slabs {
-    // No division by zero; signs do not matter where the other side of a box is as far.
+    // Avoids division by zero; the sign does not matter, as both planes of the slab are then far away.
     let safe = select(direction, vec3f(1e-20), abs(direction) < vec3f(1e-20));
     return Slabs(origin + margin, origin - margin, 1.0 / safe);
 }
 
-// Distances along a ray are the same in the coordinates of an instance's nodes.
+// The ray's slabs in an instance's node coordinates, where distances along the ray stay the same.
 fn slabs_in(at: Instance, origin: vec3f, direction: vec3f) -> Slabs {
     let far = max(abs(origin.x), max(abs(origin.y), abs(origin.z)));
     let begin = at.to_nodes * vec4f(origin, 1.0);
     return slabs(begin, at.to_nodes * vec4f(direction, 0.0), at.margin * max(far, 1.0));
 }
 
-// A triangle as an instance has it.
+// A triangle, placed by an instance.
 fn in_instance(triangle: Triangle, instance: u32) -> Triangle {
     if instance == LOCAL {
         return triangle;
@@ -163,12 +163,12 @@ fn in_instance(triangle: Triangle, instance: u32) -> Triangle {
     );
 }
 
-// The triangle that was met.
+// The triangle that was hit.
 fn met(hit: Hit) -> Triangle {
     return in_instance(triangles[hit.triangle], hit.instance);
 }
 
-// Woop, Benthin and Wald 2013: watertight. Distance below zero where the triangle is missed.
+// Watertight intersection after Woop, Benthin and Wald 2013. The distance is negative for a miss.
 fn meet_triangle(ray: Sheared, index: u32, triangle: Triangle, instance: u32) -> Hit {
     let a = turned(triangle.a - ray.origin, ray);
     let b = turned(triangle.b - ray.origin, ray);
@@ -188,7 +188,7 @@ fn meet_triangle(ray: Sheared, index: u32, triangle: Triangle, instance: u32) ->
         return missed;
     }
     let distance = ray.shear.z * (u * a.z + v * b.z + w * c.z) / determinant;
-    // Pharr, Jakob and Humphreys, Physically Based Rendering, 6.8.7: below this it may be no distance at all.
+    // Rounding error of the distance: Pharr, Jakob and Humphreys, Physically Based Rendering, 6.8.7.
     let x = max(abs(pa.x), max(abs(pb.x), abs(pc.x)));
     let y = max(abs(pa.y), max(abs(pb.y), abs(pc.y)));
     let z = max(abs(a.z), max(abs(b.z), abs(c.z))) * abs(ray.shear.z);
@@ -197,7 +197,7 @@ fn meet_triangle(ray: Sheared, index: u32, triangle: Triangle, instance: u32) ->
     let error_y = gamma(5.0) * (y + z);
     let error_edge = 2.0 * (gamma(2.0) * x * y + error_y * x + error_x * y);
     let bound = 3.0 * (gamma(3.0) * edge * z + error_edge * z + gamma(3.0) * z * edge) / abs(determinant);
-    // Ahead with all corners it is a distance however narrow the triangle looks: a mean of theirs.
+    // If all corners lie ahead, so does the hit, which is a mean of them, however narrow the triangle looks.
     let ahead = min(a.z * ray.shear.z, min(b.z * ray.shear.z, c.z * ray.shear.z));
     if (distance > bound || ahead > gamma(8.0) * z) && distance < FAR_AWAY {
         return Hit(index, distance, vec3f(u, v, w) / determinant, instance);
@@ -205,7 +205,7 @@ fn meet_triangle(ray: Sheared, index: u32, triangle: Triangle, instance: u32) ->
     return missed;
 }
 
-// Distance at which a ray enters a box before a limit; FAR_AWAY where it does not.
+// Distance at which a ray enters a box before `limit`; FAR_AWAY for a miss.
 fn enter(ray: Slabs, index: u32, limit: f32) -> f32 {
     let node = nodes[index];
     let low = (node.low - ray.low_origin) * ray.inverse;
@@ -217,22 +217,22 @@ fn enter(ray: Slabs, index: u32, limit: f32) -> f32 {
     return select(FAR_AWAY, begin, begin <= end);
 }
 
-// A search for the nearest triangle.
+// State of a search for the nearest triangle.
 struct Search {
     best: Hit,
     best_order: u32,
-    // The node to look at next, where there is one.
+    // The node to visit next, if there is one.
     index: u32,
     is_over: bool,
     count: u32,
-    // Whose triangles are searched.
+    // The instance being searched.
     instance: u32,
-    // How many nodes wait that lie over instances: those after them are of the one that is searched.
+    // Height of the stack when the instance was entered: entries above belong to it.
     outside: u32,
 }
 
-// The nearest triangle before a limit, from either side. First down to a leaf, then through its triangles: neighbouring
-// rays then do the same at the same time.
+// The nearest triangle before `limit`, from either side. Descends to a leaf first and then intersects its triangles, so
+// that neighbouring rays do the same at the same time.
 fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
     let ray = sheared(origin, direction);
     let outside = slabs(origin, direction, 0.0);
@@ -268,7 +268,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             if min(left, right) < FAR_AWAY {
                 search.index = select(node.first + 1u, node.first, is_left);
             } else if search.count > 0u {
-                // It may be farther than what was found since: then its children are.
+                // It may be farther than the best hit by now; its children are then culled.
                 if search.count == search.outside {
                     search.instance = LOCAL;
                     boxes = outside;
@@ -283,7 +283,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
         for (var slot = first; slot < end; slot += 1u) {
             let triangle = in_instance(triangles[slot], search.instance);
             let found = meet_triangle(ray, slot, triangle, search.instance);
-            // Of triangles at the same distance the first given.
+            // Of triangles at the same distance, the one of lowest order wins.
             let is_nearer = found.distance < search.best.distance
                 || (found.distance == search.best.distance && triangle.order < search.best_order);
             if found.triangle != NO_TRIANGLE && is_nearer && triangle.object != NO_OBJECT {

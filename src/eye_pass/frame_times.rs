@@ -17,43 +17,39 @@ use crate::scene::{Camera, Scene};
 /// Samples per pixel, as in the window.
 pub const SAMPLES: u32 = 4;
 
-/// Format of the target: encoded values, as in the window.
+/// Format of the target: sRGB-encoded values, as in the window.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-/// A frame is drawn once more where pipelines were made for it. They come in one go; whoever makes new ones for ever
-/// is not waited for.
+/// Maximum number of times that a frame is drawn again because it created pipelines. They are normally created all at
+/// once; a renderer that never stops creating them is not waited for.
 const MAX_REPEATS: usize = 8;
 
-/// What is drawn.
+/// A camera path through a lit scene.
 #[derive(Debug)]
 pub struct Walk<'a> {
-    /// The scene.
     pub scene: &'a Scene,
-    /// Its light.
     pub maps: &'a [IlluminationMap],
-    /// Size, exposure, tone map and background of every frame; its camera counts for the exposure alone.
+    /// Size, exposure, tone map and background of every frame; its camera is used for auto exposure alone.
     pub view: View,
-    /// One for each frame.
+    /// One per frame.
     pub cameras: &'a [Camera],
-    /// Whether what is seen through glass is parted by wavelength.
+    /// Only the switch of dispersion is used.
     pub effects: &'a EffectSwitches,
-    /// What radiance is multiplied by before tone mapping.
+    /// Matrix by which radiance is multiplied before tone mapping.
     pub white_balance: Matrix3,
 }
 
-/// Three figures of many.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Spread {
-    /// The middle one; the lower middle of an even number.
+    /// Lower median for an even number of values.
     pub median: f64,
-    /// The least that at least 95 % of them do not exceed.
+    /// The smallest value that at least 95 % of the values do not exceed.
     pub p95: f64,
-    /// The largest.
     pub max: f64,
 }
 
 impl Spread {
-    /// Of some values; zeros where there are none.
+    /// All zero without values.
     pub fn of(mut values: Vec<f64>) -> Self {
         values.sort_by(f64::total_cmp);
         // Rounded up: 95 % of 20 are 19.
@@ -61,7 +57,6 @@ impl Spread {
         Self {
             p95: values.get(rank.saturating_sub(1)).copied().unwrap_or(0.0),
             max: values.last().copied().unwrap_or(0.0),
-            // The lower middle of an even number.
             median: values
                 .get(values.len().saturating_sub(1) / 2)
                 .copied()
@@ -70,66 +65,65 @@ impl Spread {
     }
 }
 
-/// Time on the device by pass [ms].
+/// GPU time by pass [ms].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DeviceMs {
-    /// Surfaces, as the picture shows them.
+    /// The pass over all surfaces.
     pub opaque: Spread,
-    /// Chains of mirrors, polish and clear bodies.
+    /// Tracing chains.
     pub specular: Spread,
-    /// The last pass.
     pub tone_mapping: Spread,
-    /// All three of a frame together.
+    /// All three passes of a frame.
     pub sum: Spread,
 }
 
-/// A drawing that made pipelines or was the very first: it says what a first look costs, and counts nowhere else.
+/// A frame that created pipelines or was the very first. It measures start-up cost and is excluded from all other
+/// figures.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WarmUp {
-    /// Which frame, from 1 on.
+    /// Number of the frame, from 1 on.
     pub frame: usize,
-    /// From the call until the device was done [ms].
+    /// From the call until the GPU is done [ms].
     pub wall_ms: f64,
-    /// All passes; `None` where the device cannot tell.
+    /// GPU time of all passes [ms]; `None` without timestamp queries.
     pub device_ms: Option<f64>,
-    /// Pipelines that were made for it.
+    /// Pipelines created.
     pub pipelines: u64,
 }
 
-/// All frames of a path, drawn in one manner.
+/// Times of all frames of a path, drawn with one setting of chains.
 #[derive(Clone, Debug, Serialize)]
 pub struct MannerTimes {
-    /// How the eye's chains were switched.
     pub chains: EffectSwitch,
-    /// Frames that were timed: each of the path once, warm-up apart.
+    /// Timed frames: each frame of the path once, without warm-up.
     pub frames: usize,
-    /// `None` where the device cannot tell.
+    /// `None` without timestamp queries.
     pub device_ms: Option<DeviceMs>,
-    /// From the call until the device was done [ms].
+    /// From the call until the GPU is done [ms].
     pub wall_ms: Spread,
-    /// Objects that a frame drew.
+    /// Objects drawn per frame.
     pub drawn_objects: Spread,
-    /// Those of them that were drawn as specular.
+    /// Specular objects drawn per frame.
     pub drawn_specular: Spread,
     /// Render pipelines at the end.
     pub pipelines: u64,
     /// Those of them for specular surfaces.
     pub specular_pipelines: u64,
-    /// In the order of the frames.
+    /// In frame order.
     pub warm_up: Vec<WarmUp>,
 }
 
-/// What one manner takes over what another takes, median over median.
+/// Ratio of the median times of two settings; `None` where the other median is not positive.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ratio {
-    /// Of the sum of all passes on the device; `None` where it cannot tell.
+    /// GPU time of all passes; also `None` without timestamp queries.
     pub device: Option<f64>,
-    /// Of the time from the call until the device was done.
+    /// Time from the call until the GPU is done.
     pub wall: Option<f64>,
 }
 
 impl MannerTimes {
-    /// What it takes over what `other` takes.
+    /// Ratio of these times to those of `other`.
     pub fn over(&self, other: &Self) -> Ratio {
         let over = |a: f64, b: f64| (b > 0.0).then(|| a / b);
         let device = self.device_ms.zip(other.device_ms);
@@ -140,15 +134,14 @@ impl MannerTimes {
     }
 }
 
-/// Called with the number of a frame, from 0 on, and its pixels: encoded, RGBA, row 0 at the top.
+/// Called with the index of a frame, from 0 on, and its pixels: sRGB-encoded RGBA, row 0 at the top.
 pub type Keep<'a> = dyn FnMut(usize, Vec<u8>) -> Result<()> + 'a;
 
-/// Draws every frame once with each of `switches`, now one first, now another, so that what drifts meets all alike.
-/// `keep` gets the frames of the last switch.
+/// Draws every frame once with each of `switches`. The order rotates from frame to frame, so that drift affects all
+/// switches alike. `keep` receives the frames of the last switch.
 ///
 /// # Errors
-/// No switch or camera; a picture that the device cannot hold; a device that was lost; stopped before the end; what
-/// `keep` returns.
+/// A picture that the device cannot hold; a lost device; cancellation; errors of `keep`.
 pub fn measure(
     gpu: &Gpu,
     walk: &Walk<'_>,
@@ -183,14 +176,14 @@ pub fn measure(
     Ok(manners.into_iter().map(TimedRenderer::times).collect())
 }
 
-/// Exposure that suits what the walk's view shows [stops].
+/// Auto exposure of the walk's view [stops].
 ///
 /// # Errors
-/// A picture that the device cannot hold; a device that was lost.
+/// A picture that the device cannot hold; a lost device.
 pub fn auto_exposure_stops(gpu: &Gpu, walk: &Walk<'_>) -> Result<f64> {
     let mut renderer = Renderer::new(gpu, walk.scene, FORMAT, SAMPLES)?;
     renderer.set_maps(gpu, walk.scene, walk.maps)?;
-    // An eighth of the pixels tells as much about the brightness as all of them.
+    // An eighth of the width and height is enough to estimate the brightness.
     let view = View {
         width: walk.view.width.div_ceil(8),
         height: walk.view.height.div_ceil(8),
@@ -216,7 +209,6 @@ fn target(gpu: &Gpu, view: &View) -> wgpu::Texture {
     })
 }
 
-/// One drawing.
 #[derive(Clone, Copy, Debug)]
 struct TimedFrame {
     wall_ms: f64,
@@ -229,7 +221,7 @@ fn sum(ms: GpuMs) -> f64 {
     ms.opaque + ms.specular + ms.tone_mapping
 }
 
-/// A renderer of its own, since switching chains off gives up what they took.
+/// Each switch has a renderer of its own, since switching chains off frees their resources.
 struct TimedRenderer {
     chains: EffectSwitch,
     renderer: Renderer,
@@ -253,7 +245,7 @@ impl TimedRenderer {
         })
     }
 
-    /// Draws a frame until nothing had to be made for it.
+    /// Draws a frame until it creates no more pipelines.
     fn draw_settled(&mut self, gpu: &Gpu, target: &wgpu::Texture, view: &View, frame: usize) -> Result<()> {
         let mut is_first = self.drawings.is_empty();
         for repeat in 0.. {
@@ -285,7 +277,7 @@ impl TimedRenderer {
         gpu.queue.submit([encoder.finish()]);
         gpu.wait()?;
         let wall_ms = 1e3 * start.elapsed().as_secs_f64();
-        // The device is done: what it tells now is of this frame.
+        // The GPU is done, so these times are of this frame.
         let is_told = self.renderer.collect_times(gpu);
         let counts = self.renderer.counts();
         Ok(TimedFrame {
@@ -314,7 +306,7 @@ impl TimedRenderer {
     }
 }
 
-/// Of frames that the device has all told of.
+/// `None` if any frame has no GPU times.
 fn device_ms(drawings: &[TimedFrame]) -> Option<DeviceMs> {
     let told: Vec<GpuMs> = drawings
         .iter()

@@ -22,7 +22,7 @@ use reference::ReferenceSettings;
 pub use view::{Picture, ToneMap, View};
 pub use white_balance::WhiteBalance;
 
-/// What a view shows of a scene in the light of its maps, traced by the CPU with four samples a pixel.
+/// Renders a view of a scene lit by its maps, on the CPU, with four samples per pixel.
 ///
 /// # Errors
 /// It was cancelled.

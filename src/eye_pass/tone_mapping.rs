@@ -3,10 +3,10 @@
 use super::{Picture, ToneMap};
 use crate::optics::{LinearSrgb, luminance};
 
-/// Where auto exposure brings the log-average luminance: the 18 % grey card.
+/// Auto exposure maps the log-average luminance to this, the 18 % grey card.
 const MIDDLE_GREY: f64 = 0.18;
 
-/// Khronos PBR Neutral, exact below its shoulder, hue kept above it.
+/// Khronos PBR Neutral: exact below its shoulder, preserves hue above it.
 /// Source: <https://github.com/KhronosGroup/ToneMapping/tree/main/PBR_Neutral>.
 fn neutral(exposed: LinearSrgb) -> LinearSrgb {
     const SHOULDER: f64 = 0.8 - 0.04;
@@ -36,9 +36,9 @@ fn transform(rows: &Rows, colour: LinearSrgb) -> LinearSrgb {
     LinearSrgb::new(r, g, b)
 }
 
-/// From linear sRGB to AgX's working space: primaries of BT.709 drawn in by a fifth of their distance to D65.
+/// Linear sRGB to AgX's working space, whose primaries are those of BT.709 moved a fifth of the way towards D65.
 ///
-/// Worked out from that rule, so that greys stay grey; the rounded matrix of the sources differs by 1e-4.
+/// Computed from that rule, so that greys stay grey; the rounded matrix of the sources differs by 1e-4.
 const AGX_INSET: Rows = [
     [
         0.842_398_929_049_531,
@@ -76,14 +76,14 @@ const AGX_OUTSET: Rows = [
     ],
 ];
 
-/// Ten stops below and 6.5 above middle grey, as powers of two: log2(0.18) − 10 and + 6.5.
+/// log2(0.18) − 10 and log2(0.18) + 6.5: ten stops below and 6.5 above middle grey.
 const AGX_STOPS: [f64; 2] = [-12.473_931_188_332_413, 4.026_068_811_667_587];
 
-/// AgX's sigmoid from [0, 1] to display codes [0, 1]: slope 2 at middle grey, which becomes 1/2, and powers 3 below it
-/// and 3.25 above. The scales are what brings its ends to 0 and 1.
+/// AgX's sigmoid from [0, 1] to display codes [0, 1]. Middle grey maps to 1/2 with slope 2; the exponents are 3 below
+/// it and 3.25 above. The scales bring the ends to 0 and 1.
 ///
-/// The closed form that the table of the reference was made with, not one of the polynomials that approximate it.
-/// Source: `AgX.py` of <https://github.com/sobotka/SB2383-Configuration-Generation>, after Jed Smith; agrees with every
+/// This is the closed form behind the reference's table, not one of its polynomial approximations.
+/// Source: `AgX.py` of <https://github.com/sobotka/SB2383-Configuration-Generation>, after Jed Smith; matches every
 /// entry that was compared of `AgX_Default_Contrast.spi1d` in <https://github.com/sobotka/AgX>.
 fn agx_contrast(position: f64) -> f64 {
     const PIVOT: f64 = 10.0 / 16.5;
@@ -96,8 +96,8 @@ fn agx_contrast(position: f64) -> f64 {
     0.5 + rise * (1.0 + (rise.abs() / scale).powf(power)).powf(-1.0 / power)
 }
 
-/// Troy Sobotka's AgX without a look. Black, and all that is darker than ten stops below middle grey, is 0.
-/// Sources: <https://github.com/sobotka/AgX>; the order of its steps, and the display's exponent of 2.2 at the end, as in
+/// Troy Sobotka's AgX without a look. Everything darker than ten stops below middle grey is 0.
+/// Sources: <https://github.com/sobotka/AgX>; the order of its steps and the final display exponent of 2.2 follow
 /// <https://iolite-engine.com/blog_posts/minimal_agx_implementation>.
 fn agx(exposed: LinearSrgb) -> LinearSrgb {
     let [least, most] = AGX_STOPS;
@@ -106,8 +106,8 @@ fn agx(exposed: LinearSrgb) -> LinearSrgb {
     transform(&AGX_OUTSET, codes).map(|code| code.max(0.0).powf(2.2))
 }
 
-/// The fit of ACES' reference rendering and output transforms by Stephen Hill, matrices from and to linear sRGB
-/// included. Greys below 0.0033 are 0, those above 25.7 are white; a fit, not the transform of the Academy itself.
+/// Stephen Hill's fit of the ACES reference rendering and output transforms, with its matrices from and to linear sRGB.
+/// Greys below 0.0033 become 0, those above 25.7 white. It is a fit, not the Academy's own transform.
 /// Source: `ACES.hlsl` of <https://github.com/TheRealMJP/BakingLab>.
 fn aces(exposed: LinearSrgb) -> LinearSrgb {
     const INPUT: Rows = [
@@ -125,11 +125,11 @@ fn aces(exposed: LinearSrgb) -> LinearSrgb {
     transform(&OUTPUT, transform(&INPUT, exposed).map(curve))
 }
 
-/// Exact up to 0.4, then logarithmic: 1 is shown as 0.62, each stop above it as a tenth more, and four stops above it as
-/// white. Keeps hues, but for the brightest, of which up to two fifths turn white.
+/// Exact up to 0.4, logarithmic above: 1 maps to 0.62, each stop above adds a tenth, and four stops above reach white.
+/// Preserves hue, except that the brightest colours desaturate by up to two fifths.
 fn soft(exposed: LinearSrgb) -> LinearSrgb {
     const SHOULDER: f64 = 0.4;
-    /// Brings 16 to 1, with slope 1 at the shoulder.
+    /// Maps 16 to 1, with slope 1 at the shoulder.
     const STEP: f64 = 0.123_872_741_774_841_12;
     const MAX_WHITENESS: f64 = 0.4;
     let peak = exposed.max_channel();
@@ -139,12 +139,12 @@ fn soft(exposed: LinearSrgb) -> LinearSrgb {
     let rise = STEP * ((peak - SHOULDER) / STEP).ln_1p();
     let new_peak = (SHOULDER + rise).min(1.0);
     let whiteness = MAX_WHITENESS * ((new_peak - SHOULDER) / (1.0 - SHOULDER)).powi(3);
-    // A grey stays the same grey to the last bit.
+    // This order of operations keeps greys bit-identical.
     ((exposed / peak) * (1.0 - whiteness) + LinearSrgb::grey(whiteness)) * new_peak
 }
 
 impl ToneMap {
-    /// Display light [0, 1] from exposed radiance, where 1 is the display's white. Negative channels count as 0.
+    /// Display light [0, 1] of exposed radiance, where 1 is display white. Negative channels are clamped to 0.
     pub fn apply(self, exposed: LinearSrgb) -> LinearSrgb {
         let exposed = exposed.map(|channel| channel.max(0.0));
         let display = match self {
@@ -158,7 +158,7 @@ impl ToneMap {
     }
 }
 
-/// A picture as sRGB-encoded bytes, RGBA with full alpha, row by row: radiance × 2^`exposure_stops`, tone-mapped.
+/// Encodes a picture as opaque sRGB RGBA8, row by row, after exposure by 2^`exposure_stops` and tone mapping.
 pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) -> Vec<u8> {
     let exposure = exposure_stops.exp2();
     let pixel = |radiance: &[f32; 3]| {
@@ -171,11 +171,12 @@ pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) 
 }
 
 impl Picture {
-    /// Exposure [stops] that brings the log-average luminance of the lit pixels, but for their darkest and their brightest
-    /// tenth, to middle grey, or less where that tenth would go beyond white; 0 for a black picture.
+    /// Exposure [stops] that brings the log-average luminance of the lit pixels to middle grey; 0 for a black picture.
+    /// The average leaves out the darkest and the brightest tenth. The exposure is lower where the brightest tenth
+    /// would exceed white.
     ///
-    /// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor the last traces of
-    /// light decide.
+    /// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor faint residual
+    /// light affect the result.
     pub fn auto_exposure_stops(&self) -> f64 {
         let mut lit: Vec<f64> = self.radiance.iter().map(luminance).collect();
         lit.retain(|luminance| luminance.is_finite() && *luminance > 0.0);

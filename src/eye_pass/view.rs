@@ -24,7 +24,7 @@ use crate::scene::Camera;
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum ToneMap {
-    /// Cut at 1.
+    /// Clipped at 1.
     None,
     /// Khronos PBR Neutral: keeps hues, rolls highlights off.
     Neutral,
@@ -32,35 +32,35 @@ pub enum ToneMap {
     AgX,
     /// ACES, in the fit of Stephen Hill: more contrast, darker middle tones.
     Aces,
-    /// Exact in dark and middle tones, logarithmic above: what is up to 16 times as bright as white can be told apart.
+    /// Exact in dark and middle tones, logarithmic above: preserves detail up to 16 times white.
     #[default]
     Soft,
 }
 
 impl ToneMap {
-    /// Every one.
+    /// All tone maps.
     pub const ALL: [Self; 5] = [Self::None, Self::Neutral, Self::AgX, Self::Aces, Self::Soft];
 }
 
-/// One picture to be made.
+/// A camera, and the size and display settings of its picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// From where.
+    /// Viewpoint, direction and field of view.
     pub camera: Camera,
-    /// Pixels across, > 0.
+    /// Width [pixels], > 0.
     pub width: u32,
-    /// Pixels down, > 0.
+    /// Height [pixels], > 0.
     pub height: u32,
     /// Radiance [W/(m² sr)] is multiplied by 2^stops before tone mapping.
     pub exposure_stops: f64,
-    /// After the exposure.
+    /// Applied after exposure.
     pub tone_map: ToneMap,
-    /// Radiance seen where nothing is hit [W/(m² sr)], in scenes without an environment.
+    /// Background radiance [W/(m² sr)] of scenes without an environment.
     pub background: LinearSrgb,
 }
 
 impl View {
-    /// What a camera sees before a black background, as bright as it is.
+    /// A view over a black background, at neutral exposure.
     pub fn new(camera: Camera, [width, height]: [u32; 2]) -> Self {
         Self {
             camera,
@@ -76,9 +76,9 @@ impl View {
 /// Radiance per pixel [W/(m² sr)], linear sRGB, row 0 at the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
-    /// Pixels across.
+    /// Width [pixels].
     pub width: u32,
-    /// Pixels down.
+    /// Height [pixels].
     pub height: u32,
     /// `width × height` values.
     pub radiance: Vec<[f32; 3]>,

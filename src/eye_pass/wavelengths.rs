@@ -1,9 +1,9 @@
 //! The wavelengths at which chains are traced through dispersive glass, and the colour that each contributes.
 //!
-//! Radiance in linear sRGB stands for a spectrum: daylight (D65) times what the colour is of each wavelength
-//! ([`ColourBasis`]). What the eye sees of that at one wavelength is again a colour, so that a wavelength is a matrix on
-//! linear sRGB. Over all wavelengths, and over those of every set made here, the matrices add up to the identity: what
-//! is not parted keeps its colour exactly.
+//! Radiance in linear sRGB stands for a spectrum: daylight (D65) times the reflectance that [`ColourBasis`] assigns to
+//! the colour. The part of it at one wavelength is again a colour, so that each wavelength is a matrix on linear sRGB.
+//! Over the whole spectrum, and over every set made here, these matrices add up to the identity: light that does not
+//! disperse keeps its colour exactly.
 
 use std::sync::LazyLock;
 
@@ -14,32 +14,32 @@ use crate::optics::spectrum::{WavelengthSampler, Xyz, illuminants, xyz_bar};
 use crate::optics::wavelength::{D_LINE, VISIBLE};
 use crate::optics::{ColourBasis, LinearSrgb, Nanometres};
 
-/// Wavelengths of a picture that is seen for a moment only.
+/// Wavelengths per frame of an interactive view.
 const WHILE_WALKING: u32 = 3;
-/// Most wavelengths of one of many pictures of a view: three, and the one that carries what they lack.
+/// Maximum number of wavelengths per frame of a view: three samples, and one that carries the remainder to white.
 pub const MAX_PER_PICTURE: usize = WHILE_WALKING as usize + 1;
-/// Fraction of the golden ratio: multiples of it fill the unit interval evenly, however many there are.
+/// The golden ratio less one: the fractional parts of its multiples fill the unit interval evenly.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
 
-/// A wavelength that light is followed at.
+/// A wavelength at which chains are traced, with the colour that it contributes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeenWavelength {
-    /// Which.
     pub wavelength: Nanometres,
-    /// From radiance in linear sRGB to what is seen of it at this wavelength.
+    /// Maps radiance in linear sRGB to the part of it at this wavelength.
     pub share: DMat3,
 }
 
 impl SeenWavelength {
-    /// What is seen of a radiance, in its unit; channels may be negative, as no display shows one wavelength.
+    /// The part of a radiance at this wavelength, in the same unit. Channels may be negative: no display shows
+    /// monochromatic light.
     pub fn of(&self, radiance: LinearSrgb) -> LinearSrgb {
         LinearSrgb::from((self.share * DVec3::from_array(radiance.to_array())).to_array())
     }
 }
 
-/// A set for one sample of a pixel: bands of equal importance to the eye that meet without gap, each followed at its
-/// median. `shift` [0, 1) moves all of them by this part of a band; above 0 the first and last are cut, and there is
-/// one more than `count` > 0.
+/// Wavelengths of one sample of a pixel: the medians of adjacent bands of equal importance to the eye, which cover the
+/// visible range. `shift` [0, 1) moves all bands by this fraction of a band. Above 0, the first and last are cut, and
+/// there is one more than `count` > 0.
 pub fn bands(count: u32, shift: f64) -> Vec<SeenWavelength> {
     let inner = (0..=count).map(|index| (f64::from(index) + shift) / f64::from(count));
     let inner = inner.filter(|edge| (0.0..=1.0).contains(edge));
@@ -54,14 +54,14 @@ pub fn bands(count: u32, shift: f64) -> Vec<SeenWavelength> {
     edges.windows(2).map(band).collect()
 }
 
-/// The shift of [`bands`] of one of many samples; 0 for the first.
+/// The `shift` of [`bands`] for a sample of a pixel; 0 for the first.
 pub fn shift_of_sample(index: u32) -> f64 {
     (GOLDEN * f64::from(index)).fract()
 }
 
-/// The set of one of many pictures of a view: three bands for the first, as it may be the only one; for each later
-/// one three other wavelengths with their own colours and, as three colours seldom add up to white, what is left at
-/// 587.56 nm. That adds up to nothing over many pictures, whose mean approaches all wavelengths.
+/// Wavelengths of one of the frames that are averaged for a view. The first frame has three bands, as it may be the
+/// only one. Each later one has three samples with their own colours and, as these seldom add up to white, the
+/// remainder at 587.56 nm. The remainders average to zero, so that the mean converges to the full spectrum.
 pub fn of_picture(index: u32) -> Vec<SeenWavelength> {
     if index == 0 {
         return bands(WHILE_WALKING, 0.0);
@@ -84,18 +84,17 @@ pub fn of_picture(index: u32) -> Vec<SeenWavelength> {
     set
 }
 
-/// What is seen at all wavelengths below one.
+/// Sum of the matrices of all wavelengths below this one.
 pub fn share_below(wavelength: Nanometres) -> DMat3 {
     SPECTRUM.below(wavelength)
 }
 
 static SPECTRUM: LazyLock<SeenSpectrum> = LazyLock::new(SeenSpectrum::new);
 
-/// The matrices of all wavelengths.
 struct SeenSpectrum {
-    /// Sums below each whole nanometre of the visible, between which they are linear.
+    /// Cumulative sums at each whole nanometre of the visible range, linear in between.
     below: Vec<DMat3>,
-    /// How much daylight of each wavelength matters to the eye.
+    /// Importance to the eye of each wavelength of daylight.
     importance: WavelengthSampler,
 }
 
@@ -119,7 +118,7 @@ impl SeenSpectrum {
                 DMat3::from_cols_array(&columns)
             })
             .collect();
-        // The basis has the primaries' colours but for the rounding of its table; what is left is taken out here.
+        // The basis has the primaries' colours up to the rounding of its table, which this removes.
         let whole: DMat3 = pieces.iter().fold(DMat3::ZERO, |sum, piece| sum + *piece);
         let exact = whole.inverse();
         let mut below = vec![DMat3::ZERO];
@@ -134,13 +133,12 @@ impl SeenSpectrum {
         }
     }
 
-    /// Below a wavelength.
     fn below(&self, wavelength: Nanometres) -> DMat3 {
         let (piece, along) = self.piece(wavelength);
         self.below[piece] * (1.0 - along) + self.below[piece + 1] * along
     }
 
-    /// Below the wavelength under which a share [0, 1] of importance lies; nothing and all at the ends.
+    /// Cumulative sum at the quantile `share` [0, 1] of importance; exactly zero and identity at the ends.
     fn below_share(&self, share: f64) -> DMat3 {
         if share <= 0.0 {
             DMat3::ZERO
@@ -156,7 +154,7 @@ impl SeenSpectrum {
         self.below[piece + 1] - self.below[piece]
     }
 
-    /// The nanometre that a wavelength lies in, and how far along it [0, 1].
+    /// Index of the 1 nm interval that contains a wavelength, and the position within it [0, 1].
     fn piece(&self, wavelength: Nanometres) -> (usize, f64) {
         let place = (wavelength.0 - VISIBLE.start().0).clamp(0.0, (self.below.len() - 1) as f64);
         let piece = (place as usize).min(self.below.len() - 2);

@@ -12,25 +12,24 @@ use crate::optics::spectrum::temperature::{CAMERA_KELVIN, white_of_kelvin};
 use crate::optics::spectrum::xyz::{IDENTITY, Matrix3, transformed, white_balance};
 use crate::scene::Scene;
 
-/// The light that is to look white.
+/// The illuminant that the display shows as white.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum WhiteBalance {
-    /// That of the display, D65: colours stay as they are.
+    /// That of the display, D65: colours are unchanged.
     #[default]
     None,
-    /// What the scene's lamps send to its middle together, as a grey card there would show it.
+    /// The combined light of all lamps at the middle of the scene, as a grey card there would show it.
     Lamps,
-    /// Daylight or a black body of a temperature [K], see [`white_of_kelvin`].
+    /// Daylight or a black body of a colour temperature [K], see [`white_of_kelvin`].
     Kelvin(f64),
-    /// Light of a chromaticity x, y of CIE 1931.
+    /// CIE 1931 chromaticity x, y.
     Chromaticity([f64; 2]),
 }
 
 impl WhiteBalance {
-    /// What radiance in linear sRGB is multiplied by before tone mapping (Bradford); light of the chosen colour keeps
-    /// its luminance. The identity where there is no such light, as among lamps of a colour that no display can show as
-    /// white, or without lamps.
+    /// Matrix by which linear sRGB radiance is multiplied before tone mapping (Bradford). Light of the chosen colour
+    /// keeps its luminance. The identity without lamps, or if the cone responses to their light are not all positive.
     pub fn matrix(self, scene: &Scene) -> Matrix3 {
         let white = match self {
             Self::None => None,
@@ -42,7 +41,7 @@ impl WhiteBalance {
     }
 }
 
-/// `none`, `lamps`, kelvin with or without a K, or x and y with a comma between them.
+/// Accepts `none`, `lamps`, kelvin with or without a K, or x and y separated by a comma.
 impl FromStr for WhiteBalance {
     type Err = String;
 
@@ -86,7 +85,7 @@ impl fmt::Display for WhiteBalance {
 }
 
 impl Picture {
-    /// The picture with every pixel times a matrix of [`WhiteBalance::matrix`].
+    /// Multiplies every pixel by a matrix of [`WhiteBalance::matrix`].
     #[must_use]
     pub fn white_balanced(mut self, matrix: &Matrix3) -> Self {
         if *matrix != IDENTITY {

@@ -7,10 +7,10 @@ use std::time::SystemTime;
 
 use super::{read_file, write_atomically};
 
-/// Most that is kept [bytes]; beyond it the oldest goes.
+/// Capacity [bytes]; beyond it, the oldest files are removed.
 const CAPACITY_BYTES: u64 = 256 << 20;
 
-/// Where, once it was asked for.
+/// The cache folder, if the cache is enabled.
 static FOLDER: OnceLock<PathBuf> = OnceLock::new();
 
 /// FNV-1a over 64-bit words (Fowler, Noll, Vo): the same on every machine and in every version.
@@ -24,19 +24,19 @@ impl Default for ContentHash {
 }
 
 impl ContentHash {
-    /// Takes one word more.
+    /// Hashes one more word.
     pub fn take(&mut self, word: u64) {
         self.0 = (self.0 ^ word).wrapping_mul(0x0000_0100_0000_01b3);
     }
 
-    /// The hash of all words.
+    /// The hash of all words so far.
     pub fn value(self) -> u64 {
         self.0
     }
 }
 
-/// Keeps files in the user's cache folder from now on, where there is one: `$XDG_CACHE_HOME/nephroid`,
-/// `%LOCALAPPDATA%\nephroid` or `~/.cache/nephroid`.
+/// Enables the cache in the user's cache folder, if there is one: `$XDG_CACHE_HOME/nephroid`, `%LOCALAPPDATA%\nephroid`
+/// or `~/.cache/nephroid`.
 pub fn enable() {
     let folder = |variable: &str, below: &str| {
         let base = std::env::var_os(variable).filter(|base| !base.is_empty())?;
@@ -46,17 +46,17 @@ pub fn enable() {
         .or_else(|| folder("LOCALAPPDATA", "nephroid"))
         .or_else(|| folder("HOME", ".cache/nephroid"));
     if let Some(found) = found {
-        // The first word holds.
+        // The first call wins.
         let _ = FOLDER.set(found);
     }
 }
 
-/// A file that was kept under a name, of at most so many bytes; `None` where there is none.
+/// A cached file of at most `most_bytes`; `None` if there is none.
 pub fn load(name: &str, most_bytes: u64) -> Option<Vec<u8>> {
     read_file(&FOLDER.get()?.join(name), most_bytes).ok()
 }
 
-/// Keeps a file, if anything is kept; what cannot be written is made again next time.
+/// Stores a file if the cache is enabled. If that fails, its contents are computed again next time.
 pub fn store(name: &str, bytes: &[u8]) {
     let Some(folder) = FOLDER.get() else { return };
     let path = folder.join(name);

@@ -8,7 +8,7 @@ use tempfile::TempDir;
 use super::write_atomically;
 use crate::error::{Error, Result};
 
-/// A folder that can be written. One that was made for it is removed again unless something was written into it.
+/// A folder that can be written. Folders created for it are removed again if they stay empty.
 #[derive(Debug)]
 pub struct OutputFolder {
     path: PathBuf,
@@ -16,10 +16,10 @@ pub struct OutputFolder {
 }
 
 impl OutputFolder {
-    /// Makes the folder, with its parents, where it is missing, and tries to write into it.
+    /// Creates the folder and its parents if they are missing, and checks that it can be written.
     ///
     /// # Errors
-    /// Something else of that name; a place that cannot be written.
+    /// Something else of that name; a folder that cannot be written.
     pub fn open(path: &Path) -> Result<Self> {
         let mut made = Vec::new();
         let mut missing: Vec<&Path> = path
@@ -44,11 +44,11 @@ impl OutputFolder {
         }
     }
 
-    /// The same of a folder whose files are to be replaced: one that is not empty and not ours is taken only with `force`.
-    /// `whose`: what its files should be from.
+    /// [`Self::open`] for a folder whose files are to be replaced. If it is not empty and not ours, it is accepted only
+    /// with `force`. `whose` says in errors what its files should be from.
     ///
     /// # Errors
-    /// As [`Self::open`]; other people's files in it.
+    /// Those of [`Self::open`]; foreign files in the folder.
     pub fn open_own(path: &Path, is_ours: bool, force: bool, whose: &str) -> Result<Self> {
         let folder = Self::open(path)?;
         if is_ours || force || folder.is_empty()? {
@@ -61,12 +61,11 @@ impl OutputFolder {
         ))
     }
 
-    /// Where it is.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether nothing is in it.
+    /// Whether it has no entries.
     ///
     /// # Errors
     /// A folder that cannot be listed.
@@ -88,17 +87,17 @@ impl Drop for OutputFolder {
     }
 }
 
-/// Removes those folders that are empty, the innermost first; the others stay.
+/// Removes those folders that are empty, innermost first.
 fn remove_empty(made: &[PathBuf]) {
     for folder in made.iter().rev() {
         let _ = fs::remove_dir(folder);
     }
 }
 
-/// Refuses a file that could not be written, before the work that would fill it.
+/// Checks that a file can be written, before the work that produces it.
 ///
 /// # Errors
-/// No such folder, a folder or a device of that name, a place that cannot be written.
+/// No such folder; a folder or a device of that name; a folder that cannot be written.
 pub fn check_output_file(path: &Path) -> Result<()> {
     let location = path.display().to_string();
     let parent = match path.parent() {
@@ -127,10 +126,10 @@ pub fn check_output_file(path: &Path) -> Result<()> {
     }
 }
 
-/// Removes a file that is of no more use; one that is gone already is as good.
+/// Removes a file that is obsolete; a missing file is no error.
 ///
 /// # Errors
-/// A file that the system does not let go.
+/// A file that cannot be removed.
 pub fn remove_file(path: &Path) -> Result<()> {
     match fs::remove_file(path) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(Error::failure(
@@ -150,21 +149,21 @@ fn unwritable(path: &Path, error: &io::Error) -> Error {
     )
 }
 
-/// Files that are written aside, within the folder that they are for, and get their places when all of them are on the
-/// disk: a full disk or a cancelled run leaves the folder as it was.
+/// Files that are staged within the folder that they are for, and moved into place once all of them are on the disk: a
+/// full disk or a cancelled run leaves the folder unchanged.
 #[derive(Debug)]
 pub struct StagedFolder {
-    /// Goes first, so that a folder that was made for nothing is empty when it is removed.
+    /// Dropped before `root`, so that a folder created for nothing is empty when it is removed.
     aside: TempDir,
     root: OutputFolder,
     names: Vec<String>,
 }
 
 impl StagedFolder {
-    /// For a folder that can be written.
+    /// Stages files for a folder that can be written.
     ///
     /// # Errors
-    /// A place that cannot be written any more.
+    /// A folder that can no longer be written.
     pub fn new(root: OutputFolder) -> Result<Self> {
         let mut builder = tempfile::Builder::new();
         builder.prefix(".nephroid-").suffix(".part");
@@ -176,15 +175,15 @@ impl StagedFolder {
         })
     }
 
-    /// Where the files will be.
+    /// The folder that the files are for.
     pub fn path(&self) -> &Path {
         self.root.path()
     }
 
-    /// Writes a file of a plain name aside; one of the same name is replaced.
+    /// Stages a file, given its plain name; replaces one of the same name.
     ///
     /// # Errors
-    /// A disk that is full; a folder of that name where the file is to be.
+    /// A full disk; a folder where the file is to be.
     pub fn write(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
         let place = self.root.path().join(name);
         if place.is_dir() {
@@ -195,7 +194,7 @@ impl StagedFolder {
             ));
         }
         let written = write_atomically(&self.aside.path().join(name), |writer| writer.write_all(bytes));
-        // Errors name the place that the user knows.
+        // Errors name the path that the user knows.
         written.map_err(|error| Error {
             location: place.display().to_string(),
             ..error
@@ -206,10 +205,10 @@ impl StagedFolder {
         Ok(())
     }
 
-    /// Gives all files their places, in the order in which they were written.
+    /// Moves all files into place, in the order in which they were staged.
     ///
     /// # Errors
-    /// A file that the system does not let be replaced.
+    /// A file that cannot be replaced.
     pub fn commit(self) -> Result<()> {
         for name in &self.names {
             let place = self.root.path().join(name);
@@ -219,7 +218,7 @@ impl StagedFolder {
     }
 }
 
-/// Brings the names in a folder to the disk, where the system knows how.
+/// Flushes a folder's entries to disk, where the system supports it.
 fn sync(folder: &Path) -> io::Result<()> {
     if cfg!(unix) {
         return fs::File::open(folder)?.sync_all();

@@ -21,7 +21,7 @@ pub use folder::{OutputFolder, check_output_file, remove_file};
 /// # Errors
 /// No such file; a folder, device or pipe of that name.
 pub fn file_bytes(path: &Path) -> Result<u64> {
-    // Asked before opening, since opening a pipe waits for its other end.
+    // Checked before opening, since opening a pipe waits for its other end.
     let metadata = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?;
     if !metadata.is_file() {
         return Err(Error::failure(
@@ -33,10 +33,10 @@ pub fn file_bytes(path: &Path) -> Result<u64> {
     Ok(metadata.len())
 }
 
-/// Bytes of a file from a place on. No memory is taken for more than the file holds.
+/// Reads a part of a file, starting at `from`. Allocates no more than the file holds.
 ///
 /// # Errors
-/// As [`file_bytes`]; a file that ends before; one that cannot be read.
+/// Those of [`file_bytes`]; a file that is too short; a file that cannot be read.
 pub fn read_part(path: &Path, from: u64, bytes: u64) -> Result<Vec<u8>> {
     let length = file_bytes(path)?;
     if from.checked_add(bytes).is_none_or(|end| end > length) {
@@ -56,12 +56,12 @@ pub fn read_part(path: &Path, from: u64, bytes: u64) -> Result<Vec<u8>> {
     read().map_err(|error| unreadable(path, &error))
 }
 
-/// The whole of a file of at most `max_bytes`. Only as much memory is taken as the file really holds.
+/// Reads a whole file of at most `max_bytes`. Allocates no more than the file holds.
 ///
 /// # Errors
 /// No such file; a folder, device or pipe of that name; a larger file; a file that cannot be read.
 pub fn read_file(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
-    // Asked before opening, since opening a pipe waits for its other end.
+    // Checked before opening, since opening a pipe waits for its other end.
     let metadata = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?;
     if !metadata.is_file() {
         let what = if metadata.is_dir() {
@@ -73,7 +73,7 @@ pub fn read_file(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     }
     let file = File::open(path).map_err(|error| unreadable(path, &error))?;
     let mut bytes = Vec::new();
-    // One byte more than allowed tells a file that is too large, even where its stated size is wrong.
+    // Reading one byte more than allowed detects a file that is too large, even if its stated size is wrong.
     file.take(max_bytes.saturating_add(1))
         .read_to_end(&mut bytes)
         .map_err(|error| unreadable(path, &error))?;
@@ -90,7 +90,7 @@ pub fn read_file(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// Why a file cannot be read, in the user's terms.
+/// Says why a file cannot be read, in the user's terms.
 fn unreadable(path: &Path, error: &io::Error) -> Error {
     let (what, remedy) = match error.kind() {
         io::ErrorKind::NotFound => ("there is no such file".into(), "check the path"),
@@ -105,11 +105,11 @@ fn unreadable(path: &Path, error: &io::Error) -> Error {
     Error::failure(path.display().to_string(), what, remedy)
 }
 
-/// Writes a file aside in the same folder, brings it to the disk and then gives it its name, so that a reader finds
-/// the old file or the new one and never a part, whatever happens in between. On failure nothing is left behind.
+/// Writes a temporary file in the same folder, flushes it to disk and renames it, so that readers find the old file or
+/// the new one, but never a partial one. On failure nothing is left behind.
 ///
 /// # Errors
-/// No such folder, no permission, a full disk, a folder of that name; whatever `write` returns.
+/// No such folder, no permission, a full disk, a folder of that name; errors of `write`.
 pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<()> {
     if path.is_dir() {
         return Err(Error::failure(
@@ -135,11 +135,11 @@ fn write_and_rename(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Resul
     Ok(())
 }
 
-/// A file of a name that is not taken, removed again unless it is renamed.
+/// A temporary file with an unused name, removed unless it is renamed.
 fn create_aside(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
     builder.prefix(".nephroid-").suffix(".part");
-    // Temporary files are private to their owner by default; a result is as public as any new file of the user.
+    // Temporary files are private to their owner by default; a result has the permissions of any new file.
     #[cfg(unix)]
     let permissions = <std::fs::Permissions as std::os::unix::fs::PermissionsExt>::from_mode(0o666);
     #[cfg(unix)]
@@ -147,7 +147,7 @@ fn create_aside(folder: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(folder)
 }
 
-/// Why a file cannot be written, in the user's terms.
+/// Says why a file cannot be written, in the user's terms.
 fn unwritable(path: &Path, error: &io::Error) -> Error {
     let (what, remedy) = match error.kind() {
         io::ErrorKind::NotFound => (
@@ -179,20 +179,19 @@ fn unwritable(path: &Path, error: &io::Error) -> Error {
     Error::failure(path.display().to_string(), what, remedy)
 }
 
-/// A value as JSON for people to read; `location` is named in errors.
+/// Serialises a value as readable JSON; `location` is named in errors.
 ///
 /// # Errors
-/// A value that JSON cannot hold.
+/// A value that JSON cannot represent.
 pub fn to_json(value: &impl Serialize, location: &str) -> Result<Vec<u8>> {
     serde_json::to_vec_pretty(value)
         .map_err(|error| Error::failure(location, format!("is not valid JSON ({error})"), "report this"))
 }
 
-/// Most characters of a slug.
+/// Maximum number of characters of a slug.
 const MAX_SLUG: usize = 40;
 
-/// A name as part of a file's name: lower-case ASCII letters, digits and hyphens; `otherwise` where nothing of it is
-/// left.
+/// Makes a name fit for file names: lower-case ASCII letters, digits and hyphens; `otherwise` if nothing is left.
 pub fn slug(name: &str, otherwise: &str) -> String {
     let mut slug = String::new();
     for character in name.chars() {
@@ -213,7 +212,7 @@ pub fn slug(name: &str, otherwise: &str) -> String {
     }
 }
 
-/// A picture of so many pixels as PNG, from its pixels' codes row by row; one clause where its size is wrong or too large.
+/// Encodes pixels as PNG, row by row. The error is a clause, for a size that is wrong or too large.
 pub fn png<P>(width: u32, height: u32, codes: Vec<P::Subpixel>) -> std::result::Result<Vec<u8>, String>
 where
     P: PixelWithColorType,

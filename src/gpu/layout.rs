@@ -1,27 +1,27 @@
 //! Structs that Rust and WGSL share: one declaration gives the bytes and the offsets, which tests compare with the
 //! shader's.
 
-/// Where one field of a shared struct lies.
+/// Position of a field in a shared struct.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FieldLayout {
-    /// Its name on both sides.
+    /// Name on both sides.
     pub name: &'static str,
-    /// Bytes from the struct's start.
+    /// Offset from the start of the struct [bytes].
     pub offset: usize,
 }
 
-/// How Rust lays out a struct that a shader reads.
+/// Memory layout of a struct that a shader reads.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct StructLayout {
-    /// Its name on both sides.
+    /// Name on both sides.
     pub name: &'static str,
-    /// Bytes, padding included.
+    /// Size including padding [bytes].
     pub size: usize,
-    /// In order.
+    /// In order of declaration.
     pub fields: Vec<FieldLayout>,
 }
 
-/// Declares a struct that is handed to shaders byte by byte, with its layout for the tests.
+/// Declares a struct that is copied to shaders byte by byte, and its layout for the tests.
 macro_rules! shader_struct {
     ($(#[$doc:meta])* $name:ident { $($(#[$field_doc:meta])* $field:ident: $type:ty,)* }) => {
         $(#[$doc])*
@@ -32,7 +32,7 @@ macro_rules! shader_struct {
         }
 
         impl $name {
-            /// Where its fields lie.
+            /// Offsets of its fields.
             pub(crate) fn layout() -> $crate::gpu::layout::StructLayout {
                 $crate::gpu::layout::StructLayout {
                     name: stringify!($name),

@@ -8,46 +8,43 @@ pub mod layout;
 pub mod readback;
 pub mod shader;
 
-/// A device that is ready to draw, with what went wrong on it so far.
+/// A graphics device, and the first error that it reported.
 ///
-/// Nothing on it panics: faults of the device are kept and handed out by [`take_error`](Self::take_error).
+/// Errors of the device cause no panic; [`take_error`](Self::take_error) returns them.
 #[derive(Debug)]
 pub struct Gpu {
-    /// Where surfaces come from.
+    /// Creates surfaces.
     pub instance: wgpu::Instance,
-    /// The chosen adapter.
     pub adapter: wgpu::Adapter,
-    /// Makes resources.
     pub device: wgpu::Device,
-    /// Takes commands.
     pub queue: wgpu::Queue,
     faults: Faults,
 }
 
-/// Tells how long the device takes; nothing else depends on it.
+/// Measures GPU times; nothing else depends on it.
 const CLOCK: wgpu::Features = wgpu::Features::TIMESTAMP_QUERY;
 
-/// Location of the error of a machine without an adapter.
+/// Location of the error on a machine without an adapter.
 const GRAPHICS: &str = "graphics";
 
-/// Whether something failed because there is no graphics adapter to draw with.
+/// Whether an error says that there is no graphics adapter.
 pub fn is_no_adapter(error: &Error) -> bool {
     error.location == GRAPHICS
 }
 
 impl Gpu {
-    /// A device without a window. Vulkan comes first, the others of this build where there is none.
+    /// A device without a window: on Vulkan if possible, otherwise on any backend of this build.
     ///
     /// # Errors
-    /// No adapter, or one that refuses to give a device.
+    /// No adapter, or one that provides no device.
     pub fn headless() -> Result<Self> {
         Self::headless_within(|limits| limits)
     }
 
-    /// [`headless`](Self::headless) on a device that is made smaller than it is, to try how the program fares there.
+    /// [`headless`](Self::headless) with reduced limits, to test smaller devices.
     ///
     /// # Errors
-    /// No adapter, or one that refuses to give a device of these limits.
+    /// No adapter, or one that provides no device with these limits.
     pub fn headless_within(limits: impl FnOnce(wgpu::Limits) -> wgpu::Limits) -> Result<Self> {
         let vulkan = instance_of(wgpu::Backends::VULKAN);
         if let Ok(adapter) = request_adapter(&vulkan, None) {
@@ -60,17 +57,17 @@ impl Gpu {
         Self::from_adapter(any, adapter, limits)
     }
 
-    /// A device with the adapter's own limits that can present to `surface`, which was made by `instance`.
+    /// A device with all limits of its adapter, which can present to `surface`. The surface was created by `instance`.
     ///
     /// # Errors
-    /// No adapter that can present to it, or one that refuses to give a device.
+    /// No adapter that can present to it, or one that provides no device.
     pub fn for_surface(instance: wgpu::Instance, surface: &wgpu::Surface<'_>) -> Result<Self> {
         let adapter = request_adapter(&instance, Some(surface))?;
         let limits = adapter.limits();
         Self::from_adapter(instance, adapter, limits)
     }
 
-    /// No optional feature but a clock is asked for, so that what runs here runs everywhere.
+    /// Requires no optional feature except timestamps, so that what runs here runs everywhere.
     fn from_adapter(
         instance: wgpu::Instance,
         adapter: wgpu::Adapter,
@@ -99,36 +96,35 @@ impl Gpu {
         })
     }
 
-    /// The adapter's name and the interface it is reached by, for people.
+    /// Name of the adapter and its backend, for messages.
     pub fn adapter_name(&self) -> String {
         let info = self.adapter.get_info();
         format!("{} ({})", info.name, info.backend)
     }
 
-    /// Whether the processor plays the device.
+    /// Whether the device is emulated on the CPU.
     pub fn is_software(&self) -> bool {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
-    /// What the device can hold.
     pub fn limits(&self) -> wgpu::Limits {
         self.device.limits()
     }
 
-    /// The first fault since the last call, if there was one.
+    /// The first error since the last call, if there was one.
     pub fn take_error(&self) -> Option<Error> {
         self.faults.take()
     }
 
-    /// Whether the device is gone for good: make a new [`Gpu`] and everything on it.
+    /// Whether the device is lost: this [`Gpu`] and everything created on it must be replaced.
     pub fn is_lost(&self) -> bool {
         self.faults.is_lost()
     }
 
-    /// Waits until all work handed in is done.
+    /// Waits until all submitted work is done.
     ///
     /// # Errors
-    /// The device was lost, or reported a fault meanwhile.
+    /// A lost device, or an error that it reported since the last check.
     pub fn wait(&self) -> Result<()> {
         let polled = self.device.poll(wgpu::PollType::wait_indefinitely());
         if let Some(fault) = self.take_error() {
@@ -139,7 +135,7 @@ impl Gpu {
             .map_err(|error| device_error(&error.to_string()))
     }
 
-    /// Refuses a picture or map that no texture of this device can hold; `location` says which.
+    /// Checks that a texture of this device can hold a picture or a map; `location` names it in the error.
     ///
     /// # Errors
     /// A side of 0 or above the device's limit.
@@ -190,8 +186,8 @@ fn request_adapter(
 }
 
 impl Gpu {
-    /// A buffer that holds these bytes, with zeros up to the next multiple of four, and four bytes at least. On a lost
-    /// device nothing is written: what is made there is of no use, and [`Gpu::take_error`] tells why.
+    /// A buffer with the given contents, zero-padded to a multiple of four bytes, at least four. On a lost device
+    /// nothing is written: the buffer is useless, and [`Gpu::take_error`] tells why.
     pub fn filled_buffer(&self, label: &str, contents: &[u8], usage: wgpu::BufferUsages) -> wgpu::Buffer {
         let whole = contents.len().max(1) as u64;
         let buffer = self.device.create_buffer(&wgpu::BufferDescriptor {
@@ -214,12 +210,11 @@ struct State {
     lost: bool,
 }
 
-/// Shared between a device's callbacks and its owner.
+/// First error and loss of a device, shared between its callbacks and its owner.
 #[derive(Clone, Debug, Default)]
 struct Faults(Arc<Mutex<State>>);
 
 impl Faults {
-    /// Sets both callbacks of a device.
     fn listen_to(device: &wgpu::Device) -> Self {
         let faults = Self::default();
         let on_error = faults.clone();
@@ -229,7 +224,7 @@ impl Faults {
         }));
         let on_lost = faults.clone();
         device.set_device_lost_callback(move |reason, message| {
-            // Dropping the last handle of a device is no fault.
+            // Dropping the last handle of a device is not an error.
             if reason != wgpu::DeviceLostReason::Destroyed {
                 log::error!("graphics device lost: {message}");
             }
@@ -249,7 +244,7 @@ impl Faults {
     fn record(&self, error: Error, lost: bool) {
         self.with(|state| {
             state.lost |= lost;
-            // Later faults are mostly consequences of the first one.
+            // Later errors are mostly consequences of the first one.
             state.first_error.get_or_insert(error);
         });
     }
@@ -259,7 +254,7 @@ impl Faults {
     }
 }
 
-/// A fault in one sentence: drivers answer with many lines, of which the last names the cause.
+/// Joins the lines of a driver's message into one; its last line names the cause.
 fn device_error(message: &str) -> Error {
     let lines: Vec<&str> = message
         .lines()

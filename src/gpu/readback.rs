@@ -3,14 +3,14 @@
 use super::Gpu;
 use crate::error::Result;
 
-/// The texels of level 0 of a 2D texture (usage `COPY_SRC`), row by row without padding.
+/// Texels of level 0 of a 2D texture (usage `COPY_SRC`), row by row without padding.
 ///
 /// # Errors
-/// The device was lost or refused the copy.
+/// A lost device; an error of the device.
 pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
     let texel_bytes = texture.format().block_copy_size(None).unwrap_or(0);
     let row_bytes = texture.width() * texel_bytes;
-    // Rows of a copy start at multiples of 256 bytes.
+    // Copies need rows aligned to 256 bytes.
     let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("read-back"),
@@ -44,10 +44,10 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
         .collect())
 }
 
-/// The bytes of a buffer (usage `COPY_SRC`).
+/// Contents of a buffer (usage `COPY_SRC`).
 ///
 /// # Errors
-/// The device was lost or refused the copy.
+/// A lost device; an error of the device.
 pub fn read_buffer(gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<u8>> {
     let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("read-back"),
@@ -61,9 +61,9 @@ pub fn read_buffer(gpu: &Gpu, source: &wgpu::Buffer) -> Result<Vec<u8>> {
     mapped(gpu, &buffer)
 }
 
-/// Waits for a buffer (usage `MAP_READ`) and gives its bytes.
+/// Waits for a buffer (usage `MAP_READ`) and returns its contents.
 fn mapped(gpu: &Gpu, buffer: &wgpu::Buffer) -> Result<Vec<u8>> {
-    // The outcome of the mapping shows in whether the range can be had below.
+    // If mapping fails, so does `get_mapped_range` below.
     buffer.map_async(wgpu::MapMode::Read, .., |_| ());
     gpu.wait()?;
     let range = buffer

@@ -1,24 +1,23 @@
 //! Assembles WGSL modules from files by name.
 
-/// One WGSL file, built into the program.
+/// A WGSL file, embedded in the program.
 #[derive(Clone, Copy, Debug)]
 pub struct ShaderFile {
-    /// Its path below `shaders/` without the ending: `shared/srgb`.
+    /// Path below `shaders/` without extension, as in `shared/srgb`.
     pub name: &'static str,
-    /// Its text.
     pub text: &'static str,
 }
 
-/// A shader module: the files it is put together from, in order.
+/// A shader module, concatenated from files.
 #[derive(Clone, Copy, Debug)]
 pub struct Program {
-    /// For messages and captures.
+    /// Label in messages and frame captures.
     pub name: &'static str,
-    /// What it consists of.
+    /// In this order.
     pub sources: &'static [ShaderFile],
 }
 
-/// A file of `shaders/` by its name.
+/// Embeds a file of `shaders/`, given its name.
 macro_rules! shader_source {
     ($name:literal) => {
         $crate::gpu::shader::ShaderFile {
@@ -30,7 +29,7 @@ macro_rules! shader_source {
 pub(crate) use shader_source;
 
 impl Program {
-    /// The whole WGSL text; each part starts with a comment that names its file.
+    /// The whole WGSL source; a comment with its name precedes each file.
     pub fn wgsl(&self) -> String {
         let parts = self.sources.iter();
         parts
@@ -38,7 +37,7 @@ impl Program {
             .collect()
     }
 
-    /// Compiles it on a device. Faults surface through the device's error callback.
+    /// Compiles it on a device, whose error callback reports errors.
     pub(crate) fn module(&self, device: &wgpu::Device) -> wgpu::ShaderModule {
         device.create_shader_module(wgpu::ShaderModuleDescriptor {
             label: Some(self.name),

@@ -4,11 +4,11 @@
 use super::Chart;
 use crate::optics::LinearSrgb;
 
-/// The unit that flux is counted in: a power of two of watts, 2⁻⁶⁰ of the power that can be deposited at most.
+/// Unit in which flux is counted: a power of two of watts, 2⁻⁶⁰ of the maximum power that can be deposited.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxUnit {
     watts: f64,
-    /// Exact while `watts` is a power of two.
+    /// Exact as long as `watts` is a power of two.
     counts_per_watt: f64,
 }
 
@@ -16,9 +16,9 @@ pub struct FluxUnit {
 pub type FluxCount = [i64; 3];
 
 impl FluxUnit {
-    /// The unit for sums of up to `power_w` [W per channel, > 0]; they stay below 2⁶⁰, so that no sum overflows.
+    /// Unit for sums of up to `power_w` [W per channel, > 0]; they stay below 2⁶⁰ and cannot overflow.
     pub fn for_power(power_w: f64) -> Self {
-        // Denormal powers keep a unit above zero.
+        // Keeps the unit above zero for denormal powers.
         let exponent = (power_w.log2().ceil() - 60.0).clamp(-1022.0, 960.0);
         Self {
             watts: exponent.exp2(),
@@ -26,7 +26,7 @@ impl FluxUnit {
         }
     }
 
-    /// The unit of a mean over a number of sums, where this is that of the sums.
+    /// Unit in which the counts of a total are those of its mean over `sums` terms.
     #[must_use]
     pub fn per(self, sums: u64) -> Self {
         Self {
@@ -35,7 +35,7 @@ impl FluxUnit {
         }
     }
 
-    /// The unit of a sum over a number of means, where this is that of the means.
+    /// Unit in which the counts of a mean are those of `factor` times that mean.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self {
@@ -49,12 +49,12 @@ impl FluxUnit {
         self.watts
     }
 
-    /// The nearest count of each channel.
+    /// The nearest count, per channel.
     pub fn count(self, flux_w: LinearSrgb) -> FluxCount {
         let [r, g, b] = flux_w.to_array();
         let count = |channel: f64| nearest(channel * self.counts_per_watt);
         let red = count(r);
-        // Grey light is the most common.
+        // Grey light is most common.
         let alike = |channel: f64| if channel == r { red } else { count(channel) };
         [red, alike(g), alike(b)]
     }
@@ -65,14 +65,14 @@ impl FluxUnit {
     }
 }
 
-/// The nearest whole number, halves away from zero, without a call into the mathematics library.
+/// Rounds to the nearest integer, halves away from zero, without a call into the mathematics library.
 fn nearest(x: f64) -> i64 {
     let towards_zero = x as i64;
     let rest = x - towards_zero as f64;
     towards_zero + i64::from(rest >= 0.5) - i64::from(rest <= -0.5)
 }
 
-/// Flux per texel of one map, row 0 at v = 0; that of a map in tiles is one row, tile after tile.
+/// Flux per texel of a map, row 0 at v = 0. A tiled map is a single row, tile after tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FluxAccumulator {
     width: usize,
@@ -81,7 +81,7 @@ pub struct FluxAccumulator {
 }
 
 impl FluxAccumulator {
-    /// No flux yet.
+    /// Without flux.
     pub fn new(width: usize, height: usize) -> Self {
         Self {
             width,
@@ -90,7 +90,7 @@ impl FluxAccumulator {
         }
     }
 
-    /// No flux yet on a chart.
+    /// Without flux, with the texels of a chart.
     pub fn for_chart(chart: &Chart) -> Self {
         match &chart.layout {
             Some(layout) => Self::new(layout.texel_count(), 1),
@@ -113,7 +113,6 @@ impl FluxAccumulator {
         &self.texels
     }
 
-    /// Counts row by row, to be added to.
     pub fn texels_mut(&mut self) -> &mut [FluxCount] {
         &mut self.texels
     }

@@ -10,49 +10,47 @@ use super::seams::{SeamTexel, SeamTexels};
 use super::tiles::TileLayout;
 use super::{Receiver, Side};
 
-/// Which texture coordinates a map follows.
+/// Source of a map's coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum UvSet {
-    /// The file's first set.
+    /// The file's first texture coordinate set.
     #[serde(rename = "TEXCOORD_0")]
     TexCoord0,
-    /// The file's second set.
+    /// The file's second texture coordinate set.
     #[serde(rename = "TEXCOORD_1")]
     TexCoord1,
-    /// Made here; written beside the map.
+    /// Generated, and written with the map.
     #[serde(rename = "generated")]
     Generated,
 }
 
 /// Parametrisation of one object at one map size.
 ///
-/// Texel (i, j) covers u in [i/W, (i+1)/W] and v in [j/H, (j+1)/H]; v runs downwards as in glTF. All that is known of
-/// texels lies row by row or, where the chart is in tiles, as the tiles' [`TileLayout`] says; texel coordinates are those
-/// of the finest size always.
+/// Texel (i, j) covers u in [i/W, (i+1)/W] and v in [j/H, (j+1)/H]; v runs downwards as in glTF. Values per texel are
+/// stored row by row, or in the order of [`TileLayout`] in a tiled chart. Texel coordinates always refer to the finest
+/// size.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// Whose light it holds.
+    /// The receiver of the map's light.
     pub receiver: Receiver,
-    /// Where the coordinates come from.
     pub uv_set: UvSet,
     /// Map coordinates in [0, 1] of the three corners of every triangle of the object's mesh.
     pub corner_uvs: Vec<[DVec2; 3]>,
-    /// Texels across, > 0; in tiles: of the finest size.
+    /// Texels across, > 0; of the finest size if tiled.
     pub width: usize,
-    /// Texels down, > 0; in tiles: of the finest size.
+    /// Texels down, > 0; of the finest size if tiled.
     pub height: usize,
-    /// Surface area under each texel [m²]: a single value where all are alike, else one per texel (0 = uncovered).
+    /// Surface area under each texel [m²]: a single value if all are equal, else one per texel (0 = uncovered).
     pub texel_areas_m2: Vec<f64>,
-    /// How fine each tile is; `None` where every texel is as fine. Only surfaces that fill their map evenly have tiles.
+    /// Resolution of each tile; `None` without tiles. Only surfaces that fill their map evenly are tiled.
     pub layout: Option<Arc<TileLayout>>,
-    /// Texels beside the surface that stand for where it goes on.
+    /// Uncovered texels beside seams, with the points where the surface continues.
     pub beyond: Vec<SeamTexel>,
-    /// Texels that touch where there is no room beside the surface.
+    /// Texels that touch at seams without a gutter.
     pub joints: Vec<SeamTexels>,
 }
 
 impl Chart {
-    /// Number of texels.
     pub fn texel_count(&self) -> usize {
         match &self.layout {
             Some(layout) => layout.texel_count(),
@@ -60,7 +58,7 @@ impl Chart {
         }
     }
 
-    /// The texel at a column and row of the finest size.
+    /// Index of the texel at a column and row of the finest size.
     pub fn texel_at(&self, column: usize, row: usize) -> usize {
         match &self.layout {
             Some(layout) => layout.texel(column, row),
@@ -68,12 +66,12 @@ impl Chart {
         }
     }
 
-    /// Whether the surface fills the whole map, evenly.
+    /// Whether the surface fills the whole map evenly.
     pub fn is_full(&self) -> bool {
         self.layout.is_some() || self.texel_areas_m2.len() == 1
     }
 
-    /// The same chart with all texels as small as those of its finest size.
+    /// The same chart without tiles, in which all texels have the finest size.
     #[must_use]
     pub fn without_tiles(&self) -> Self {
         let texel_areas_m2 = match &self.layout {
@@ -91,12 +89,12 @@ impl Chart {
         }
     }
 
-    /// Index into `Scene::objects`.
+    /// Index in `Scene::objects`.
     pub fn object(&self) -> usize {
         self.receiver.object()
     }
 
-    /// The same chart for a side of its object.
+    /// The same chart for the given side of its object.
     #[must_use]
     pub fn of_side(self, side: Side) -> Self {
         Self {
@@ -105,8 +103,7 @@ impl Chart {
         }
     }
 
-    /// Surface area under a texel [m²], 0 where the surface does not reach it; `texel` = row·width + column, or counted
-    /// tile after tile.
+    /// Surface area under a texel [m²], 0 if uncovered. `texel` is row·width + column, or an index in tile order.
     pub fn texel_area_m2(&self, texel: usize) -> f64 {
         if self.texel_areas_m2.len() == 1 {
             self.texel_areas_m2[0]
@@ -115,7 +112,7 @@ impl Chart {
         }
     }
 
-    /// Area of the surface in the map [m²].
+    /// Surface area in the map [m²].
     pub fn area_m2(&self) -> f64 {
         match self.texel_areas_m2[..] {
             [texel_m2] => texel_m2 * (self.width * self.height) as f64,
@@ -123,24 +120,24 @@ impl Chart {
         }
     }
 
-    /// Map coordinates of a point of a triangle from its barycentric coordinates.
+    /// Map coordinates of a point of a triangle, given its barycentric coordinates.
     pub fn uv(&self, triangle: usize, barycentric: [f64; 3]) -> DVec2 {
         let [a, b, c] = self.corner_uvs[triangle];
         a * barycentric[0] + b * barycentric[1] + c * barycentric[2]
     }
 
-    /// Rows of the linear map from a world displacement in a triangle's plane [m] to a displacement in texels:
-    /// texel = (rows[0]·d, rows[1]·d). `None` where the triangle has no area.
+    /// Jacobian of texel coordinates: rows of the linear map from a world displacement in a triangle's plane [m] to one
+    /// in texels, (rows[0]·d, rows[1]·d). `None` if the triangle has no area.
     pub fn texel_from_world(&self, triangle: usize, corners: [DVec3; 3]) -> Option<[DVec3; 2]> {
         let [across, down] = uv_from_world(self.corner_uvs[triangle], corners)?;
         Some([across * self.width as f64, down * self.height as f64])
     }
 }
 
-/// The same for map coordinates in [0, 1]: rows [1/m] of the map from a displacement in a triangle's plane.
+/// Jacobian of map coordinates in [0, 1]: rows [1/m] of the map from a displacement in a triangle's plane.
 pub fn uv_from_world([a, b, c]: [DVec2; 3], corners: [DVec3; 3]) -> Option<[DVec3; 2]> {
     let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
-    // Dual basis of (e1, e2) within the plane.
+    // Dual basis of (e1, e2) in the plane.
     let (g11, g12, g22) = (e1.dot(e1), e1.dot(e2), e2.dot(e2));
     let determinant = g11 * g22 - g12 * g12;
     if determinant.is_nan() || determinant <= 0.0 {

@@ -1,9 +1,9 @@
 //! Error measures between two maps, over texels of equal area, for any quantity.
 
-/// Share of the reference's mean from which on a texel counts in the average relative difference.
+/// Fraction of the reference's mean above which a texel counts in the average relative difference.
 const SIGNIFICANT_SHARE_OF_MEAN: f64 = 0.01;
 
-/// Values on a rectangle of texels, row by row.
+/// Values of a rectangular grid of texels, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
     /// Texels across, > 0.
@@ -14,7 +14,7 @@ pub struct Grid {
     pub values: Vec<f64>,
 }
 
-/// Measures of an image against its reference. Those that divide by the reference are `None` where it is dark.
+/// Measures of an image against its reference. Relative ones are `None` if the reference is dark.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Comparison {
     /// See [`relative_rmse`].
@@ -29,36 +29,36 @@ pub struct Comparison {
     pub mean: f64,
     /// Mean of the reference.
     pub reference_mean: f64,
-    /// Flux of the image over that of the reference: the ratio of the means, since both cover the same area.
+    /// Ratio of flux: that of the means, since both cover the same area.
     pub flux_ratio: Option<f64>,
 }
 
-/// One texel of a map beside its reference.
+/// A texel of an image and of its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TexelPair {
-    /// E of the image [W/m²], luminance.
+    /// Luminance of E in the image [W/m²].
     pub image: f64,
-    /// E of the reference [W/m²], luminance.
+    /// Luminance of E in the reference [W/m²].
     pub reference: f64,
-    /// Surface under the texel [m²]; any unit where all texels are alike.
+    /// Surface area under the texel [m²]; any unit if all texels are equal.
     pub area_m2: f64,
 }
 
-/// Measures of an image against its reference, over all texels.
+/// Area-weighted measures of an image against its reference.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Agreement {
     /// sqrt(mean((I − R)²)) / mean(R).
     pub relative_rmse: f64,
     /// mean(|I − R| / R) over texels with R > 1 % of mean(R).
     pub average_relative_difference: f64,
-    /// Largest I over largest R.
+    /// max(I) / max(R).
     pub peak_ratio: f64,
     /// mean(I) / mean(R).
     pub flux_ratio: f64,
 }
 
 impl Agreement {
-    /// Of all texels together; `None` where the reference is dark.
+    /// `None` if the reference is dark.
     pub fn of(texels: &[TexelPair]) -> Option<Self> {
         let sum = |value: &dyn Fn(&TexelPair) -> f64| -> f64 {
             texels.iter().map(|texel| value(texel) * texel.area_m2).sum()
@@ -82,10 +82,10 @@ impl Agreement {
     }
 }
 
-/// The measures of texels of one area; `None` where mean(R) is not above zero.
+/// Measures over texels of equal area; `None` unless mean(R) > 0.
 ///
 /// # Panics
-/// Slices of different lengths.
+/// The slices must have the same length.
 pub fn agreement(image: &[f64], reference: &[f64]) -> Option<Agreement> {
     assert_eq!(image.len(), reference.len(), "maps of one size are compared");
     let pair = |(&image, &reference)| TexelPair {
@@ -96,28 +96,28 @@ pub fn agreement(image: &[f64], reference: &[f64]) -> Option<Agreement> {
     Agreement::of(&image.iter().zip(reference).map(pair).collect::<Vec<_>>())
 }
 
-/// sqrt(mean((I − R)²)) / mean(R); as [`agreement`].
+/// sqrt(mean((I − R)²)) / mean(R), as in [`agreement`].
 pub fn relative_rmse(image: &[f64], reference: &[f64]) -> Option<f64> {
     agreement(image, reference).map(|agreement| agreement.relative_rmse)
 }
 
-/// mean(|I − R| / R) over the texels with R > 1 % of mean(R); as [`agreement`].
+/// mean(|I − R| / R) over the texels with R > 1 % of mean(R), as in [`agreement`].
 pub fn average_relative_difference(image: &[f64], reference: &[f64]) -> Option<f64> {
     agreement(image, reference).map(|agreement| agreement.average_relative_difference)
 }
 
-/// Arithmetic mean; 0 of nothing.
+/// Arithmetic mean; 0 if empty.
 pub fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 impl Grid {
-    /// Largest value; 0 of nothing.
+    /// Largest value; 0 if empty.
     pub fn peak(&self) -> f64 {
         self.values.iter().copied().reduce(f64::max).unwrap_or(0.0)
     }
 
-    /// Each block of `columns × rows` texels replaced by its mean; `None` where the blocks do not divide the grid.
+    /// Replaces each block of `columns × rows` texels by its mean; `None` if the blocks do not divide the grid.
     pub fn box_averaged(&self, columns: usize, rows: usize) -> Option<Self> {
         if columns == 0
             || rows == 0
@@ -144,8 +144,8 @@ impl Grid {
     }
 }
 
-/// Both grids at the size of the smaller: the larger is box-averaged, which keeps its flux. `None` where neither size
-/// is a whole multiple of the other.
+/// Brings both grids to the size of the smaller one. The larger is box-averaged, which conserves its flux. `None`
+/// unless one size is a multiple of the other.
 pub fn at_common_size(image: &Grid, reference: &Grid) -> Option<(Grid, Grid)> {
     if image.width >= reference.width && image.height >= reference.height {
         let reduced = reduced_to(image, reference)?;
@@ -164,7 +164,7 @@ fn reduced_to(large: &Grid, small: &Grid) -> Option<Grid> {
 /// All measures at once.
 ///
 /// # Panics
-/// Grids of different sizes; see [`at_common_size`].
+/// The grids must have the same size; see [`at_common_size`].
 pub fn compare(image: &Grid, reference: &Grid) -> Comparison {
     assert_eq!(
         (image.width, image.height),

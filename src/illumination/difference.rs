@@ -7,49 +7,48 @@ use super::{Chart, IlluminationMap, Receiver};
 use crate::error::{Error, Result};
 use crate::optics::luminance;
 
-/// The difference on one surface.
 #[derive(Clone, Debug)]
 pub struct SignedMap {
-    /// Of the finer of both maps.
+    /// Chart of the finer map.
     pub chart: Arc<Chart>,
-    /// Luminance with minus luminance without, per texel of the chart [W/m²].
+    /// Luminance of the first bake minus that of the second, per texel of the chart [W/m²].
     pub irradiance: Vec<f32>,
-    /// Mean luminance over the surface [W/m²]: with, or without where there is none with.
+    /// Mean luminance of the first bake over the surface [W/m²], or of the second if the first has no map.
     pub mean_w_m2: f64,
 }
 
-/// How two bakes differ, over the luminance of all layers together.
+/// Difference of two bakes in the luminance of all layers together.
 #[derive(Clone, Debug)]
 pub struct Difference {
-    /// One for each surface that has a map on either side, in the order of `Scene::objects`.
+    /// One per surface that has a map in either bake, in the order of `Scene::objects`.
     pub maps: Vec<SignedMap>,
-    /// On all maps of the first bake [W].
+    /// Flux of all maps of the first bake [W].
     pub with_w: f64,
-    /// On all maps of the second bake [W].
+    /// Flux of all maps of the second bake [W].
     pub without_w: f64,
-    /// sqrt(mean((with − without)²)) / mean(with) by area over all maps; `None` where the first bake is dark.
+    /// sqrt(mean((with − without)²)) / mean(with), area-weighted over all maps; `None` if the first bake is dark.
     pub relative_rmse: Option<f64>,
 }
 
 impl Difference {
-    /// What the first bake has more [W]; below 0 where it has less.
+    /// Flux by which the first bake exceeds the second [W].
     pub fn difference_w(&self) -> f64 {
         self.with_w - self.without_w
     }
 }
 
-/// Sums by area of squares and of light.
+/// Area, and the sum of squared differences over area.
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     area_m2: f64,
     squares: f64,
 }
 
-/// Takes one bake's maps from another's. Of maps of different sizes the coarser is repeated texel by texel; a map that
-/// exists on one side only counts as zero on the other.
+/// Subtracts the second bake from the first. Of two maps of different sizes, the coarser is upsampled by repetition. A
+/// map that only one bake has counts as zero in the other.
 ///
 /// # Errors
-/// Maps of one surface of which neither's size divides the other's.
+/// Two maps of one surface, neither of whose sizes divides the other.
 pub fn difference(with: &[IlluminationMap], without: &[IlluminationMap]) -> Result<Difference> {
     let mut pairs: BTreeMap<Receiver, [Option<&IlluminationMap>; 2]> = BTreeMap::new();
     for (side, maps) in [with, without].into_iter().enumerate() {
@@ -81,7 +80,7 @@ pub fn difference(with: &[IlluminationMap], without: &[IlluminationMap]) -> Resu
     Ok(found)
 }
 
-/// A map with its luminance [W/m²].
+/// A map's luminance [W/m²].
 struct Side<'a> {
     chart: &'a Arc<Chart>,
     luminance: Vec<f64>,
@@ -106,12 +105,12 @@ impl<'a> Side<'a> {
         [self.chart.width, self.chart.height]
     }
 
-    /// Whether each of its texels is a whole number of the other's.
+    /// Whether each of its texels covers a whole number of the other's.
     fn divides(&self, finer: &Self) -> bool {
         (0..2).all(|axis| finer.size()[axis].is_multiple_of(self.size()[axis]))
     }
 
-    /// The value under a texel of a finer map.
+    /// The value at a texel of a finer map.
     fn under(&self, texel: usize, finer: &Chart) -> f64 {
         let (column, row) = (texel % finer.width, texel / finer.width);
         let (across, down) = (finer.width / self.chart.width, finer.height / self.chart.height);
@@ -164,7 +163,7 @@ mod tests {
     use crate::illumination::{Layer, UvSet};
     use crate::settings::LayerKind;
 
-    /// A grey map over a surface, all texels alike in area.
+    /// A grey map over a surface, with texels of equal area.
     fn map(object: usize, [width, height]: [usize; 2], area_m2: f64, grey: &[f32]) -> IlluminationMap {
         assert_eq!(grey.len(), width * height);
         IlluminationMap {

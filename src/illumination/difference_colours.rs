@@ -3,29 +3,29 @@
 use super::difference::SignedMap;
 use super::false_colours::mixed;
 
-/// Differences relative to the map's mean between the middle of the scale and its ends, logarithmic between them: 1 %
-/// and 1000 %, either way.
+/// Magnitudes at the middle of the scale and at its ends, relative to the map's mean: 1 % and 1000 %, in both
+/// directions and logarithmic in between.
 pub const RANGE: (f64, f64) = (1e-2, 10.0);
 
-/// Display colours (sRGB) from no difference to the end of the scale where light is added: warm.
+/// Display colours (sRGB) from no difference to the end of the scale, where light is added: warm.
 const ADDED: [[u8; 3]; 4] = [[38, 38, 42], [128, 52, 24], [232, 122, 32], [255, 226, 150]];
-/// The same where light is taken away: cool.
+/// The same where light is removed: cool.
 const TAKEN: [[u8; 3]; 4] = [[38, 38, 42], [24, 62, 128], [52, 140, 226], [190, 230, 255]];
 
-/// Display colour (sRGB) of a difference relative to the map's mean; both ends of the scale go on.
+/// Display colour (sRGB) of a difference relative to the map's mean, clamped to the ends of the scale.
 pub fn colour(relative: f64) -> [u8; 3] {
     let stops = if relative < 0.0 { TAKEN } else { ADDED };
     mixed(&stops, place(relative.abs()))
 }
 
-/// Where a size of a difference lies between the middle of the scale (0) and its ends (1).
+/// Position of a magnitude between the middle of the scale (0) and its ends (1).
 fn place(size: f64) -> f64 {
     let (low, high) = RANGE;
     let place = ((size / low).log10() / (high / low).log10()).clamp(0.0, 1.0);
     if place.is_nan() { 0.0 } else { place }
 }
 
-/// The difference at a place of the scale from one end (−1) to the other (1).
+/// The difference at a position on the scale, from one end (−1) to the other (1).
 pub fn at(place: f64) -> f64 {
     let (low, high) = RANGE;
     (low * (high / low).powf(place.abs())).copysign(place)

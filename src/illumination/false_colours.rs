@@ -1,8 +1,7 @@
 //! False colours by viridis, which is perceptually uniform, also for the colour-blind (Smith and van der Walt, "A
 //! Better Default Colormap for Matplotlib", SciPy 2015).
 
-/// Coefficients of t⁰ … t⁶ for red, green and blue: a fit to the table of viridis by Matt Zucker, see
-/// `assets/SOURCES.md`.
+/// Coefficients of t⁰ … t⁶ for red, green and blue: Matt Zucker's fit to the table of viridis, see `assets/SOURCES.md`.
 const FIT: [[f64; 3]; 7] = [
     [0.2777273272234177, 0.005407344544966578, 0.3340998053353061],
     [0.1050930431085774, 1.404613529898575, 1.384590162594685],
@@ -13,7 +12,7 @@ const FIT: [[f64; 3]; 7] = [
     [-5.435455855934631, 4.645852612178535, 26.3124352495832],
 ];
 
-/// Display colour (sRGB in [0, 1]) of a place in [0, 1] of the scale; places beyond are the ends. Twin of
+/// Display colour (sRGB in [0, 1]) at a position on the scale, clamped to [0, 1]. Twin of
 /// `shaders/shared/false_colours.wgsl`.
 pub fn viridis(place: f64) -> [f64; 3] {
     let t = place.clamp(0.0, 1.0);
@@ -23,7 +22,7 @@ pub fn viridis(place: f64) -> [f64; 3] {
     })
 }
 
-/// Display colour (sRGB) of a place in [0, 1] of a scale, between stops at even steps.
+/// Display colour (sRGB) at a position in [0, 1] on a scale, interpolated between evenly spaced stops.
 pub fn mixed(stops: &[[u8; 3]], place: f64) -> [u8; 3] {
     let place = place * (stops.len() - 1) as f64;
     let index = (place as usize).min(stops.len() - 2);
@@ -34,25 +33,25 @@ pub fn mixed(stops: &[[u8; 3]], place: f64) -> [u8; 3] {
     })
 }
 
-/// Which quantities the two ends of the colours stand for.
+/// Range of quantities that the colours cover.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ColourScale {
-    /// Darkest; > 0 where it is logarithmic.
+    /// Quantity at the dark end; > 0 on a logarithmic scale.
     pub low: f64,
-    /// Brightest, > low.
+    /// Quantity at the bright end, > low.
     pub high: f64,
-    /// Whether equal ratios are equal steps, and not equal differences.
+    /// Whether equal ratios, rather than equal differences, are equal steps.
     pub is_logarithmic: bool,
 }
 
 impl ColourScale {
-    /// Where a quantity lies: 0 at the dark end, 1 at the bright one, and beyond.
+    /// Position of a quantity: 0 at the dark end, 1 at the bright one, and beyond.
     pub fn place(&self, quantity: f64) -> f64 {
         let [begin, factor] = self.for_shaders();
         (self.steps(quantity) - begin) * factor
     }
 
-    /// The quantity at a place of the scale.
+    /// The quantity at a position on the scale.
     pub fn at(&self, place: f64) -> f64 {
         if self.is_logarithmic {
             self.low * (self.high / self.low).powf(place)
@@ -66,7 +65,7 @@ impl ColourScale {
         viridis(self.place(quantity))
     }
 
-    /// Where it begins, and what steps from there are multiplied by, in binary orders where it is logarithmic.
+    /// Start of the scale, and the factor of distances from it; in binary orders on a logarithmic scale.
     pub fn for_shaders(&self) -> [f64; 2] {
         let (low, high) = (self.steps(self.low), self.steps(self.high));
         [low, (high - low).recip()]

@@ -4,19 +4,19 @@
 use super::Chart;
 use super::lookup::bilinear;
 
-/// Texels that a gutter reaches beyond the surface.
+/// Width of a gutter [texels].
 pub const GUTTER_REACH_TEXELS: usize = 2;
 
-/// Rounds of exchange between texels that touch.
+/// Rounds of exchange between texels that are joined at a seam.
 const EXCHANGES: usize = 8;
 
-/// Rounds in which texels beyond a seam read each other's surroundings.
+/// Rounds in which gutters of both sides of a seam read from each other.
 const SEAM_ROUNDS: usize = 2;
 
-/// Fills the texels without area within [`GUTTER_REACH_TEXELS`] of covered ones: each takes the mean of those of its
-/// eight neighbours that are covered or were filled a step before; those beside a seam then the value of the place where
-/// the surface goes on. Covered texels keep their value, and as a gutter has no area, no flux is added; but those that
-/// touch at a seam without a gutter are made to agree.
+/// Fills uncovered texels within [`GUTTER_REACH_TEXELS`] of covered ones with the mean of those of their eight
+/// neighbours that are covered or already filled. Next to a seam they then take the value at the point where the
+/// surface continues. Gutters have no area, so this adds no flux. Covered texels keep their values, except that those
+/// joined at a seam without a gutter are made to agree.
 pub fn fill_gutter(chart: &Chart, irradiance: &mut [[f32; 3]]) {
     even_out(chart, irradiance);
     if chart.is_full() {
@@ -52,8 +52,8 @@ pub fn fill_gutter(chart: &Chart, irradiance: &mut [[f32; 3]]) {
     }
 }
 
-/// Texels that touch at a seam without room between exchange flux until they agree: a look-up at the border of either
-/// reads nothing but its own. None is lost.
+/// Exchanges flux between texels joined at a seam without a gutter until they agree, as a lookup at the border of
+/// either reads only its own side. Conserves flux.
 fn even_out(chart: &Chart, irradiance: &mut [[f32; 3]]) {
     for _ in 0..EXCHANGES {
         for joint in &chart.joints {
@@ -82,7 +82,7 @@ fn mean(values: impl Iterator<Item = [f32; 3]>) -> Option<[f32; 3]> {
     (count > 0.0).then(|| sum.map(|channel| (channel / count) as f32))
 }
 
-/// The up to eight texels around one.
+/// The up to eight neighbours of a texel.
 pub fn neighbours(texel: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
     let (column, row) = (texel % width, texel / width);
     let rows = row.saturating_sub(1)..(row + 2).min(height);

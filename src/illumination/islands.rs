@@ -8,12 +8,12 @@ use glam::DVec2;
 use super::Chart;
 use super::parametrisation::coverage;
 
-/// Mark of a texel that several islands share.
+/// Marks a texel that several islands share.
 const SHARED: u32 = u32::MAX;
-/// Mark of a texel that none covers.
+/// Marks an uncovered texel.
 const NONE: u32 = u32::MAX - 1;
 
-/// Which island each triangle and each texel belongs to.
+/// The island of each triangle and texel.
 #[derive(Clone, Debug)]
 pub struct Islands {
     of_triangle: Vec<u32>,
@@ -22,14 +22,14 @@ pub struct Islands {
 }
 
 impl Islands {
-    /// Finds the islands of a chart; `None` where it is one.
+    /// Finds the islands of a chart; `None` if there is only one.
     pub fn find(chart: &Chart) -> Option<Self> {
         let of_triangle = connect(&chart.corner_uvs);
         let first = *of_triangle.first()?;
         if of_triangle.iter().all(|&island| island == first) {
             return None;
         }
-        // Tiles belong to surfaces that fill their map: only triangles are asked for.
+        // Only surfaces that fill their map are tiled: texels need no owner there.
         let (width, height) = match chart.layout {
             Some(_) => (1, 1),
             None => (chart.width, chart.height),
@@ -61,8 +61,7 @@ impl Islands {
         self.of_triangle[triangle]
     }
 
-    /// The island that has a texel for itself, or why there is none: `Err(true)` where several share it, `Err(false)`
-    /// where none covers it.
+    /// The only island that covers a texel. `Err(true)` if several do, `Err(false)` if none does.
     pub fn owner(&self, texel: usize) -> Result<u32, bool> {
         match self.of_texel[texel] {
             SHARED => Err(true),
@@ -71,21 +70,20 @@ impl Islands {
         }
     }
 
-    /// Whether an island reaches a texel.
+    /// Whether an island covers any part of a texel.
     pub fn covers(&self, column: usize, row: usize, island: u32) -> bool {
         let owner = self.of_texel[row * self.width + column];
         owner == island || owner == SHARED
     }
 }
 
-/// The smallest triangle index of each triangle's island: triangles with a corner at the very same place belong
-/// together.
+/// The smallest triangle index of each triangle's island. Triangles that share a corner position are connected.
 fn connect(corner_uvs: &[[DVec2; 3]]) -> Vec<u32> {
     let mut parent: Vec<u32> = (0..corner_uvs.len() as u32).collect();
     let mut at: HashMap<(u64, u64), u32> = HashMap::new();
     for (triangle, corners) in corner_uvs.iter().enumerate() {
         for corner in corners {
-            // Adding zero makes both zeros alike.
+            // Adding zero turns −0 into +0.
             let place = ((corner.x + 0.0).to_bits(), (corner.y + 0.0).to_bits());
             let other = *at.entry(place).or_insert(triangle as u32);
             let (a, b) = (root(&mut parent, triangle as u32), root(&mut parent, other));
@@ -97,7 +95,7 @@ fn connect(corner_uvs: &[[DVec2; 3]]) -> Vec<u32> {
         .collect()
 }
 
-/// The triangle that stands for the set that one belongs to; shortens the way there.
+/// Root of a triangle's set in the union-find forest; halves the path to it.
 pub(crate) fn root(parent: &mut [u32], mut triangle: u32) -> u32 {
     while parent[triangle as usize] != triangle {
         let above = parent[parent[triangle as usize] as usize];

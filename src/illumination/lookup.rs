@@ -6,15 +6,15 @@ use super::Chart;
 use super::tiles::{SIDE, TileLayout};
 use crate::optics::LinearSrgb;
 
-/// Bilinear look-up between texel centres of `width × height` values; beyond the outermost centres the border goes
-/// on. Texel (i, j) has its centre at u = (i + ½)/width, v = (j + ½)/height.
+/// Bilinear lookup between texel centres of `width × height` values, clamped at the border. Texel (i, j) has its centre
+/// at u = (i + ½)/width, v = (j + ½)/height.
 pub fn bilinear(values: &[[f32; 3]], width: usize, height: usize, uv: DVec2) -> LinearSrgb {
     let texel = |column: usize, row: usize| LinearSrgb::from(values[row * width + column].map(f64::from));
     blend(DVec2::new(width as f64, height as f64), uv, texel)
 }
 
-/// [`bilinear`] among the values of a chart's texels. In tiles: between centres as far apart as the texels of the tile;
-/// what lies in a neighbour is its mean over such a texel.
+/// [`bilinear`] for the values of a chart. In a tiled chart, the texel size is that of the tile at `uv`; neighbouring
+/// tiles contribute their means over texels of that size.
 pub fn in_chart(chart: &Chart, values: &[[f32; 3]], uv: DVec2) -> LinearSrgb {
     let Some(layout) = &chart.layout else {
         return bilinear(values, chart.width, chart.height, uv);
@@ -25,7 +25,7 @@ pub fn in_chart(chart: &Chart, values: &[[f32; 3]], uv: DVec2) -> LinearSrgb {
     blend(size, uv, |column, row| mean(layout, values, level, (column, row)))
 }
 
-/// Mean over a texel of a level, given by its column and row there: of what the map covers of it.
+/// Mean over a texel of a level, given by its column and row in that level, as far as the map covers it.
 pub fn mean(
     layout: &TileLayout,
     values: &[[f32; 3]],
@@ -44,7 +44,7 @@ pub fn mean(
         (row + (1 << level)).min(height),
     );
     let (mut sum, mut area) = (LinearSrgb::BLACK, 0.0);
-    // Tiles under it may have levels of their own.
+    // Tiles under the texel may have different levels.
     for (top, next_top) in pieces(row, bottom) {
         for (left, next_left) in pieces(column, right) {
             let own = layout.level_at(left, top);
@@ -60,12 +60,12 @@ pub fn mean(
     sum * (1.0 / area)
 }
 
-/// A line of finest texels, cut at the borders of tiles.
+/// Splits an interval of finest texels at tile borders.
 fn pieces(begin: usize, end: usize) -> impl Iterator<Item = (usize, usize)> {
     (begin / SIDE..end.div_ceil(SIDE)).map(move |tile| (begin.max(tile * SIDE), end.min((tile + 1) * SIDE)))
 }
 
-/// Blends the four texels around a place on a map of `size` texels, the last of which may be cut.
+/// Blends the four texels around a position on a map of `size` texels, the last of which may be partial.
 pub fn blend(size: DVec2, uv: DVec2, texel: impl Fn(usize, usize) -> LinearSrgb) -> LinearSrgb {
     let (left, right, across) = between_centres(uv.x, size.x);
     let (top, bottom, down) = between_centres(uv.y, size.y);
@@ -73,7 +73,7 @@ pub fn blend(size: DVec2, uv: DVec2, texel: impl Fn(usize, usize) -> LinearSrgb)
     row(top) * (1.0 - down) + row(bottom) * down
 }
 
-/// The two texels of a line of `size` whose centres enclose a coordinate in [0, 1], and how far between them it lies.
+/// The two texels along a side of `size` whose centres enclose a coordinate in [0, 1], and the position between them.
 fn between_centres(coordinate: f64, size: f64) -> (usize, usize, f64) {
     let last = size.ceil() - 1.0;
     let position = (coordinate * size - 0.5).clamp(0.0, last);

@@ -10,29 +10,29 @@ use crate::settings::LayerKind;
 /// One layer of a map: mean irradiance of each texel of its chart [W/m²], linear sRGB; row 0 at v = 0.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// Which light.
+    /// Kind of light.
     pub kind: LayerKind,
     /// E per texel [W/m²].
     pub irradiance: Vec<[f32; 3]>,
 }
 
-/// The map of one surface.
+/// The illumination map of one side of a surface.
 #[derive(Clone, Debug)]
 pub struct IlluminationMap {
-    /// How the surface lies in the map, with the map's size and texel areas.
+    /// Map coordinates of the surface, size of the map and texel areas.
     pub chart: Arc<Chart>,
-    /// The layers that were baked, in the order of [`LayerKind`], at least one.
+    /// The baked layers, at least one, in the order of [`LayerKind`].
     pub layers: Vec<Layer>,
-    /// √(variance + bias²) of the luminance of the sum [W/m²] per texel, where it was estimated.
+    /// Estimated error √(variance + bias²) of the luminance of all layers [W/m²], per texel; `None` if not estimated.
     pub error: Option<Vec<f32>>,
-    /// Estimated relative RMSE of this map, where it was estimated.
+    /// Estimated relative RMSE of this map; `None` if not estimated.
     pub estimated_relative_rmse: Option<f64>,
-    /// Estimated visible error of this map, where it was estimated.
+    /// Estimated visible error of this map; `None` if not estimated.
     pub estimated_visible: Option<f64>,
 }
 
 impl IlluminationMap {
-    /// A map of one layer alone, without an estimate of its error.
+    /// A map with a single layer and no error estimate.
     pub fn of_layer(chart: Arc<Chart>, kind: LayerKind, irradiance: Vec<[f32; 3]>) -> Self {
         Self {
             chart,
@@ -66,7 +66,7 @@ impl IlluminationMap {
         sum
     }
 
-    /// The map without tiles, row by row at its finest size: each texel's values wherever it reaches.
+    /// The map without tiles, row by row at its finest size; each texel's values are repeated over its area.
     pub fn dense(&self) -> Cow<'_, Self> {
         let Some(layout) = &self.chart.layout else {
             return Cow::Borrowed(self);
@@ -84,12 +84,12 @@ impl IlluminationMap {
         })
     }
 
-    /// The layer of a kind, if it was baked.
+    /// The layer of this kind, if it was baked.
     pub fn layer(&self, kind: LayerKind) -> Option<&Layer> {
         self.layers.iter().find(|layer| layer.kind == kind)
     }
 
-    /// Flux of a layer over the whole surface [W per channel]: Σ E·A.
+    /// Total flux of a layer [W per channel]: Σ E·A.
     pub fn flux_w(&self, kind: LayerKind) -> LinearSrgb {
         let mut flux = LinearSrgb::BLACK;
         for (texel, e) in self

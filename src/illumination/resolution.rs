@@ -3,12 +3,13 @@
 
 use super::Chart;
 
-/// Light varies within a texel this much less, as variance, than between the texels of four times the area that it
-/// lies in with three others: half as much at a border between light and shadow, a quarter as much on a slope.
+/// Ratio of the variance within a texel to that between it and the three others of the same 2 × 2 block: a half at a
+/// border between light and shadow, a quarter on a slope.
 const PER_LEVEL: f64 = 0.5;
 
-/// Variance within each texel of a chart [square of the values' unit] of what a map would show whose texels were halved
-/// in length so often as they are too coarse: `halved` times, or as the chart's tiles say. Zero where they are not.
+/// Variance within each texel [square of the values' unit] that a map of finer texels would resolve. `halved` is how
+/// many times texels should be halved in length to be fine enough; tiled charts know this for each tile. Zero if texels
+/// are fine enough.
 pub fn variance_within(chart: &Chart, values: &[f64], halved: u32) -> Vec<f64> {
     let mut variances = vec![0.0; values.len()];
     match &chart.layout {
@@ -34,14 +35,14 @@ pub fn variance_within(chart: &Chart, values: &[f64], halved: u32) -> Vec<f64> {
     variances
 }
 
-/// Sum of the levels that are missing, relative to the variance among four texels.
+/// Sum over the missing levels, relative to the variance among four texels.
 fn below(levels: u32) -> f64 {
     (1..=levels.min(64))
         .map(|level| PER_LEVEL.powi(level as i32))
         .sum()
 }
 
-/// The variance of each two by two texels, as far as they are covered, times a share, for each of them.
+/// Sets each covered texel to the variance among the covered texels of its 2 × 2 block, times `share`.
 fn add(
     values: &[f64],
     (width, height): (usize, usize),

@@ -6,26 +6,26 @@ use glam::{DMat2, DVec2, DVec3};
 use super::chart::uv_from_world;
 use crate::scene::{Adjacency, Mesh};
 
-/// Texels beyond the border that are looked after: a bilinear look-up reaches one, a coarser level of the map two.
+/// Width of the border that is filled [texels]: a bilinear lookup reaches one texel, a coarser level two.
 const REACH_TEXELS: f64 = 2.5;
 
-/// Ends of an edge count as one place in the map up to this distance, in units of its side.
+/// Distance up to which ends of edges coincide in the map, relative to its side.
 const SAME_PLACE: f64 = 1e-9;
 
-/// An edge of a triangle at which its chart ends, though the mesh does not.
+/// An edge of a triangle at which its chart ends although the mesh continues.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seam {
-    /// Its ends in the map [0, 1].
+    /// Ends of the edge in the map [0, 1].
     ends: [DVec2; 2],
-    /// The triangle's third corner in the map [0, 1]: beyond the edge is away from it.
+    /// The triangle's third corner in the map [0, 1]; the edge faces away from it.
     inner: DVec2,
     /// Map coordinates of the edge's first end in the neighbour's chart.
     there: DVec2,
-    /// From steps in the map on this side to steps on the other, the surface unfolded at the edge.
+    /// Maps displacements in the map on this side to those on the other, with the surface unfolded at the edge.
     steps: DMat2,
 }
 
-/// A texel that the surface does not reach, with the place of the map that lies where it would be.
+/// An uncovered texel, and the point of the map that belongs there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeamTexel {
     /// Row·width + column.
@@ -34,13 +34,13 @@ pub struct SeamTexel {
     pub uv: DVec2,
 }
 
-/// Two texels that touch on the surface, and in the map have no room between them and its border, or another chart, for
-/// one to stand for the other.
+/// Two texels that touch on the surface, but have no uncovered texel beside them in the map that could stand for the
+/// other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SeamTexels {
     /// Row·width + column of both.
     pub texels: [usize; 2],
-    /// How much of a texel's side they touch along.
+    /// Fraction of a texel's side along which they touch.
     pub share: f64,
 }
 
@@ -57,7 +57,7 @@ pub fn find(mesh: &Mesh, corner_uvs: &[[DVec2; 3]]) -> Vec<Seam> {
 }
 
 impl Seam {
-    /// `None` where the chart goes on.
+    /// `None` if the chart continues across the edge.
     fn at(
         mesh: &Mesh,
         corner_uvs: &[[DVec2; 3]],
@@ -75,7 +75,7 @@ impl Seam {
             return None;
         }
         let along = (here[next] - here[edge]).try_normalize()?;
-        // Away from a triangle's third corner, within its plane.
+        // Perpendicular to the edge, away from the third corner.
         let away =
             |third: DVec3| (along * (third - here[edge]).dot(along) - (third - here[edge])).try_normalize();
         let inner = (edge + 2) % 3;
@@ -97,7 +97,7 @@ impl Seam {
     }
 }
 
-/// A seam in texels: its ends, and unit steps along it and out of the chart.
+/// A seam in texels: its ends, and unit vectors along it and out of the chart.
 struct SeamInTexels {
     a: DVec2,
     b: DVec2,
@@ -106,7 +106,7 @@ struct SeamInTexels {
 }
 
 impl Seam {
-    /// `None` where it has no length in the map.
+    /// `None` if it has no length in the map.
     fn laid(&self, size: DVec2) -> Option<SeamInTexels> {
         let [a, b] = self.ends.map(|end| end * size);
         let along = (b - a).try_normalize()?;
@@ -118,7 +118,7 @@ impl Seam {
     }
 }
 
-/// Texels that touch along seams without room, each pair once, ascending.
+/// Pairs of texels that touch along seams without a gutter, each pair once, in ascending order.
 pub fn joints(
     seams: &[Seam],
     (width, height): (usize, usize),
@@ -145,7 +145,7 @@ pub fn joints(
             if let (false, Some(here), Some(there)) = (has_room, here, texel_at(other)) {
                 let texels = [here.min(there), here.max(there)];
                 if here != there && texels.iter().all(|texel| is_covered(*texel)) {
-                    // Both sides of a seam are seams.
+                    // Each seam is found from both sides.
                     found.push((texels, 0.5 * length / count));
                 }
             }
@@ -160,14 +160,14 @@ pub fn joints(
     pairs.map(joint).collect()
 }
 
-/// The texels beside the seams of a map that the surface does not reach, each by its nearest seam, ascending.
+/// Uncovered texels beside the seams of a map, each with its nearest seam, in ascending order.
 pub fn texels(
     seams: &[Seam],
     (width, height): (usize, usize),
     is_covered: impl Fn(usize) -> bool,
 ) -> Vec<SeamTexel> {
     let size = DVec2::new(width as f64, height as f64);
-    // Distance, texel, place.
+    // Distance from the seam, and the texel.
     let mut found: Vec<(f64, SeamTexel)> = Vec::new();
     for seam in seams {
         let Some(SeamInTexels { a, b, along, out }) = seam.laid(size) else {

@@ -8,14 +8,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Side {
-    /// Where the geometric normal points to.
+    /// Side that the geometric normal points to.
     Front,
-    /// The other one.
     Back,
 }
 
 impl Side {
-    /// The side that a ray of some direction comes to, of a surface with a geometric normal.
+    /// The side that a ray of this direction hits.
     pub fn met(direction: DVec3, geometric_normal: DVec3) -> Self {
         if direction.dot(geometric_normal) <= 0.0 {
             Self::Front
@@ -24,7 +23,7 @@ impl Side {
         }
     }
 
-    /// What the geometric normal is multiplied by to point away from the surface on this side.
+    /// Factor of the geometric normal that makes it point away from the surface on this side.
     pub fn sign(self) -> f64 {
         match self {
             Self::Front => 1.0,
@@ -33,27 +32,25 @@ impl Side {
     }
 }
 
-/// One side of one object: what takes light into a map. Ordered by object, its front first.
+/// One side of one object, which can receive light in a map. Ordered by object, front first.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Receiver(u32);
 
 impl Receiver {
-    /// A side of an object, an index into `Scene::objects` below 2³¹.
+    /// A side of an object, given its index in `Scene::objects`, below 2³¹.
     pub fn new(object: usize, side: Side) -> Self {
         Self((object as u32) << 1 | u32::from(side == Side::Back))
     }
 
-    /// The front of an object.
     pub fn front(object: usize) -> Self {
         Self::new(object, Side::Front)
     }
 
-    /// The back of an object.
     pub fn back(object: usize) -> Self {
         Self::new(object, Side::Back)
     }
 
-    /// The receivers of so many objects, in order.
+    /// The receivers of this many objects, in order.
     pub fn all(objects: usize) -> impl Iterator<Item = Self> {
         (0..2 * objects as u32).map(Self)
     }
@@ -63,12 +60,11 @@ impl Receiver {
         (self.0 >> 1) as usize
     }
 
-    /// Which side of it.
     pub fn side(self) -> Side {
         if self.0 & 1 == 0 { Side::Front } else { Side::Back }
     }
 
-    /// Its place among [`Receiver::all`].
+    /// Position in [`Receiver::all`].
     pub fn index(self) -> usize {
         self.0 as usize
     }

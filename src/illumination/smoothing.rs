@@ -1,36 +1,38 @@
 //! Gaussian smoothing of a map's flux that moves integer counts between texels and loses none.
 //!
-//! A wide gaussian works on a coarser map: 2ⁿ × 2ⁿ texels are summed, the sums are smoothed and spread again by linear
-//! interpolation. Sums and interpolation together add a variance of a quarter of a coarse texel's squared side.
+//! A wide Gaussian works on a coarser map: blocks of 2ⁿ × 2ⁿ texels are summed, the sums are smoothed, and the result
+//! is distributed by linear interpolation. Summation and interpolation add a variance of a quarter of a coarse texel's
+//! squared side.
 
 use rayon::prelude::*;
 
 use super::accumulator::{FluxAccumulator, FluxCount};
 use super::tiles::TileLayout;
 
-/// Spreads at which the gaussian is cut off.
+/// The Gaussian is cut off at this many standard deviations.
 const CUT_SPREADS: f64 = 4.0;
 
-/// Spreads [texels] below which nothing is moved: not even 10⁻⁸ of a texel's flux would be.
+/// Smallest standard deviation that has an effect [texels]: below, less than 10⁻⁸ of a texel's flux would move.
 const MIN_SPREAD_TEXELS: f64 = 1e-4;
 
-/// Spreads over the map's side from which a line becomes flat.
+/// Standard deviation, relative to the length of a line, from which the result is constant.
 const FLAT_SPREADS: f64 = 2.0;
 
-/// Coarse texels per spread, at least: fewer would show the interpolation.
+/// Minimum number of coarse texels per standard deviation: with fewer, the interpolation becomes visible.
 const COARSE_PER_SPREAD: f64 = 2.0;
 
-/// Coarse texels are at most 2 to this as long as the finest: rounding stays below 2⁻³⁴ of the light's power.
+/// Coarsest level: its texels are 2 to this times as long as the finest. Rounding then stays below 2⁻³⁴ of the light's
+/// power.
 const COARSEST: u32 = 6;
 
-/// Texels of a map in tiles that are smoothed at once.
+/// Maximum number of texels of a tiled map that are smoothed at once.
 const MAX_AT_ONCE: usize = 2048 * 2048;
 
-/// Smooths flux with a gaussian of standard deviation `spread_texels` [texels of the finest size], cut off at four of
-/// them, across and down; borders mirror. Nothing happens at 0 (or less, or at what is no number), nor where a map in
-/// tiles is too large for so small a spread: under half a 2048th of its side.
+/// Smooths flux in both directions with a Gaussian of standard deviation `spread_texels` [texels of the finest size],
+/// cut off at four standard deviations and mirrored at borders. Does nothing if the deviation is NaN or not positive,
+/// or on a tiled map so large that it is below half a 2048th of the side.
 ///
-/// No count is lost, in no channel. The result does not depend on the number of threads.
+/// Conserves the counts of each channel. The result does not depend on the number of threads.
 pub fn smooth(flux: &mut FluxAccumulator, layout: Option<&TileLayout>, spread_texels: f64) {
     if spread_texels < MIN_SPREAD_TEXELS || spread_texels.is_nan() {
         return;
@@ -65,13 +67,13 @@ pub fn smooth(flux: &mut FluxAccumulator, layout: Option<&TileLayout>, spread_te
 struct Block {
     /// Its texels are 2^level times as long as the finest.
     level: u32,
-    /// [finest texels]
+    /// First column and row [finest texels].
     origin: (usize, usize),
-    /// [own texels]
+    /// Columns and rows [its own texels].
     size: (usize, usize),
 }
 
-/// All texels in the order in which they are kept.
+/// All texels, in storage order.
 fn blocks(flux: &FluxAccumulator, layout: Option<&TileLayout>) -> Vec<Block> {
     match layout {
         Some(layout) => layout
@@ -93,7 +95,7 @@ fn blocks(flux: &FluxAccumulator, layout: Option<&TileLayout>) -> Vec<Block> {
 }
 
 impl Block {
-    /// Places of its texels [finest texels].
+    /// Positions of its texels [finest texels].
     fn places(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
         let place = |origin: usize, index: usize| origin + (index << self.level);
         let (columns, rows) = self.size;
@@ -103,7 +105,7 @@ impl Block {
     }
 }
 
-/// A map of one size, 2^level times as coarse as the finest texels.
+/// Sums flux into a map whose texels are all 2^level times as long as the finest.
 fn summed(flux: &FluxAccumulator, layout: Option<&TileLayout>, level: u32) -> FluxAccumulator {
     let (width, height) = layout.map_or((flux.width(), flux.height()), TileLayout::size);
     let mut coarse = FluxAccumulator::new(width >> level, height >> level);
@@ -131,15 +133,14 @@ fn summed(flux: &FluxAccumulator, layout: Option<&TileLayout>, level: u32) -> Fl
     coarse
 }
 
-/// Adds counts to others.
 pub fn add(sum: &mut FluxCount, more: FluxCount) {
     for (sum, more) in sum.iter_mut().zip(more) {
         *sum += more;
     }
 }
 
-/// Gives the texels of a map, in place of what they hold, those of one that is 2^level times as coarse, linearly
-/// interpolated. What rounding leaves goes to the first that a coarse texel covers.
+/// Replaces the flux of a map by that of one that is 2^level times as coarse, linearly interpolated. Remainders of
+/// rounding go to the first texel under each coarse texel.
 pub fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Option<&TileLayout>, level: u32) {
     let (across, down) = (coarse.width(), coarse.height());
     let side = 1_i64 << level;
@@ -177,11 +178,11 @@ pub fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Opti
     }
 }
 
-/// Coarse texels whose light reaches an interval of so many finest texels, with what each gives. Those beyond a border
+/// Coarse texels that contribute to an interval of `length` finest texels, with their weights. Those beyond a border
 /// stand for their mirror images.
 fn weights(begin: i64, length: i64, side: i64) -> impl Iterator<Item = (i64, i64)> {
     let end = begin + length;
-    // Light of a coarse texel reaches half its side farther than itself.
+    // The tent of a coarse texel extends by half its side beyond it.
     let reach = side / 2;
     let first = (begin - reach).div_euclid(side);
     let last = (end - 1 + reach).div_euclid(side);
@@ -191,8 +192,8 @@ fn weights(begin: i64, length: i64, side: i64) -> impl Iterator<Item = (i64, i64
     })
 }
 
-/// What a coarse texel gives to the finest texels before a place, counted from the first that it reaches: the integral
-/// of a triangle of twice its side; of one finest texel, all of it.
+/// Weight of a coarse texel in all finest texels before `place`, counted from the first that it reaches: the integral
+/// of a tent of twice its side; for a single finest texel, a step.
 fn weight(side: i64, place: i64) -> i64 {
     if side == 1 {
         return place.clamp(0, 1);
@@ -205,7 +206,7 @@ fn weight(side: i64, place: i64) -> i64 {
     }
 }
 
-/// The same for a map of one size, at that size.
+/// [`smooth`] on a map whose texels are all of one size, at that size.
 fn smooth_evenly(flux: &mut FluxAccumulator, spread_texels: f64) {
     if spread_texels < MIN_SPREAD_TEXELS {
         return;
@@ -218,7 +219,6 @@ fn smooth_evenly(flux: &mut FluxAccumulator, spread_texels: f64) {
     texels.copy_from_slice(&transposed(&columns, height, width));
 }
 
-/// Rows become columns.
 fn transposed(texels: &[FluxCount], width: usize, height: usize) -> Vec<FluxCount> {
     let mut turned = vec![[0; 3]; texels.len()];
     turned
@@ -232,7 +232,7 @@ fn transposed(texels: &[FluxCount], width: usize, height: usize) -> Vec<FluxCoun
     turned
 }
 
-/// Smooths each of the lines of `length` texels along itself.
+/// Smooths each line of `length` texels.
 fn smooth_lines(texels: &mut [FluxCount], length: usize, spread: f64) {
     let kernel = Kernel::new(spread.min(FLAT_SPREADS * length as f64), length);
     texels
@@ -248,17 +248,17 @@ fn smooth_lines(texels: &mut [FluxCount], length: usize, spread: f64) {
         );
 }
 
-/// What a texel takes of those around it.
+/// Weights of a texel's neighbourhood.
 struct Kernel {
-    /// How far before the texel it begins.
+    /// Distance of the first weight before the centre [texels].
     reach: usize,
-    /// From there on; the sum is 1.
+    /// In order; they add up to 1.
     weights: Vec<f64>,
 }
 
 impl Kernel {
-    /// The gaussian for lattices (T. Lindeberg, "Scale-space for discrete signals", 1990): weights proportional to the
-    /// modified Bessel functions I_n(σ²), whose variance is σ² even where samples of the gaussian are too coarse.
+    /// The discrete Gaussian (T. Lindeberg, "Scale-space for discrete signals", 1990): weights proportional to the
+    /// modified Bessel functions I_n(σ²). Its variance is σ² even where a sampled Gaussian would be too coarse.
     fn new(spread: f64, length: usize) -> Self {
         let reach = (CUT_SPREADS * spread).ceil() as usize + 1;
         let side = bessel(spread * spread, reach, (10.0 * spread) as usize + 20);
@@ -270,7 +270,7 @@ impl Kernel {
                 weights: (0..=2 * reach).map(weight).collect(),
             };
         }
-        // A mirrored line repeats after twice its length.
+        // A mirrored line repeats with twice its length.
         let mut weights = vec![0.0; 2 * length];
         for offset in 0..=2 * reach {
             weights[(offset + 2 * length * reach - reach) % (2 * length)] += weight(offset);
@@ -279,8 +279,8 @@ impl Kernel {
     }
 }
 
-/// I_n(`x`) for n from 0 to `last`, but for a common factor: by Miller's algorithm, downwards from `beyond`, where
-/// they are as good as nothing.
+/// I_n(`x`) for n from 0 to `last`, up to a common factor, by Miller's algorithm: downwards from `beyond`, where they
+/// are negligible.
 fn bessel(x: f64, last: usize, beyond: usize) -> Vec<f64> {
     let mut values = vec![0.0; last + 1];
     let (mut above, mut here) = (0.0, f64::MIN_POSITIVE);
@@ -293,9 +293,9 @@ fn bessel(x: f64, last: usize, beyond: usize) -> Vec<f64> {
     values
 }
 
-/// Room for one channel of a line.
+/// Scratch space for one channel of a line.
 struct Line {
-    /// Counts, with what the kernel takes from beyond the borders.
+    /// Counts, extended by the kernel's reach beyond the borders.
     counts: Vec<f64>,
     smoothed: Vec<f64>,
 }

@@ -1,17 +1,17 @@
 //! A map in square tiles, each as fine as its light needs, so that memory goes where the caustic is.
 //!
-//! The map has a finest size, in which places are given and files are written. Every tile of [`SIDE`]² of its texels
-//! has a level: its own texels are 2^level times as long. Texels are kept tile after tile, row by row within each.
+//! Positions are given in texels of the finest size, in which files are also written. Each tile of [`SIDE`]² such
+//! texels has a level: its own texels are 2^level times as long. Texels are stored tile after tile, row by row in each.
 
 use std::ops::Range;
 
 /// Side of a tile [texels of the finest size].
 pub const SIDE: usize = 64;
 
-/// Coarsest level of a tile: a single texel.
+/// Coarsest level of a tile: it is a single texel.
 pub const COARSEST: u8 = 6;
 
-/// How fine each tile of a map is.
+/// Resolution of each tile of a map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TileLayout {
     width: usize,
@@ -19,35 +19,34 @@ pub struct TileLayout {
     columns: usize,
     /// By tile, row by row.
     levels: Vec<u8>,
-    /// Levels by which each tile is coarser than its light asks for.
+    /// Levels by which each tile is coarser than its light needs.
     lost: Vec<u8>,
-    /// First texel of each tile, and the number of all.
+    /// Index of the first texel of each tile, followed by the number of all texels.
     begins: Vec<usize>,
 }
 
-/// One tile.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Tile {
     /// Its texels are 2^level times as long as the finest ones.
     pub level: u8,
-    /// Levels by which it is coarser than its light asks for.
+    /// Levels by which it is coarser than its light needs.
     pub lost: u8,
-    /// First column and row that it covers [finest texels].
+    /// First column and row [finest texels].
     pub origin: (usize, usize),
-    /// Columns and rows of its own texels.
+    /// Columns and rows [its own texels].
     pub size: (usize, usize),
-    /// Its texels among those of the map.
+    /// Its range among the texels of the map.
     pub texels: Range<usize>,
 }
 
 impl TileLayout {
-    /// A map of `width` × `height` finest texels, both > 0, whose tiles are to have the given levels, row by row, though
-    /// their light asks for `wanted`. Levels end at [`COARSEST`], and where a tile at the border is no whole number of
-    /// coarser texels.
+    /// A map of `width` × `height` finest texels, both > 0. `levels` are the levels of its tiles, row by row; `wanted`
+    /// are those that their light needs. Levels are limited to [`COARSEST`], and at the border to sizes that a tile
+    /// divides into.
     ///
     /// # Panics
     ///
-    /// Where there are not as many levels as tiles.
+    /// The number of levels must equal that of tiles.
     pub fn new((width, height): (usize, usize), levels: &[u8], wanted: &[u8]) -> Self {
         let (columns, rows) = tile_counts(width, height);
         assert!(
@@ -75,17 +74,15 @@ impl TileLayout {
         layout
     }
 
-    /// Texels across and down at the finest size.
+    /// Width and height [finest texels].
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
-    /// Number of all texels.
     pub fn texel_count(&self) -> usize {
         self.begins[self.levels.len()]
     }
 
-    /// Number of tiles.
     pub fn tile_count(&self) -> usize {
         self.levels.len()
     }
@@ -95,7 +92,7 @@ impl TileLayout {
         (self.columns, self.levels.len() / self.columns)
     }
 
-    /// One tile, counted row by row.
+    /// A tile by its index, row by row.
     pub fn tile(&self, tile: usize) -> Tile {
         let level = self.levels[tile];
         let (width, height) = self.covered(tile);
@@ -113,17 +110,17 @@ impl TileLayout {
         (0..self.levels.len()).map(|tile| self.tile(tile))
     }
 
-    /// The level of the tile that holds a finest texel.
+    /// Level of the tile that contains a finest texel.
     pub fn level_at(&self, column: usize, row: usize) -> u8 {
         self.levels[self.tile_at(column, row)]
     }
 
-    /// The tile that holds a finest texel.
+    /// Index of the tile that contains a finest texel.
     pub fn tile_at(&self, column: usize, row: usize) -> usize {
         row / SIDE * self.columns + column / SIDE
     }
 
-    /// The finest level of the tiles between two places [finest texels], both within the map.
+    /// The finest level of all tiles in a rectangle [finest texels, inclusive] within the map.
     pub fn finest_between(&self, low: (usize, usize), high: (usize, usize)) -> u8 {
         let rows = low.1 / SIDE..=high.1 / SIDE;
         let columns = low.0 / SIDE..=high.0 / SIDE;
@@ -133,7 +130,7 @@ impl TileLayout {
             .unwrap_or(0)
     }
 
-    /// The texel that holds a finest texel.
+    /// Index of the texel that contains a finest texel.
     pub fn texel(&self, column: usize, row: usize) -> usize {
         let tile = self.tile_at(column, row);
         let level = self.levels[tile];
@@ -141,7 +138,7 @@ impl TileLayout {
         self.begins[tile] + ((row % SIDE) >> level) * across + ((column % SIDE) >> level)
     }
 
-    /// Texels under one row of the finest size, from left to right: each as often as it is finest texels wide.
+    /// Texels under a row of the finest size, from left to right; each repeats once per finest texel of its width.
     pub fn row_texels(&self, row: usize) -> impl Iterator<Item = usize> + '_ {
         let first = row / SIDE * self.columns;
         (first..first + self.columns).flat_map(move |tile| {
@@ -152,14 +149,14 @@ impl TileLayout {
         })
     }
 
-    /// Values at the finest size, row by row: each texel's value wherever it reaches.
+    /// Expands values to the finest size, row by row: each texel's value is repeated over its area.
     pub fn dense<T: Copy>(&self, values: &[T]) -> Vec<T> {
         let rows = (0..self.height).flat_map(|row| self.row_texels(row));
         rows.map(|texel| values[texel]).collect()
     }
 
-    /// For each texel the first of the blocks of `side` × `side` finest texels that it lies in, counted row by row; `side`
-    /// is a power of two up to [`SIDE`].
+    /// For each texel, the block of `side` × `side` finest texels that contains its first one, counted row by row.
+    /// `side` is a power of two up to [`SIDE`].
     pub fn blocks(&self, side: usize) -> Vec<u32> {
         let columns = self.width.div_ceil(side);
         let mut blocks = Vec::with_capacity(self.texel_count());
@@ -189,10 +186,10 @@ pub fn tile_counts(width: usize, height: usize) -> (usize, usize) {
     (width.div_ceil(SIDE), height.div_ceil(SIDE))
 }
 
-/// Makes tiles finer until no two of the eight around each differ by more than one level.
+/// Refines tiles until no two of eight-connected neighbours differ by more than one level.
 pub fn balance(levels: &mut [u8], columns: usize) {
     let rows = levels.len() / columns;
-    // From fine to coarse: what a level changes is changed by no later one.
+    // From fine to coarse, so that no level changes what an earlier one has settled.
     for level in 0..COARSEST {
         let fine: Vec<usize> = (0..levels.len()).filter(|&tile| levels[tile] == level).collect();
         for tile in fine {

@@ -1,11 +1,11 @@
 //! The visible error: relative to local brightness, and in the dark to what the exposure reveals. A bright focus does
 //! not dominate a room by it, and invisible errors do not count.
 //!
-//! Over blocks of 8×8 texels of all maps it is √(Σ w (ΔE/n)² / Σ w): E is the luminance of all layers, C that of caustic and
-//! indirect light together, whose error is ΔE; n is E in the light, √(E·white) in the dark and white/16 in the night; w is the
-//! block's area times min(1, C/n), so that light which is missing counts in full however small its place in the room. The
-//! square root is that of Dammertz et al., "A Hierarchical Automatic Stopping Condition for Monte Carlo Global
-//! Illumination" (WSCG 2010), as adaptive sampling of path tracers has it.
+//! Over blocks of 8×8 texels of all maps, it is √(Σ w (ΔE/n)² / Σ w). E is the luminance of all layers, C that of
+//! caustic and indirect light together, and ΔE the error of C. n is E in lit blocks, √(E·white) in dark ones, and
+//! white/16 in the darkest. w is the block's area times min(1, C/n), so that missing light counts in full, however
+//! small its place in the room. The square root is that of Dammertz et al., "A Hierarchical Automatic Stopping
+//! Condition for Monte Carlo Global Illumination" (WSCG 2010), as used for adaptive sampling in path tracers.
 
 use super::{Chart, IlluminationMap};
 use crate::optics::luminance;
@@ -14,19 +14,19 @@ use crate::settings::LayerKind;
 /// Side of a block [texels].
 const SIDE: usize = 8;
 
-/// Places darker than this part of the mean tell nothing of the exposure.
+/// Blocks darker than this fraction of the mean do not affect the exposure.
 const NIGHT: f64 = 1e-4;
 
-/// Share of the area, of the darkest and of the brightest places, that tells nothing of it either.
+/// Share of the area among the darkest and among the brightest blocks that does not affect it, either.
 const TRIMMED: f64 = 0.1;
 
-/// What exposure makes of the mean brightness, of white.
+/// Exposure maps the log-average luminance to this fraction of white.
 const MIDDLE_GREY: f64 = 0.18;
 
-/// Below this part of white it is night.
+/// Luminance, relative to white, below which errors are relative to a constant: see [`BlockLight::scale`].
 const DARKEST: f64 = 1.0 / 256.0;
 
-/// The block that each texel of a map lies in.
+/// The block that contains each texel of a map.
 #[derive(Clone, Debug)]
 pub struct Blocks {
     of_texel: Vec<u32>,
@@ -34,7 +34,7 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// Of a chart; within each tile where it is in tiles.
+    /// Blocks of a chart, or of each tile of a tiled chart.
     pub fn new(chart: &Chart) -> Self {
         let mut of_texel = Vec::with_capacity(chart.texel_count());
         let mut count = 0;
@@ -56,17 +56,16 @@ impl Blocks {
         Self { of_texel, areas_m2 }
     }
 
-    /// Number of blocks.
     pub fn count(&self) -> usize {
         self.areas_m2.len()
     }
 
-    /// The block of each texel.
+    /// Block index of each texel.
     pub fn of_texels(&self) -> &[u32] {
         &self.of_texel
     }
 
-    /// Means of a value of texels over each block, by area; 0 where the surface does not reach.
+    /// Area-weighted mean over each block of a value per texel; 0 if the block is uncovered.
     pub fn means(&self, chart: &Chart, value: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut sums = vec![0.0; self.count()];
         for (texel, &block) in self.of_texel.iter().enumerate() {
@@ -78,7 +77,7 @@ impl Blocks {
         sums
     }
 
-    /// The blocks with their light, by means over each.
+    /// Each block with its light, given means per block.
     pub fn lit(&self, all: &[f64], traced: &[f64]) -> impl Iterator<Item = BlockLight> {
         let light = all.iter().zip(traced);
         let blocks = light.zip(&self.areas_m2);
@@ -86,19 +85,18 @@ impl Blocks {
     }
 }
 
-/// The light of one block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BlockLight {
-    /// Of its surface [m²].
+    /// Surface area of the block [m²].
     pub area_m2: f64,
-    /// Mean luminance of E, of all layers [W/m²].
+    /// Mean luminance of E over all layers [W/m²].
     pub all: f64,
-    /// Of caustic and indirect light [W/m²].
+    /// Mean luminance of caustic and indirect light [W/m²].
     pub traced: f64,
 }
 
 impl BlockLight {
-    /// What an error is relative to here [W/m²].
+    /// Luminance that errors are relative to here [W/m²].
     pub fn scale(&self, white: f64) -> f64 {
         if self.all >= white {
             self.all
@@ -107,14 +105,14 @@ impl BlockLight {
         }
     }
 
-    /// How much of the whole an error here counts [m²].
+    /// Weight of an error here [m²].
     pub fn weight_m2(&self, white: f64) -> f64 {
         self.area_m2 * (self.traced / self.scale(white)).clamp(0.0, 1.0)
     }
 }
 
-/// Luminance of E [W/m²] that exposure makes white: by the mean logarithm of E, of the area that is neither in the night
-/// nor among its darkest or brightest tenth. `None` without light.
+/// Luminance of E that exposure maps to white [W/m²], from the log-average over the area without its darkest and
+/// brightest tenth, and without blocks below `NIGHT`. `None` without light.
 pub fn white(blocks: impl Iterator<Item = BlockLight>) -> Option<f64> {
     let mut blocks: Vec<BlockLight> = blocks.filter(|block| block.area_m2 > 0.0).collect();
     let (sum, area_m2) = blocks.iter().fold((0.0, 0.0), |(sum, area_m2), block| {
@@ -137,9 +135,9 @@ pub fn white(blocks: impl Iterator<Item = BlockLight>) -> Option<f64> {
     (counted_m2 > 0.0 && white.is_finite() && white > 0.0).then_some(white)
 }
 
-/// The visible error of maps, and of each of them by itself; `given_up` is the share of caustic light that is missing
-/// beside that. `None` where the error of a map is not known, and where no
-/// caustic or indirect light arrived.
+/// Visible error of all maps together, and of each. `given_up` is the share of traced light that was truncated, which
+/// the error of the maps does not include. `None` if the error of a lit map is unknown, or if there is no caustic or
+/// indirect light.
 pub fn visible_error(maps: &[IlluminationMap], given_up: f64) -> (Option<f64>, Vec<Option<f64>>) {
     let none = || (None, vec![None; maps.len()]);
     let mut lit = Vec::with_capacity(maps.len());
@@ -183,7 +181,7 @@ pub fn visible_error(maps: &[IlluminationMap], given_up: f64) -> (Option<f64>, V
 }
 
 impl IlluminationMap {
-    /// Luminance of E of some layers together, texel by texel [W/m²].
+    /// Luminance of E of several layers together, per texel [W/m²].
     fn luminance_of(&self, kinds: &[LayerKind]) -> Vec<f64> {
         let mut sums = vec![0.0; self.chart.texel_count()];
         for layer in kinds.iter().filter_map(|&kind| self.layer(kind)) {
@@ -215,7 +213,7 @@ mod tests {
         assert_eq!(white(std::iter::empty()), None);
     }
 
-    /// A tenth of the area at either end and what lies in the night are left out.
+    /// A tenth of the area at either end is left out, and so are blocks in the night.
     #[test]
     fn the_ends_tell_nothing() {
         let mut blocks = vec![even(0.18, 0.0); 8];

@@ -4,23 +4,23 @@ use super::{Effect, EffectLine, EffectPlan, EffectSwitch, LightLine};
 use crate::scene::{Material, Scene, SurfaceKind};
 use crate::settings::{BakeSettings, LayerKind};
 
-/// What a light sees of the specular objects in the scene.
+/// Specular objects that a light sees or reaches.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct LightReach {
-    /// Specular objects that nothing opaque and closed seals from the light.
+    /// Specular objects that no opaque closed surface seals from the light.
     pub unsealed: usize,
-    /// Those whose light may go on to a diffuse surface.
+    /// Those whose light may continue to a diffuse surface.
     pub casters: usize,
-    /// Those that the light's item buffer found, ascending.
+    /// Objects that the light's item buffer found, in ascending order.
     pub seen: Vec<usize>,
     /// Cells of the item buffer that opaque faces cover.
     pub hidden_cells: u64,
-    /// All specular objects that the light's light may meet, with the object that sends it there, where the light does
-    /// not see it itself.
+    /// All specular objects that the light may reach, each with the object that sends light there; `None` if the light
+    /// sees it directly.
     pub reached: Vec<(usize, Option<usize>)>,
 }
 
-/// Decides every effect. `sights` in the order of `Scene::lights`.
+/// Decides every effect. `sights` is in the order of `Scene::lights`.
 pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> EffectPlan {
     let decision = Decision {
         scene,
@@ -84,12 +84,12 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> 
     }
 }
 
-/// Whether the caustic layer is to be baked at all: for itself, or since others gather from it.
+/// Whether the caustic layer is baked: for its own sake, or because other layers gather from it.
 pub fn wants_caustics(settings: &BakeSettings) -> bool {
     is_needed(settings, LayerKind::Caustic)
 }
 
-/// Whether a layer is to be in the maps: as its effect is switched, else as the layers say.
+/// Whether a layer is in the maps: by the switch of its effect or, if that is auto, by the chosen layers.
 pub fn is_wanted(settings: &BakeSettings, layer: LayerKind) -> bool {
     match settings.effects.get(effect_of(layer)) {
         EffectSwitch::On => true,
@@ -98,13 +98,13 @@ pub fn is_wanted(settings: &BakeSettings, layer: LayerKind) -> bool {
     }
 }
 
-/// Whether a layer is to be baked, in the maps or not.
+/// Whether a layer is baked, in the maps or not.
 fn is_needed(settings: &BakeSettings, layer: LayerKind) -> bool {
     let is_off = settings.effects.get(effect_of(layer)) == EffectSwitch::Off;
     !is_off && (is_wanted(settings, layer) || is_wanted(settings, LayerKind::Indirect))
 }
 
-/// The effect that makes a layer.
+/// The effect that produces a layer.
 fn effect_of(layer: LayerKind) -> Effect {
     match layer {
         LayerKind::Caustic => Effect::LightPass,
@@ -113,17 +113,17 @@ fn effect_of(layer: LayerKind) -> Effect {
     }
 }
 
-/// Why an effect is off that the user switched off.
+/// Reason of an effect that the user switched off.
 const SWITCHED_OFF: &str = "switched off by the user";
 
-/// Why an effect is on that nothing calls for.
+/// Reason of an effect that the user switched on although nothing requires it.
 const FORCED_ON: &str = "switched on by the user, though nothing calls for it";
 
 struct Decision<'a> {
     scene: &'a Scene,
     settings: &'a BakeSettings,
     sights: &'a [LightReach],
-    /// Whether the caustic layer is wanted.
+    /// Whether the caustic layer is baked.
     caustic: bool,
 }
 
@@ -137,7 +137,7 @@ impl Decision<'_> {
         }
     }
 
-    /// Whether any object has a material that `wanted` accepts.
+    /// Whether any object has a kind of surface that `wanted` accepts.
     fn has(&self, wanted: impl Fn(SurfaceKind) -> bool) -> bool {
         (0..self.scene.objects.len()).any(|object| wanted(self.scene.material_of(object).surface))
     }
@@ -170,7 +170,7 @@ impl Decision<'_> {
         }
     }
 
-    /// Objects that light may meet: object, light, and what sends it there.
+    /// Objects that light may reach: object, light, and the object that sends light there, if any.
     fn lit_objects(&self) -> impl Iterator<Item = (usize, usize, Option<usize>)> {
         let shining = |light: usize| self.scene.lights[light].strength().max_channel() > 0.0;
         let sights = self.sights.iter().enumerate();
@@ -191,7 +191,7 @@ impl Decision<'_> {
         }
     }
 
-    /// An effect of the paths of the light pass: what is lit calls for it.
+    /// An effect on paths of the light pass: on if a lit object requires it.
     fn on_paths(
         &self,
         effect: Effect,
@@ -210,7 +210,7 @@ impl Decision<'_> {
         }
     }
 
-    /// Called for by what is lit and bends each wavelength another way, of whatever colour the light is.
+    /// On if a lit object is dispersive, whatever the colour of the light.
     fn dispersion(&self, pass: bool) -> EffectLine {
         let none = "no lit solid bends one wavelength more than another";
         let line = self.on_paths(Effect::Dispersion, pass, &Material::is_dispersive, none);
@@ -296,7 +296,7 @@ impl Decision<'_> {
         }
     }
 
-    /// Why no diffuse surface takes light, if none does.
+    /// Why no diffuse surface can receive light, if that is so.
     fn why_dark(&self) -> Option<&'static str> {
         if self.scene.lights.is_empty() {
             Some("the scene has no light")

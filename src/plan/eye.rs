@@ -3,8 +3,8 @@
 use super::{Effect, EffectLine, EffectSwitch};
 use crate::scene::{Camera, Material, Scene};
 
-/// Decides [`Effect::Chains`] for a camera and the `aspect` = width/height of its picture: on where the box of a
-/// specular surface may be seen. Without a camera, where there is a specular surface at all.
+/// Decides [`Effect::Chains`] for a camera and the `aspect` = width/height of its picture: on if the bounding box of a
+/// specular surface may be visible. Without a camera, on if there is any specular surface.
 pub fn chains(scene: &Scene, camera: Option<(&Camera, f64)>, switch: EffectSwitch) -> EffectLine {
     let is_specular = |material: &Material| material.surface.is_specular();
     let seen = first_seen(scene, camera, is_specular).map(|object| &scene.objects[object].name);
@@ -24,8 +24,8 @@ pub fn chains(scene: &Scene, camera: Option<(&Camera, f64)>, switch: EffectSwitc
     }
 }
 
-/// The line of [`Effect::Dispersion`] for both passes, where the scene has glass that parts wavelengths: `light` is the
-/// light pass's, and the eye's chains are on as `chains` says.
+/// The line of [`Effect::Dispersion`] for both passes if the scene has dispersive glass; otherwise `light` unchanged.
+/// `light` is the line of the light pass, `chains` that of the eye's chains.
 pub fn dispersion(
     light: EffectLine,
     scene: &Scene,

@@ -7,16 +7,16 @@ use super::sealed_regions::Compartments;
 use crate::geometry::enclosure::Bounds;
 use crate::scene::{InScene, Light, LightKind, Scene, SurfaceKind};
 
-/// With more specular objects than this, all that share a compartment are taken to send light to each other.
+/// With more specular objects than this, all that share a compartment are assumed to send light to each other.
 const MAX_RELAYS: usize = 512;
 
-/// Tests of a triangle with a box that are worth making for an object; beyond, it is taken to reach everything.
+/// Maximum number of triangle-box tests per object; beyond, it is assumed to reach everything.
 const MAX_TESTS: usize = 1 << 22;
 
-/// Rounding that planes and boxes are compared with, relative to the scene.
+/// Rounding tolerance of tests with planes and boxes, relative to the size of the scene.
 const TOLERANCE: f64 = 1e-9;
 
-/// What may send light to what.
+/// Which objects may send light to which.
 #[derive(Debug)]
 pub struct SceneReach<'a> {
     scene: &'a Scene,
@@ -25,12 +25,11 @@ pub struct SceneReach<'a> {
     specular: Vec<usize>,
     receivers: Vec<usize>,
     tolerance_m: f64,
-    /// Specular objects whose light, wherever it comes from, may end on a receiver.
+    /// Specular objects whose light may end on a receiver, wherever it comes from.
     is_useful: Vec<bool>,
 }
 
 impl<'a> SceneReach<'a> {
-    /// Looks at a scene.
     pub fn of(scene: &'a Scene) -> Self {
         let of_kind = |wanted: fn(SurfaceKind) -> bool| -> Vec<usize> {
             (0..scene.objects.len())
@@ -53,10 +52,10 @@ impl<'a> SceneReach<'a> {
         reach
     }
 
-    /// Specular objects that a light may meet first and whose light may end on a receiver, ascending.
+    /// Specular objects, in ascending order, that a light may hit first and whose light may end on a receiver.
     pub fn casters(&self, light: usize) -> Vec<usize> {
         let source = &self.scene.lights[light];
-        // What opaque bodies seal from the light itself, no way of it leads to.
+        // If opaque bodies seal the light from every receiver, no path leads to one.
         if !self
             .receivers
             .iter()
@@ -75,14 +74,14 @@ impl<'a> SceneReach<'a> {
         self.specular.iter().copied().filter(goes_on).collect()
     }
 
-    /// Specular objects that no opaque body seals from a light, whether their light may end on a receiver or not.
+    /// Specular objects that no opaque body seals from a light, whether or not their light may end on a receiver.
     pub fn unsealed(&self, light: usize) -> Vec<usize> {
         let meets = |&object: &usize| self.compartments.light_meets(light, object);
         self.specular.iter().copied().filter(meets).collect()
     }
 
-    /// All specular objects that light may meet on its way from a light that sees `seen`, those included, ascending;
-    /// with the object that sends it there, where the light does not see it itself.
+    /// All specular objects that light from a light may reach, including those that it sees, in ascending order. Each
+    /// comes with the object that sends light there, or `None` if the light sees it directly.
     pub fn reached(&self, light: usize, seen: &[usize]) -> Vec<(usize, Option<usize>)> {
         let source = &self.scene.lights[light];
         let mut by_way_of: Vec<Option<Option<usize>>> = vec![None; self.scene.objects.len()];
@@ -98,7 +97,7 @@ impl<'a> SceneReach<'a> {
                     waiting.push((to, None));
                 }
             }
-            // What a mirror sends to itself comes from another side.
+            // Light that a mirror reflects onto itself arrives from another side.
             if lit_by.is_some() && self.sends(from, lit_by, from) {
                 waiting.push((from, None));
             }
@@ -109,7 +108,7 @@ impl<'a> SceneReach<'a> {
             .collect()
     }
 
-    /// From the receivers backwards.
+    /// Works backwards from the receivers.
     fn find_useful(&mut self) {
         if self.specular.len() > MAX_RELAYS {
             self.specular
@@ -151,8 +150,8 @@ impl<'a> SceneReach<'a> {
         to.iter().any(|&to| self.sends(from, lit_by, to))
     }
 
-    /// Whether a specular object may send light to another object: what comes straight from `lit_by`, or light from
-    /// anywhere.
+    /// Whether a specular object may send light to another object: light directly from `lit_by`, or from anywhere if
+    /// that is `None`.
     fn sends(&self, from: usize, lit_by: Option<&Light>, to: usize) -> bool {
         let Some(bounds) = self.bounds[to] else {
             return false;
@@ -170,7 +169,7 @@ impl<'a> SceneReach<'a> {
         }
     }
 
-    /// Whether any triangle of a mirror has part of a box before it, on the side that its light comes from.
+    /// Whether part of a box lies in front of any triangle of a mirror, on a side that is lit.
     fn reflects_into(&self, mesh: InScene, lit_by: Option<&Light>, bounds: Bounds) -> bool {
         (0..mesh.triangle_count()).any(|triangle| {
             let corner = mesh.corners(triangle)[0];
@@ -181,10 +180,10 @@ impl<'a> SceneReach<'a> {
         })
     }
 
-    /// Whether a light may fall on the front and on the back of a plane.
+    /// Whether a light may illuminate the front and the back of a plane.
     fn lit_sides(&self, light: &Light, point: DVec3, normal: DVec3) -> [bool; 2] {
         let (height, tolerance) = match light.kind {
-            // What has a size may reach past any plane.
+            // A light with a size may extend beyond any plane.
             _ if light.has_extent() => return [true, true],
             LightKind::Sun { direction, .. } => (-direction.dot(normal), TOLERANCE),
             kind => match kind.position() {
@@ -196,7 +195,7 @@ impl<'a> SceneReach<'a> {
     }
 }
 
-/// Lowest and highest point of a box above a plane [m].
+/// Range of heights of a box above a plane [m].
 fn heights((low, high): Bounds, point: DVec3, normal: DVec3) -> (f64, f64) {
     let centre = (low * 0.5 + high * 0.5 - point).dot(normal);
     let reach = ((high - low) * 0.5).dot(normal.abs());

@@ -5,21 +5,21 @@ use glam::DVec3;
 use crate::geometry::enclosure::{Bounds, is_closed, triangle_meets_box, winding_number};
 use crate::scene::{InScene, Light, LightKind, LightSize, Mesh, Scene};
 
-/// Larger meshes are not looked at: they seal nothing.
+/// Larger meshes are not tested and seal nothing.
 const MAX_TRIANGLES: usize = 200_000;
 
-/// A winding number this close to a whole one is taken for it.
+/// Tolerance within which a winding number counts as an integer.
 const WINDING_TOLERANCE: f64 = 1e-6;
 
-/// The opaque closed objects around something, ascending; `None` where that cannot be told.
+/// Opaque closed objects around something, in ascending order; `None` if that is undecidable.
 type EnclosedBy = Option<Vec<usize>>;
 
-/// Which closed opaque objects everything lies inside of.
+/// The opaque closed objects around each object and each light.
 #[derive(Debug)]
 pub(super) struct Compartments {
     objects: Vec<EnclosedBy>,
     lights: Vec<EnclosedBy>,
-    /// Whether the object is such a surface itself: it has to do with its outside and its inside.
+    /// Whether the object itself is such a surface: it borders both its outside and its inside.
     encloses: Vec<bool>,
 }
 
@@ -35,7 +35,7 @@ impl Compartments {
             let Some(around) = bounds[container].filter(|_| scene.material_of(container).is_opaque()) else {
                 continue;
             };
-            // What reaches through such a surface is on both sides of it.
+            // An object that intersects such a surface is on both sides of it.
             let near: Vec<(usize, Bounds)> = bounds
                 .iter()
                 .enumerate()
@@ -59,7 +59,7 @@ impl Compartments {
             }
             compartments.encloses[container] = true;
             for (other, bounds) in near {
-                // Boxes overlap easily where surfaces do not.
+                // Bounding boxes often overlap where surfaces do not.
                 if enters(scene.objects[other].in_scene(), around) {
                     book(
                         &mut compartments.objects[other],
@@ -75,12 +75,12 @@ impl Compartments {
         compartments
     }
 
-    /// Whether light of a light may meet an object at all.
+    /// Whether light from a light may reach an object.
     pub(super) fn light_meets(&self, light: usize, object: usize) -> bool {
         self.borders(object, &self.lights[light])
     }
 
-    /// Whether light may go from one object to another.
+    /// Whether light may travel from one object to another.
     pub(super) fn share(&self, from: usize, to: usize) -> bool {
         let Some(own) = &self.objects[from] else {
             return true;
@@ -89,7 +89,7 @@ impl Compartments {
         self.borders(to, &self.objects[from]) || inner.is_some_and(|inner| self.borders(to, &inner))
     }
 
-    /// Whether an object borders the space within `around`.
+    /// Whether an object borders the space enclosed by `around`.
     fn borders(&self, object: usize, around: &EnclosedBy) -> bool {
         let (Some(own), Some(around)) = (&self.objects[object], around) else {
             return true;
@@ -98,7 +98,7 @@ impl Compartments {
     }
 }
 
-/// The box that a light comes from; what comes from infinitely far is outside of everything.
+/// Bounding box of a light; `None` for lights at infinity, which are outside of everything.
 fn extent(light: &Light, objects: &[Option<Bounds>]) -> Option<Bounds> {
     match light.kind {
         LightKind::Point { position, .. } | LightKind::Spot { position, .. } => {
@@ -123,16 +123,16 @@ fn overlap((low, high): Bounds, (from, to): Bounds) -> bool {
     low.cmple(to).all() && high.cmpge(from).all()
 }
 
-/// Whether any part of a mesh lies in a box.
+/// Whether any part of a mesh lies in a box; assumed for large meshes.
 fn enters(mesh: InScene, bounds: Bounds) -> bool {
     mesh.triangle_count() > MAX_TRIANGLES
         || (0..mesh.triangle_count()).any(|triangle| triangle_meets_box(mesh.corners(triangle), bounds))
 }
 
-/// Whether a box lies wholly inside a closed mesh; `None` where the mesh goes through it, or hardly passes it.
+/// Whether a box lies entirely inside a closed mesh; `None` if the mesh intersects it or comes too close.
 fn is_inside(mesh: &Mesh, (low, high): Bounds) -> Option<bool> {
     let corners = || (0..mesh.triangles.len()).map(|triangle| mesh.corners(triangle));
-    // Wider than rounding, so that what touches is not told apart.
+    // Exceeds rounding, so that surfaces that touch the box count as intersecting it.
     let margin = DVec3::splat(1e-9 * (high.abs().max(low.abs()).max_element() + (high - low).length()));
     let widened = (low - margin, high + margin);
     if corners().any(|corners| triangle_meets_box(corners, widened)) {
@@ -143,7 +143,7 @@ fn is_inside(mesh: &Mesh, (low, high): Bounds) -> Option<bool> {
     ((winding - whole).abs() < WINDING_TOLERANCE).then_some(whole == 1.0)
 }
 
-/// Adds a container to what is around something.
+/// Adds a container to those around something.
 fn book(around: &mut EnclosedBy, container: usize, is_inside: Option<bool>) {
     match (around.as_mut(), is_inside) {
         (Some(list), Some(true)) => list.push(container),
@@ -152,7 +152,7 @@ fn book(around: &mut EnclosedBy, container: usize, is_inside: Option<bool>) {
     }
 }
 
-/// The same containers and one more.
+/// A copy with one more container, in order.
 fn with(around: &[usize], container: usize) -> Vec<usize> {
     let place = around.partition_point(|&other| other < container);
     let mut all = around.to_vec();

@@ -15,47 +15,47 @@ use crate::error::{Error, Result};
 /// An option of a bake.
 #[derive(Debug)]
 pub struct OptionInfo {
-    /// On the command line, without dashes.
+    /// Name on the command line, without dashes.
     pub name: &'static str,
-    /// The panel's, with its unit; empty where it has no control there.
+    /// Label in the panel, with its unit; empty if it has no control there.
     pub label: &'static str,
-    /// Stands for a value, with its unit; empty where being named is all.
+    /// Placeholder of the value, with its unit; empty for flags.
     pub value: &'static str,
-    /// Whether several values can be named, separated by commas.
+    /// Whether it takes several values, separated by commas.
     pub is_list: bool,
-    /// What it sets, in one line of help.
+    /// Purpose, in one line of help.
     pub brief: &'static str,
-    /// What it sets.
+    /// Purpose.
     pub what: &'static str,
-    /// Its values; empty where their names say all.
+    /// Range of the values; empty if their names are enough.
     range: &'static str,
-    /// What holds where it is not named.
+    /// What applies if it is not given.
     pub default: &'static str,
-    /// What it does to accuracy.
+    /// Effect on accuracy.
     pub accuracy: &'static str,
-    /// What it does to time and memory.
+    /// Effect on time and memory.
     pub cost: &'static str,
-    /// Each value by name, and what it is; `None` of numbers and the like.
+    /// Names and meanings of the values; `None` for numbers and the like.
     pub values: Option<Names>,
-    /// Least and most of numbers, and those that are set.
+    /// Minimum and maximum of numbers, and how to get the present ones.
     limits: Option<Limits>,
-    /// Whether it applies to the other settings; else why not, and what to do.
+    /// Whether it is compatible with the other settings; if not, the reason and a remedy.
     applies: fn(&BakeSettings) -> Applies,
-    /// Sets it to a value as it is written.
+    /// Parses a value and sets it.
     set: fn(&mut BakeSettings, &str) -> Read<()>,
 }
 
-/// What is wrong with a value where one cannot be read.
+/// Result of parsing; the error says what to write instead.
 type Read<T> = std::result::Result<T, String>;
 
-/// Names, and what they mean.
+/// Names and their meanings.
 type Names = fn() -> Vec<(&'static str, &'static str)>;
 
 type Limits = (f64, f64, fn(&BakeSettings) -> Vec<f64>);
 
 type Applies = std::result::Result<(), (&'static str, &'static str)>;
 
-/// What most rows have in common: no limits but those of how a value is written.
+/// Defaults that most rows share: compatible with everything, without limits.
 const fn row(name: &'static str, label: &'static str, value: &'static str) -> OptionInfo {
     OptionInfo {
         name,
@@ -75,7 +75,7 @@ const fn row(name: &'static str, label: &'static str, value: &'static str) -> Op
     }
 }
 
-/// One of the values of an enumeration.
+/// A row whose values are those of an enumeration.
 const fn choice<T>(name: &'static str, label: &'static str, value: &'static str) -> OptionInfo
 where
     T: VariantArray + EnumMessage + Into<&'static str> + Copy,
@@ -86,12 +86,12 @@ where
     }
 }
 
-/// On where it is named.
+/// A row that is on if it is given.
 const fn flag(name: &'static str) -> OptionInfo {
     row(name, "", "")
 }
 
-/// All of them, in the order of the command line's help.
+/// All options, in the order of the command line's help.
 pub const OPTIONS: &[OptionInfo] = &[
     OptionInfo {
         brief: "Target error by name: draft 10 %, preview 3 %, final 1 %",
@@ -343,7 +343,7 @@ pub const OPTIONS: &[OptionInfo] = &[
         accuracy: "light of an effect that is off is missing",
         cost: "see `study effects`",
         set: |s, text| {
-            // The last one counts where an effect is named twice.
+            // The last one counts if an effect is named twice.
             for one in text.split(',') {
                 let (effect, switch) = effect_switch(one)?;
                 s.effects.set(effect, switch);
@@ -390,7 +390,7 @@ fn refining(settings: &BakeSettings) -> Applies {
 }
 
 impl OptionInfo {
-    /// Its values, by name where nothing else is said of them.
+    /// Range of the values, or else their names.
     pub fn range(&self) -> String {
         match self.values {
             Some(values) if self.range.is_empty() => {
@@ -401,18 +401,18 @@ impl OptionInfo {
         }
     }
 
-    /// Sets it to a value as it is written.
+    /// Parses a value and sets it.
     ///
     /// # Errors
-    /// What can be written instead.
+    /// What to write instead.
     pub fn set(&self, settings: &mut BakeSettings, text: &str) -> Read<()> {
         (self.set)(settings, text)
     }
 
-    /// Refuses an option that was named and does not apply to what the others say.
+    /// Checks that an option that was given is compatible with the other settings.
     ///
     /// # Errors
-    /// A usage error that says why not.
+    /// A usage error that gives the reason.
     pub fn check_applies(&self, settings: &BakeSettings) -> Result<()> {
         (self.applies)(settings).map_err(|(what, remedy)| {
             let option = format!("--{}", self.name);
@@ -421,7 +421,7 @@ impl OptionInfo {
         })
     }
 
-    /// Refuses numbers outside its limits.
+    /// Checks that numbers are within their limits.
     ///
     /// # Errors
     /// A usage error that names the option, its value and its range.
@@ -443,16 +443,16 @@ impl OptionInfo {
     }
 }
 
-/// Names of an enumeration with what their documentation says.
+/// Names of an enumeration's values with their documentation.
 fn names<T: VariantArray + EnumMessage + Into<&'static str> + Copy>() -> Vec<(&'static str, &'static str)> {
     let told = |value: &T| ((*value).into(), value.get_documentation().unwrap_or_default());
     T::VARIANTS.iter().map(told).collect()
 }
 
-/// The variant of a name.
+/// The variant of this name.
 ///
 /// # Errors
-/// All names.
+/// Lists all names.
 pub fn named<T: VariantArray + Copy + Into<&'static str>>(name: &str) -> Read<T> {
     let variants = T::VARIANTS.iter().copied();
     let found = variants.clone().find(|variant| (*variant).into() == name);
@@ -474,7 +474,7 @@ fn on_off(text: &str) -> Read<bool> {
     }
 }
 
-/// A number with one of some units, in the last of them.
+/// Parses a number with one of several units and converts it to the last of them.
 fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     units.iter().find_map(|(unit, factor)| {
         let number: f64 = text.strip_suffix(unit)?.trim().parse().ok()?;
@@ -485,7 +485,7 @@ fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
 /// `2%` or `0.02`.
 ///
 /// # Errors
-/// Neither.
+/// Any other text.
 pub fn share(text: &str) -> Read<f64> {
     let number = match text.strip_suffix('%') {
         Some(percent) => percent.trim().parse::<f64>().map(|percent| percent / 100.0),

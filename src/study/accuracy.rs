@@ -19,8 +19,8 @@ use crate::scene::builtin::{self, shapes};
 use crate::scene::{Light, Scene};
 use crate::settings::{BakeSettings, ErrorMetric};
 
-/// What a bake that got to its target was expected to take when its error was first at most five times that, and where it
-/// stood then.
+/// Forecast for a bake that reached its target, made when its error first was at most five times the target, and the
+/// state of the bake at that time.
 fn predicted(measured: &Measured) -> Option<(CostPoint, Forecast)> {
     let (result, target) = (measured.result, measured.variant.settings.max_error?);
     let made = stood_at(&result.course, 5.0 * target)?;
@@ -93,7 +93,7 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
     let mut groups = Vec::new();
     for &name in names {
         let scene = scene(name)?;
-        // Splats do not follow the light of lamps with a size.
+        // The splat estimator does not trace lamps with a size.
         if scene.lights.iter().any(Light::has_extent) {
             continue;
         }
@@ -169,7 +169,7 @@ pub(super) fn scaling(bench: &Bench) -> Result<Sweep> {
         Plot::new(file, ["value", y], &["what"])
     }
     let ring = scene("ring")?;
-    // So little that what was traced is not kept for later changes.
+    // Too little memory to keep traced light for later changes.
     let thrifty = |settings: BakeSettings| BakeSettings {
         memory_bytes: 16 << 20,
         ..bench.at(settings, 256)

@@ -5,8 +5,8 @@ use crate::illumination::compare::TexelPair;
 use crate::optics::LinearSrgb;
 use crate::settings::LayerKind;
 
-/// Texels of the caustic layer of all maps beside those of their references; a map that only one side has is dark on
-/// the other. `None` where two maps of one surface differ in size.
+/// Pairs the caustic layers of maps and their references, texel by texel; a map that only one side has is dark on the
+/// other. `None` if two maps of one surface differ in size.
 pub fn pair_maps(maps: &[IlluminationMap], references: &[IlluminationMap]) -> Option<Vec<TexelPair>> {
     let pairs = pair_texels(maps, references, caustic_luminance)?.into_iter();
     let pair = |(image, reference, area_m2)| TexelPair {
@@ -17,7 +17,7 @@ pub fn pair_maps(maps: &[IlluminationMap], references: &[IlluminationMap]) -> Op
     Some(pairs.map(pair).collect())
 }
 
-/// The same of any values that a map has, each pair with the surface under the texel [m²].
+/// [`pair_maps`] for any values per texel, each pair with the surface area under the texel [m²].
 pub fn pair_texels<T: Copy + Default>(
     maps: &[IlluminationMap],
     references: &[IlluminationMap],
@@ -48,7 +48,7 @@ pub fn pair_texels<T: Copy + Default>(
     Some(pairs)
 }
 
-/// The caustic layer per texel [W/m²], row by row; black where the layer was not baked.
+/// The caustic layer per texel [W/m²], row by row; black if it was not baked.
 pub fn caustic_colours(map: &IlluminationMap) -> Vec<LinearSrgb> {
     match map.dense().layer(LayerKind::Caustic) {
         Some(layer) => layer

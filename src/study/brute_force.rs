@@ -1,9 +1,9 @@
 //! Brute-force light tracing, the reference for the estimators: random rays, each hit's whole flux into the texel it
 //! falls in. It shares only transport and aiming with the code it judges.
 //!
-//! Rays are stratified, one at a random place in each cell of a lattice. Two such lattices, each with half of the
-//! rays, tell the noise: each carries half of the flux, so that their sum is the map, and their difference A − B has
-//! the same variance as the sum.
+//! Rays are stratified: one at a random position in each cell of a lattice. The noise is measured with two such
+//! lattices, each with half of the rays. Each carries half of the flux, so that their sum is the map, and their
+//! difference A − B has the same variance as the sum.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
@@ -31,17 +31,17 @@ use crate::scene::{Material, Scene};
 use crate::settings::{BakeSettings, ItemBufferKind, LayerKind, MapResolution};
 use crate::transport::{EffectSet, Microfacets, Tracer};
 
-/// Least and most rays of a run.
+/// Range of the number of rays.
 pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
 
-/// The caustic layer of a scene by about `rays` rays ([`RAYS`]), shared evenly among the lights. Of the settings, map
-/// resolution (which has to be fixed), seed, item buffer, depth, branch threshold and threads apply. Each map's
-/// `error` is the texel's standard error [W/m²], and its `estimated_relative_rmse` is the noise: the root mean square
-/// of these over the mean. The same bytes for any number of threads.
+/// Bakes the caustic layer of a scene with about `rays` rays ([`RAYS`]), divided evenly among the lights. Of the
+/// settings, map resolution (which must be fixed), seed, item buffer, depth, branch threshold, threads and the switches
+/// of effects apply. Each map's `error` is the texel's standard error [W/m²], and its `estimated_relative_rmse` is the
+/// noise: the root mean square of these over the mean. Bit-identical for any number of threads.
 ///
 /// # Errors
-/// Settings or rays outside their ranges; an automatic map resolution; lights of no finite power; no threads; stopped
-/// before the end.
+/// Settings or rays outside their ranges; an automatic map resolution; lights without finite power; threads that cannot
+/// be started; cancellation.
 pub fn brute_force(
     tracer: &Tracer,
     settings: &BakeSettings,
@@ -135,51 +135,51 @@ fn run(
     Ok(result)
 }
 
-/// Independent sets of rays.
+/// Number of independent half sets of rays.
 const HALVES: usize = 2;
 
-/// Places of a light with a size, of each half set.
+/// Sampled positions of a light with a size, per half set.
 const PLACES: usize = 2048;
 
-/// What all lights share.
+/// State shared by all lights.
 struct Run<'a> {
     tracer: &'a Tracer,
     limits: PathLimits,
     aiming: (ItemBufferKind, CullMode),
-    /// Whether lights have sizes.
+    /// Whether lights are sampled over their size.
     sizes: bool,
-    /// Whether rough surfaces have lobes.
+    /// Whether rough surfaces scatter into lobes.
     lobes: bool,
     unit: FluxUnit,
     targets: Vec<Option<Target>>,
     seed: u64,
-    /// Of each light, about.
+    /// Approximate number per light.
     rays_per_half: f64,
     progress: &'a dyn Progress,
     control: &'a Control,
-    /// What is done of all lights, and all.
+    /// Progress over all lights, and its total.
     done: AtomicU64,
     total: u64,
 }
 
-/// What one light is of the whole work, in units of progress.
+/// Units of progress per light.
 const OF_A_LIGHT: u64 = 1 << 30;
 
-/// Which rays of a light.
+/// A subset of a light's rays.
 #[derive(Clone, Copy, Debug)]
 struct RayRange {
-    /// Of one half set; `None` for both.
+    /// Index of the half set; `None` for both.
     half: Option<usize>,
     /// Share of the light's flux.
     share: f64,
-    /// Sets its rays apart from those of other places.
+    /// Separates the random streams of different positions.
     place: u64,
 }
 
-/// The stream that places are drawn from.
+/// The random stream of positions.
 const PLACE_STREAM: u64 = u64::MAX;
 
-/// What became of a part of the rays.
+/// Outcome of a subset of rays.
 #[derive(Clone, Copy, Debug, Default)]
 struct Tally {
     ledger: LedgerSum,
@@ -197,14 +197,14 @@ impl Tally {
 }
 
 impl Run<'_> {
-    /// Hears of a part of a light that is done: one of so many.
+    /// Reports one of `parts` equal parts of a light as done.
     fn advance(&self, parts: usize) {
         let part = OF_A_LIGHT / parts as u64;
         let done = self.done.fetch_add(part, Ordering::Relaxed) + part;
         self.progress.advance(Stage::Caustic, done, self.total);
     }
 
-    /// Both half sets of one light.
+    /// Traces both half sets of a light.
     fn light(&self, light: &VisibleLight) -> Tally {
         let source = &self.tracer.scene().lights[light.light];
         if !(self.sizes && source.has_extent()) {
@@ -215,14 +215,14 @@ impl Run<'_> {
             };
             return self.part(light, whole);
         }
-        // Each half set has places of its own, drawn as its rays are.
+        // Each half set has its own positions, drawn like its rays.
         let source = source.of_unit_strength();
         (0..HALVES * PLACES)
             .into_par_iter()
             .map(|index| {
                 let (half, place) = (index / PLACES, index % PLACES);
                 let mut random = self.generator(light.light, (half, 0, place), PLACE_STREAM);
-                // One in each cell of a lattice of places.
+                // Stratified: one position per cell of a square lattice.
                 let side = (PLACES as f64).sqrt().floor() as usize;
                 let within = DVec2::new(random(), random());
                 let square = if place < side * side {
@@ -246,7 +246,7 @@ impl Run<'_> {
             .reduce(Tally::default, Tally::merged)
     }
 
-    /// Rays from one place of a light, of both half sets or one.
+    /// Traces rays from one position of a light, for one half set or both.
     fn part(&self, light: &VisibleLight, part: RayRange) -> Tally {
         let measure = light.item_buffer.marked_measure(&light.launch);
         let halves = part.half.map_or(0..HALVES, |half| half..half + 1);
@@ -272,7 +272,7 @@ impl Run<'_> {
             .reduce(Tally::default, Tally::merged)
     }
 
-    /// One ray, with its part of its cell's flux, for each cell of a row that may see something specular.
+    /// Traces one ray, with its share of the cell's flux, per cell of a row that may see something specular.
     fn row(
         &self,
         light: &VisibleLight,
@@ -311,7 +311,7 @@ impl Run<'_> {
         tally
     }
 
-    /// Uniform numbers in [0, 1): a generator per row, so that the order of the rows does not matter.
+    /// Uniform random numbers in [0, 1). Each row has its own generator, so that the order of rows does not matter.
     fn generator(
         &self,
         light: usize,
@@ -319,13 +319,13 @@ impl Run<'_> {
         place: u64,
     ) -> impl FnMut() -> f64 {
         let stream = (light as u64) << 40 ^ (half as u64) << 36 ^ (face as u64) << 32 ^ row as u64;
-        // Nothing changes for lights of a single place.
+        // Leaves the streams of lights without a size unchanged.
         let stream = stream ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let mut generator = Pcg64Mcg::seed_from_u64(self.seed.rotate_left(29) ^ stream);
         move || (generator.next_u64() >> 11) as f64 * (-53_f64).exp2()
     }
 
-    /// Adds flux to the texel that an arrival hits; the account that it belongs to.
+    /// Adds flux to the texel that an arrival hits; returns the account to book it to.
     fn deposit(&self, half: usize, arrival: &Arrival, count: FluxCount) -> Account {
         match &self.targets[arrival.receiver.index()] {
             Some(target) if target.add(half, arrival, count) => Account::Deposited,
@@ -334,15 +334,14 @@ impl Run<'_> {
     }
 }
 
-/// The map of one surface while it is filled: flux per texel of each half set. Sums of integers do not depend on their
-/// order.
+/// A map being accumulated: flux per texel for each half set. Integer sums do not depend on their order.
 struct Target {
     chart: Arc<Chart>,
     halves: [Vec<[AtomicI64; 3]>; HALVES],
 }
 
 impl Target {
-    /// Whether there was a texel to take it.
+    /// Returns whether there was a texel to receive it.
     fn add(&self, half: usize, arrival: &Arrival, count: FluxCount) -> bool {
         let [b, c] = arrival.barycentric.to_array();
         let uv = self.chart.uv(arrival.triangle as usize, [1.0 - b - c, b, c]);
@@ -357,7 +356,7 @@ impl Target {
         covered
     }
 
-    /// The mean of both half sets with its noise; `None` where nothing arrived.
+    /// The sum of both half sets, with its noise; `None` if nothing arrived.
     fn map(&self, unit: FluxUnit) -> Option<IlluminationMap> {
         let (mut irradiance, mut error) = (Vec::new(), Vec::new());
         for texel in 0..self.chart.texel_count() {
@@ -384,7 +383,7 @@ impl Target {
     }
 }
 
-/// Empty maps of all surfaces that take light.
+/// Empty targets, by receiver; `None` for surfaces that receive no light.
 fn targets(scene: &Scene, (width, height): (usize, usize)) -> Vec<Option<Target>> {
     let receivers: Vec<Receiver> = Receiver::all(scene.objects.len()).collect();
     receivers
@@ -456,8 +455,8 @@ fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> Bake {
     }
 }
 
-/// Noise of all maps together: the root mean square of their standard errors over their mean, by area; `None` where
-/// nothing was lit, or a map has no error.
+/// Noise of all maps together: area-weighted root mean square of their standard errors over their mean. `None` if
+/// nothing is lit, or if a map has no error.
 pub fn relative_noise(maps: &[IlluminationMap]) -> Option<f64> {
     let (mut area_m2, mut flux_w, mut squares) = (0.0, 0.0, 0.0);
     for map in maps {

@@ -2,14 +2,14 @@
 
 use super::table::three_digits;
 
-/// What reaching an error takes, in the unit of the measurements.
+/// Cost of reaching an error, in the unit of the measurements.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cost {
     /// Between two measurements.
     Interpolated(f64),
-    /// Beyond the last measurement, on the slope of the last ones.
+    /// Beyond the last measurement, by the slope of the last few.
     Extrapolated(f64),
-    /// The first measurement reaches it already.
+    /// Upper bound: the first measurement reaches the error already.
     AtMost(f64),
 }
 
@@ -25,11 +25,11 @@ impl std::fmt::Display for Cost {
     }
 }
 
-/// Measurements from which an extrapolation takes its slope.
+/// Number of measurements that determine the slope of an extrapolation.
 const EXTRAPOLATION_POINTS: usize = 3;
 
 /// Cost from which on the error stays at or below `target`, by linear interpolation of logarithms. `points` are (cost,
-/// error), both above zero, cheapest first. `None` where the error does not fall, or nothing was measured.
+/// error), both > 0, cheapest first. `None` if the error does not fall, or without measurements.
 pub fn cost_of(points: &[(f64, f64)], target: f64) -> Option<Cost> {
     let Some(above) = points.iter().rposition(|(_, error)| *error > target) else {
         return points.first().map(|(cost, _)| Cost::AtMost(*cost));
@@ -44,7 +44,7 @@ pub fn cost_of(points: &[(f64, f64)], target: f64) -> Option<Cost> {
     Some(Cost::Extrapolated(cost * (target / error).powf(1.0 / slope)))
 }
 
-/// d ln(error) / d ln(cost) of the line of least squares; `None` with less than two different costs.
+/// d ln(error) / d ln(cost) by least squares; `None` with fewer than two different costs.
 pub fn slope(points: &[(f64, f64)]) -> Option<f64> {
     let logarithms: Vec<(f64, f64)> = points
         .iter()

@@ -17,27 +17,27 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, Scene};
 use crate::settings::{BakeSettings, Estimator, LayerKind, SpectralSampling, Wavelengths};
 
-/// Name and one line of each.
+/// Name and description.
 pub const CONVERGENCE: (&str, &str) = (
     "convergence",
     "error against light rays and CPU time, for every estimator",
 );
-/// Name and one line.
+/// Name and description.
 pub const EFFECTS: (&str, &str) = (
     "effects",
     "what each effect costs and what it is worth, by bakes without it",
 );
-/// Name and one line.
+/// Name and description.
 pub const SPECTRUM: (&str, &str) = (
     "spectrum",
     "split and stochastic rays, few wavelengths, many and all: how right and how dear",
 );
 
-/// The finest bake is this many times as dense where it is the reference itself.
+/// Density of the reference bake relative to the densest variant, if no other reference is given.
 const SELF_REFERENCE_FACTOR: f64 = 16.0;
 
-/// Every estimator at every density (ascending, at least one), against a reference or a much denser bake by the last
-/// estimator. Of the settings, estimator, density and sigma are those of the variant.
+/// Compares every estimator at every density (ascending, at least one) with a reference or, without one, with a much
+/// denser bake by the last estimator. Variants override estimator, density and sigma of the settings.
 pub fn convergence(
     scene: &Arc<Scene>,
     settings: &BakeSettings,
@@ -92,7 +92,7 @@ pub fn convergence(
     }
 }
 
-/// A bake as planned, and one without each effect that is on in the plan.
+/// Bakes the scene as planned, and without each effect that is on in the plan.
 ///
 /// # Errors
 /// Settings outside their ranges.
@@ -144,14 +144,14 @@ const EFFECT_COLUMNS: &[Column] = &[
 /// Wavelengths of the reference.
 const REFERENCE_WAVELENGTHS: u32 = 300;
 
-/// The reference's lattice is so many times as dense as the others.
+/// Density of the reference's lattice relative to the others.
 const REFERENCE_DENSITY_FACTOR: f64 = 2.0;
 
-/// A spot of less than this half-angle is a thin beam [rad].
+/// Half-angle below which a spot counts as a thin beam [rad].
 const THIN_RAD: f64 = 0.05;
 
-/// Every way to sample the spectrum, the paper's first (section 4.1, Plates 3 and 4). Of a scene with thin beams those alone
-/// shine.
+/// Bakes with every way to sample the spectrum, the paper's first (section 4.1, Plates 3 and 4). If the scene has thin
+/// beams, only these shine.
 ///
 /// # Errors
 /// A scene without dispersive light.
@@ -241,7 +241,7 @@ const SPECTRUM_COLUMNS: &[Column] = &[
     FLUX_RATIO,
 ];
 
-/// ‖I − R‖ / ‖R‖ over all texels, by area.
+/// ‖I − R‖ / ‖R‖ over all texels, area-weighted.
 fn norm_of_difference(measured: &Measured, of: fn(LinearSrgb) -> [f64; 3]) -> Cell {
     let Some(Truth::Maps(references)) = measured.reference.map(|reference| &reference.truth) else {
         return Cell::Empty;

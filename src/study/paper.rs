@@ -26,7 +26,7 @@ use crate::settings::{
 use crate::transport::{EffectSet, MediumStack, Tracer};
 use crate::units::Flux;
 
-/// The paper's densest lattice but one [1/sr].
+/// The paper's second densest lattice [1/sr].
 const DENSITY_PER_SR: f64 = 79_577.5;
 
 pub(super) type Method = (&'static str, fn(f64) -> BakeSettings);
@@ -35,7 +35,7 @@ pub(super) const SPLAT: Method = ("splat", splat);
 pub(super) const WAVEFRONT: Method = ("wavefront", wavefront);
 pub(super) const AUTO: Method = ("auto", auto);
 
-/// What "as the paper" means.
+/// Explains "as the paper".
 const AS_PAPER_NOTE: &str = "As the paper: jittered rays, a cube around the light, discs of the wavefront's area, point samples \
                              of a gaussian with σ = 1.";
 
@@ -54,12 +54,12 @@ pub(super) fn splat(density_per_sr: f64) -> BakeSettings {
     at_density(Estimator::Splat, density_per_sr)
 }
 
-/// Exactly one lattice.
+/// Traces exactly one lattice.
 pub(super) fn wavefront(density_per_sr: f64) -> BakeSettings {
     at_density(Estimator::Wavefront, density_per_sr)
 }
 
-/// The estimator that is used unless another is asked for.
+/// The default estimator.
 pub(super) fn auto(density_per_sr: f64) -> BakeSettings {
     at_density(Estimator::Auto, density_per_sr)
 }
@@ -71,13 +71,13 @@ fn at_density(estimator: Estimator, density_per_sr: f64) -> BakeSettings {
     }
 }
 
-/// A built-in scene with the name that it has on the command line.
+/// A built-in scene, given its name on the command line.
 pub(super) fn scene(name: &str) -> Result<Arc<Scene>> {
     let scene = builtin::build(name).map(Arc::new);
     scene.ok_or_else(|| Error::failure(name, "there is no built-in scene of that name", "report this"))
 }
 
-/// A built-in scene with its analytic map.
+/// A built-in scene and its analytic map.
 pub(super) fn scene_and_truth(name: &str) -> Result<(Arc<Scene>, Against)> {
     let scene = scene(name)?;
     match Reference::analytic(&scene)? {
@@ -90,7 +90,7 @@ const fn error_against_rays(file: &'static str, by: &'static [&'static str]) -> 
     Plot::new(file, ["rays", "relative_rmse"], by)
 }
 
-/// Something of glass over a floor of that half width, below a lamp.
+/// A glass object over a floor of half width `half_m`, below a lamp.
 pub(super) fn over_a_floor(half_m: f64, (name, mesh): (&str, Mesh), lamp: DVec3) -> Arc<Scene> {
     let mut scene = parts::reference_scene(half_m);
     scene.name = name.into();
@@ -100,7 +100,7 @@ pub(super) fn over_a_floor(half_m: f64, (name, mesh): (&str, Mesh), lamp: DVec3)
 }
 
 pub(super) fn table1(bench: &Bench) -> Result<Sweep> {
-    /// Rays per steradian, light rays, light-pass seconds, eye-pass seconds (a 486 at 66 MHz).
+    /// Rays per steradian, light rays, light-pass seconds, eye-pass seconds (on a 486 at 66 MHz).
     const TABLE: [(f64, u64, f64, f64); 3] = [
         (7_957.7, 3_467, 11.57, 148.33),
         (79_577.5, 34_680, 53.27, 144.72),
@@ -162,8 +162,8 @@ pub(super) fn rays(bench: &Bench) -> Result<Sweep> {
 
 pub(super) fn sigma(bench: &Bench) -> Result<Sweep> {
     const SIGMAS: [f64; 12] = [0.1, 0.3, 0.5, 1.0, 3.0, 0.2, 0.4, 0.7, 0.9, 1.4, 2.0, 5.0];
-    /// σ counts squared lengths: in squares of half the side of the square of the footprint's area instead of squares of the
-    /// radius of its disc, the same kernel has a σ so many times as large.
+    /// σ is in squared lengths. In units of half the side of a square of the footprint's area, instead of the radius of
+    /// its disc, the same kernel has a σ that is larger by this factor.
     const PER_HALF_SIDE: f64 = 4.0 / std::f64::consts::PI;
     let (scene, against) = scene_and_truth("ring")?;
     let even = BakeSettings {
@@ -321,7 +321,7 @@ pub(super) fn connectivity(bench: &Bench) -> Result<Sweep> {
     })
 }
 
-/// In place of what was baked: E by the density of the nearest hits, on the floor of a built-in scene.
+/// Replaces the irradiance of a bake by the density of the nearest hits, on the floor of a built-in scene.
 fn nearest_hits(variant: &Variant, mut result: Bake) -> Bake {
     /// Half the side of the floor [m].
     const HALF_M: f64 = 1.0;
@@ -349,7 +349,7 @@ fn nearest_hits(variant: &Variant, mut result: Bake) -> Bake {
     result
 }
 
-/// Where on the floor [m] the light of the scene's lamps falls, and how much [W]: directions on a spiral, evenly dense.
+/// Hits of the lamps' light on the floor: position [m] and flux [W]. Directions lie on a spiral of constant density.
 fn hits(scene: &Arc<Scene>, density_per_sr: f64) -> Vec<(DVec2, f64)> {
     let tracer = Tracer::new(Arc::clone(scene));
     let limits = PathLimits {
@@ -467,7 +467,8 @@ pub(super) fn pool_plates(bench: &Bench) -> Result<Sweep> {
 }
 
 pub(super) fn complex(bench: &Bench) -> Result<Sweep> {
-    /// Quads around and along the knot's tube: the second has about as many triangles as the paper's object (3,958).
+    /// Quads around and along the knot's tube; the second mesh has about as many triangles as the paper's object
+    /// (3,958).
     const MESHES: [(u32, u32); 3] = [(11, 45), (22, 90), (44, 180)];
     let settings = bench.at(wavefront(if bench.quick { 500.0 } else { 3e3 }), bench.side());
     let knot = |(around, along)| over_a_floor(1.0, ("knot", tube(around, along)), DVec3::new(0.4, 2.4, 0.3));
@@ -496,7 +497,7 @@ pub(super) fn complex(bench: &Bench) -> Result<Sweep> {
     })
 }
 
-/// The tube of a trefoil.
+/// The tube of a trefoil knot.
 fn tube(around: u32, along: u32) -> Mesh {
     const CENTRE: DVec3 = DVec3::new(0.0, 0.55, 0.0);
     // Radii [m] of the ring that it winds around, of its winding, of its tube.

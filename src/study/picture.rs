@@ -19,33 +19,33 @@ use crate::scene::{Camera, Scene};
 use crate::settings::LayerKind;
 use crate::transport::Tracer;
 
-/// So many times the mean of what a sheet shows of its first map is white.
+/// White of a sheet, relative to the mean of the part of its first map that it shows.
 const WHITE_OVER_MEAN: f64 = 6.0;
 
-/// Luminance, over the largest of the first map, from which on a texel is in a sheet.
+/// Luminance, relative to the peak of the first map, above which a sheet shows a texel.
 const SHOWN: f64 = 5e-3;
 
-/// Least size of the longer side of a map in a sheet [pixels].
+/// Minimum length of the longer side of a map in a sheet [pixels].
 const MIN_SIDE: usize = 200;
 
-/// Pixels between two maps, and their grey.
+/// Gap between two maps [pixels], and its grey.
 const GAP: usize = 4;
 const GAP_GREY: [u8; 4] = [90, 90, 90, 255];
 
-/// 8-bit sRGB.
+/// An 8-bit sRGB picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Picture {
     /// File name without `.png`.
     pub file: String,
-    /// What is seen, row by row.
+    /// Lists the contents, row by row.
     pub caption: String,
-    /// Across and down [pixels].
+    /// Width and height [pixels].
     pub size: (u32, u32),
     /// Row 0 at the top.
     pub rgba: Vec<u8>,
 }
 
-/// Irradiance of one surface [W/m²], to be shown.
+/// Irradiance of one surface [W/m²], for display.
 #[derive(Clone, Debug)]
 pub struct Image {
     width: usize,
@@ -54,7 +54,7 @@ pub struct Image {
 }
 
 impl Image {
-    /// Of a map, all layers together.
+    /// The sum of all layers of a map.
     pub fn of_map(map: &IlluminationMap) -> Self {
         let map = map.dense();
         let values = map
@@ -68,7 +68,7 @@ impl Image {
         }
     }
 
-    /// Of the reference, with the object whose surface it is: the brightest one of several.
+    /// The reference and its object; the brightest surface if there are several.
     pub fn of_reference(reference: &Reference) -> Option<(usize, Self)> {
         match &reference.truth {
             Truth::Surface { object, grid } => Some((
@@ -88,13 +88,13 @@ impl Image {
         }
     }
 
-    /// The texel at a place in 0..1 from the upper left corner.
+    /// The texel at a position in [0, 1] from the upper left corner.
     fn at(&self, u: f64, v: f64) -> LinearSrgb {
         let index = |share: f64, side: usize| ((share * side as f64) as usize).min(side - 1);
         self.values[index(v, self.height) * self.width + index(u, self.width)]
     }
 
-    /// Columns and rows around all that is lit; everything where nothing is.
+    /// Columns and rows that enclose everything lit; the whole image if nothing is.
     fn lit_part(&self) -> [std::ops::Range<usize>; 2] {
         let peak = self.values.iter().map(|rgb| rgb.luminance()).fold(0.0, f64::max);
         let lit = |texel: &usize| self.values[*texel].luminance() > SHOWN * peak;
@@ -111,7 +111,8 @@ impl Image {
     }
 }
 
-/// Maps side by side, so many in a row: what the first one has lit, all at its exposure.
+/// Maps side by side in rows of `columns`, cropped to the lit part of the first and at its exposure. `None` without
+/// maps.
 pub fn sheet(file: String, caption: String, images: &[Image], columns: usize) -> Option<Picture> {
     let first = images.first()?;
     let [across, down] = first.lit_part();
@@ -157,10 +158,10 @@ pub fn sheet(file: String, caption: String, images: &[Image], columns: usize) ->
     })
 }
 
-/// What the reference's ray tracer sees, and the CPU seconds that it took.
+/// Renders a view with the CPU ray tracer; returns it with the CPU time [s].
 ///
 /// # Errors
-/// Stopped before the end.
+/// It was cancelled.
 pub fn view(
     bench: &Bench,
     (file, caption): (String, String),
@@ -187,9 +188,9 @@ pub fn view(
     Ok((picture, cpu_s))
 }
 
-/// The largest map of a difference: warm where its first bake has more light, cool where it has less.
+/// Picture of the largest map of a difference: warm where the first bake has more light, cool where it has less.
 pub fn difference(file: String, caption: String, found: &Difference) -> Option<Picture> {
-    // Both sides of a sheet are as large: its front.
+    // Both sides of a sheet have maps of the same size; this takes the front.
     let map = found.maps.iter().rev().max_by_key(|map| map.irradiance.len())?;
     let rgba = difference_colours::of_map(map).flat_map(|[r, g, b]| [r, g, b, u8::MAX]);
     Some(Picture {

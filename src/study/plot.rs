@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 /// Width and height [pixels].
 const SIZE: (u32, u32) = (760, 520);
 
-/// Told apart by people who do not see all colours (Okabe and Ito 2008).
+/// Distinguishable for colour-blind readers (Okabe and Ito 2008).
 const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -19,32 +19,32 @@ const COLOURS: [RGBColor; 7] = [
     RGBColor(0, 0, 0),
 ];
 
-/// Two columns of a table against each other.
+/// Plots two columns of a table against each other.
 #[derive(Clone, Copy, Debug)]
 pub struct Plot {
     /// File name without `.svg`.
     pub file: &'static str,
-    /// Column of the abscissa.
+    /// Column on the horizontal axis.
     pub x: &'static str,
-    /// Column of the ordinate.
+    /// Column on the vertical axis.
     pub y: &'static str,
-    /// Columns that tell curves apart.
+    /// Columns that identify a curve.
     pub by: &'static [&'static str],
-    /// Column and value of the rows that are taken; `None` takes all.
+    /// Column and value that select rows; `None` selects all.
     pub only: Option<(&'static str, &'static str)>,
 }
 
-/// Named points above zero, from left to right.
+/// A named series of points above zero, from left to right.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// For the legend.
+    /// Name in the legend.
     pub name: String,
     /// (x, y).
     pub points: Vec<(f64, f64)>,
 }
 
 impl Plot {
-    /// All rows of two columns, a curve for each value of some others.
+    /// Plots all rows, with one curve per combination of values in the columns `by`.
     pub const fn new(file: &'static str, [x, y]: [&'static str; 2], by: &'static [&'static str]) -> Self {
         Self {
             file,
@@ -55,18 +55,18 @@ impl Plot {
         }
     }
 
-    /// Of the rows with that value in a column.
+    /// Selects the rows with this value in a column.
     pub const fn only(mut self, column: &'static str, value: &'static str) -> Self {
         self.only = Some((column, value));
         self
     }
 
-    /// Whether the ordinate is an error, which is shown in per cent.
+    /// Whether the vertical axis is an error, which is shown in per cent.
     pub fn shows_error(&self) -> bool {
         self.y.ends_with("rmse")
     }
 
-    /// The curves that a table holds; none where it lacks a column.
+    /// The curves in a table; none if it lacks a column.
     pub fn curves(&self, table: &Table) -> Vec<Curve> {
         let mut curves: Vec<Curve> = Vec::new();
         let cell = |row: &[Cell], name| table.column(name).map(|column| row[column].clone());
@@ -95,10 +95,10 @@ impl Plot {
         curves
     }
 
-    /// The plot of curves.
+    /// Draws curves as SVG.
     ///
     /// # Errors
-    /// The drawing library's.
+    /// Errors of the drawing library.
     pub fn svg(&self, curves: &[Curve]) -> Result<String> {
         let mut svg = String::new();
         self.draw(&mut svg, curves).map_err(|reason| {
@@ -139,7 +139,7 @@ impl Plot {
             .draw()?;
         for (index, curve) in curves.iter().enumerate() {
             let colour = COLOURS[index % COLOURS.len()];
-            // A second round of colours is told by its thin lines.
+            // When colours repeat, lines become thinner.
             let width = if index < COLOURS.len() { 2 } else { 1 };
             let line = LineSeries::new(curve.points.iter().copied(), colour.stroke_width(width));
             chart
@@ -157,7 +157,7 @@ impl Plot {
     }
 }
 
-/// Whole decades around all values; one around 1 where there are none.
+/// Whole decades that enclose all values; a range around 1 if there are none.
 fn range(curves: &[Curve], pick: fn(&(f64, f64)) -> f64) -> std::ops::Range<f64> {
     let values = curves.iter().flat_map(|curve| curve.points.iter().map(pick));
     let (low, high) = values.fold((f64::INFINITY, 0.0), |(low, high): (f64, f64), value| {
@@ -171,7 +171,7 @@ fn range(curves: &[Curve], pick: fn(&(f64, f64)) -> f64) -> std::ops::Range<f64>
     low..if high > low { high } else { 10.0 * low }
 }
 
-/// Without what powers of ten leave in the last digits.
+/// Removes the rounding error that powers of ten leave in the last digits.
 fn tick(value: f64) -> String {
     if !(1e-4..1e4).contains(&value) {
         return format!("1e{}", value.log10().round());

@@ -18,7 +18,7 @@ macro_rules! shipped {
     };
 }
 
-/// Built-in scenes with an analytic map of their floor, by an independent solver (`assets/SOURCES.md`).
+/// Built-in scenes with an analytic map of their floor, computed by an independent solver (`assets/SOURCES.md`).
 const ANALYTIC: [(&str, &str, &[u8]); 7] = [
     shipped!("ring", "S1"),
     shipped!("ball", "S2"),
@@ -29,24 +29,24 @@ const ANALYTIC: [(&str, &str, &[u8]); 7] = [
     shipped!("nephroid", "S8"),
 ];
 
-/// Surface of the analytic maps, and of others where none is named.
+/// Surface of the analytic maps, and the default for other references.
 const DEFAULT_SURFACE: &str = "floor";
 
-/// Maps that a bake should give.
+/// The maps that a bake should produce.
 #[derive(Clone, Debug)]
 pub struct Reference {
-    /// What it is, for people: `analytic S1`, `file a.pfm`, `a bake of …`.
+    /// Description for users: `analytic S1`, `file a.pfm`, `a bake of …`.
     pub kind: String,
-    /// Irradiance, of one surface or of all.
+    /// Irradiance of one surface or of all.
     pub truth: Truth,
 }
 
-/// Irradiance that is taken as right.
+/// Irradiance that serves as ground truth.
 #[derive(Clone, Debug)]
 pub enum Truth {
-    /// Of the surface of one object [W/m²].
+    /// Irradiance of one object's surface [W/m²].
     Surface {
-        /// Its index.
+        /// Index in `Scene::objects`.
         object: usize,
         /// Luminance.
         grid: Grid,
@@ -56,10 +56,10 @@ pub enum Truth {
 }
 
 impl Reference {
-    /// The analytic map of a built-in scene; `None` where there is none.
+    /// The analytic map of a built-in scene; `None` if it has none.
     ///
     /// # Errors
-    /// Never for maps as they are shipped.
+    /// None for the maps as shipped.
     pub fn analytic(scene: &Scene) -> Result<Option<Self>> {
         let Some((_, name, bytes)) = ANALYTIC.iter().find(|(source, ..)| *source == scene.source) else {
             return Ok(None);
@@ -72,10 +72,10 @@ impl Reference {
         }))
     }
 
-    /// A map of the surface of that name [W/m²]; without a name, of `floor` or of the only surface that takes light.
+    /// A map of the surface of that name [W/m²]; without a name, of `floor` or else of the only receiver.
     ///
     /// # Errors
-    /// No such surface; several, of which none is called `floor`.
+    /// No such surface; without a name, several receivers, none of which is called `floor`.
     pub fn of_surface(scene: &Scene, surface: Option<&str>, grid: Grid, kind: String) -> Result<Self> {
         let object = match surface {
             Some(name) => object_named(scene, name),
@@ -97,7 +97,7 @@ impl Reference {
         })
     }
 
-    /// Texels of maps of the scene, each beside its own; `None` where sizes are no whole multiples of one another.
+    /// Pairs the texels of a bake's maps with those of the reference; `None` if their sizes do not match.
     pub fn pairs(&self, maps: &[IlluminationMap]) -> Option<Vec<TexelPair>> {
         match &self.truth {
             Truth::Maps(references) => pair_maps(maps, references),
@@ -106,7 +106,7 @@ impl Reference {
     }
 }
 
-/// The map of an object on the side that has most of the light: files may wind a floor either way.
+/// The map of the side of an object that receives most of the light: a floor may have either winding in a file.
 pub fn lit_side(maps: &[IlluminationMap], object: usize) -> Option<&IlluminationMap> {
     let flux_w = |map: &IlluminationMap| map.flux_w(LayerKind::Caustic).luminance();
     let sides = maps.iter().filter(|map| map.chart.object() == object);
@@ -123,7 +123,7 @@ fn only_receiver(scene: &Scene) -> Option<usize> {
     receivers.next().filter(|_| receivers.next().is_none())
 }
 
-/// A surface that received nothing is dark.
+/// A surface without a map is dark.
 fn pair_with_grid(maps: &[IlluminationMap], object: usize, grid: &Grid) -> Option<Vec<TexelPair>> {
     let image = match lit_side(maps, object) {
         None => Grid {

@@ -7,9 +7,9 @@ use crate::error::Result;
 /// A study of built-in scenes.
 #[derive(Clone, Copy, Debug)]
 pub struct Study {
-    /// On the command line.
+    /// Name on the command line.
     pub name: &'static str,
-    /// What it finds out, in one line.
+    /// Purpose, in one line.
     pub what: &'static str,
     sweep: fn(&Bench) -> Result<Sweep>,
 }
@@ -19,10 +19,10 @@ impl Study {
         Self { name, what, sweep }
     }
 
-    /// Its bakes.
+    /// The bakes of the study.
     ///
     /// # Errors
-    /// Never for built-in scenes and references as they are shipped.
+    /// None for built-in scenes and references as shipped.
     pub fn sweep(&self, bench: &Bench) -> Result<Sweep> {
         Ok(Sweep {
             name: self.name,
@@ -32,7 +32,7 @@ impl Study {
     }
 }
 
-/// All of them, in the order of the paper, what it has not first.
+/// All studies: first those that the paper does not have, then those that it has, in its order.
 pub const STUDIES: [Study; 11] = [
     Study::new(
         "accuracy",

@@ -16,83 +16,77 @@ use crate::progress::{Control, Progress};
 use crate::scene::{Camera, Scene};
 use crate::settings::{BakeSettings, MapResolution};
 
-/// A bake is no reference where it stopped before it was known as well as this.
+/// Maximum error of a bake that serves as a reference.
 const TRUSTED: f64 = 0.01;
 
-/// Errors that costs are given for.
+/// Errors whose costs are tabulated.
 const TARGETS: [(&str, f64); 3] = [("5 %", 0.05), ("2 %", 0.02), ("1 %", 0.01)];
 
-/// Where and how thoroughly a study is done.
+/// How a study is run.
 #[derive(Clone, Copy)]
 pub struct Bench<'a> {
-    /// Small maps and few of everything: shows that it works, not what it says.
+    /// Small maps and few variants: checks that the study runs, not what it finds.
     pub quick: bool,
     /// Worker threads; 0 = one per core.
     pub threads: usize,
-    /// Hears how far each bake is.
     pub progress: &'a dyn Progress,
-    /// Asks it to stop.
     pub control: &'a Control,
 }
 
-/// A study.
 #[derive(Clone, Debug, Default)]
 pub struct Sweep {
-    /// On the command line, and of its files.
+    /// Name on the command line and of its files.
     pub name: &'static str,
-    /// What it finds out, in one line.
+    /// Purpose, in one line.
     pub what: &'static str,
-    /// What was measured, on which scenes, with which settings.
+    /// Description: what is measured, on which scenes, with which settings.
     pub note: String,
-    /// Columns that tell variants apart.
+    /// Columns that identify a variant.
     pub labels: &'static [&'static str],
     /// Columns that are measured.
     pub columns: &'static [Column],
-    /// In the order of the rows.
+    /// In row order.
     pub groups: Vec<Group>,
-    /// Bakes of each variant, whose median CPU time counts; 0 is 1.
+    /// Bakes per variant; the median of their CPU times counts. 0 means 1.
     pub repeats: usize,
-    /// Two columns each.
+    /// Each plots two columns.
     pub plots: &'static [Plot],
-    /// Maps in a row of a sheet.
+    /// Maps per row of a sheet.
     pub sheet_columns: usize,
 }
 
-/// Variants that are measured against one reference.
+/// Variants that share a reference.
 #[derive(Clone, Debug)]
 pub struct Group {
-    /// What they should give.
     pub against: Against,
     /// At least one.
     pub variants: Vec<Variant>,
 }
 
-/// What bakes are measured against.
+/// Source of a reference.
 #[derive(Clone, Debug)]
 pub enum Against {
     Nothing,
-    /// A map that is known.
+    /// A known map.
     Known(Reference),
-    /// All maps of another bake; nothing where it has a target error but is not known to 1 % when it stops.
+    /// All maps of another bake. If that has a target error but stops before it is known to 1 %, there is no reference.
     Bake(Arc<Scene>, Box<BakeSettings>),
 }
 
 /// One row of the table.
 #[derive(Clone, Debug)]
 pub struct Variant {
-    /// One for each of the sweep's labels.
+    /// One per label of the sweep.
     pub labels: Vec<Cell>,
-    /// What is baked.
     pub scene: Arc<Scene>,
-    /// How.
     pub settings: BakeSettings,
-    /// What becomes of the bake before it is measured.
+    /// Transforms the bake before it is measured.
     pub estimate: Option<fn(&Variant, Bake) -> Bake>,
-    /// Pictures of the scene in the bake's light: a file's name without `.png`, and from where.
+    /// Views of the baked scene: file name without `.png`, and camera.
     pub views: Vec<(String, Camera)>,
-    /// The sheet that its map goes into; the reference is the first of each.
+    /// Sheet that its map is added to; each sheet starts with the reference.
     pub sheet: Option<String>,
-    /// The picture of what the reference has more and less.
+    /// File of the picture that shows where the reference has more and less light.
     pub difference: Option<String>,
 }
 
@@ -110,14 +104,14 @@ impl Variant {
         }
     }
 
-    /// Its map goes into a sheet.
+    /// Adds its map to a sheet.
     #[must_use]
     pub fn in_sheet(self, file: impl Into<String>) -> Self {
         let sheet = Some(file.into());
         Self { sheet, ..self }
     }
 
-    /// The scene in the bake's light is seen from a camera.
+    /// Adds a view of the baked scene.
     #[must_use]
     pub fn seen(mut self, file: impl Into<String>, camera: &Camera) -> Self {
         self.views.push((file.into(), camera.clone()));
@@ -130,35 +124,32 @@ impl Variant {
     }
 }
 
-/// A measured column.
 #[derive(Clone, Copy, Debug)]
 pub struct Column {
-    /// With its unit, where it has one.
+    /// Includes the unit, if there is one.
     pub name: &'static str,
     /// Its value for one variant.
     pub value: fn(&Measured) -> Cell,
 }
 
-/// A bake beside its reference.
+/// A bake and its reference.
 pub struct Measured<'a> {
-    /// What was asked for.
     pub variant: &'a Variant,
-    /// The first bake.
+    /// The first of its bakes.
     pub result: &'a Bake,
-    /// What it is measured against.
     pub reference: Option<&'a Reference>,
-    /// Texels beside those of the reference, where they can be paired.
+    /// Texels paired with those of the reference, if they can be.
     pub pairs: &'a [TexelPair],
-    /// Of the pairs.
+    /// Agreement of the pairs.
     pub agreement: Option<Agreement>,
-    /// CPU seconds of the light pass, the median of all bakes.
+    /// CPU time of the light pass [s], the median over all bakes.
     pub cpu_s: f64,
-    /// CPU seconds of the views.
+    /// CPU time of the views [s].
     pub eye_pass_cpu_s: Option<f64>,
 }
 
 impl Measured<'_> {
-    /// What a reference that was baked has more, over all layers.
+    /// Light that the reference has more, over all layers, if it was baked.
     pub fn difference(&self) -> Option<Difference> {
         match &self.reference?.truth {
             Truth::Maps(maps) => difference::difference(maps, &self.result.maps).ok(),
@@ -171,12 +162,12 @@ impl Measured<'_> {
     }
 }
 
-/// A number where there is one.
+/// A number, or an empty cell.
 pub fn number(value: Option<f64>) -> Cell {
     value.map_or(Cell::Empty, Cell::Number)
 }
 
-/// A share where there is one.
+/// A share, or an empty cell.
 pub fn share(value: Option<f64>) -> Cell {
     value.map_or(Cell::Empty, Cell::Share)
 }
@@ -191,16 +182,16 @@ pub const RAYS: Column = column("rays", |m| m.result.counts.rays.into());
 pub const SPLATS: Column = column("splats", |m| m.result.counts.splats.into());
 /// Wavefront cells deposited.
 pub const CELLS: Column = column("cells", |m| m.result.counts.cells.into());
-/// Item buffers, tracing and depositing: all of the light pass but the hierarchy.
+/// CPU time of item buffers, tracing and depositing: the light pass without the hierarchy.
 pub const CPU_S: Column = column("cpu_s", |m| m.cpu_s.into());
-/// The same on the wall.
+/// The same in wall-clock time.
 pub const WALL_S: Column = column("wall_s", |m| {
     let times = &m.result.timings_s;
     (times.plan + times.trace + times.deposit).into()
 });
-/// Of the views, by the ray tracer on the CPU.
+/// CPU time of the views, traced on the CPU.
 pub const EYE_PASS_CPU_S: Column = column("eye_pass_cpu_s", |m| number(m.eye_pass_cpu_s));
-/// Held for maps, rays and patches.
+/// Memory of maps, rays and patches.
 pub const MEMORY_MB: Column = column("memory_mb", |m| {
     number(m.result.course.last().map(|point| point.bytes as f64 / 1e6))
 });
@@ -210,23 +201,23 @@ pub const RELATIVE_RMSE: Column = column("relative_rmse", |m| m.agreed(|a| Cell:
 pub const ARD: Column = column("ard", |m| {
     m.agreed(|a| Cell::Share(a.average_relative_difference))
 });
-/// Largest I over largest R.
+/// max(I) / max(R).
 pub const PEAK_RATIO: Column = column("peak_ratio", |m| m.agreed(|a| a.peak_ratio.into()));
 /// mean(I) / mean(R).
 pub const FLUX_RATIO: Column = column("flux_ratio", |m| m.agreed(|a| a.flux_ratio.into()));
-/// What R is.
+/// Kind of the reference R.
 pub const REFERENCE: Column = column("reference", |m| {
     m.reference
         .map_or(Cell::Empty, |reference| reference.kind.clone().into())
 });
 
 impl Bench<'_> {
-    /// Texels across and down: those of the shipped references, or fewer.
+    /// Map side [texels]: that of the shipped references, or less for a quick run.
     pub fn side(&self) -> usize {
         if self.quick { 64 } else { 256 }
     }
 
-    /// Of a choice, the first few where there is no time.
+    /// All values or, for a quick run, the first few.
     pub fn some<'v, T>(&self, values: &'v [T], few: usize) -> &'v [T] {
         &values[..if self.quick {
             few.min(values.len())
@@ -235,7 +226,7 @@ impl Bench<'_> {
         }]
     }
 
-    /// Settings with maps of that side.
+    /// Settings with maps of the given side.
     pub fn at(&self, settings: BakeSettings, side: usize) -> BakeSettings {
         BakeSettings {
             map_resolution: MapResolution::Fixed {
@@ -246,7 +237,7 @@ impl Bench<'_> {
         }
     }
 
-    /// In a session of its own, so that no bake finds the work of another done.
+    /// Bakes in a new session, so that no bake reuses the work of another.
     fn bake(&self, scene: &Arc<Scene>, settings: &BakeSettings) -> Result<Bake> {
         let threads = if settings.threads == 0 {
             self.threads
@@ -286,22 +277,20 @@ impl Against {
     }
 }
 
-/// Light pass without the hierarchy [s of CPU].
+/// CPU time of the light pass without the hierarchy [s].
 fn light_pass_cpu_s(result: &Bake) -> f64 {
     result.cpu_s.plan + result.cpu_s.trace + result.cpu_s.deposit
 }
 
-/// All that a study found.
 #[derive(Clone, Debug)]
 pub struct StudyResult {
-    /// Of the sweep.
     pub name: &'static str,
     what: &'static str,
     note: String,
     threads: usize,
-    /// A row for each variant.
+    /// One row per variant.
     pub table: Table,
-    /// What errors cost, curve by curve; empty where no error is plotted.
+    /// Costs of errors, curve by curve; empty if no error is plotted.
     pub costs: Table,
     plots: Vec<(&'static Plot, Vec<Curve>)>,
     pictures: Vec<Picture>,
@@ -311,7 +300,7 @@ impl Sweep {
     /// Bakes and measures every variant.
     ///
     /// # Errors
-    /// Those of a bake; a reference that does not fit; stopped before the end.
+    /// Errors of a bake; a reference that does not fit; cancellation.
     pub fn run(&self, bench: &Bench) -> Result<StudyResult> {
         let mut table = Table {
             columns: self.labels.to_vec(),
@@ -377,7 +366,7 @@ impl Sweep {
             reference,
             pairs: &pairs,
             agreement: Agreement::of(&pairs),
-            // Of an even number the lower middle one.
+            // The lower median of an even number.
             cpu_s: cpu_s[(cpu_s.len() - 1) / 2],
             eye_pass_cpu_s,
         };
@@ -394,10 +383,10 @@ impl Sweep {
     }
 }
 
-/// Its file, its maps and what they are.
+/// File, maps and captions of a sheet.
 type Sheet = (String, Vec<Image>, String);
 
-/// Adds the map of the reference's surface to a sheet; a new one begins with the reference.
+/// Adds the map of the reference's surface to a sheet; a new sheet starts with the reference.
 fn show(
     sheets: &mut Vec<Sheet>,
     file: &String,
@@ -418,7 +407,7 @@ fn show(
     }
 }
 
-/// Texels beside those of the reference. Maps of another bake may have sizes of their own, and then have no pairs.
+/// Pairs texels with those of the reference. Maps of another bake may differ in size, and then have no pairs.
 fn pairs(reference: Option<&Reference>, result: &Bake) -> Result<Vec<TexelPair>> {
     let Some(reference) = reference else {
         return Ok(Vec::new());
@@ -438,7 +427,7 @@ fn pairs(reference: Option<&Reference>, result: &Bake) -> Result<Vec<TexelPair>>
     }
 }
 
-/// The power of each curve of errors, and where it meets the [`TARGETS`].
+/// The power law of each error curve, and where the curve meets the [`TARGETS`].
 fn costs(plots: &[(&'static Plot, Vec<Curve>)]) -> Table {
     let mut table = Table {
         columns: vec!["of", "curve", "error_power"],
@@ -464,7 +453,7 @@ fn costs(plots: &[(&'static Plot, Vec<Curve>)]) -> Table {
 }
 
 impl StudyResult {
-    /// The files that it consists of, each with its name: table, plots, pictures, and the page that shows them.
+    /// The files of the study, by name: table, plots, pictures, and the page that shows them.
     ///
     /// # Errors
     /// A plot or picture that cannot be encoded.
@@ -492,7 +481,7 @@ impl StudyResult {
         text
     }
 
-    /// All of it, with links to the files beside it.
+    /// The page: description, tables, and links to the other files.
     fn page(&self) -> String {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let threads = if self.threads == 0 { cores } else { self.threads };

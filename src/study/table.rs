@@ -6,20 +6,18 @@ use serde::Serialize;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum Cell {
-    /// A word.
     Text(String),
-    /// A number of things.
     Count(u64),
-    /// Anything measured, in the unit of its column.
+    /// A measured value, in the unit of its column.
     Number(f64),
-    /// A share [1]; Markdown shows it in per cent.
+    /// A fraction [1]; Markdown shows it in per cent.
     Share(f64),
-    /// Nothing was measured.
+    /// Not measured.
     Empty,
 }
 
 impl Cell {
-    /// Every digit, shares as they are.
+    /// All digits; shares as fractions.
     fn exact(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
@@ -29,7 +27,7 @@ impl Cell {
         }
     }
 
-    /// Three digits.
+    /// Rounded to three digits; shares in per cent.
     pub fn rounded(&self) -> String {
         match self {
             Self::Number(value) => three_digits(*value),
@@ -38,7 +36,7 @@ impl Cell {
         }
     }
 
-    /// Its number; `None` of words and of nothing.
+    /// Its numeric value; `None` for text and empty cells.
     pub fn value(&self) -> Option<f64> {
         match self {
             Self::Count(count) => Some(*count as f64),
@@ -75,19 +73,19 @@ impl From<f64> for Cell {
 /// Rows under named columns.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Table {
-    /// Names, with units where there are any.
+    /// Names, with units if there are any.
     pub columns: Vec<&'static str>,
     /// Each as long as `columns`.
     pub rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
-    /// The place of a column; `None` where there is none of that name.
+    /// Index of a column; `None` if there is none of that name.
     pub fn column(&self, name: &str) -> Option<usize> {
         self.columns.iter().position(|column| *column == name)
     }
 
-    /// Comma-separated, header first (RFC 4180 but for its line ends).
+    /// Comma-separated, header first (RFC 4180 except for line ends).
     pub fn csv(&self) -> String {
         let quoted = |field: String| match field.contains([',', '"', '\n', '\r']) {
             true => format!("\"{}\"", field.replace('"', "\"\"")),
@@ -99,7 +97,6 @@ impl Table {
         header + &rows.map(line).collect::<String>()
     }
 
-    /// A table of Markdown.
     pub fn markdown(&self) -> String {
         let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
         let header = line(self.columns.iter().map(|name| (*name).into()).collect());

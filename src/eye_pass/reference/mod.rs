@@ -20,20 +20,19 @@ use radiance::{LitScene, visible_hit};
 
 pub use radiance::{ChainLimits, EyeRays};
 
-/// How well a picture is made.
+/// Quality of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ReferenceSettings {
-    /// Samples across and down a pixel, > 0. One sample looks through the pixel's centre, as a raster does.
+    /// Samples across and down a pixel, > 0. A single sample goes through the pixel centre, as in rasterisation.
     pub samples_per_side: u32,
-    /// How far chains are followed.
     pub limits: ChainLimits,
-    /// Wavelengths at which each sample is followed from where it meets glass that parts them; 0 for one path by the
-    /// index at 587.56 nm.
+    /// Wavelengths traced per sample, from the first dispersive surface on; 0 traces a single path by the refractive
+    /// indices at 587.56 nm.
     pub wavelengths: u32,
 }
 
 impl ReferenceSettings {
-    /// The default, or without wavelengths where dispersion is switched off.
+    /// The default, without wavelengths if dispersion is switched off.
     pub fn switched(dispersion: EffectSwitch) -> Self {
         let settings = Self::default();
         match dispersion {
@@ -56,9 +55,9 @@ impl Default for ReferenceSettings {
     }
 }
 
-/// Renders a view of a scene lit by its illumination maps. The same for any number of threads.
+/// Renders a view of a scene lit by its illumination maps. The result does not depend on the number of threads.
 ///
-/// Surfaces without a map are black but for what they emit. An eye within a body of glass or water sees from there.
+/// Surfaces without a map show only their emission. The camera may be inside glass or water.
 ///
 /// # Errors
 /// It was cancelled.
@@ -73,7 +72,7 @@ pub fn render(
     render_counted(tracer, maps, view, settings, progress, control).map(|(picture, _)| picture)
 }
 
-/// [`render`] with the rays that it took: where nothing specular is in view, none of them belongs to a chain.
+/// [`render`] with ray counts. No chain rays are traced if nothing specular is in view.
 ///
 /// # Errors
 /// It was cancelled.
@@ -94,17 +93,17 @@ pub fn render_counted(
             let media = media_at(tracer, view.camera.position);
             trace::<true>(&lit, media, &looks, progress, control)
         }
-        // Bodies that are left out surround nobody.
+        // Clear bodies are left out, so that the camera is inside none.
         EffectSwitch::Off => trace::<false>(&lit, MediumStack::default(), &looks, progress, control),
     }
 }
 
-/// How the samples of a picture look.
+/// Sampling of a picture.
 struct Looks<'a> {
     view: &'a View,
     /// Samples across and down a pixel.
     sides: u32,
-    /// By sample.
+    /// One per sample of a pixel.
     spectra: Vec<SpectralScene>,
 }
 
@@ -154,7 +153,7 @@ fn trace<const CHAINS: bool>(
     Ok((picture, rays))
 }
 
-/// The object that each pixel's centre sees first, row 0 at the top; `None` where it sees the background.
+/// The object seen at each pixel centre, row 0 at the top; `None` for the background.
 pub fn first_hits(tracer: &Tracer, view: &View) -> Vec<Option<usize>> {
     (0..view.height)
         .into_par_iter()
@@ -167,7 +166,7 @@ pub fn first_hits(tracer: &Tracer, view: &View) -> Vec<Option<usize>> {
         .collect()
 }
 
-/// The ray through a place of a pixel ([0, 1] from its left and top), from the near plane on.
+/// The ray through a position within a pixel ([0, 1] from its left and top), starting at the near plane.
 fn eye_ray(view: &View, [column, row]: [u32; 2], within: [f64; 2]) -> Ray {
     let x = (f64::from(column) + within[0]) / f64::from(view.width) * 2.0 - 1.0;
     let y = 1.0 - (f64::from(row) + within[1]) / f64::from(view.height) * 2.0;

@@ -11,17 +11,16 @@ use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
 use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
 
-/// How far chains are followed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainLimits {
-    /// Largest number of specular surfaces between the eye and a diffuse one.
+    /// Maximum number of specular surfaces between the eye and a diffuse one.
     pub max_depth: u32,
-    /// Branches that carry less than this share of their pixel are black.
+    /// Branches whose throughput is below this are black.
     pub branch_threshold: f64,
-    /// Up to this many surfaces on a chain both ways on are followed, and after them the one that carries more.
+    /// Number of specular surfaces on a chain at which both branches are followed; beyond, only the stronger one is.
     pub branching_depth: u32,
-    /// Off: mirrors show what they emit, polished surfaces their diffuse part, and clear bodies are left out. Auto and
-    /// on are the same here: nothing is prepared for chains.
+    /// Off: mirrors show only their emission, coated surfaces their diffuse part, and clear bodies are left out. Auto
+    /// and on are equivalent, since chains need no preparation.
     pub switch: EffectSwitch,
 }
 
@@ -36,14 +35,14 @@ impl Default for ChainLimits {
     }
 }
 
-/// Rays of a picture.
+/// Number of rays traced for a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct EyeRays {
-    /// From the eye, one for each sample.
+    /// Rays from the eye, one per sample.
     pub camera_rays: u64,
-    /// Further ones, each after a specular surface.
+    /// Rays that continue after a specular surface.
     pub chain_rays: u64,
-    /// Those of them that were followed at one wavelength.
+    /// Chain rays that carry a single wavelength.
     pub rays_by_wavelength: u64,
 }
 
@@ -59,38 +58,38 @@ impl std::ops::Add for EyeRays {
     }
 }
 
-/// A scene with its maps, ready to be looked at.
+/// A scene with its illumination maps, ready to be rendered.
 pub struct LitScene<'a> {
     tracer: &'a Tracer,
-    /// By object.
+    /// By [`Receiver::index`].
     maps: Vec<Option<MapTotal<'a>>>,
-    /// Emission of each object [W/(m² sr)].
+    /// Emitted radiance by object [W/(m² sr)].
     emitted: Vec<LinearSrgb>,
     background: LinearSrgb,
     limits: ChainLimits,
 }
 
-/// All layers of a map together.
+/// The sum of all layers of a map.
 struct MapTotal<'a> {
     chart: &'a Chart,
     irradiance: Vec<[f32; 3]>,
 }
 
-/// A ray on its way from the eye.
+/// One ray of a chain, traced from the eye.
 #[derive(Clone, Copy)]
 struct EyePath<'a> {
     ray: Ray,
     media: MediumStack,
-    /// Share of the pixel's radiance that the ray brings, per channel.
+    /// Throughput: share of the ray's radiance that reaches the pixel, per channel.
     weight: LinearSrgb,
     /// Specular surfaces met so far.
     depth: u32,
-    /// The wavelength that it is followed at; `None` where it stands for all of them.
+    /// The wavelength that is traced; `None` before the path splits into wavelengths.
     at: Option<&'a SceneAtWavelength>,
 }
 
 impl EyePath<'_> {
-    /// What a radiance at its end adds to the pixel's.
+    /// Contribution to the pixel of a radiance at the far end of the ray.
     fn brings(&self, radiance: LinearSrgb) -> LinearSrgb {
         let brought = self.weight * radiance;
         match self.at {
@@ -101,7 +100,7 @@ impl EyePath<'_> {
 }
 
 impl<'a> LitScene<'a> {
-    /// A scene lit by maps, before its environment or else a background radiance [W/(m² sr)].
+    /// A scene lit by maps. Rays that escape see its environment or, without one, a background radiance [W/(m² sr)].
     pub fn new(
         tracer: &'a Tracer,
         maps: &'a [IlluminationMap],
@@ -126,8 +125,9 @@ impl<'a> LitScene<'a> {
         }
     }
 
-    /// Radiance [W/(m² sr)] that arrives against a ray which starts within `media`, at the wavelengths of `spectrum`
-    /// where it is parted. Without `CHAINS` the ray ends at the first surface that is not clear.
+    /// Radiance [W/(m² sr)] that arrives along a ray, which starts within `media` and splits into the wavelengths of
+    /// `spectrum` at the first dispersive surface. Without `CHAINS` the ray ends at the first surface that is not
+    /// clear.
     pub fn radiance<const CHAINS: bool>(
         &self,
         ray: Ray,
@@ -164,7 +164,7 @@ impl<'a> LitScene<'a> {
         seen
     }
 
-    /// What a gaze sees of the surface that it meets; the ways on wait.
+    /// Radiance that a surface itself adds to a path. The branches to follow are pushed onto `waiting`.
     fn meet<'b, const CHAINS: bool>(
         &self,
         gaze: EyePath<'b>,
@@ -197,7 +197,7 @@ impl<'a> LitScene<'a> {
         seen
     }
 
-    /// What is seen where nothing stands in the way [W/(m² sr)].
+    /// Radiance of the environment or the background [W/(m² sr)].
     fn beyond(&self, direction: DVec3) -> LinearSrgb {
         match self.tracer.scene().sky() {
             Some((sky, strength)) => strength * sky.smooth_radiance(direction),
@@ -205,7 +205,7 @@ impl<'a> LitScene<'a> {
         }
     }
 
-    /// What a surface sends by itself: emission, and the share of its map that its polish lets out, L = ρE/π.
+    /// Emission, plus diffuse radiance L = ρE/π of the map, of which the coat lets `share` out.
     fn own_radiance(&self, hit: &SurfaceHit, side: Side, share: LinearSrgb) -> LinearSrgb {
         let scene = self.tracer.scene();
         let emitted = self.emitted[hit.object] * scene.glow_at(hit.object, hit.triangle, hit.barycentric);
@@ -221,8 +221,8 @@ impl<'a> LitScene<'a> {
         emitted + share * self.tracer.base_colour(hit) * irradiance / std::f64::consts::PI
     }
 
-    /// The gaze along a branch, unless it lies beyond the limits. Radiance through a refraction scales by the square
-    /// of n on the eye's side over n on the far side.
+    /// The path along a branch; `None` beyond the limits. Refraction scales radiance by the square of n on the eye's
+    /// side over n on the far side.
     fn followed<'b>(&self, gaze: &EyePath<'b>, branch: &Branch) -> Option<EyePath<'b>> {
         let weight = gaze.weight * branch.share * (branch.ior_ratio * branch.ior_ratio);
         let within = gaze.depth < self.limits.max_depth
@@ -238,13 +238,13 @@ impl<'a> LitScene<'a> {
     }
 }
 
-/// The nearest surface that is drawn, with its distance from the ray's origin [m]: backs of single-sided opaque
-/// surfaces are not.
+/// The nearest visible surface, with its distance from the ray's origin [m]. Backs of single-sided opaque surfaces are
+/// not visible.
 pub fn visible_hit(tracer: &Tracer, ray: Ray) -> Option<(SurfaceHit, f64)> {
     nearest::<true>(tracer, ray)
 }
 
-/// The nearest surface that is drawn; without `CHAINS` clear ones are not.
+/// The nearest visible surface; without `CHAINS`, clear ones are skipped too.
 fn nearest<const CHAINS: bool>(tracer: &Tracer, mut ray: Ray) -> Option<(SurfaceHit, f64)> {
     let mut passed_m = 0.0;
     loop {
@@ -264,25 +264,24 @@ fn nearest<const CHAINS: bool>(tracer: &Tracer, mut ray: Ray) -> Option<(Surface
     }
 }
 
-/// The scene as light of one wavelength meets it.
+/// The scene at a single wavelength.
 #[derive(Debug)]
 pub struct SceneAtWavelength {
-    /// What the eye sees of that wavelength.
     pub seen: SeenWavelength,
-    /// With the indices of that wavelength.
+    /// Uses the refractive indices at the wavelength.
     pub tracer: Tracer,
 }
 
-/// The wavelengths of one sample; none where nothing is to be parted.
+/// The wavelengths of one sample; none in scenes without dispersion.
 #[derive(Debug, Default)]
 pub struct SpectralScene {
-    /// Together they are all light.
+    /// Their matrices add up to the identity.
     pub wavelengths: Vec<SceneAtWavelength>,
 }
 
 impl SpectralScene {
-    /// For each of a pixel's samples `count` wavelengths, shifted from sample to sample; none in scenes where all
-    /// light goes the same ways.
+    /// For each sample of a pixel `count` wavelengths, whose shift varies between samples; none in scenes without
+    /// dispersion.
     pub fn of_samples(tracer: &Tracer, count: u32, samples: u32) -> Vec<Self> {
         let is_parting = tracer.scene().parts_wavelengths() && count > 0;
         let sample = |index: u32| {
@@ -301,7 +300,7 @@ impl SpectralScene {
         (0..samples).map(sample).collect()
     }
 
-    /// Whether light goes on from a surface another way at another wavelength, or another part of it does.
+    /// Whether the directions or shares of light that leaves a surface depend on the wavelength.
     pub fn parts(&self, tracer: &Tracer, hit: &SurfaceHit, media: &MediumStack) -> bool {
         let scene = tracer.scene();
         let is_dispersive = |object: usize| scene.material_of(object).is_dispersive();

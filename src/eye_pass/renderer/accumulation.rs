@@ -5,24 +5,24 @@ use super::shaders::ACCUMULATED;
 use super::uniforms::Accumulation;
 use crate::gpu::Gpu;
 
-/// A mean of many half floats needs more digits than they have.
+/// Half floats are too coarse for the mean of many frames.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
-/// Two pictures in turn: the mean, and the mean before.
+/// A running mean of frames. The two pictures alternate between the current mean and the previous one.
 #[derive(Debug)]
 pub(super) struct Mean {
     width: u32,
     height: u32,
     pictures: [wgpu::Texture; 2],
     views: [wgpu::TextureView; 2],
-    /// Pictures in the mean.
+    /// Frames in the mean.
     count: u32,
     layout: wgpu::BindGroupLayout,
     pipeline: wgpu::RenderPipeline,
 }
 
 impl Mean {
-    /// For pictures of a size that the device's textures can have.
+    /// The size must be within the device's limit.
     pub(super) fn new(gpu: &Gpu, width: u32, height: u32) -> Self {
         let picture = || {
             gpu.device.create_texture(&wgpu::TextureDescriptor {
@@ -68,17 +68,15 @@ impl Mean {
         (self.width, self.height) == (width, height)
     }
 
-    /// Forgets all pictures.
     pub(super) fn clear(&mut self) {
         self.count = 0;
     }
 
-    /// Pictures in the mean.
     pub(super) fn count(&self) -> u32 {
         self.count
     }
 
-    /// Takes up a picture of the same size.
+    /// Adds a frame of the same size.
     pub(super) fn add(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, picture: &wgpu::TextureView) {
         let accumulation = Accumulation {
             share: 1.0 / (self.count + 1) as f32,
@@ -112,7 +110,7 @@ impl Mean {
         self.count += 1;
     }
 
-    /// The mean: to be looked at, and to be read back as four floats per pixel.
+    /// The mean, as a texture for readback (four floats per pixel) and as its view.
     pub(super) fn picture(&self) -> (&wgpu::Texture, &wgpu::TextureView) {
         let latest = self.count as usize % 2;
         (&self.pictures[latest], &self.views[latest])

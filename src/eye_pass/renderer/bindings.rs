@@ -4,7 +4,7 @@ use bytemuck::Pod;
 
 use crate::gpu::Gpu;
 
-/// A binding's type with the stages that see it.
+/// Type of a binding, with the stages that it is visible to.
 pub(super) type Binding = (wgpu::ShaderStages, wgpu::BindingType);
 
 pub(super) fn uniform(stages: wgpu::ShaderStages) -> Binding {
@@ -25,7 +25,7 @@ pub(super) fn texture(filterable: bool, view_dimension: wgpu::TextureViewDimensi
     (wgpu::ShaderStages::FRAGMENT, texture)
 }
 
-/// A buffer that fragments read.
+/// A buffer that fragment shaders read.
 pub(super) fn storage() -> Binding {
     let buffer = wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Storage { read_only: true },
@@ -63,7 +63,7 @@ pub(super) fn pipeline_layout(gpu: &Gpu, groups: &[&wgpu::BindGroupLayout]) -> w
         })
 }
 
-/// Resources bound in the order of their layout.
+/// Binds resources in the order of their layout.
 pub(super) fn bind_group<const N: usize>(
     gpu: &Gpu,
     label: &str,
@@ -81,7 +81,7 @@ pub(super) fn bind_group<const N: usize>(
     })
 }
 
-/// A pipeline whose fragment stage `entry_point` fills targets of a format; its module has `shared/cover`.
+/// A full-screen pipeline with the fragment stage `entry_point`. The module must include `shared/cover`.
 pub(super) fn cover_pipeline(
     gpu: &Gpu,
     module: &wgpu::ShaderModule,
@@ -117,7 +117,7 @@ pub(super) fn cover_pipeline(
         })
 }
 
-/// A buffer that shaders read, with a copy of what it holds.
+/// A buffer that shaders read, with a copy of its contents on the CPU.
 #[derive(Debug)]
 pub(super) struct Storage {
     label: &'static str,
@@ -125,7 +125,7 @@ pub(super) struct Storage {
     written: Vec<u8>,
 }
 
-/// Buffers have some size even without content [bytes].
+/// Minimum size of a buffer, even without contents [bytes].
 const MIN_BYTES: u64 = 256;
 
 impl Storage {
@@ -137,7 +137,7 @@ impl Storage {
         }
     }
 
-    /// Holds these items; sends them where they differ from what it held, and tells how many bytes that took.
+    /// Replaces the contents; uploads them if they differ. Returns the number of bytes uploaded.
     pub(super) fn write<T: Pod>(&mut self, gpu: &Gpu, items: &[T]) -> usize {
         let bytes: &[u8] = bytemuck::cast_slice(items);
         if bytes == self.written {
@@ -151,7 +151,7 @@ impl Storage {
         bytes.len()
     }
 
-    /// Replaces as many items from one on that it holds.
+    /// Overwrites existing items from index `first` on.
     pub(super) fn write_at<T: Pod>(&mut self, gpu: &Gpu, first: usize, items: &[T]) {
         let bytes: &[u8] = bytemuck::cast_slice(items);
         let offset = first * size_of::<T>();
@@ -162,7 +162,7 @@ impl Storage {
         }
     }
 
-    /// Holds what vertices are read from, too.
+    /// Vertex attributes are read from it, too.
     pub(super) fn buffer(&self) -> &wgpu::Buffer {
         &self.buffer
     }

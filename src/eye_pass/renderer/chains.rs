@@ -19,35 +19,35 @@ use crate::scene::emitter::{Emitter, EmitterKind};
 use crate::scene::{Object, Scene};
 use crate::transport::{MediumStack, PackedInstance, PackedMesh, Tracer, media_at};
 
-/// Nodes that may wait while a ray is traced; `STACK` in the shader.
+/// Capacity of the traversal stack; `STACK` in the shader.
 const STACK: usize = 64;
-/// Largest number of a body that a chain can remember.
+/// Maximum number of objects, since the shader stores a medium in 16 bits.
 const MAX_OBJECTS: usize = u16::MAX as usize - 1;
-/// Storage buffers that a fragment of a chain reads.
+/// Storage buffers that a fragment shader of chains reads.
 const BUFFERS: u32 = 8;
-/// Count of a node that is an instance; the shader's.
+/// `count` of a node that is an instance; `INSTANCE` in the shader.
 const INSTANCE: u32 = u32::MAX;
-/// In place of an object; the shader's.
+/// Stands for no object; `NO_OBJECT` in the shader.
 const NO_OBJECT: u32 = u32::MAX;
-/// Nodes that an instance takes.
+/// Nodes that one instance occupies.
 const INSTANCE_NODES: usize = 4;
-/// Surfaces at which both ways on can be followed; `MAX_BRANCHING` in the shader.
+/// Maximum number of surfaces at which both branches are followed; `MAX_BRANCHING` in the shader.
 pub(super) const MAX_BRANCHING: u32 = 4;
 
-/// The scene as chains see it.
+/// The scene as chains are traced through it.
 #[derive(Debug)]
 pub(super) struct ChainScene {
-    /// In double precision: it tells which bodies the eye is in.
+    /// Finds the media around the eye and the lights, in double precision.
     tracer: Tracer,
-    /// Of each object.
+    /// By object.
     firsts: Vec<First>,
-    /// Of each mesh its first node and triangle.
+    /// First node and triangle of each mesh.
     starts: Vec<(usize, usize)>,
-    /// The node around what is no instance, if anything is.
+    /// Root over everything that is not instanced, if there is any.
     root: Option<Node>,
-    /// Largest number of nodes above one in a mesh.
+    /// Largest depth of the hierarchy of any mesh.
     depth: usize,
-    /// Those over instances and the instances first, which are written again when something is moved.
+    /// Nodes over instances and the instances come first; they are written again when something moves.
     nodes: Storage,
     triangles: Storage,
     lights: Storage,
@@ -56,10 +56,10 @@ pub(super) struct ChainScene {
 }
 
 impl ChainScene {
-    /// Builds and uploads the hierarchies; of what `before` has of them, only what stands elsewhere is uploaded again.
+    /// Builds and uploads the hierarchies. If `before` has the same meshes, only what has moved is uploaded.
     ///
     /// # Errors
-    /// A scene that is larger than what the device lets a shader read.
+    /// A scene that exceeds the device's limits.
     pub(super) fn new(
         gpu: &Gpu,
         scene: &Arc<Scene>,
@@ -113,7 +113,7 @@ impl ChainScene {
         Ok(made)
     }
 
-    /// Says where the meshes stand.
+    /// Uploads instances and moved triangles, with the hierarchy above them.
     ///
     /// # Errors
     /// A hierarchy that is too deep.
@@ -149,7 +149,7 @@ impl ChainScene {
         Ok(())
     }
 
-    /// An instance as `instance_at` in the shader reads it.
+    /// An instance in the layout that `instance_at` in the shader reads.
     fn instance(&self, instance: &PackedInstance) -> [Node; INSTANCE_NODES] {
         let object = instance.object.map(|object| object as usize);
         let First { index, order } = object.map_or(First::default(), |object| self.firsts[object]);
@@ -172,12 +172,12 @@ impl ChainScene {
         })
     }
 
-    /// What it takes on the device [bytes].
+    /// Device memory [bytes].
     pub(super) fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// A place [m] in local coordinates.
+    /// A position [m] in local coordinates.
     pub(super) fn local(&self, place: DVec3) -> [f32; 3] {
         self.tracer.frame().local(place).as_vec3().to_array()
     }
@@ -187,12 +187,11 @@ impl ChainScene {
         1.0 / self.tracer.frame().scale
     }
 
-    /// Nodes and triangles.
     pub(super) fn bindings(&self) -> [wgpu::BindingResource<'_>; 2] {
         [self.nodes.binding(), self.triangles.binding()]
     }
 
-    /// Group 1 of what traces; `None` without triangles.
+    /// Group 1 of pipelines that trace; `None` without triangles.
     pub(super) fn bind(
         &self,
         gpu: &Gpu,
@@ -218,7 +217,7 @@ impl ChainScene {
         Some(bind_group(gpu, "chains", layout, resources))
     }
 
-    /// Takes over the lamps of a scene, each as its middle; an environment has none.
+    /// Uploads the lamps of a scene, each reduced to its centre. An environment is left out.
     pub(super) fn set_lights(&mut self, gpu: &Gpu, scene: &Scene) {
         let middles = scene
             .lights
@@ -276,7 +275,7 @@ impl ChainScene {
         }
     }
 
-    /// Where the chains of a view begin; `traces_lights`: whether light straight from the lamps is traced.
+    /// Start of the chains of a view. `traces_lights`: whether direct light is traced.
     pub(super) fn start(&self, view: &View, limits: &ChainLimits, traces_lights: bool) -> ChainStart {
         let eye = view.camera.position;
         ChainStart {
@@ -293,16 +292,16 @@ impl ChainScene {
     }
 }
 
-/// What the numbers of an object's first triangle are.
+/// Offsets of the triangle numbers of an object.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct First {
-    /// Place of the indices of its corners.
+    /// Position of the indices of its corners.
     index: u32,
-    /// Among all triangles of the scene.
+    /// Order of its first triangle among all triangles of the scene.
     order: u32,
 }
 
-/// Of each object, all of whose triangles are in one page.
+/// By object. The triangles of each object must lie in a single page.
 fn firsts(scene: &Scene, geometry: &Geometry) -> Vec<First> {
     let mut order = 0;
     let objects = scene.objects.iter().zip(&geometry.segments);
@@ -317,7 +316,7 @@ fn firsts(scene: &Scene, geometry: &Geometry) -> Vec<First> {
     objects.map(first).collect()
 }
 
-/// A node of a mesh with its first node and triangle.
+/// A node of a mesh, offset by the mesh's first node and triangle.
 fn placed(node: &PackedNode, (first_node, first_triangle): (usize, usize)) -> Node {
     let first = if node.count > 0 {
         first_triangle
@@ -332,7 +331,7 @@ fn placed(node: &PackedNode, (first_node, first_triangle): (usize, usize)) -> No
     }
 }
 
-/// Triangles of a mesh, slot by slot.
+/// Triangles of a mesh, in the order of the leaves.
 fn records(mesh: &PackedMesh, firsts: &[First]) -> impl Iterator<Item = Triangle> {
     let slots = mesh.owners.iter().zip(&mesh.bvh.corners);
     slots.map(move |(&(object, triangle), &[a, b, c])| {
@@ -348,7 +347,7 @@ fn records(mesh: &PackedMesh, firsts: &[First]) -> impl Iterator<Item = Triangle
     })
 }
 
-/// Bodies as `medium.wgsl` has them: innermost first, 16 bits each, object index + 1.
+/// Media in the layout of `medium.wgsl`: innermost first, 16 bits each, object index + 1.
 fn numbers(media: &MediumStack) -> [u32; 4] {
     let mut words = [0; 4];
     for (place, object) in media.objects().iter().rev().enumerate() {
@@ -357,8 +356,10 @@ fn numbers(media: &MediumStack) -> [u32; 4] {
     words
 }
 
+/// Checks the limits that are known before anything is built.
+///
 /// # Errors
-/// A scene that chains cannot be traced through on this device, by what is known of it at once.
+/// A scene that exceeds the device's limits.
 fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
     let limits = gpu.limits();
     if limits.max_storage_buffers_per_shader_stage < BUFFERS {
@@ -389,7 +390,7 @@ fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
 }
 
 /// # Errors
-/// A hierarchy that chains cannot be traced through.
+/// A hierarchy deeper than the traversal stack.
 fn check_depth(scene: &Scene, depth: usize) -> Result<()> {
     if depth >= STACK {
         return Err(refused(
@@ -409,7 +410,7 @@ fn check_bytes(gpu: &Gpu, scene: &Scene, bytes: usize) -> Result<()> {
     Ok(())
 }
 
-/// Bytes that a shader can read of one buffer.
+/// Bytes of one buffer that a shader can read.
 fn readable(gpu: &Gpu) -> u64 {
     let limits = gpu.limits();
     limits.max_storage_buffer_binding_size.min(limits.max_buffer_size)

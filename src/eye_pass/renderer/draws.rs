@@ -5,7 +5,6 @@ use super::objects::{Appearance, Objects};
 use super::pipelines::{Faces, PipelineFlags, PipelineKey, RenderTarget};
 use crate::eye_pass::View;
 
-/// An object drawn once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Draw {
     /// Index into the scene's objects.
@@ -13,25 +12,25 @@ pub(super) struct Draw {
     pub(super) key: PipelineKey,
 }
 
-/// What objects are drawn as.
+/// What the pipeline of an object depends on, besides the object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DrawState {
     pub(super) style: MapStyle,
-    /// Whether mirrors, polish and clear bodies show more than themselves.
+    /// Whether chains are traced.
     pub(super) has_chains: bool,
-    /// Whether anything that chains go on from has a texture.
+    /// Whether any mirror or clear surface has a texture.
     pub(super) has_tinted_glass: bool,
-    /// Whether normals of anything are bent.
+    /// Whether any surface has bumps.
     pub(super) has_bumps: bool,
-    /// Whether the traced picture has other pixels than the picture.
+    /// Whether the resolution of the traced image differs from that of the frame.
     pub(super) is_scaled: bool,
-    /// Whether light straight from the lamps is traced.
+    /// Whether direct light is traced.
     pub(super) traces_lights: bool,
-    /// Whether an environment is seen.
+    /// Whether an environment is visible.
     pub(super) has_sky: bool,
-    /// Whether anything that chains may meet parts wavelengths.
+    /// Whether chains split into wavelengths.
     pub(super) parts_wavelengths: bool,
-    /// Whether anything has holes.
+    /// Whether any surface has an alpha mask.
     pub(super) has_masks: bool,
 }
 
@@ -41,7 +40,7 @@ impl DrawState {
         self.style == MapStyle::Lit && self.has_chains && look.surface.is_specular()
     }
 
-    /// How an object appears in the picture; `None` where it is left out.
+    /// Pipeline of an object in the frame; `None` if it is left out.
     pub(super) fn key(self, look: &Appearance) -> Option<PipelineKey> {
         let writes = match self.style {
             MapStyle::AsItIs => RenderTarget::MapValue,
@@ -54,7 +53,7 @@ impl DrawState {
         (!is_left_out).then(|| self.of(look, writes))
     }
 
-    /// How an object appears in the traced picture: what hides others, and what is traced.
+    /// Pipelines of an object in the traced image: the depth prepass, and chains if it is specular.
     pub(super) fn traced_keys(self, look: &Appearance) -> Vec<PipelineKey> {
         let writes: &[RenderTarget] = if self.is_specular(look) {
             &[RenderTarget::Depth, RenderTarget::Traced]
@@ -95,21 +94,21 @@ impl DrawState {
     }
 }
 
-/// Everything that a picture draws, in order.
+/// Everything that a frame draws, in order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct DrawList {
-    /// Depths of the traced picture.
+    /// Depth prepass of the traced image.
     pub(super) depths: Vec<Draw>,
-    /// Chains of the traced picture.
+    /// Chains of the traced image.
     pub(super) traced: Vec<Draw>,
-    /// The picture itself.
+    /// The frame itself.
     pub(super) surfaces: Vec<Draw>,
-    /// Objects that are specular.
+    /// Visible specular objects.
     pub(super) specular_objects: usize,
 }
 
 impl DrawList {
-    /// The objects of `visible`, in order; what draws alike together.
+    /// Draws of the objects in `visible`, grouped by pipeline.
     pub(super) fn new(objects: &Objects, visible: &[usize], draw_state: DrawState) -> Self {
         let mut list = Self::default();
         let look = |object: usize| &objects.list[object];
@@ -133,13 +132,12 @@ impl DrawList {
         list
     }
 
-    /// All draws.
     pub(super) fn all(&self) -> impl Iterator<Item = &Draw> {
         self.depths.iter().chain(&self.traced).chain(&self.surfaces)
     }
 }
 
-/// The objects whose boxes may be seen, in the scene's order.
+/// The objects whose bounding boxes may be visible, in the scene's order.
 pub(super) fn visible_objects(objects: &Objects, view: &View) -> Vec<usize> {
     let aspect = f64::from(view.width) / f64::from(view.height);
     let frustum = view.camera.frustum(aspect);
@@ -150,22 +148,22 @@ pub(super) fn visible_objects(objects: &Objects, view: &View) -> Vec<usize> {
     (0..objects.list.len()).filter(is_seen).collect()
 }
 
-/// Quality of a picture.
+/// Quality of frames.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EyeQuality {
-    /// Traced pixels per pixel, across and down, [1/8, 4]: below 1 what is seen in mirrors and through glass is coarser
-    /// than the picture, above 1 each pixel is a mean.
+    /// Pixels of the traced image per pixel of the frame, across and down, [1/8, 4]. Below 1, reflections and
+    /// refractions are coarser than the frame; above 1, they are supersampled.
     pub traced_scale: f64,
-    /// Up to this many specular surfaces on a chain, at most 4, both ways on are followed, and after them the one that
-    /// carries more.
+    /// Number of specular surfaces on a chain, at most 4, at which both branches are followed; beyond, only the
+    /// stronger one is.
     pub branching_depth: u32,
-    /// Whether maps and textures are looked up as coarsely as they are seen; else always at their finest, as the CPU
-    /// eye pass does.
+    /// Whether maps and textures are read at the mip level of their footprint; otherwise always at the finest, as in
+    /// the CPU eye pass.
     pub minifies: bool,
 }
 
 impl EyeQuality {
-    /// For pictures of a walk.
+    /// For interactive views.
     pub const WALKING: Self = Self {
         traced_scale: 1.0,
         branching_depth: 2,
@@ -177,7 +175,7 @@ impl EyeQuality {
         ..Self::WALKING
     };
 
-    /// Within the ranges above; what is no number becomes the least.
+    /// Clamped to the ranges above; NaN becomes the minimum.
     #[must_use]
     pub fn clamped(self) -> Self {
         let traced_scale = if self.traced_scale.is_nan() {
@@ -199,90 +197,90 @@ impl Default for EyeQuality {
     }
 }
 
-/// Where in its pixels a picture is looked at, and how finely.
+/// Subpixel position of a frame, and the level of detail that suits it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Sample {
-    /// From the pixel's centre, right and down [pixels].
+    /// Offset from the pixel centre, right and down [pixels].
     pub(super) offset: [f64; 2],
-    /// Added to the level of images.
+    /// Added to the mip level of lookups.
     pub(super) level_bias: f64,
-    /// Number of the picture among those of its view, which chooses its wavelengths.
+    /// Index among the frames of the same view; selects the wavelengths.
     pub(super) picture: u32,
 }
 
 impl Sample {
-    /// The pixel's centre.
     pub(super) const CENTRE: Self = Self {
         offset: [0.0; 2],
         level_bias: 0.0,
         picture: 0,
     };
 
-    /// The same for the traced picture: where it is coarser than the picture, its own pixels are shared out.
+    /// Offset of the traced image: if that is coarser than the frame, samples are spread over its own pixels.
     pub(super) fn traced_offset(self, quality: EyeQuality) -> [f64; 2] {
         self.offset.map(|offset| offset / quality.traced_scale.min(1.0))
     }
 
-    /// One of `side`² places that share out a pixel evenly, those of the CPU eye pass, in turn.
+    /// One position of a regular grid of `side`² in a pixel, in turn; the same as in the CPU eye pass.
     pub(super) fn of_grid(index: u32, side: u32) -> Self {
         let place = |index: u32| (f64::from(index) + 0.5) / f64::from(side) - 0.5;
         Self {
             offset: [place(index % side), place(index / side % side)],
             level_bias: -f64::from(side).log2(),
-            // Many pictures are made: none has to show all colours by itself.
+            // Many frames are averaged, so that no single one has to cover the spectrum.
             picture: index + 1,
         }
     }
 
-    /// A further place of a sequence that fills pixels evenly however long it is (M. Roberts, "The Unreasonable
-    /// Effectiveness of Quasirandom Sequences", 2018: R2).
+    /// A position of the sequence R2, which covers pixels evenly at any length (M. Roberts, "The Unreasonable
+    /// Effectiveness of Quasirandom Sequences", 2018).
     pub(super) fn of_sequence(index: u32) -> Self {
         const STEPS: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
         Self {
             offset: STEPS.map(|step| (0.5 + step * f64::from(index)).fract() - 0.5),
-            // A pixel's mean blurs enough by itself.
+            // The mean over the pixel blurs enough by itself.
             level_bias: -1.0,
             picture: index,
         }
     }
 }
 
-/// Counted where things are made; of the last picture, where it says so.
+/// Counts of resources, and figures of the last frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EyeCounts {
-    /// Render pipelines of surfaces and tone mapping that exist.
+    /// Render pipelines for surfaces and tone mapping.
     pub pipelines: u64,
-    /// Those of them that draw what is seen in mirrors and through glass.
+    /// Those of them for reflections and refractions.
     pub specular_pipelines: u64,
-    /// What chains are traced through: the hierarchy with its triangles [bytes].
+    /// Device memory of the hierarchy and its triangles [bytes].
     pub chain_bytes: u64,
-    /// The environment on the device [bytes].
+    /// Device memory of the environment [bytes].
     pub sky_bytes: u64,
-    /// Illumination maps on the device [bytes].
+    /// Device memory of illumination maps [bytes].
     pub map_bytes: u64,
-    /// Maps of which the device does not hold the finest level, for want of memory.
+    /// Maps whose finest level is not resident, for lack of memory.
     pub coarse_maps: u64,
-    /// Objects that the last picture drew.
+    /// Objects drawn in the last frame.
     pub drawn_objects: u64,
-    /// Those of them that were drawn as specular.
+    /// Specular objects among them.
     pub drawn_specular: u64,
-    /// Pixels of the traced picture; 0 where nothing specular was in view.
+    /// Pixels of the traced image; 0 if nothing specular was in view.
     pub traced_pixels: u64,
-    /// Pictures of which the last one is the mean.
+    /// Frames in the mean that was shown last.
     pub samples: u32,
-    /// Time on the device of the last picture that it has told of; `None` where it cannot tell, or has not yet.
+    /// GPU time of the latest frame for which it is known; `None` without timestamp queries, or before the first
+    /// result.
     pub gpu_ms: Option<GpuMs>,
-    /// How that picture was made.
+    /// Quality of that frame.
     pub timed_quality: Option<EyeQuality>,
 }
 
-/// Time on the device [ms].
+/// GPU time by pass [ms].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GpuMs {
-    /// All surfaces, as the picture shows them, and the resolving of samples after them.
+    /// The pass over all surfaces, including the multisample resolve.
     pub opaque: f64,
-    /// Chains of mirrors, polish and clear bodies; 0 where nothing of that kind was drawn.
+    /// Tracing chains; 0 if nothing specular was drawn.
     pub specular: f64,
-    /// The last pass; 0 for pictures that are read back as radiance.
+    /// Tone mapping; 0 for frames that are read back as radiance.
     pub tone_mapping: f64,
 }

@@ -15,21 +15,22 @@ use crate::gpu::Gpu;
 use crate::illumination::Chart;
 use crate::scene::{Material, Mesh, Object, Scene};
 
-/// A corner of a triangle. Surfaces with a map share none between triangles, since maps may cut them anywhere.
+/// A corner of a triangle. Triangles of surfaces with a map share no corners, since a map may have a seam along any
+/// edge.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub(super) struct Corner {
-    /// In coordinates of the mesh [m].
+    /// In mesh coordinates [m].
     position: [f32; 3],
-    /// In these too, of any length.
+    /// In mesh coordinates, of any length.
     normal: [f32; 3],
-    /// TEXCOORD_0 and TEXCOORD_1, 0 where the mesh has none.
+    /// TEXCOORD_0 and TEXCOORD_1; 0 if the mesh has none.
     uvs: [[f32; 2]; 2],
-    /// What the base colour is multiplied by, in steps of 1/65535; the last number is not used.
+    /// Factor of the base colour, in steps of 1/65535; the last channel is unused.
     colour: [u16; 4],
 }
 
-/// Map coordinates of a corner: they change with the maps.
+/// Map coordinates of a corner, in a separate buffer because they change with the maps.
 type MapUv = [f32; 2];
 
 /// The vertex buffers of the surface pipelines.
@@ -49,7 +50,7 @@ pub(super) const MAP_UV_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     attributes: &[attribute(3, 0, wgpu::VertexFormat::Float32x2)],
 };
 
-/// The objects' records: where each stands.
+/// Per-instance attributes: the transforms in the objects' records.
 pub(super) const OBJECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBufferLayout {
     array_stride: size_of::<ObjectRecord>() as u64,
     step_mode: wgpu::VertexStepMode::Instance,
@@ -68,25 +69,24 @@ const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexForm
     }
 }
 
-/// Largest buffer [bytes]: one allocation that drivers serve. Chains need all of a scene in one page.
+/// Maximum size of a buffer that drivers allocate reliably [bytes]. Chains need the whole scene in one page.
 const PAGE_BYTES: u64 = 1 << 30;
 
 /// Part of an object within one page.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Segment {
-    /// Which page.
     pub(super) page: usize,
-    /// Where the page's indices draw it.
+    /// Range in the page's index buffer.
     pub(super) indices: Range<u32>,
     /// First corner within the page.
     first_corner: usize,
     /// Triangles of the object's mesh.
     pub(super) triangles: Range<usize>,
-    /// Whether its corners are the mesh's vertices; else three for each triangle.
+    /// Whether its corners are the vertices of the mesh, rather than three per triangle.
     shares_corners: bool,
 }
 
-/// Corners with as many map coordinates, and which three of them make a triangle.
+/// Corners, their map coordinates, and the indices of triangles.
 #[derive(Debug)]
 pub(super) struct Page {
     pub(super) corners: wgpu::Buffer,
@@ -94,16 +94,15 @@ pub(super) struct Page {
     pub(super) indices: wgpu::Buffer,
 }
 
-/// All triangles of a scene.
 #[derive(Debug)]
 pub(super) struct Geometry {
     pub(super) pages: Vec<Page>,
-    /// One list per object of the scene.
+    /// By object.
     pub(super) segments: Vec<Vec<Segment>>,
-    /// The objects, and what is drawn of them.
+    /// The scene's objects, and what is drawn for each.
     shown: Vec<Object>,
     drawn: Vec<Drawn>,
-    /// Where the map coordinates come from, object by object.
+    /// Charts of the map coordinates, by object.
     pub(super) charts: Vec<Option<Arc<Chart>>>,
 }
 
@@ -115,7 +114,7 @@ impl Geometry {
         let limit = limits.max_buffer_size.min(bindable).min(PAGE_BYTES) as usize;
         let mut packing = Packing {
             gpu,
-            // Indices are smaller than corners, and never more of them are allowed.
+            // Indices have the same limit in number; as they are smaller, they fit, too.
             page_corners: (limit / size_of::<Corner>()).max(3),
             pages: Vec::new(),
             corners: Vec::new(),
@@ -136,8 +135,8 @@ impl Geometry {
         }
     }
 
-    /// Takes over an edited scene with as many objects. Corners of a mesh that changed its form alone are written again;
-    /// where an object needs others than it has, everything is uploaded anew.
+    /// Switches to an edited scene with the same number of objects. If only the shape of a mesh changed, its corners
+    /// are written again; if an object needs other corners than it has, everything is uploaded again.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
         let (mut can_stay, mut reshaped) = (true, Vec::new());
         for (index, object) in scene.objects.iter().enumerate() {
@@ -169,7 +168,7 @@ impl Geometry {
         uploaded
     }
 
-    /// Rows of the way from an object's corners to the scene.
+    /// Rows of the transform from an object's corners to the scene.
     pub(super) fn rows(&self, object: usize) -> [[f32; 4]; 3] {
         let transform = &self.drawn[object].world_from_mesh;
         [0, 1, 2].map(|row| {
@@ -178,7 +177,7 @@ impl Geometry {
         })
     }
 
-    /// Whether no other object is drawn by its corners.
+    /// Whether no other object shares its corners.
     fn is_alone(&self, index: usize) -> bool {
         let own = &self.segments[index];
         self.segments.iter().filter(|segments| *segments == own).count() == 1
@@ -202,7 +201,7 @@ impl Geometry {
         self.pages.iter().map(page_bytes).sum::<u64>() as usize
     }
 
-    /// Writes the map coordinates of one object, which takes light, unless they are there already.
+    /// Writes the map coordinates of a receiver unless they are there already.
     pub(super) fn set_chart(&mut self, gpu: &Gpu, chart: &Arc<Chart>) -> Uploaded {
         let is_there = |shown: &Arc<Chart>| Arc::ptr_eq(shown, chart) || shown.corner_uvs == chart.corner_uvs;
         if self.charts[chart.object()].as_ref().is_some_and(is_there) {
@@ -239,8 +238,8 @@ impl Segment {
     }
 }
 
-/// What is drawn of an object: a mesh in its own coordinates, or a copy in those of the scene where the former do not do
-/// in single precision.
+/// What is drawn for an object: its mesh, or a copy in scene coordinates if mesh coordinates are not accurate enough in
+/// single precision.
 #[derive(Clone, Debug)]
 struct Drawn {
     mesh: Arc<Mesh>,
@@ -275,7 +274,7 @@ impl Drawn {
         Arc::ptr_eq(&self.mesh, &other.mesh) && self.is_mirrored() == other.is_mirrored()
     }
 
-    /// Whether its corners have the places of those.
+    /// Whether its corners fit in place of the other's.
     fn fits_corners_of(&self, other: &Self) -> bool {
         self.mesh.positions.len() == other.mesh.positions.len()
             && self.mesh.triangles == other.mesh.triangles
@@ -283,20 +282,20 @@ impl Drawn {
     }
 }
 
-/// Fills page after page.
+/// Packs corners and indices into pages.
 struct Packing<'a> {
     gpu: &'a Gpu,
     page_corners: usize,
     pages: Vec<Page>,
     corners: Vec<Corner>,
     indices: Vec<u32>,
-    /// Where meshes are that need no corners for each object, mirrored ones apart.
+    /// Segments of meshes whose corners all instances share, by mesh and whether it is mirrored.
     shared: HashMap<(*const Mesh, bool), Segment>,
 }
 
 impl Packing<'_> {
-    /// Where an object ended up. Surfaces without maps share the corners of neighbouring triangles, and with all other
-    /// instances of their mesh.
+    /// Adds an object. Surfaces without maps share corners between neighbouring triangles and all instances of their
+    /// mesh.
     fn add(&mut self, material: &Material, drawn: &Drawn) -> Vec<Segment> {
         let mesh = &*drawn.mesh;
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
@@ -329,7 +328,7 @@ impl Packing<'_> {
         segments
     }
 
-    /// The segment that comes next, on a new page where this one has no room for so many corners or indices.
+    /// The next segment, on a new page if this one has no room for `needed` corners or indices.
     fn segment(&mut self, needed: usize, triangles: Range<usize>, shares_corners: bool) -> Segment {
         if self.corners.len().max(self.indices.len()) + needed > self.page_corners {
             self.close_page();

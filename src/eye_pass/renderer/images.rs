@@ -10,34 +10,33 @@ use crate::illumination::Receiver;
 use crate::optics::LinearSrgb;
 use crate::scene::{Material, Scene, Texture, TextureRef};
 
-/// What an object refers to in place of an image that it does not have; `NO_IMAGE` in the shaders.
+/// Stands for a missing image; `NO_IMAGE` in the shaders.
 pub(super) const NO_IMAGE: u32 = u32::MAX;
 
-/// Bytes of a tile of a map, as the device stores it.
+/// Device memory of a map tile [bytes].
 const MAP_TILE_BYTES: u64 =
     (super::paging::STORED * super::paging::STORED * size_of::<super::maps::Texel>()) as u64;
 
-/// Maps and textures of a scene.
 #[derive(Debug)]
 pub(super) struct Images {
     map_pool: TilePool,
     texture_pool: TilePool,
-    /// By object.
+    /// By [`Receiver::index`].
     maps: Vec<Option<DeviceMap>>,
-    /// As `textures` hold them.
+    /// Sources of `textures`, in the same order.
     sources: Vec<Arc<Texture>>,
     textures: Vec<PagedImage<Texel>>,
-    /// How materials look their images up, in the order of [`Material::images`].
+    /// Texture references by material, in the order of [`Material::images`].
     looks: Vec<[Option<TextureRef>; 4]>,
-    /// What bends normals, by object: the material, and the words that follow the look of its image.
+    /// Bumps by object: the material, and the words that follow its texture reference in the record.
     bumps: Vec<Option<(usize, Vec<u32>)>>,
-    /// Records of images and where their tiles are, of looks, and of what bends normals.
+    /// Records of images with their pages, of texture references, and of bumps.
     pub(super) table: Storage,
-    /// Where the record of each object's map, and of each material's looks, starts in the table.
+    /// Where records start in the table: of maps by receiver, of texture references by material, of bumps by object.
     map_records: Vec<u32>,
     look_records: Vec<[u32; 4]>,
     bump_records: Vec<u32>,
-    /// Most that maps may take [bytes].
+    /// Memory budget of illumination maps [bytes].
     budget_bytes: u64,
 }
 
@@ -61,7 +60,7 @@ impl Images {
         images
     }
 
-    /// Takes over the images of an edited scene; maps stay where the number of objects does.
+    /// Switches to the images of an edited scene; maps stay if the number of objects is unchanged.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
         let mut uploaded = Uploaded::default();
         if self.maps.len() != 2 * scene.objects.len() {
@@ -135,8 +134,8 @@ impl Images {
         uploaded
     }
 
-    /// Holds of each map the levels that fit the budget together; of maps that are seen coarsely, by `needs` [levels],
-    /// the finest ones go first.
+    /// Makes the finest levels resident that fit the budget together. Maps that are seen coarsely, by `needs` [levels],
+    /// lose their finest levels first.
     pub(super) fn keep_budget(&mut self, gpu: &Gpu, needs: &[f64]) -> Uploaded {
         let maps: Vec<(usize, &DeviceMap)> = self
             .maps
@@ -153,7 +152,7 @@ impl Images {
         let finest = finest_levels(&costs.collect::<Vec<_>>(), self.budget_bytes / MAP_TILE_BYTES);
         let wanted: Vec<(usize, usize)> = maps.iter().map(|(object, _)| *object).zip(finest).collect();
         let mut uploaded = Uploaded::default();
-        // What goes makes room for what comes.
+        // Evict first, to make room.
         for is_coarser in [true, false] {
             for (object, finest) in &wanted {
                 if let Some(map) = &mut self.maps[*object]
@@ -167,7 +166,7 @@ impl Images {
         uploaded
     }
 
-    /// Whether the maps could take more than the budget allows.
+    /// Whether all levels of all maps together could exceed the budget.
     pub(super) fn may_exceed_budget(&self) -> bool {
         let tiles = self.maps.iter().flatten().map(|map| {
             let [width, height] = map.image.size();
@@ -176,17 +175,16 @@ impl Images {
         tiles.sum::<u64>() * MAP_TILE_BYTES > self.budget_bytes
     }
 
-    /// Changes the budget [bytes].
     pub(super) fn set_budget(&mut self, bytes: u64) {
         self.budget_bytes = bytes;
     }
 
-    /// Illumination maps on the device [bytes].
+    /// Device memory of illumination maps [bytes].
     pub(super) fn map_bytes(&self) -> u64 {
         self.map_pool.tiles() * MAP_TILE_BYTES
     }
 
-    /// Maps of which the device does not hold the finest level.
+    /// Maps whose finest level is not resident.
     pub(super) fn coarse_maps(&self) -> u64 {
         self.maps
             .iter()
@@ -199,17 +197,15 @@ impl Images {
         self.maps[object].as_ref()
     }
 
-    /// Record of an object's map.
     pub(super) fn map_record(&self, receiver: Receiver) -> u32 {
         self.map_records[receiver.index()]
     }
 
-    /// Records of how a material looks its images up.
+    /// Records of the texture references of a material.
     pub(super) fn look_records(&self, material: usize) -> [u32; 4] {
         self.look_records[material]
     }
 
-    /// Record of what bends an object's normals.
     pub(super) fn bump_record(&self, object: usize) -> u32 {
         self.bump_records.get(object).copied().unwrap_or(NO_IMAGE)
     }
@@ -239,7 +235,7 @@ impl Images {
         let mut write_look = |look: &TextureRef| {
             let record = words.len() as u32;
             words.extend([texture_records[look.texture], look.uv_set as u32]);
-            // Rows, each with what is added to it.
+            // Two rows of the matrix, each followed by its translation.
             let [u, v, shift] = look.uv_transform.to_cols_array_2d();
             let rows = [u[0], v[0], shift[0], u[1], v[1], shift[1]];
             words.extend(rows.map(|number| (number as f32).to_bits()));
@@ -265,7 +261,7 @@ impl Images {
     }
 }
 
-/// What bends a material's normals, as `bumps.wgsl` reads it after the look of its image.
+/// A material's bumps, as `bumps.wgsl` reads them after the texture reference.
 fn bumps(material: &Material) -> Option<Vec<u32>> {
     if !material.has_bumps() {
         return None;
@@ -281,17 +277,17 @@ fn bumps(material: &Material) -> Option<Vec<u32>> {
     Some(words)
 }
 
-/// What a map would take.
+/// Memory demand of a map.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Cost {
-    /// The finest level that can be told from coarser ones where it is seen nearest; negative where even the finest is
-    /// seen coarsely.
+    /// Finest level that can be resolved where the map is seen from nearest; negative if even level 0 is magnified
+    /// there.
     pub(super) need: f64,
     /// Tiles of each level, from fine to coarse.
     pub(super) tiles: Vec<u64>,
 }
 
-/// Upper bound on the tiles of a map with all its coarser levels.
+/// Upper bound of the number of tiles of a map with all its levels.
 pub(super) fn tiles_of(width: usize, height: usize) -> u64 {
     let (mut width, mut height, mut tiles) = (width, height, 0);
     loop {
@@ -303,13 +299,13 @@ pub(super) fn tiles_of(width: usize, height: usize) -> u64 {
     }
 }
 
-/// The finest level to be held of each map, so that together they take no more than `budget` tiles where the coarsest
-/// levels alone do: as long as they take more, the map whose finest level is needed least loses it.
+/// The finest level of each map to keep resident, so that all maps take at most `budget` tiles, if their coarsest
+/// levels alone do. While they take more, the map that needs its finest level least loses it.
 pub(super) fn finest_levels(costs: &[Cost], budget: u64) -> Vec<usize> {
     let mut finest = vec![0; costs.len()];
     let mut total: u64 = costs.iter().flat_map(|cost| &cost.tiles).sum();
     while total > budget {
-        // Positive where the finest level held is finer than needed.
+        // Positive if the finest level that is kept is finer than needed.
         let spare = |index: usize| costs[index].need - finest[index] as f64;
         let can_lose = |index: &usize| finest[*index] + 1 < costs[*index].tiles.len();
         let candidates = (0..costs.len()).filter(can_lose);
@@ -325,16 +321,16 @@ pub(super) fn finest_levels(costs: &[Cost], budget: u64) -> Vec<usize> {
 /// An sRGB-encoded texel.
 pub(super) type Texel = [u8; 4];
 
-/// Uploads an image with its coarser levels.
+/// Uploads an image with its mip levels.
 pub(super) fn upload(gpu: &Gpu, pool: &mut TilePool, texture: &Texture) -> (PagedImage<Texel>, Uploaded) {
     let (image, uploaded) = PagedImage::new(gpu, pool, mip_chain(texture), texture.wrap, 0);
     (image, Uploaded::other(uploaded.tile_bytes as usize))
 }
 
-/// Texels across and down, and row by row.
+/// Size [texels], and texels row by row.
 type Image = ([usize; 2], Vec<Texel>);
 
-/// The image and its halvings down to a few texels.
+/// The image and its mip levels.
 fn mip_chain(texture: &Texture) -> Vec<Level<Texel>> {
     let size = [texture.width as usize, texture.height as usize];
     let mut images: Vec<Image> = vec![(size, texture.rgba.clone())];
@@ -349,7 +345,7 @@ fn mip_chain(texture: &Texture) -> Vec<Level<Texel>> {
     images.into_iter().map(level).collect()
 }
 
-/// Means of 2×2 texels in linear light; an odd last row or column is left out of its neighbour's mean.
+/// Means of 2×2 texels in linear light; an odd last row or column is dropped.
 fn halved((fine_size, fine): &Image) -> Image {
     let [fine_width, fine_height] = *fine_size;
     let (width, height) = ((fine_width / 2).max(1), (fine_height / 2).max(1));

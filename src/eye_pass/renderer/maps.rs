@@ -15,14 +15,14 @@ use crate::gpu::Gpu;
 use crate::illumination::{Chart, IlluminationMap};
 use crate::scene::texture::Wrap;
 
-/// A texel: linear red, green and blue, and 1 in place of all three where they are no numbers.
+/// Linear red, green and blue; if one of them is not finite, all are 0 and alpha is 1.
 pub(super) type Texel = [f16; 4];
 
-/// Texels that one thread works on at a time.
+/// Texels per parallel task.
 const BLOCK: usize = 4096;
-/// Largest value written: below the end of half floats, 65504, with room to spare.
+/// Largest stored value, well below the largest half float, 65504.
 const LARGEST_VALUE: f32 = 32768.0;
-/// Least peak that a kept scale leaves [written value]: 21 binary orders of half floats are below it.
+/// Smallest peak for which a scale is kept [stored value]: half floats reach 21 binary orders below it.
 const MIN_PEAK: f32 = 128.0;
 
 /// A map on the device: E [W/m²] = texel × `irradiance_scale`.
@@ -36,7 +36,7 @@ pub(super) struct DeviceMap {
     pub(super) peak_w_m2: f32,
 }
 
-/// What a map shows: the sum of its layers [W/m²], computed once for all who need it.
+/// Irradiance shown by a map: the sum of its layers [W/m²], computed only once.
 #[derive(Clone, Debug)]
 pub(super) struct ShownMap<'a> {
     pub(super) chart: Arc<Chart>,
@@ -57,7 +57,7 @@ impl<'a> ShownMap<'a> {
 }
 
 impl DeviceMap {
-    /// Uploads a map with its coarser levels, the finest of them aside where they are not to be held.
+    /// Uploads a map with its mip levels, from level `finest` on.
     pub(super) fn new(gpu: &Gpu, pool: &mut TilePool, map: &ShownMap, finest: usize) -> (Self, Uploaded) {
         let minification = Minification::of(&map.chart);
         let peak_w_m2 = peak(&map.irradiance);
@@ -74,7 +74,7 @@ impl DeviceMap {
         (map, uploaded)
     }
 
-    /// Whether a map can take this one's place: it lies in the same chart.
+    /// Whether a map can replace this one in place: both have the same chart.
     pub(super) fn can_become(&self, map: &ShownMap) -> bool {
         let (old, new) = (&self.chart, &map.chart);
         Arc::ptr_eq(old, new)
@@ -84,8 +84,8 @@ impl DeviceMap {
                 && old.layout == new.layout)
     }
 
-    /// Replaces the map by another of the same chart and uploads the tiles that differ. The scale stays where the new
-    /// peak still fits it; else it changes, and with it all tiles that are not black.
+    /// Replaces the map by another of the same chart and uploads the tiles that differ. The scale is kept if the new
+    /// peak fits it; otherwise it changes, and with it all tiles that are not black.
     pub(super) fn update(&mut self, gpu: &Gpu, pool: &mut TilePool, map: &ShownMap) -> Uploaded {
         self.peak_w_m2 = peak(&map.irradiance);
         self.irradiance_scale = kept_scale(self.irradiance_scale, self.peak_w_m2);
@@ -94,8 +94,8 @@ impl DeviceMap {
     }
 }
 
-/// The power of two by which a peak [any unit] is divided to lie in (16384, 32768]; 1 for nothing. Powers of two
-/// change no digit, and half floats keep all of theirs down to 2⁻²⁹ of the peak.
+/// The power of two that brings a peak [any unit] into (16384, 32768] when dividing it; 1 for a peak of 0. Powers of
+/// two are lossless, and half floats keep their full precision down to 2⁻²⁹ of the peak.
 fn scale_for_half_floats(peak: f32) -> f32 {
     if peak > 0.0 && peak.is_finite() {
         (peak / LARGEST_VALUE).log2().ceil().exp2()
@@ -104,7 +104,7 @@ fn scale_for_half_floats(peak: f32) -> f32 {
     }
 }
 
-/// The present scale where a peak still fits it, so that what did not change keeps its bits; else the peak's own.
+/// The present scale if a peak fits it, so that unchanged texels keep their bits; otherwise the peak's own.
 fn kept_scale(present: f32, peak: f32) -> f32 {
     let written = peak / present;
     if (MIN_PEAK..=LARGEST_VALUE).contains(&written) {
@@ -148,7 +148,7 @@ fn levels(map: &ShownMap, minification: &Minification, scale: f32) -> Vec<Level<
         .collect()
 }
 
-/// Half floats of a map, many at once: a window waits for them.
+/// Converts irradiance to half floats in batches, since an interactive window waits for it.
 pub(super) fn half_floats(irradiance: &[[f32; 3]], scale: f32) -> Vec<Texel> {
     let mut texels = vec![[f16::ZERO; 4]; irradiance.len()];
     let blocks = texels.par_chunks_mut(BLOCK).zip(irradiance.par_chunks(BLOCK));

@@ -11,12 +11,12 @@ use crate::illumination::islands::Islands;
 /// Irradiance per texel [W/m²].
 type Irradiance = Vec<[f32; 3]>;
 
-/// How the levels of a chart's map follow from each other; those of a map in tiles do by themselves.
+/// How the mip levels of a map follow from each other, except for tiled maps.
 #[derive(Debug)]
 pub(super) struct Minification {
-    /// Texels across and down of each level, from fine to coarse.
+    /// Size of each level [texels], from fine to coarse.
     sizes: Vec<[usize; 2]>,
-    /// Surface area under each texel [m²], by level; nothing where all are alike.
+    /// Surface area under each texel [m²], by level; empty if all are equal.
     areas: Vec<Vec<f32>>,
 }
 
@@ -63,12 +63,11 @@ impl Minification {
         Self { sizes, areas }
     }
 
-    /// Texels across and down of each level.
     pub(super) fn sizes(&self) -> &[[usize; 2]] {
         &self.sizes
     }
 
-    /// The coarser levels of a map, without the map itself.
+    /// The mip levels of a map, without level 0.
     pub(super) fn coarser(&self, irradiance: &[[f32; 3]]) -> Vec<Irradiance> {
         let mut levels: Vec<Irradiance> = Vec::with_capacity(self.sizes.len() - 1);
         for index in 1..self.sizes.len() {
@@ -109,7 +108,7 @@ impl Minification {
     }
 }
 
-/// Uncovered texels take the mean of the covered ones around them: look-ups next to a border reach half a texel beyond.
+/// Fills uncovered texels with the mean of their covered neighbours: lookups at a border reach half a texel beyond it.
 fn fill_beside(level: &mut [[f32; 3]], areas: &[f32], [width, height]: [usize; 2]) {
     for texel in (0..level.len()).filter(|texel| areas[*texel] <= 0.0) {
         let around = neighbours(texel, width, height).filter(|neighbour| areas[*neighbour] > 0.0);
@@ -129,7 +128,7 @@ fn halved(size: [usize; 2]) -> [usize; 2] {
     size.map(|side| side.div_ceil(2))
 }
 
-/// The up to four texels of the finer level, of this size, under a texel.
+/// The up to four texels of the finer level, of the given size, that a texel covers.
 fn children(texel: usize, [width, height]: [usize; 2]) -> impl Iterator<Item = usize> {
     let across = width.div_ceil(2);
     let (column, row) = (2 * (texel % across), 2 * (texel / across));
@@ -137,12 +136,12 @@ fn children(texel: usize, [width, height]: [usize; 2]) -> impl Iterator<Item = u
     rows.flat_map(move |row| (column..(column + 2).min(width)).map(move |column| row * width + column))
 }
 
-/// Whose a texel is.
+/// The island that a texel belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Owner {
     Nobody,
     Island(u32),
-    /// Of several islands already in the map itself.
+    /// Several islands share the texel, already in level 0.
     Several,
 }
 
@@ -155,7 +154,7 @@ impl Owner {
         }
     }
 
-    /// Whether light of one may be mixed into the other.
+    /// Whether texels of the two may be blended.
     fn may_mix(self, other: Self) -> bool {
         match (self, other) {
             (Self::Island(a), Self::Island(b)) => a == b,
@@ -169,7 +168,7 @@ impl Owner {
     }
 }
 
-/// Whose the texels of the next level are; `None` where one of them, or two that a look-up may blend, would mix islands.
+/// Owners of the texels of the next level; `None` if a texel, or a lookup between two texels, would blend islands.
 fn coarser_owners(fine: &[Owner], fine_size: [usize; 2]) -> Option<Vec<Owner>> {
     let [width, height] = halved(fine_size);
     let mut coarse = Vec::with_capacity(width * height);

@@ -1,13 +1,13 @@
 //! The eye pass on the device: rasterised triangles with radiance from the illumination maps, chains traced where a
 //! specular surface is nearest, then tone mapping.
 //!
-//! Diffuse surfaces show L = ρE/π. Where a mirror, polish, glass or water is the nearest surface of a pixel, its chain
-//! is followed through the scene's hierarchy as the CPU eye pass follows it, in single precision. Two things are
-//! approximated: after the first surfaces of a chain only the stronger way on is followed, and images are looked up by
-//! an isotropic footprint. [`EyeQuality`] sets both.
+//! Diffuse surfaces show L = ρE/π. Where the nearest surface of a pixel is a mirror, a coat, glass or water, its chain
+//! is traced through the scene's hierarchy as in the CPU eye pass, but in single precision and with two approximations:
+//! after the first surfaces of a chain only the stronger branch is followed, and images are read with an isotropic
+//! footprint. [`EyeQuality`] controls both.
 //!
-//! Only what a view calls for is made: pipelines when an object that needs them first comes into view, and so what
-//! chains are traced through.
+//! Resources are created when a view first needs them: pipelines when an object that uses them comes into view, and
+//! likewise what chains are traced through.
 
 mod accumulation;
 mod bindings;
@@ -61,12 +61,11 @@ use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::Matrix3;
 use crate::scene::Scene;
 
-/// Most that illumination maps take on the device unless it is told otherwise [bytes].
+/// Default memory budget of illumination maps on the device [bytes].
 const MAP_BUDGET_BYTES: u64 = 1 << 30;
-/// Storage buffers that every fragment reads.
+/// Storage buffers that every fragment shader reads.
 const MIN_BUFFERS: u32 = 2;
 
-/// A scene on the device, drawn as often as asked.
 #[derive(Debug)]
 pub struct Renderer {
     sample_count: u32,
@@ -75,38 +74,37 @@ pub struct Renderer {
     tone_mapping: ToneMappingPipelines,
     geometry: Geometry,
     objects: Objects,
-    /// What chains are traced through.
+    /// What chains are traced through; `None` until it is needed.
     chain_scene: Option<ChainScene>,
-    /// Whether triangles changed since it was made.
+    /// Whether geometry changed since `chain_scene` was built.
     chain_scene_is_stale: bool,
-    /// Why there are no chains though they were called for.
+    /// Why chains are not drawn although they were requested.
     refusal: Option<Error>,
-    /// The environment of the scene.
     sky: Option<Sky>,
     targets: Option<Targets>,
     traced: Option<TracedTargets>,
     mean: Option<Mean>,
-    /// Whether mirrors are grey where chains are switched off.
+    /// Whether mirrors are grey instead of black while chains are switched off.
     has_stand_in: bool,
-    /// What `targets` show, if that is what [`draw`](Self::draw) drew last.
+    /// View of the last [`draw`](Self::draw), as long as `targets` show it.
     drawn_view: Option<View>,
     map_style: MapStyle,
     chains: EffectSwitch,
     dispersion: EffectSwitch,
     quality: EyeQuality,
-    /// Whether light straight from the lamps is traced.
+    /// Whether direct light is traced instead of read from the maps.
     traces_lights: bool,
     timing: Option<Timing>,
-    /// Objects of the last picture, and the specular ones among them.
+    /// Objects of the last frame, and the specular ones among them.
     drawn: [usize; 2],
 }
 
 impl Renderer {
-    /// Uploads a scene. `colour_format` is that of the targets of [`draw`](Self::draw): formats that encode sRGB by
-    /// themselves get linear light, all others get encoded values. `sample_count` is 1 or 4 samples per pixel.
+    /// Uploads a scene. `colour_format` is the format of the targets of [`draw`](Self::draw): sRGB formats receive
+    /// linear values, all others encoded ones. `sample_count` is 1 or 4 samples per pixel.
     ///
     /// # Errors
-    /// Another sample count; a device that refuses what it is given.
+    /// An unsupported sample count; an error of the device.
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
@@ -155,11 +153,11 @@ impl Renderer {
         gpu.take_error().map_or(Ok(renderer), Err)
     }
 
-    /// Shows an edited scene: other materials, moved objects. Uploads what differs; the maps stay until
+    /// Switches to an edited scene with other materials or moved objects. Uploads what differs; the maps stay until
     /// [`set_maps`](Self::set_maps), unless the number of objects changed.
     ///
     /// # Errors
-    /// A device that refuses what it is given.
+    /// An error of the device.
     pub fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Result<Uploaded> {
         let mut uploaded = Uploaded::default();
         if self.scene.triangle_count() != scene.triangle_count() {
@@ -181,11 +179,11 @@ impl Renderer {
         gpu.take_error().map_or(Ok(uploaded), Err)
     }
 
-    /// Replaces all illumination maps; surfaces without one are dark. Of maps that keep their size only the tiles that
-    /// differ from what is shown are uploaded.
+    /// Replaces all illumination maps; receivers without one are dark. If a map keeps its chart, only tiles that differ
+    /// are uploaded.
     ///
     /// # Errors
-    /// A map that does not belong to the scene: the old maps stay. A device that refuses what it is given.
+    /// A map that does not belong to the scene: the old maps stay. An error of the device.
     pub fn set_maps(&mut self, gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap]) -> Result<Uploaded> {
         let shown: Vec<ShownMap> = maps.iter().map(ShownMap::of).collect();
         let mut uploaded = self.objects.set_maps(gpu, scene, &shown)?;
@@ -196,43 +194,42 @@ impl Renderer {
         gpu.take_error().map_or(Ok(uploaded), Err)
     }
 
-    /// Says what the values of the maps stand for, from the next picture on.
+    /// Sets what map values mean, from the next frame on.
     pub fn set_map_style(&mut self, style: MapStyle) {
         self.map_style = style;
         self.drawn_view = None;
     }
 
-    /// Most that illumination maps take on the device [bytes], from the next picture on; 1 GiB before. Maps that do not
-    /// fit are shown more coarsely, those first of which the detail would not be seen.
+    /// Limits the memory of illumination maps on the device [bytes], from the next frame on; 1 GiB by default. Maps
+    /// beyond the budget lose their finest levels, starting where their detail is least visible.
     pub fn set_map_budget(&mut self, bytes: u64) {
         self.objects.images.set_budget(bytes);
         self.drawn_view = None;
     }
 
-    /// How well pictures are made from the next one on.
+    /// Sets the quality, from the next frame on.
     pub fn set_quality(&mut self, quality: EyeQuality) {
         self.quality = quality.clamped();
         self.drawn_view = None;
     }
 
-    /// Whether light straight from the scene's lamps is traced from the next picture on, by a shadow ray for each lamp
-    /// and pixel: right at once where a lamp or an object was moved. The maps are then to be given without it.
+    /// Whether direct light is traced from the next frame on, with a shadow ray per light and pixel: it is correct as
+    /// soon as a light or an object moves. The maps must then exclude direct light.
     pub fn set_traces_lights(&mut self, traces: bool) {
         self.traces_lights = traces;
         self.drawn_view = None;
     }
 
-    /// How well pictures are made.
     pub fn quality(&self) -> EyeQuality {
         self.quality
     }
 
-    /// Switches what is seen in mirrors and through glass, from the next picture on. Auto makes what it takes when a
-    /// specular surface comes into view, on makes at once what all of the scene's objects could take. Off gives it up:
-    /// mirrors show what they emit, polished surfaces their diffuse part, and clear bodies are left out.
+    /// Switches chains, from the next frame on. Auto creates what they need when a specular surface comes into view; on
+    /// creates at once what any object of the scene could need. Off frees it: mirrors show only their emission, coated
+    /// surfaces their diffuse part, and clear bodies are left out.
     ///
     /// # Errors
-    /// A device that refuses what it is given.
+    /// An error of the device.
     pub fn set_chains(&mut self, gpu: &Gpu, switch: EffectSwitch) -> Result<()> {
         self.chains = switch;
         self.drawn_view = None;
@@ -248,22 +245,22 @@ impl Renderer {
         gpu.take_error().map_or(Ok(()), Err)
     }
 
-    /// Switches what glass that parts wavelengths does to what is seen through it, from the next picture on; off, it
-    /// bends all light as at 587.56 nm. Auto and on are the same here: without such glass there is nothing to prepare.
+    /// Switches dispersion in chains, from the next frame on; off, all light is refracted as at 587.56 nm. Auto and on
+    /// are equivalent: without dispersive glass there is nothing to prepare.
     pub fn set_dispersion(&mut self, switch: EffectSwitch) {
         self.dispersion = switch;
         self.drawn_view = None;
     }
 
     /// Multiplies radiance by a matrix of [`WhiteBalance::matrix`](super::WhiteBalance::matrix) before tone mapping,
-    /// from the next picture on. Radiance that is read back stays as it is.
+    /// from the next frame on. Radiance that is read back is not affected.
     pub fn set_white_balance(&mut self, gpu: &Gpu, matrix: &Matrix3) {
         if self.tone_mapping.set_white_balance(gpu, matrix) {
             self.drawn_view = None;
         }
     }
 
-    /// Whether mirrors are grey instead of black where chains are switched off, from the next picture on.
+    /// Whether mirrors are grey instead of black while chains are switched off, from the next frame on.
     pub fn set_stand_in(&mut self, has_stand_in: bool) {
         if self.has_stand_in != has_stand_in {
             self.has_stand_in = has_stand_in;
@@ -271,13 +268,13 @@ impl Renderer {
         }
     }
 
-    /// Why mirrors and glass are drawn without what is seen in them though that was called for: the scene is too large
-    /// for the device.
+    /// Why mirrors and glass are drawn without reflections and refractions although these were requested: the scene
+    /// exceeds the device's limits.
     pub fn chain_refusal(&self) -> Option<&Error> {
         self.refusal.as_ref()
     }
 
-    /// What was made and drawn so far.
+    /// Counts of resources, and figures of the last frame.
     pub fn counts(&self) -> EyeCounts {
         let traced_pixels = self
             .traced
@@ -301,22 +298,22 @@ impl Renderer {
         }
     }
 
-    /// Looks whether the device has told how long pictures took, without waiting for it. Tells whether it has:
-    /// [`counts`](Self::counts) then says so. [`draw`](Self::draw) does this too, for pictures before its own.
+    /// Collects GPU times that have arrived, without waiting. Returns whether any have; [`counts`](Self::counts) then
+    /// reports them. [`draw`](Self::draw) does this too, for the frames before its own.
     pub fn collect_times(&mut self, gpu: &Gpu) -> bool {
         self.timing.as_mut().is_some_and(|timing| timing.collect(gpu))
     }
 
-    /// Whether the device has still to tell how long a picture took.
+    /// Whether GPU times of a frame are still pending.
     pub fn awaits_times(&self) -> bool {
         self.timing.as_ref().is_some_and(Timing::is_waiting)
     }
 
-    /// Draws a picture into `target`, a view of the size of `view` and of the format given to [`new`](Self::new).
-    /// Draws nothing for a size of 0, which a minimised window has.
+    /// Draws a frame into `target`, which has the size of `view` and the format given to [`new`](Self::new). Draws
+    /// nothing for a size of 0, which a minimised window has.
     ///
     /// # Errors
-    /// A picture larger than the device's textures.
+    /// A frame larger than the device's textures.
     pub fn draw(
         &mut self,
         gpu: &Gpu,
@@ -345,11 +342,11 @@ impl Renderer {
         Ok(())
     }
 
-    /// Makes the picture of a view that was drawn last better: draws it once more, through other places of its pixels,
-    /// and shows the mean of all. Draws it for the first time where another one was drawn.
+    /// Refines the last frame: draws the view again with a subpixel offset and shows the mean of all its frames. If
+    /// another view was drawn last, draws this one for the first time.
     ///
     /// # Errors
-    /// A picture larger than the device's textures.
+    /// A frame larger than the device's textures.
     pub fn refine(
         &mut self,
         gpu: &Gpu,
@@ -386,12 +383,11 @@ impl Renderer {
         Ok(())
     }
 
-    /// Whether an environment is seen where nothing stands in the way.
+    /// Whether an environment is visible behind the surfaces.
     fn shows_sky(&self) -> bool {
         self.map_style == MapStyle::Lit && self.scene.environment.is_some()
     }
 
-    /// How objects are drawn now.
     fn draw_state(&self) -> DrawState {
         DrawState {
             style: self.map_style,
@@ -407,7 +403,7 @@ impl Renderer {
     }
 }
 
-/// By which radiance is multiplied before it is displayed: half floats then hold whatever can be.
+/// Radiance is stored exposed, which puts what is displayed into the range of half floats.
 fn exposure(view: &View) -> f64 {
     view.exposure_stops.exp2()
 }

@@ -15,36 +15,34 @@ use crate::illumination::{Chart, Receiver};
 use crate::optics::glass::Dispersion;
 use crate::scene::{InScene, Material, Scene, SurfaceKind};
 
-/// What an object looks like but for its map.
+/// Appearance of an object, apart from its map.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Appearance {
-    /// How its material is treated.
     pub(super) surface: SurfaceKind,
     pub(super) double_sided: bool,
-    /// Whether its normals are bent.
     pub(super) has_bumps: bool,
-    /// Smallest box [m]; `None` without vertices.
+    /// Bounding box [m]; `None` without vertices.
     pub(super) bounds: Option<(DVec3, DVec3)>,
-    /// Without what refers to images.
+    /// References to images are filled in when it is written.
     record: ObjectRecord,
     material: usize,
     pub(super) has_texture: bool,
 }
 
-/// Glasses that can part wavelengths in one scene; as many as the shader's uniform has room for.
+/// Maximum number of dispersive glasses in a scene: the capacity of the shader's uniform.
 const MAX_GLASSES: usize = 128;
 
-/// All objects with the images they share.
+/// All objects, with the images that they share.
 #[derive(Debug)]
 pub(super) struct Objects {
     pub(super) list: Vec<Appearance>,
     pub(super) images: Images,
     pub(super) records: Storage,
-    /// Each glass that parts wavelengths once.
+    /// The scene's dispersive glasses, each once.
     pub(super) glasses: Vec<Dispersion>,
-    /// Map texels per metre of each receiver that has a map.
+    /// Map texels per metre, by receiver; `None` without a map.
     texels_per_m: Vec<Option<f64>>,
-    /// Largest radiance that any surface sends out by itself or from its map [W/(m² sr)].
+    /// Largest radiance of any surface, emitted or diffuse [W/(m² sr)].
     pub(super) peak_radiance: f64,
 }
 
@@ -62,7 +60,7 @@ impl Objects {
         objects
     }
 
-    /// Takes over an edited scene; the maps stay where it has as many objects.
+    /// Switches to an edited scene; the maps stay if the number of objects is unchanged.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Uploaded {
         let mut uploaded = self.images.set_scene(gpu, scene);
         self.texels_per_m.resize(2 * scene.objects.len(), None);
@@ -74,7 +72,7 @@ impl Objects {
         uploaded
     }
 
-    /// Tells the glasses that part wavelengths apart.
+    /// Numbers the dispersive glasses.
     fn number_glasses(&mut self, scene: &Scene) {
         self.glasses.clear();
         for (object, look) in self.list.iter_mut().enumerate() {
@@ -98,10 +96,10 @@ impl Objects {
         }
     }
 
-    /// Replaces all maps; objects without one turn dark. Only what differs from the maps before is uploaded.
+    /// Replaces all maps; receivers without one are dark. Uploads only what differs from the previous maps.
     ///
     /// # Errors
-    /// A map of an object that the scene lacks; the old maps stay.
+    /// A map that does not belong to the scene; the old maps stay.
     pub(super) fn set_maps(&mut self, gpu: &Gpu, scene: &Scene, maps: &[ShownMap]) -> Result<Uploaded> {
         let mut map_of: Vec<Option<&ShownMap>> = vec![None; 2 * self.list.len()];
         for shown in maps {
@@ -119,7 +117,7 @@ impl Objects {
         Ok(uploaded)
     }
 
-    /// Fits the maps into their budget, with most detail where `eye` is near; `pixel_rad` is the angle of a pixel.
+    /// Fits the maps into their budget, with most detail near `eye`. `pixel_rad` is the angle of a pixel.
     pub(super) fn keep_budget(
         &mut self,
         gpu: &Gpu,
@@ -138,7 +136,7 @@ impl Objects {
             };
             let distance_m = (eye.clamp(low, high) - eye).length();
             let level = (distance_m * pixel_rad * density).max(1e-9).log2().floor();
-            // What is not in view may still be seen in a mirror, but mostly farther away.
+            // An object out of view may still be seen in a mirror, but mostly from farther away.
             if visible.contains(&index) {
                 level
             } else {
@@ -151,18 +149,16 @@ impl Objects {
         uploaded
     }
 
-    /// Whether a mirror, a pane or a body has a texture.
+    /// Whether any mirror or clear surface has a texture.
     pub(super) fn has_tinted_glass(&self) -> bool {
         let mut looks = self.list.iter();
         looks.any(|look| look.surface.is_specular() && !look.surface.is_receiver() && look.has_texture)
     }
 
-    /// Whether anything has holes.
     pub(super) fn has_masks(&self) -> bool {
         self.list.iter().any(Appearance::has_mask)
     }
 
-    /// Whether normals of anything are bent.
     pub(super) fn has_bumps(&self) -> bool {
         self.list.iter().any(|look| look.has_bumps)
     }
@@ -197,7 +193,7 @@ impl Appearance {
         let object = &scene.objects[index];
         let material = &scene.materials[object.material];
         let emitted = match scene.glows.get(&index) {
-            // The shader multiplies by its image.
+            // The shader multiplies this by the texture of the emission.
             Some(glow) => scene.emitted_radiance(index) * glow.per_colour(),
             None => scene.emitted_radiance(index),
         };
@@ -238,12 +234,11 @@ impl Appearance {
         }
     }
 
-    /// Whether it has holes.
     pub(super) fn has_mask(&self) -> bool {
         self.record.alpha_cutoff > 0.0
     }
 
-    /// Bound on the radiance that leaves it, reflections aside [W/(m² sr)].
+    /// Upper bound of the radiance that leaves it, without reflections [W/(m² sr)].
     fn peak_radiance(&self, peak_w_m2: f64) -> f64 {
         let largest = |rgb: [f32; 3]| f64::from(rgb.into_iter().fold(0.0, f32::max));
         let diffuse = largest(self.record.base_colour) * peak_w_m2 / std::f64::consts::PI;
@@ -263,17 +258,17 @@ pub(super) fn surface_code(surface: SurfaceKind) -> u32 {
     }
 }
 
-/// Alpha of a texture from which on a surface is there; 0 where it always is.
+/// Alpha of a texture below which the surface is cut out; 0 without a mask.
 fn alpha_cutoff(material: &Material) -> f32 {
     match material.alpha_mask {
         Some(mask) if mask.factor >= mask.cutoff => (mask.cutoff / mask.factor).max(0.0) as f32,
-        // Nowhere, whatever its texture.
+        // Cut out everywhere, whatever the texture.
         Some(_) => f32::INFINITY,
         None => 0.0,
     }
 }
 
-/// What a body absorbs [1/m]: −ln(colour)/distance, per channel.
+/// Absorption coefficient of a body [1/m]: −ln(colour)/distance, per channel.
 pub(super) fn absorption_per_m(material: &Material) -> [f32; 3] {
     match material.volume {
         Some(volume) if volume.attenuation_distance_m.is_finite() && volume.attenuation_distance_m > 0.0 => {
@@ -285,7 +280,7 @@ pub(super) fn absorption_per_m(material: &Material) -> [f32; 3] {
     }
 }
 
-/// Mean density of a map's texels along a line on its surface; 0 where the surface has no area.
+/// Mean linear density of a map's texels on its surface [1/m]; 0 if the surface has no area.
 fn texels_per_m(chart: &Chart, mesh: InScene) -> f64 {
     let in_map: f64 = chart
         .corner_uvs
@@ -300,7 +295,7 @@ fn texels_per_m(chart: &Chart, mesh: InScene) -> f64 {
     }
 }
 
-/// Maps come from files too: one of another scene must be refused, not drawn.
+/// Maps also come from files: a map of another scene must be rejected, not drawn.
 fn check_chart(scene: &Scene, chart: &Chart) -> Result<()> {
     let belongs = scene.objects.get(chart.object()).is_some_and(|object| {
         scene.materials[object.material].surface.is_receiver()
@@ -316,26 +311,25 @@ fn check_chart(scene: &Scene, chart: &Chart) -> Result<()> {
     ))
 }
 
-/// What the values of maps stand for.
+/// What map values mean.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MapStyle {
-    /// Irradiance [W/m²]: surfaces send it by their albedo, mirrors reflect it, glass lets it through.
+    /// Irradiance [W/m²] of a lit scene, with reflections and refractions.
     #[default]
     Lit,
-    /// Colours in linear light: shown as they are, and clear bodies left out. Surfaces without a map are black.
+    /// Linear colours, shown as they are. Clear bodies are left out, and surfaces without a map are black.
     AsItIs,
-    /// Irradiance [W/m²] of surfaces that are shown by something else, in display colours: to be shown without exposure
-    /// and tone mapping.
+    /// Irradiance [W/m²] of surfaces that show a property instead. The result is in display colours, to be shown
+    /// without exposure and tone mapping.
     Inspected {
-        /// By what.
         what: Inspected,
-        /// Of false colours, in the quantity's own unit.
+        /// Scale of false colours, in the property's own unit.
         scale: ColourScale,
     },
 }
 
 impl MapStyle {
-    /// What shaders take a place on the scale from.
+    /// Start of the scale of false colours, and the factor of distances from it.
     pub(super) fn colour_scale(self) -> [f64; 2] {
         match self {
             Self::Inspected { scale, .. } => scale.for_shaders(),
@@ -348,25 +342,24 @@ impl MapStyle {
     }
 }
 
-/// Something that surfaces are shown by in place of their light.
+/// A property that surfaces show instead of their radiance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Inspected {
-    /// Luminance of their maps [W/m²] in false colours; clear bodies are left out.
+    /// Luminance of the map [W/m²] in false colours; clear bodies are left out.
     Irradiance,
-    /// Texels of their maps as a checkerboard; clear bodies are left out.
+    /// Texels of the map as a checkerboard; clear bodies are left out.
     Texels,
-    /// Texels of their maps per metre in false colours; clear bodies are left out.
+    /// Texels of the map per metre in false colours; clear bodies are left out.
     TexelDensity,
-    /// The mesh's normals n in the scene's axes: red, green and blue are (n + 1)/2 of x, y and z.
+    /// Mesh normals n in scene axes: red, green and blue are (n + 1)/2 of x, y and z.
     Normals,
-    /// Coordinates of the base colour's image, or of set 0: red is u, green v, without their integer parts.
+    /// Texture coordinates of the base colour, or of set 0 without a texture: red is u, green v, fractional parts only.
     Uv,
     /// Coordinates in the illumination map: red is u, green v; clear bodies are left out.
     MapUv,
 }
 
 impl Inspected {
-    /// Every one.
     pub const ALL: [Self; 6] = [
         Self::Irradiance,
         Self::Texels,
@@ -388,7 +381,7 @@ impl Inspected {
         }
     }
 
-    /// Whether it is something that surfaces without a map have too.
+    /// Whether surfaces without a map have this property, too.
     pub(super) fn is_of_shape(self) -> bool {
         matches!(self, Self::Normals | Self::Uv)
     }

@@ -13,24 +13,23 @@ use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
 use crate::scene::Scene;
 
-/// Largest value of scaled radiance that the picture is scaled to: half floats end at 65504, and a body may still
-/// multiply it by the square of its refractive index.
+/// The peak radiance is scaled to at most this. Half floats end at 65504, and refraction may still multiply radiance by
+/// the square of a refractive index.
 const LARGEST_SCALED: f64 = 4096.0;
 
-/// How much brighter than surfaces an environment may be before it is cut: eleven binary digits of half floats are left
-/// for what sends a thousandth of the brightest surface.
+/// Ratio of the environment's radiance to that of surfaces above which it is clipped. Half floats then keep eleven
+/// binary digits for radiance of a thousandth of the brightest surface.
 const LARGEST_OVER_SURFACES: f64 = 1024.0;
 
-/// From here on a mean may hold something that a picture cut.
+/// Scaled radiance from which on a mean may contain clipped values.
 const CUT_SCALED: f64 = 500.0;
-/// Places across and down a pixel of a picture that is drawn anew to be kept.
+/// Samples across and down a pixel when a picture to be kept is drawn again.
 const ANEW_SIDE: u32 = 2;
-/// Least pictures of a view in which chains go on by wavelength: 48 wavelengths.
+/// Minimum number of frames per picture when chains split into wavelengths: 48 wavelengths.
 const MIN_PARTED: u32 = 16;
 
 impl Renderer {
-    /// Radiance per pixel [W/(m² sr)] of a view, looked at through the centres of its pixels, in the precision of half
-    /// floats.
+    /// Radiance per pixel [W/(m² sr)] of a view, sampled at the pixel centres, in the precision of half floats.
     ///
     /// # Errors
     /// A size of 0 or above the device's limit; a lost device.
@@ -38,7 +37,7 @@ impl Renderer {
         self.radiance_sampled(gpu, view, 1)
     }
 
-    /// [`radiance`](Self::radiance) without what is seen in mirrors and through glass: enough to tell how bright it is.
+    /// [`radiance`](Self::radiance) without chains, which is enough to estimate the brightness.
     ///
     /// # Errors
     /// Those of [`radiance`](Self::radiance).
@@ -50,8 +49,8 @@ impl Renderer {
         picture
     }
 
-    /// Mean radiance of `samples_per_side`² places of each pixel, those of the CPU eye pass; of at least 16 pictures
-    /// where chains go on by wavelength, which each of them follows few of.
+    /// Mean radiance of `samples_per_side`² samples per pixel, at the same positions as in the CPU eye pass. Averages
+    /// at least 16 frames if chains split into wavelengths, since each frame traces only a few of them.
     ///
     /// # Errors
     /// Those of [`radiance`](Self::radiance).
@@ -90,8 +89,8 @@ impl Renderer {
         })
     }
 
-    /// Radiance of the picture that was drawn last, the mean of all that were made of its view. Where another view was
-    /// drawn, or something is so bright that the picture cuts it, the view is drawn anew.
+    /// Radiance of the last frame, or the mean of all frames of its view. Draws the view again if another one was drawn
+    /// last, or if it is bright enough to be clipped.
     ///
     /// # Errors
     /// Those of [`radiance`](Self::radiance).
@@ -117,7 +116,7 @@ impl Renderer {
         })
     }
 
-    /// Pictures of a view, of whose pixels so many places are looked at: enough for all colours.
+    /// Number of frames for `places` samples per pixel, enough to cover the spectrum.
     fn pictures(&self, view: &View, places: u32) -> u32 {
         let draw_state = self.draw_state();
         let is_chain = |object: &usize| draw_state.is_specular(&self.objects.list[*object]);
@@ -129,13 +128,13 @@ impl Renderer {
         }
     }
 
-    /// By which radiance fits half floats.
+    /// Scale that brings radiance into the range of half floats.
     fn scale(&self, view: &View) -> f64 {
         if matches!(self.map_style, MapStyle::Inspected { .. }) {
             return 1.0;
         }
         let peak = self.objects.peak_radiance.max(self.peak_behind(view));
-        // A power of two changes no digit.
+        // Powers of two are lossless.
         if peak > 0.0 {
             (LARGEST_SCALED / peak).log2().floor().exp2()
         } else {
@@ -143,8 +142,8 @@ impl Renderer {
         }
     }
 
-    /// Largest radiance that is seen behind surfaces [W/(m² sr)]. A sun in an environment may be cut: a scale that holds
-    /// it must leave what else is seen its digits.
+    /// Largest radiance behind the surfaces [W/(m² sr)]. The sun of an environment may be clipped, as a scale that
+    /// holds it would leave too little precision for everything else.
     fn peak_behind(&self, view: &View) -> f64 {
         match (self.scene.sky(), self.seen_sky()) {
             (Some((_, strength)), Some(sky)) => {
@@ -203,7 +202,7 @@ impl Renderer {
     }
 }
 
-/// One picture through the centres of its pixels, in a quality to be kept.
+/// Renders one picture through the pixel centres, in the quality of stills.
 ///
 /// # Errors
 /// Those of [`Renderer::new`], [`Renderer::set_maps`] and [`Renderer::radiance`].
@@ -211,7 +210,7 @@ pub fn render_offscreen(gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap], view
     render_sampled(gpu, scene, maps, view, 1)
 }
 
-/// One picture, the mean of `samples_per_side`² places of each pixel.
+/// Renders one picture with `samples_per_side`² samples per pixel.
 ///
 /// # Errors
 /// Those of [`render_offscreen`].
@@ -233,7 +232,7 @@ pub fn render_sampled(
     Ok(counted.0)
 }
 
-/// [`render_sampled`] with chains and dispersion switched, and what was made and drawn for it.
+/// [`render_sampled`] with switches for chains and dispersion; also returns the renderer's counts.
 ///
 /// # Errors
 /// Those of [`render_offscreen`].

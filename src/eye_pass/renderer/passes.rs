@@ -22,15 +22,15 @@ use crate::eye_pass::{View, wavelengths};
 use crate::gpu::Gpu;
 use crate::optics::LinearSrgb;
 
-/// Largest value of scaled radiance of a background: half floats end at 65504.
+/// Largest scaled radiance of a background, well below the largest half float, 65504.
 const LARGEST_SCALED: f64 = 32768.0;
-/// Level that is always finer than the finest.
+/// Level bias that always selects the finest level.
 const FINEST: f64 = -64.0;
-/// What mirrors show before tone mapping while what they reflect cannot be traced [1].
+/// Exposed radiance of mirrors while chains are switched off [1].
 const STAND_IN: f64 = 0.15;
 
 impl Renderer {
-    /// Radiance times a scale, into this renderer's own targets.
+    /// Draws radiance times a scale into the renderer's own targets.
     pub(super) fn draw_radiance(
         &mut self,
         gpu: &Gpu,
@@ -91,7 +91,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Binds what rays are traced through; `None` where nothing traces.
+    /// Group 1 of pipelines that trace; `None` if nothing traces.
     fn bind_chains(
         &self,
         gpu: &Gpu,
@@ -113,7 +113,7 @@ impl Renderer {
         scene.bind(gpu, layout, &self.geometry, &start, &wavelengths)
     }
 
-    /// Traces the chains of what is specular in view.
+    /// Traces the chains of the visible specular surfaces.
     fn trace(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -149,7 +149,7 @@ impl Renderer {
         Ok(())
     }
 
-    /// Makes what a view calls for and does not exist yet; gives what it draws.
+    /// Creates what a view needs and does not exist yet; returns its draw list.
     fn prepare(&mut self, gpu: &Gpu, view: &View) -> DrawList {
         if self.chains == EffectSwitch::On {
             self.make_everything(gpu);
@@ -167,7 +167,7 @@ impl Renderer {
         if let Some(scene) = self.chain_scene.as_mut().filter(|_| draw_state.traces_lights) {
             scene.set_lights(gpu, &self.scene);
         }
-        // What chains are traced through may have been refused.
+        // Chains may have been refused just above, which changes the draw state.
         let list = DrawList::new(&self.objects, &visible, self.draw_state());
         for draw in list.all() {
             self.surfaces.make(gpu, draw.key);
@@ -175,7 +175,7 @@ impl Renderer {
         list
     }
 
-    /// Uploads the environment where one is seen and was not uploaded.
+    /// Uploads the environment if it is visible and not uploaded yet.
     pub(super) fn make_sky(&mut self, gpu: &Gpu) {
         match &self.scene.environment {
             Some(source) if self.shows_sky() => {
@@ -193,13 +193,12 @@ impl Renderer {
         }
     }
 
-    /// The environment, where it is seen.
+    /// The environment, if it is visible.
     pub(super) fn seen_sky(&self) -> Option<&Sky> {
         self.sky.as_ref().filter(|_| self.shows_sky())
     }
 
-    /// What is seen where nothing stands in the way: a radiance [W/(m² sr)], or what that of the environment is
-    /// multiplied by.
+    /// Background radiance [W/(m² sr)], or the factor of the environment's radiance.
     fn background(&self, view: &View) -> LinearSrgb {
         match self.scene.sky() {
             Some((_, strength)) if self.shows_sky() => strength,
@@ -207,7 +206,7 @@ impl Renderer {
         }
     }
 
-    /// Makes what any view could call for, with maps as light.
+    /// Creates what any view could need when maps are shown as light.
     pub(super) fn make_everything(&mut self, gpu: &Gpu) {
         let lit = |draw_state: DrawState| DrawState {
             style: MapStyle::Lit,
@@ -231,7 +230,7 @@ impl Renderer {
         }
     }
 
-    /// Makes what chains are traced through, or brings it up to date.
+    /// Builds what chains are traced through, or updates it if it is stale.
     fn make_chain_scene(&mut self, gpu: &Gpu) {
         if self.chain_scene.is_some() && !self.chain_scene_is_stale {
             return;
@@ -319,7 +318,7 @@ impl Renderer {
     }
 
     fn draw_each(&self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw]) {
-        // Instances that follow each other are one draw.
+        // Consecutive instances of the same segment become one draw.
         let mut runs: Vec<(PipelineKey, &Segment, Range<u32>)> = Vec::new();
         for draw in draws {
             let object = draw.object as u32;
@@ -352,14 +351,14 @@ impl Renderer {
     }
 }
 
-/// A shift of the picture right and down [pixels], as the shaders have it: right and up, in half pictures.
+/// Converts an offset right and down [pixels] to the shaders' right and up [half images].
 fn jitter(view: &View, [right, down]: [f64; 2]) -> [f32; 2] {
     let half = |pixels: f64, size: u32| (2.0 * pixels / f64::from(size)) as f32;
     [half(right, view.width), -half(down, view.height)]
 }
 
-/// Clip from world axes with the camera at the origin: perspective with depth near/distance, so that it is 1 at the
-/// near plane, 0 infinitely far, and floats resolve all distances alike.
+/// Clip space from world axes with the camera at the origin. Depth is near/distance: 1 at the near plane, 0 at
+/// infinity, with the same relative precision at all distances.
 pub(super) fn clip_from_camera(view: &View) -> [[f32; 4]; 4] {
     let camera = &view.camera;
     let aspect = f64::from(view.width) / f64::from(view.height);

@@ -14,32 +14,31 @@ use crate::gpu::Gpu;
 use crate::gpu::shader::Program;
 use crate::scene::SurfaceKind;
 
-/// Radiance is kept in half floats until it is displayed.
+/// Radiance is stored in half floats until tone mapping.
 pub(super) const HDR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
-/// Reversed and infinite, see `camera`.
+/// Reversed, with an infinite far plane: see `passes::clip_from_camera`.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// What a pipeline writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum RenderTarget {
-    /// What an opaque surface sends by itself.
+    /// Emission and diffuse radiance of an opaque surface.
     Own,
-    /// The same, lit straight from the lamps by shadow rays.
+    /// The same, with direct light traced by shadow rays.
     OwnUnderLights,
-    /// The map's value.
+    /// Values of the map, unlit.
     MapValue,
-    /// Something else about the surface.
+    /// Another property of the surface.
     Inspected(Inspected),
-    /// Depth only, before chains are traced for what is nearest.
+    /// Depth only: the prepass of chains.
     Depth,
-    /// Chains that begin at a specular surface.
+    /// Chains that start at a specular surface.
     Traced,
-    /// What was traced, in the picture.
+    /// The traced image, composed into the frame.
     Composed,
 }
 
 impl RenderTarget {
-    /// Every one.
     pub(super) fn all() -> impl Iterator<Item = Self> {
         let others = [
             Self::Own,
@@ -54,62 +53,61 @@ impl RenderTarget {
             .chain(Inspected::ALL.into_iter().map(Self::Inspected))
     }
 
-    /// Whether it is part of a chain from the eye over specular surfaces.
+    /// Whether it is needed only for chains.
     pub(super) fn is_specular(self) -> bool {
         matches!(self, Self::Depth | Self::Traced | Self::Composed)
     }
 
-    /// Whether it sends rays through the scene's hierarchy.
+    /// Whether it traces rays through the scene's hierarchy.
     pub(super) fn goes_through_scene(self) -> bool {
         matches!(self, Self::OwnUnderLights | Self::Traced)
     }
 
-    /// Whether it draws into the traced picture, which has one sample per pixel.
+    /// Whether it draws into the traced image, which has one sample per pixel.
     fn is_of_traced_picture(self) -> bool {
         matches!(self, Self::Depth | Self::Traced)
     }
 }
 
-/// Which faces are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Faces {
     Front,
     Both,
 }
 
-/// All that a pipeline is specialised by.
+/// Everything that a pipeline is specialised by.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct PipelineKey {
     pub(super) writes: RenderTarget,
     pub(super) faces: Faces,
-    /// Of what shows itself only.
+    /// `Diffuse` where the pipeline does not depend on it.
     surface: SurfaceKind,
     how: PipelineFlags,
 }
 
-/// What a kind of drawing has to be ready for.
+/// Features that a pipeline supports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct PipelineFlags {
-    /// Whether the surface has a texture; for chains, whether anything specular in the scene has.
+    /// Whether the surface has a texture; for chains, whether any mirror or clear surface of the scene has one.
     pub(super) has_texture: bool,
-    /// Whether the traced picture has other pixels than the picture.
+    /// Whether the resolution of the traced image differs from that of the frame.
     pub(super) is_scaled: bool,
-    /// Whether light straight from the lamps is traced.
+    /// Whether direct light is traced.
     pub(super) traces_lights: bool,
-    /// Whether the surface's normals are bent; for chains, whether those of anything in the scene are.
+    /// Whether the surface has bumps; for chains, whether any surface of the scene has.
     pub(super) has_bumps: bool,
     /// Whether chains that leave the scene end in an environment.
     pub(super) has_sky: bool,
-    /// Whether chains go on by wavelength where glass parts light.
+    /// Whether chains split into wavelengths at dispersive surfaces.
     pub(super) parts_wavelengths: bool,
-    /// Whether the surface has holes; for chains, whether anything in the scene has.
+    /// Whether the surface has an alpha mask; for chains, whether any surface of the scene has.
     pub(super) has_mask: bool,
     /// Whether the scale of false colours is logarithmic.
     pub(super) is_logarithmic: bool,
 }
 
 impl PipelineKey {
-    /// The key of a kind of drawing. What does not matter to it is left out, so that fewer pipelines serve.
+    /// The key of a draw. Clears what does not affect its pipeline, so that draws share pipelines.
     pub(super) fn new(writes: RenderTarget, surface: SurfaceKind, faces: Faces, how: PipelineFlags) -> Self {
         let is_lit = how.traces_lights && surface != SurfaceKind::Mirror;
         let writes = match writes {
@@ -147,7 +145,7 @@ impl PipelineKey {
         }
     }
 
-    /// Its fragment stage, if it has one.
+    /// The fragment entry point, if there is one.
     pub(super) fn entry_point(self) -> Option<&'static str> {
         match self.writes {
             RenderTarget::Own => Some("own"),
@@ -160,7 +158,6 @@ impl PipelineKey {
         }
     }
 
-    /// The shader module it is part of.
     pub(super) fn program(self) -> Program {
         match self.writes {
             RenderTarget::Own | RenderTarget::MapValue | RenderTarget::Depth => SURFACE,
@@ -176,7 +173,7 @@ impl PipelineKey {
         }
     }
 
-    /// The values of the shader's overrides.
+    /// Values of the shader's overrides.
     pub(super) fn constants(self) -> Vec<(&'static str, f64)> {
         let mask = ("HAS_MASK", flag(self.how.has_mask));
         match self.writes {
@@ -209,16 +206,16 @@ fn flag(is_set: bool) -> f64 {
     f64::from(u8::from(is_set))
 }
 
-/// The pipelines that were called for so far, and how they are bound.
+/// The pipelines created so far, with their bind group layouts.
 #[derive(Debug)]
 pub(super) struct SurfacePipelines {
     modules: HashMap<&'static str, wgpu::ShaderModule>,
     sample_count: u32,
     /// Group 0.
     pub(super) frame_layout: wgpu::BindGroupLayout,
-    /// Group 1 of what traces; made with the first of it, as many devices cannot have it.
+    /// Group 1 of pipelines that trace; created on first use, as many devices do not support it.
     traced_layout: Option<wgpu::BindGroupLayout>,
-    /// Group 1 of what shows what was traced.
+    /// Group 1 of pipelines that compose the traced image.
     pub(super) composed_layout: wgpu::BindGroupLayout,
     made: HashMap<PipelineKey, wgpu::RenderPipeline>,
 }
@@ -243,7 +240,7 @@ impl SurfacePipelines {
         }
     }
 
-    /// Makes a pipeline unless it is there.
+    /// Creates a pipeline unless it exists.
     pub(super) fn make(&mut self, gpu: &Gpu, key: PipelineKey) {
         if !self.made.contains_key(&key) {
             let program = key.program();
@@ -258,27 +255,24 @@ impl SurfacePipelines {
         }
     }
 
-    /// A pipeline that was made.
+    /// `None` if it was not created.
     pub(super) fn get(&self, key: PipelineKey) -> Option<&wgpu::RenderPipeline> {
         self.made.get(&key)
     }
 
-    /// Group 1 of what traces, where any of that was made.
+    /// Group 1 of pipelines that trace; `None` before the first of them.
     pub(super) fn traced_layout(&self) -> Option<&wgpu::BindGroupLayout> {
         self.traced_layout.as_ref()
     }
 
-    /// Gives up those of specular surfaces.
     pub(super) fn drop_specular(&mut self) {
         self.made.retain(|key, _| !key.writes.is_specular());
     }
 
-    /// How many there are.
     pub(super) fn count(&self) -> usize {
         self.made.len()
     }
 
-    /// How many of them serve specular surfaces.
     pub(super) fn specular_count(&self) -> usize {
         self.made.keys().filter(|key| key.writes.is_specular()).count()
     }
@@ -333,7 +327,7 @@ impl SurfacePipelines {
             },
             targets,
         });
-        // Chains are traced once per pixel: where the surface is the nearest, which was drawn before.
+        // Chains are traced once per pixel: where the depth prepass found the surface to be the nearest.
         let (depth_write, depth_compare) = if writes == RenderTarget::Traced {
             (false, wgpu::CompareFunction::Equal)
         } else {

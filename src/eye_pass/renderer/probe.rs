@@ -11,22 +11,23 @@ use crate::geometry::Ray;
 use crate::gpu::{Gpu, readback};
 use crate::scene::Scene;
 
-/// Rays of one workgroup.
+/// Rays per workgroup.
 const WORKGROUP: u32 = 64;
 
-/// What a ray met on the device.
+/// A hit found on the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProbedHit {
-    /// The triangle, counted over all objects in the scene's order.
+    /// Index of the triangle over all objects in the scene's order.
     pub triangle: u32,
-    /// From the ray's origin [m].
+    /// Distance from the ray's origin [m].
     pub distance_m: f64,
 }
 
-/// The nearest triangle on each ray, as chains find it: in single precision. Rays start within a few radii of the scene.
+/// The nearest triangle on each ray, as chains find it: in single precision. Rays start within a few radii of the
+/// scene.
 ///
 /// # Errors
-/// A scene or a number of rays that the device cannot hold.
+/// A scene or a number of rays that exceeds the device's limits.
 pub fn probe(gpu: &Gpu, scene: &Scene, rays: &[Ray]) -> Result<Vec<Option<ProbedHit>>> {
     let groups = (rays.len() as u32).div_ceil(WORKGROUP);
     let limit = gpu.limits().max_compute_workgroups_per_dimension;

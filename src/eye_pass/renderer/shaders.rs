@@ -12,7 +12,7 @@ use crate::gpu::layout::StructLayout;
 use crate::gpu::shader::{Program, shader_source};
 use crate::scene::SurfaceKind;
 
-/// A program of files, in their order.
+/// A program made of these sources, in this order.
 macro_rules! program {
     ($name:literal: $($source:literal)+) => {
         Program {
@@ -22,7 +22,7 @@ macro_rules! program {
     };
 }
 
-/// A program that follows chains of specular surfaces, with its files of indices and of what is behind the scene.
+/// A program that traces chains. `$indices` supplies refractive indices, `$background` the radiance behind the scene.
 macro_rules! chains {
     ($name:literal, $indices:literal, $background:literal) => {
         program! { $name:
@@ -34,26 +34,26 @@ macro_rules! chains {
     };
 }
 
-/// Surfaces of the scene by themselves.
+/// Surfaces without reflections.
 pub(super) const SURFACE: Program = program! { "surface":
     "shared/srgb" "shared/refraction" "shared/fresnel" "eye_pass/frame" "eye_pass/objects" "eye_pass/images"
     "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/surface" "eye_pass/own"
 };
 
-/// Surfaces by something else than their light.
+/// Surfaces that show a property instead of their radiance.
 pub(super) const INSPECTED: Program = program! { "inspected":
     "shared/false_colours" "eye_pass/frame" "eye_pass/objects" "eye_pass/images" "eye_pass/place"
     "eye_pass/mask" "eye_pass/inspected"
 };
 
-/// Chains of specular surfaces.
+/// Chains over a plain background.
 pub(super) const TRACED: Program = chains!("traced", "eye_pass/one_index", "eye_pass/plain_background");
 
-/// The same in an environment.
+/// Chains in an environment.
 pub(super) const TRACED_UNDER_SKY: Program =
     chains!("traced_under_sky", "eye_pass/one_index", "eye_pass/sky");
 
-/// Chains of specular surfaces, by wavelength from where glass parts light.
+/// Chains that split into wavelengths at dispersive surfaces.
 pub(super) const PARTED: Program = chains!("parted", "eye_pass/wavelengths", "eye_pass/plain_background");
 
 /// The same in an environment.
@@ -65,24 +65,24 @@ pub(super) const SKY: Program = program! { "sky":
     "eye_pass/frame" "eye_pass/sky" "eye_pass/sky_drawn"
 };
 
-/// Surfaces of the scene by themselves, while lights are moved.
+/// Surfaces without reflections, with traced direct light.
 pub(super) const UNDER_LIGHTS: Program = program! { "under_lights":
     "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
     "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
     "eye_pass/mixture" "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
 };
 
-/// What was traced, in the picture.
+/// The traced image, composed into the frame.
 pub(super) const COMPOSED: Program = program! { "composed":
     "eye_pass/frame" "eye_pass/objects" "eye_pass/images" "eye_pass/place" "eye_pass/mask" "eye_pass/composed"
 };
 
-/// Means of pictures.
+/// Means of frames.
 pub(super) const ACCUMULATED: Program = program! { "accumulated":
     "shared/cover" "eye_pass/accumulated"
 };
 
-/// Rays, to hold the device's answers against the processor's.
+/// Single rays, to compare the device's hits with the CPU's.
 pub(super) const PROBE: Program = program! { "probe":
     "shared/traversal" "eye_pass/probe"
 };
@@ -136,18 +136,15 @@ pub fn vertex_attributes() -> Vec<wgpu::VertexAttribute> {
         .collect()
 }
 
-/// A fragment stage as a pipeline may use it.
+/// A fragment stage with values of its overrides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Specialisation {
-    /// Name of its program.
     pub program: &'static str,
-    /// Name of the stage in WGSL.
     pub entry_point: &'static str,
-    /// Values of the program's overrides.
     pub constants: Vec<(&'static str, f64)>,
 }
 
-/// Every specialisation that pipelines can ask for, for the tests; some of them more than once.
+/// Every specialisation that a pipeline can request, for the tests; some occur more than once.
 pub fn specialisations() -> Vec<Specialisation> {
     const KINDS: [SurfaceKind; 6] = [
         SurfaceKind::Diffuse,

@@ -11,14 +11,14 @@ use super::shaders::SKY;
 use crate::gpu::Gpu;
 use crate::scene::Environment;
 
-/// Radiance may span more than half floats do.
+/// Radiance may exceed the range of half floats.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
-/// An environment ready to be drawn.
+/// An environment, uploaded and ready to be drawn.
 #[derive(Debug)]
 pub(super) struct Sky {
     source: Arc<Environment>,
-    /// Group 2 of what shows it.
+    /// Group 2 of pipelines that show it.
     bound: wgpu::BindGroup,
     pipeline: wgpu::RenderPipeline,
     /// Largest channel of any pixel [W/(m² sr)].
@@ -26,13 +26,13 @@ pub(super) struct Sky {
     bytes: u64,
 }
 
-/// Layout of group 2 of what shows the environment.
+/// Layout of group 2 of pipelines that show an environment.
 pub(super) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
     bind_group_layout(gpu, "sky", &[texture(false, wgpu::TextureViewDimension::D2)])
 }
 
 impl Sky {
-    /// Uploads an environment; one that is larger than the device's textures in pixels halved until it fits.
+    /// Uploads an environment, halved until it fits the device's textures.
     pub(super) fn new(
         gpu: &Gpu,
         source: &Arc<Environment>,
@@ -71,27 +71,24 @@ impl Sky {
         }
     }
 
-    /// Whether it shows that environment.
     pub(super) fn is_of(&self, source: &Arc<Environment>) -> bool {
         Arc::ptr_eq(&self.source, source)
     }
 
-    /// Group 2 of what shows it.
     pub(super) fn bound(&self) -> &wgpu::BindGroup {
         &self.bound
     }
 
-    /// Largest channel of any of its pixels [W/(m² sr)].
     pub(super) fn peak(&self) -> f64 {
         self.peak
     }
 
-    /// What it takes on the device [bytes].
+    /// Device memory [bytes].
     pub(super) fn bytes(&self) -> u64 {
         self.bytes
     }
 
-    /// Fills a pass over surfaces of which group 0 is set, before any of them.
+    /// Draws the environment into a surface pass whose group 0 is set, before any surface.
     pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(2, &self.bound, &[]);
@@ -99,7 +96,7 @@ impl Sky {
     }
 }
 
-/// Size and pixels of an environment whose sides are at most `limit`: means of 2 × 2 as often as it takes.
+/// Size and pixels of an environment, halved by means of 2 × 2 pixels until both sides are at most `limit`.
 fn fitted(source: &Environment, limit: usize) -> (usize, usize, Vec<[f32; 4]>) {
     let (mut width, mut height) = source.size();
     let mut pixels: Vec<[f32; 4]> = source.pixels().iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
@@ -109,7 +106,7 @@ fn fitted(source: &Environment, limit: usize) -> (usize, usize, Vec<[f32; 4]>) {
         let mean = |x: usize, y: usize| {
             let four =
                 [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, down)| pixel(2 * x + right, 2 * y + down));
-            // Quartered first: the sum of four large ones has no float.
+            // Scaled before they are added: the sum of four large values would overflow.
             std::array::from_fn(|channel| four.iter().map(|pixel| 0.25 * pixel[channel]).sum())
         };
         pixels = (0..high)
@@ -128,7 +125,7 @@ fn pipeline(
     sample_count: u32,
 ) -> wgpu::RenderPipeline {
     let module = SKY.module(&gpu.device);
-    // Group 1 is that of chains, which the picture does not trace.
+    // Group 1 is used by chains, which this pipeline does not trace.
     let nothing = bind_group_layout(gpu, "nothing", &[]);
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {

@@ -4,20 +4,20 @@ use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
 use crate::error::Result;
 use crate::gpu::Gpu;
 
-/// Textures of one picture size.
+/// Render targets of a frame.
 #[derive(Debug)]
 pub(super) struct Targets {
     pub(super) width: u32,
     pub(super) height: u32,
-    /// One sample per pixel: what is shown or read back.
+    /// One sample per pixel: shown or read back.
     pub(super) resolved: wgpu::Texture,
     pub(super) resolved_view: wgpu::TextureView,
-    /// Where there are several samples per pixel.
+    /// `None` with one sample per pixel.
     multisampled: Option<wgpu::TextureView>,
     depth: wgpu::TextureView,
 }
 
-/// The traced picture: chains of specular surfaces, in a resolution of its own.
+/// Render targets of the traced image, in a resolution of its own.
 #[derive(Debug)]
 pub(super) struct TracedTargets {
     pub(super) width: u32,
@@ -47,8 +47,8 @@ impl Targets {
         })
     }
 
-    /// Starts the pass over all surfaces, on a background [scaled radiance]. Its samples are resolved; neither they nor
-    /// depths are kept.
+    /// Begins the pass over all surfaces, on a background [scaled radiance]. Samples are resolved; neither they nor
+    /// depth are kept.
     pub(super) fn begin_pass<'a>(
         &self,
         encoder: &'a mut wgpu::CommandEncoder,
@@ -94,7 +94,7 @@ impl TracedTargets {
         })
     }
 
-    /// Starts the pass that finds what is nearest.
+    /// Begins the depth prepass.
     pub(super) fn begin_depth<'a>(
         &self,
         encoder: &'a mut wgpu::CommandEncoder,
@@ -108,7 +108,7 @@ impl TracedTargets {
         })
     }
 
-    /// Starts the pass that traces, on nothing.
+    /// Begins the pass that traces chains, on transparent black.
     pub(super) fn begin_chains<'a>(
         &self,
         encoder: &'a mut wgpu::CommandEncoder,

@@ -9,7 +9,7 @@ use crate::illumination::Chart;
 use crate::illumination::lookup::{in_chart, mean};
 use crate::illumination::tiles::{SIDE, TileLayout};
 
-/// Levels of a map of values [W/m²], divided by `scale`, from fine to coarse.
+/// Mip levels of a map of values [W/m²], divided by `scale`, from fine to coarse.
 pub(super) fn levels(
     chart: &Chart,
     layout: &TileLayout,
@@ -44,7 +44,7 @@ fn level(map: (&Chart, &TileLayout, &[[f32; 3]]), index: u32, size: [usize; 2], 
     }
 }
 
-/// Whether any tile of the map under a tile of a level is as fine as the level.
+/// Whether a tile of a level covers any tile of the map that is at least as fine as the level.
 fn is_as_fine(layout: &TileLayout, index: u32, [column, row]: [usize; 2]) -> bool {
     let (width, height) = layout.size();
     let under = |tile: usize, size: usize| {
@@ -55,7 +55,7 @@ fn is_as_fine(layout: &TileLayout, index: u32, [column, row]: [usize; 2]) -> boo
     u32::from(layout.finest_between((left, top), (right, bottom))) <= index
 }
 
-/// What is stored of a tile.
+/// The stored texels of a tile.
 fn texels(
     (chart, layout, values): (&Chart, &TileLayout, &[[f32; 3]]),
     index: u32,
@@ -66,7 +66,7 @@ fn texels(
     let map_size = DVec2::new(chart.width as f64, chart.height as f64);
     let [columns, rows] = [0, 1].map(|axis| {
         let first = place[axis] * TILE;
-        // Beyond the map the border goes on.
+        // Beyond the map, its border is repeated.
         (first..first + stored(place[axis], size[axis])).map(move |at| at.min(size[axis] - 1))
     });
     let value = |column: usize, row: usize| {

@@ -7,17 +7,17 @@ use super::EyeQuality;
 use super::draws::GpuMs;
 use crate::gpu::Gpu;
 
-/// Marks of each pass: where it begins and where it ends.
+/// Queries at the beginning and the end of each pass.
 const SURFACES: [u32; 2] = [0, 1];
 const CHAINS: [u32; 2] = [2, 3];
 const TONE_MAPPING: [u32; 2] = [4, 5];
 const MARKS: u32 = 6;
-/// Results are written at multiples of this [bytes].
+/// Alignment of resolved queries [bytes].
 const STRIDE: u64 = wgpu::QUERY_RESOLVE_BUFFER_ALIGNMENT;
-/// One place for each pass.
+/// One aligned slot per pass.
 const BYTES: u64 = 3 * STRIDE;
 
-/// Pictures that may be under way at once; further ones are not timed.
+/// Frames that may be in flight at once; further ones are not timed.
 const SLOTS: usize = 3;
 
 const FREE: u8 = 0;
@@ -25,37 +25,37 @@ const UNDER_WAY: u8 = 1;
 const READABLE: u8 = 2;
 const FAILED: u8 = 3;
 
-/// The marks of one picture on their way back.
+/// The queries of one frame, being read back.
 #[derive(Debug)]
 struct Slot {
     buffer: wgpu::Buffer,
     state: Arc<AtomicU8>,
-    /// Which passes there were: surfaces, chains, tone mapping.
+    /// Which passes were drawn: surfaces, chains, tone mapping.
     passes: [bool; 3],
     quality: EyeQuality,
 }
 
 impl Slot {
-    /// Marks of the passes that there were, each with its place in the buffers [bytes].
+    /// Queries of the passes that were drawn, each with its offset in the buffers [bytes].
     fn set_marks(&self) -> impl Iterator<Item = (u64, [u32; 2])> + use<> {
         let passes = (0..).zip([SURFACES, CHAINS, TONE_MAPPING]).zip(self.passes);
         passes.filter_map(|((index, marks), was_drawn)| was_drawn.then_some((index * STRIDE, marks)))
     }
 }
 
-/// Times pictures on a device that can.
+/// Times frames on devices with timestamp queries.
 #[derive(Debug)]
 pub(super) struct Timing {
     marks: wgpu::QuerySet,
     resolved: wgpu::Buffer,
     slots: Vec<Slot>,
-    /// Of one tick [ms].
+    /// Duration of one tick [ms].
     tick_ms: f64,
     latest: Option<(GpuMs, EyeQuality)>,
 }
 
 impl Timing {
-    /// `None` where the device cannot tell.
+    /// `None` without timestamp queries.
     pub(super) fn new(gpu: &Gpu) -> Option<Self> {
         if !gpu.device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
@@ -93,27 +93,27 @@ impl Timing {
         })
     }
 
-    /// Times of the last picture that is done, and how it was made.
+    /// Times and quality of the latest frame that is done.
     pub(super) fn latest(&self) -> Option<(GpuMs, EyeQuality)> {
         self.latest
     }
 
-    /// Marks around the pass over all surfaces.
+    /// Queries around the pass over all surfaces.
     pub(super) fn around_surfaces(&self) -> wgpu::RenderPassTimestampWrites<'_> {
         self.marks(Some(SURFACES[0]), Some(SURFACES[1]))
     }
 
-    /// Mark before the passes that trace chains.
+    /// Query before the passes of chains.
     pub(super) fn before_chains(&self) -> wgpu::RenderPassTimestampWrites<'_> {
         self.marks(Some(CHAINS[0]), None)
     }
 
-    /// Mark after the passes that trace chains.
+    /// Query after the passes of chains.
     pub(super) fn after_chains(&self) -> wgpu::RenderPassTimestampWrites<'_> {
         self.marks(None, Some(CHAINS[1]))
     }
 
-    /// Marks around the last pass.
+    /// Queries around tone mapping.
     pub(super) fn around_tone_mapping(&self) -> wgpu::RenderPassTimestampWrites<'_> {
         self.marks(Some(TONE_MAPPING[0]), Some(TONE_MAPPING[1]))
     }
@@ -126,7 +126,7 @@ impl Timing {
         }
     }
 
-    /// Ends a picture: its times are read back once `encoder` was submitted and the device is done.
+    /// Ends a frame: its times are read back once `encoder` was submitted and the GPU is done.
     pub(super) fn finish(
         &mut self,
         encoder: &mut wgpu::CommandEncoder,
@@ -140,7 +140,7 @@ impl Timing {
         };
         slot.passes = [true, has_specular, has_tone_mapping];
         slot.quality = quality;
-        // Only marks that were set: the others have no value.
+        // Only queries that were written; the others are undefined.
         for (place, [begin, end]) in slot.set_marks() {
             encoder.resolve_query_set(&self.marks, begin..end + 1, &self.resolved, place);
         }
@@ -152,9 +152,9 @@ impl Timing {
         });
     }
 
-    /// Takes what has come back; waits for nothing. Tells whether anything has.
+    /// Collects results that have arrived, without waiting. Returns whether any have.
     pub(super) fn collect(&mut self, gpu: &Gpu) -> bool {
-        // Runs the call-backs of what is done. A lost device is found by whoever draws.
+        // Runs the callbacks of finished work. A lost device is reported by whoever draws.
         let _ = gpu.device.poll(wgpu::PollType::Poll);
         let mut has_news = false;
         for index in 0..self.slots.len() {
@@ -173,7 +173,7 @@ impl Timing {
         has_news
     }
 
-    /// Whether times are on their way back.
+    /// Whether results are pending.
     pub(super) fn is_waiting(&self) -> bool {
         let states = self.slots.iter().map(|slot| slot.state.load(Ordering::Acquire));
         states.into_iter().any(|state| state != FREE)

@@ -9,7 +9,7 @@ use crate::eye_pass::ToneMap;
 use crate::gpu::Gpu;
 use crate::optics::spectrum::xyz::{IDENTITY, Matrix3};
 
-/// The pipelines that were called for so far.
+/// The pipelines created so far.
 #[derive(Debug)]
 pub(super) struct ToneMappingPipelines {
     module: wgpu::ShaderModule,
@@ -21,7 +21,6 @@ pub(super) struct ToneMappingPipelines {
 }
 
 impl ToneMappingPipelines {
-    /// For targets of a format.
     pub(super) fn new(gpu: &Gpu, target: wgpu::TextureFormat) -> Self {
         let bindings = [
             texture(false, wgpu::TextureViewDimension::D2),
@@ -37,7 +36,7 @@ impl ToneMappingPipelines {
         }
     }
 
-    /// Multiplies radiance by a matrix from the next picture on; tells whether it is another one.
+    /// Multiplies radiance by a matrix from the next frame on; returns whether the matrix changed.
     pub(super) fn set_white_balance(&mut self, gpu: &Gpu, matrix: &Matrix3) -> bool {
         let is_new = self.white_balance != *matrix;
         if is_new {
@@ -47,12 +46,11 @@ impl ToneMappingPipelines {
         is_new
     }
 
-    /// How many there are.
     pub(super) fn count(&self) -> usize {
         self.made.len()
     }
 
-    /// Fills `target` from `radiance`, texel by texel.
+    /// Tone-maps `radiance` into `target`, texel by texel.
     pub(super) fn draw(
         &mut self,
         gpu: &Gpu,
@@ -108,7 +106,7 @@ fn white(gpu: &Gpu, matrix: &Matrix3) -> wgpu::Buffer {
     )
 }
 
-/// The values of the shader's overrides. Formats that encode sRGB by themselves take linear light.
+/// Values of the shader's overrides. sRGB formats take linear values.
 pub(super) fn constants(tone_map: ToneMap, encode_srgb: bool) -> [(&'static str, f64); 2] {
     let code = match tone_map {
         ToneMap::None => 0.0,

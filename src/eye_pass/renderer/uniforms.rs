@@ -7,41 +7,41 @@ use crate::optics::glass::Dispersion;
 use crate::optics::spectrum::xyz::Matrix3;
 
 shader_struct! {
-    /// One picture.
+    /// Camera and output of one frame.
     Frame {
-        /// Clip from world axes with the camera at the origin, column by column.
+        /// Clip space from world axes with the camera at the origin, column-major.
         clip_from_camera: [[f32; 4]; 4],
         /// Scene coordinates [m].
         camera_position: [f32; 3],
-        /// What is written is radiance times this.
+        /// Factor of all radiance that is written.
         radiance_scale: f32,
-        /// Seen where nothing is hit [W/(m² sr)]; what the radiance of an environment is multiplied by.
+        /// Background radiance [W/(m² sr)], or the factor of the environment's radiance.
         background: [f32; 3],
-        /// Added to the level at which images are looked up; far below zero for the finest one always.
+        /// Added to the mip level of lookups; far below zero to always use the finest.
         level_bias: f32,
-        /// Unit, where the camera looks.
+        /// Unit view direction.
         forward: [f32; 3],
-        /// Pixels of the traced picture across.
+        /// Width of the traced image [pixels].
         traced_width: f32,
-        /// From the picture's middle to its right border, at a distance of 1.
+        /// From the image centre to its right edge, at a distance of 1.
         right: [f32; 3],
-        /// Pixels of the traced picture down.
+        /// Height of the traced image [pixels].
         traced_height: f32,
-        /// From the picture's middle to its upper border, at a distance of 1.
+        /// From the image centre to its upper edge, at a distance of 1.
         up: [f32; 3],
-        /// Angle of a pixel of the traced picture [rad].
+        /// Angle of a pixel of the traced image [rad].
         pixel_rad: f32,
-        /// By which all of the picture is shifted, right and up [half pictures].
+        /// Subpixel offset, right and up [half images].
         jitter: [f32; 2],
-        /// Pixels of the traced picture per pixel, across and down.
+        /// Pixels of the traced image per pixel of the frame, across and down.
         traced_per_pixel: [f32; 2],
-        /// By which the traced picture is looked up off its place, right and down [pixels of it].
+        /// Offset of lookups in the traced image, right and down [its pixels].
         traced_offset: [f32; 2],
-        /// Where the scale of false colours begins, and what its steps are multiplied by.
+        /// Start of the scale of false colours, and the factor of distances from it.
         colour_scale: [f32; 2],
-        /// What is written in place of what is no number.
+        /// Written in place of values that are not finite.
         fault: f32,
-        /// Radiance that mirrors show while what they reflect cannot be traced [W/(m² sr)].
+        /// Radiance of mirrors while chains are switched off [W/(m² sr)].
         stand_in: f32,
         padding0: f32,
         padding1: f32,
@@ -49,23 +49,23 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// Where chains begin, and how far they are followed.
+    /// Start and limits of chains.
     ChainStart {
-        /// The camera, local.
+        /// Camera position, local.
         eye: [f32; 3],
-        /// Of a local unit [m].
+        /// Length of a local unit [m].
         unit_m: f32,
         /// The media around the eye, see `medium.wgsl`.
         media: [u32; 4],
-        /// Distance of the nearest thing that is seen, along the camera's axis, local.
+        /// Distance of the near plane, local.
         near: f32,
-        /// Chains that carry less than this share of their pixel end.
+        /// Chains with a smaller throughput end.
         branch_threshold: f32,
-        /// Most specular surfaces on a chain.
+        /// Maximum number of specular surfaces on a chain.
         max_depth: u32,
-        /// Up to this many surfaces both ways on are followed, and then the stronger.
+        /// Number of surfaces on a chain at which both branches are followed; beyond, only the stronger one is.
         branching_depth: u32,
-        /// Lights that are traced.
+        /// Number of lights to trace.
         light_count: u32,
         padding0: u32,
         padding1: u32,
@@ -74,66 +74,65 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// The wavelengths that a picture follows light at.
+    /// The wavelengths of a frame.
     SeenWavelengths {
-        /// From radiance in linear sRGB to what is seen of it, column by column; a fourth number fills each.
+        /// Matrices from radiance in linear sRGB to its part at each wavelength, column-major; columns are padded to
+        /// four numbers.
         shares: [[[f32; 4]; 3]; 4],
-        /// How many there are.
         count: u32,
         padding0: u32,
         padding1: u32,
         padding2: u32,
-        /// Index of each glass at each wavelength, in groups.
+        /// Refractive index of each glass at each wavelength, in groups of 16 glasses.
         indices: [[[f32; 4]; 16]; 8],
     }
 }
 
 shader_struct! {
-    /// One object.
+    /// Material and transform of one object.
     ObjectRecord {
         /// [`Material::base_colour`](crate::scene::Material::base_colour).
         base_colour: [f32; 3],
-        /// Refractive index.
         ior: f32,
         /// [W/(m² sr)].
         emitted_radiance: [f32; 3],
         /// `SURFACE_*`.
         surface: u32,
-        /// What its body absorbs [1/m].
+        /// Absorption coefficient of its interior [1/m].
         absorption_per_m: [f32; 3],
         /// Whether its back is drawn.
         double_sided: u32,
         /// Record of the illumination map of its front.
         map: u32,
-        /// Record of its base colour texture.
+        /// Texture reference of its base colour.
         texture: u32,
         /// [0, 1].
         roughness: f32,
-        /// Record of what bends its normals.
+        /// Record of its bumps.
         bumps: u32,
-        /// Part of the surface that its polish covers.
+        /// Coverage of the coat [0, 1].
         polish: f32,
         /// Record of the illumination map of its back.
         back_map: u32,
-        /// Number of its glass from 1 on, where that parts wavelengths; else 0.
+        /// Number of its glass, from 1 on, if that is dispersive; else 0.
         glass: u32,
-        /// Alpha of its texture from which on its surface is there; 0 where it always is.
+        /// Alpha of its texture below which the surface is cut out; 0 without a mask.
         alpha_cutoff: f32,
-        /// Record of the image that multiplies transmission, roughness and metallic.
+        /// Texture reference of the image that multiplies transmission, roughness and metallic.
         variation: u32,
         /// [0, 1].
         metallic: f32,
         /// [0, 1].
         transmission: f32,
-        /// Share of it that is there, times its texture's alpha; negative where all of it is.
+        /// Coverage [0, 1], to be multiplied by the texture's alpha; negative if all of the surface is there.
         coverage: f32,
         /// Whether it bounds a body.
         solid: u32,
-        /// Record of the image of what it emits.
+        /// Texture reference of its emission.
         glow: u32,
         padding0: u32,
         padding1: u32,
-        /// Rows of the way from its mesh's coordinates to the scene.
+        /// Rows of the transform from mesh to scene coordinates.
         row_x: [f32; 4],
         row_y: [f32; 4],
         row_z: [f32; 4],
@@ -141,71 +140,72 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// A lamp.
+    /// One light.
     LightRecord {
-        /// Where it is, local; for suns the way their light travels.
+        /// Position, local; for suns, the direction in which their light travels.
         place: [f32; 3],
         /// `LIGHT_*`.
         kind: u32,
-        /// [W/sr], of suns [W/m²].
+        /// Intensity [W/sr]; of suns, irradiance [W/m²].
         strength: [f32; 3],
-        /// Cosine of the half-angle of full strength.
+        /// Cosine of the half-angle of full intensity.
         cos_inner: f32,
-        /// Of a spot or of what glows, unit, away from the lamp.
+        /// Unit axis of a spot or unit normal of an emissive facet, away from the light.
         axis: [f32; 3],
-        /// Cosine of the half-angle at which it ends.
+        /// Cosine of the half-angle at which the cone ends.
         cos_outer: f32,
-        /// Of what is around it [1/m].
+        /// Absorption coefficient of the medium around it [1/m].
         absorption_per_m: [f32; 3],
-        /// Refractive index of that [1].
+        /// Refractive index of that medium.
         ior: f32,
     }
 }
 
 shader_struct! {
-    /// A node of a hierarchy, of triangles or of instances; or a part of an instance.
+    /// A node of a hierarchy, of triangles or of instances; or a quarter of an instance.
     Node {
         /// Minimum corner, local.
         low: [f32; 3],
-        /// Of a leaf its first triangle or the first node of its instance, of others the first of two children.
+        /// Leaf: its first triangle. Instance: its first node. Others: the first of two adjacent children.
         first: u32,
         /// Maximum corner, local.
         high: [f32; 3],
-        /// Triangles of a leaf, or `INSTANCE`; 0 for other nodes.
+        /// Number of triangles of a leaf, or `INSTANCE`; 0 for other nodes.
         count: u32,
     }
 }
 
 shader_struct! {
-    /// A triangle of a hierarchy. Where its mesh has instances, it has the mesh's coordinates, and they its numbers.
+    /// A triangle of a hierarchy. In an instanced mesh, coordinates are those of the mesh, and each instance adds the
+    /// object and offsets of the numbers.
     Triangle {
         /// First corner, local.
         a: [f32; 3],
-        /// Index into the scene's objects; `NO_OBJECT` where it is not there any more.
+        /// Index into the scene's objects; `NO_OBJECT` if it was moved away or belongs to an instanced mesh.
         object: u32,
         /// Second corner, local.
         b: [f32; 3],
-        /// Of three indices of its corners.
+        /// Position of the first of its three corner indices.
         first_index: u32,
         /// Third corner, local.
         c: [f32; 3],
-        /// Of triangles at the same distance the one of lowest order is met.
+        /// Of triangles at the same distance, the one of lowest order is hit.
         order: u32,
     }
 }
 
 shader_struct! {
-    /// Which light the display shows as white.
+    /// White balance of the display.
     DisplayWhite {
-        /// What radiance is multiplied by, column by column; a fourth number fills each.
+        /// Matrix by which radiance is multiplied, column-major; columns are padded to four numbers.
         balance: [[f32; 4]; 3],
     }
 }
 
 shader_struct! {
-    /// How a mean of pictures takes up another one.
+    /// How a frame enters a running mean.
     Accumulation {
-        /// Share of the new picture in the mean.
+        /// Weight of the new frame.
         share: f32,
         padding0: f32,
         padding1: f32,
@@ -214,7 +214,6 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// A ray to be traced for its own sake.
     ProbeRay {
         /// Local.
         origin: [f32; 3],
@@ -226,9 +225,8 @@ shader_struct! {
 }
 
 shader_struct! {
-    /// What a ray met.
     ProbeHit {
-        /// Order of the triangle; `NO_TRIANGLE` where nothing was met.
+        /// Order of the triangle; `NO_TRIANGLE` for a miss.
         order: u32,
         /// Local.
         distance: f32,
@@ -237,7 +235,7 @@ shader_struct! {
 }
 
 impl DisplayWhite {
-    /// By a matrix of [`WhiteBalance::matrix`](crate::eye_pass::WhiteBalance::matrix).
+    /// From a matrix of [`WhiteBalance::matrix`](crate::eye_pass::WhiteBalance::matrix).
     pub(crate) fn new(matrix: &Matrix3) -> Self {
         let column = |column: usize| {
             let [r, g, b] = matrix.map(|row| row[column] as f32);
@@ -250,7 +248,7 @@ impl DisplayWhite {
 }
 
 impl SeenWavelengths {
-    /// A picture's set, with the indices of the scene's glasses, as many as there is room for.
+    /// The wavelengths of a frame, with the indices of as many of the scene's glasses as fit.
     pub(crate) fn of(set: &[SeenWavelength], glasses: &[Dispersion]) -> Self {
         let mut seen = Self {
             count: set.len() as u32,

@@ -2,17 +2,17 @@
 
 use glam::DVec2;
 
-/// Corners of a triangle cut by the four sides of a texel: at most 3 + 4.
+/// A triangle clipped by the four sides of a texel has at most 3 + 4 corners.
 const MAX_CORNERS: usize = 7;
 
-/// A convex polygon in texels.
+/// A convex polygon in texel coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct Polygon {
     corners: [DVec2; MAX_CORNERS],
     len: usize,
 }
 
-/// The side of a line that is kept.
+/// The side of a line that clipping keeps.
 #[derive(Clone, Copy)]
 enum Keep {
     Above,
@@ -20,7 +20,7 @@ enum Keep {
 }
 
 impl Polygon {
-    /// A triangle, either way round.
+    /// A triangle of either winding.
     pub fn triangle(corners: [DVec2; 3]) -> Self {
         let mut polygon = Self {
             corners: [DVec2::ZERO; MAX_CORNERS],
@@ -30,7 +30,6 @@ impl Polygon {
         polygon
     }
 
-    /// Its corners, in order.
     pub fn corners(&self) -> &[DVec2] {
         &self.corners[..self.len]
     }
@@ -40,7 +39,7 @@ impl Polygon {
         convex_area(self.corners())
     }
 
-    /// Centre of gravity; the mean of the corners where there is no area.
+    /// Centroid; the mean of the corners if the area is zero.
     pub fn centroid(&self) -> DVec2 {
         let corners = self.corners();
         let first = corners.first().copied().unwrap_or_default();
@@ -57,7 +56,7 @@ impl Polygon {
         }
     }
 
-    /// Whether a point lies within it or on its border.
+    /// Whether a point lies inside or on the border.
     pub fn contains(&self, point: DVec2) -> bool {
         let corners = self.corners();
         let (mut left, mut right) = (false, false);
@@ -77,7 +76,8 @@ impl Polygon {
             .halved(axis, high, Keep::Below)
     }
 
-    /// Sutherland and Hodgman's step. Cut corners lie exactly on the line, so that neighbouring cells share them.
+    /// One step of Sutherland and Hodgman's clipping. New corners lie exactly on the line, so that neighbouring cells
+    /// share them.
     fn halved(&self, axis: usize, line: f64, keep: Keep) -> Self {
         let distance = |corner: DVec2| match keep {
             Keep::Above => corner[axis] - line,
@@ -111,7 +111,7 @@ impl Polygon {
         }
     }
 
-    /// Smallest and largest coordinate on an axis.
+    /// Range of coordinates on an axis.
     fn range(&self, axis: usize) -> (f64, f64) {
         self.corners()
             .iter()
@@ -131,7 +131,7 @@ pub fn convex_area(corners: &[DVec2]) -> f64 {
     0.5 * twice.abs()
 }
 
-/// Cells of a line of `count` unit cells that an interval within 0..=count reaches.
+/// Unit cells, out of `count` in a row, that an interval within 0..=count overlaps.
 pub fn cells(low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
     if high.is_nan() || low.is_nan() || high < low {
         return 0..0;
@@ -141,13 +141,13 @@ pub fn cells(low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
     first..end.max((first + 1).min(count))
 }
 
-/// Rows that a triangle reaches.
+/// Rows that a triangle overlaps.
 pub fn rows(corners: [DVec2; 3], height: usize) -> std::ops::Range<usize> {
     let (low, high) = Polygon::triangle(corners).range(1);
     cells(low, high, height)
 }
 
-/// Visits the texels of one row that a triangle covers: column, and the covered part of the texel.
+/// Visits the texels of a row that a triangle covers: column, and covered part of the texel.
 pub fn for_each_texel_in_row(
     corners: [DVec2; 3],
     row: usize,
@@ -174,8 +174,8 @@ pub fn for_each_texel_in_row(
     }
 }
 
-/// Interval of x over which a convex strip reaches from `top` to `bottom`, empty where it does not: what lies within
-/// both of its ends lies, by convexity, within everything between them.
+/// Interval of x in which a convex strip spans from `top` to `bottom`, or an empty one. By convexity, what lies within
+/// the strip at both ends lies within it in between.
 fn whole_columns(strip: &Polygon, top: f64, bottom: f64) -> (f64, f64) {
     let mut whole = (f64::NEG_INFINITY, f64::INFINITY);
     for line in [top, bottom] {

@@ -6,40 +6,40 @@ use super::coverage::{cells, rows, twice_signed_area};
 use super::plane::Frame;
 use crate::scene::Mesh;
 
-/// Coordinates may leave the unit square by this much (rounding in the exporter); they are moved onto its border.
+/// Tolerance outside the unit square, for rounding in the exporter; such coordinates are clamped to its border.
 const OUTSIDE: f64 = 1e-5;
 
-/// A set must use at least this share of the map, else most texels would be wasted on nothing.
+/// Minimum share of the map that a set must cover; below, most texels would be wasted.
 const MIN_COVERAGE: f64 = 0.05;
 
-/// A triangle must get at least this share of the map area that its surface area calls for.
+/// Minimum map area of a triangle, relative to its share of the surface.
 const MIN_DENSITY: f64 = 1e-6;
 
-/// How far an affine, covering set may be from affine and from covering.
+/// Tolerances for an affine set, and for one that covers the unit square.
 const AFFINE_TOLERANCE: f64 = 1e-4;
 const COVERING_TOLERANCE: f64 = 1e-3;
 
-/// Side of the overlap raster for a whole mesh.
+/// Side of the raster on which a mesh is tested for overlaps.
 const RASTER_SIDE: usize = 256;
 
-/// Why a set of the file cannot serve as map coordinates.
+/// Why a coordinate set cannot serve as map coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Refusal {
-    /// Some coordinate is no number, or beyond 0..1.
+    /// A coordinate is not finite or outside 0..1.
     #[error("coordinates lie outside 0..1")]
     Outside,
     /// Less than a twentieth of the map would be used.
     #[error("it uses less than a twentieth of the map")]
     Sparse,
-    /// Some triangle has area on the surface and none in the map.
+    /// A triangle has area on the surface, but none in the map.
     #[error("some triangles have no area in it")]
     Collapsed,
-    /// Some place of the map would belong to several of the surface.
+    /// A point of the map belongs to several points of the surface.
     #[error("it overlaps itself")]
     Overlapping,
 }
 
-/// Corner coordinates of a set that gives every point of the surface its own place in the unit square.
+/// Coordinates per corner of a set that maps the surface injectively into the unit square.
 ///
 /// # Errors
 /// Why it does not.
@@ -64,7 +64,7 @@ pub fn light_map_set(mesh: &Mesh, uvs: &[DVec2]) -> Result<Vec<[DVec2; 3]>, Refu
     Ok(corners)
 }
 
-/// Whether a valid set of a planar mesh is one affine image of the plane that covers the whole unit square.
+/// Whether a valid set of a planar mesh is a single affine image of the plane that covers the whole unit square.
 pub fn is_affine_and_covering(mesh: &Mesh, corners: &[[DVec2; 3]], normal: DVec3) -> bool {
     (covered_share(corners) - 1.0).abs() <= COVERING_TOLERANCE && is_affine(mesh, corners, normal)
 }
@@ -90,7 +90,7 @@ fn is_affine(mesh: &Mesh, corners: &[[DVec2; 3]], normal: DVec3) -> bool {
     })
 }
 
-/// Share of the unit square that the triangles cover, as long as they do not overlap.
+/// Share of the unit square that triangles cover, if they do not overlap.
 pub fn covered_share(corners: &[[DVec2; 3]]) -> f64 {
     corners
         .iter()
@@ -98,7 +98,7 @@ pub fn covered_share(corners: &[[DVec2; 3]]) -> f64 {
         .sum()
 }
 
-/// Coordinates by corner, brought onto the unit square; `None` where one is not finite or lies outside.
+/// Coordinates by corner, clamped to the unit square; `None` if any is not finite or lies outside.
 fn corner_coordinates(mesh: &Mesh, uvs: &[DVec2]) -> Option<Vec<[DVec2; 3]>> {
     let usable =
         |uv: DVec2| uv.is_finite() && uv.min_element() >= -OUTSIDE && uv.max_element() <= 1.0 + OUTSIDE;
@@ -114,17 +114,17 @@ fn corner_coordinates(mesh: &Mesh, uvs: &[DVec2]) -> Option<Vec<[DVec2; 3]>> {
         .collect()
 }
 
-/// Distance from an edge, in units of the map's side, up to which a point counts as on the border: neighbours share
+/// Distance from an edge, in units of the map's side, within which a point counts as on the border: neighbours share
 /// borders, and files store coordinates in single precision.
 const BORDER: f64 = 1e-6;
 
 /// Share of the covered samples that may be covered twice before a set counts as overlapping.
 const ALLOWED_SHARE: f64 = 1e-4;
 
-/// Whether triangles within the unit square overlap beyond their borders.
+/// Whether triangles in the unit square overlap beyond their borders.
 ///
-/// One sample in each cell of a raster that is finer than the mean triangle; `least_side` bounds the raster's side
-/// from below. Overlaps far smaller than a cell go unseen: no map can show them either.
+/// Tests one sample per cell of a raster that is finer than the mean triangle and has at least `least_side` cells per
+/// side. Misses overlaps far smaller than a cell, which no map can show, either.
 pub fn overlaps(triangles: &[[DVec2; 3]], least_side: usize) -> bool {
     let side = (8.0 * (triangles.len() as f64).sqrt()) as usize;
     let side = side.clamp(least_side, least_side.max(2048));
@@ -140,7 +140,7 @@ pub fn overlaps(triangles: &[[DVec2; 3]], least_side: usize) -> bool {
 fn mark(triangle: [DVec2; 3], side: usize, hits: &mut [u8]) {
     let scale = side as f64;
     let winding = twice_signed_area(triangle).signum();
-    // Inside is where all three signed distances from the edges are above the border's width.
+    // A point is inside if its signed distance from each edge exceeds the border's width.
     let edges = [0, 1, 2].map(|i| {
         let (from, to) = (triangle[i], triangle[(i + 1) % 3]);
         let along = (to - from).normalize_or_zero() * winding;
@@ -162,7 +162,7 @@ fn mark(triangle: [DVec2; 3], side: usize, hits: &mut [u8]) {
     }
 }
 
-/// Columns that a triangle can reach between two horizontal lines.
+/// Range of columns that a triangle overlaps between two horizontal lines.
 fn span(triangle: &[DVec2; 3], top: f64, bottom: f64) -> (f64, f64) {
     let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
     let mut reach = |x: f64| {
@@ -183,7 +183,7 @@ fn span(triangle: &[DVec2; 3], top: f64, bottom: f64) -> (f64, f64) {
     (left, right)
 }
 
-/// Place of a cell's sample within it: the R2 sequence's two irrational steps, so that samples fall on no line of a
+/// Position of a sample within its cell: the irrational steps of the R2 sequence keep samples off the lines of a
 /// regular unwrapping.
 fn jitter(column: usize, row: usize) -> DVec2 {
     let (x, y) = (column as f64, row as f64);

@@ -19,35 +19,34 @@ use crate::scene::Mesh;
 use coverage::twice_signed_area;
 use plane::{common_normal, smallest_rectangle};
 
-/// Nominal map side [texels] that generated coordinates keep gutters for, where nothing else is asked.
+/// Default map side for which generated coordinates reserve gutters [texels].
 pub const DEFAULT_NOMINAL_SIDE: usize = 512;
 
-/// Map coordinates of one object, before the map has a size.
+/// Map coordinates of one object, independent of the map size.
 #[derive(Clone, Debug)]
 pub struct Parametrisation {
-    /// Index into `Scene::objects`.
+    /// Index in `Scene::objects`.
     pub object: usize,
-    /// Where the coordinates come from.
     pub uv_set: UvSet,
     /// Map coordinates in [0, 1] of the three corners of every triangle; v runs downwards.
     pub corner_uvs: Vec<[DVec2; 3]>,
     /// Area of every triangle [m²].
     triangle_areas_m2: Vec<f64>,
-    /// Width over height of a map whose texels are square on the surface, on average.
+    /// Aspect ratio (width over height) at which texels are square on the surface, on average.
     pub suggested_aspect: f64,
     /// Whether all texels have the same area at any map size.
     uniform: bool,
-    /// Where charts end and the surface goes on.
+    /// Edges at which charts end although the surface continues.
     seams: Vec<Seam>,
 }
 
-/// Map coordinates for the mesh of an object; `None` where the mesh has no area or cannot be unwrapped.
+/// Chooses map coordinates for an object's mesh; `None` if it has no area or cannot be unwrapped.
 ///
-/// In this order: TEXCOORD_0 where the mesh is planar and the set is affine and covers the unit square; TEXCOORD_1,
-/// then TEXCOORD_0, where every point has its own place in the unit square (finite, inside, no overlap beyond
-/// borders, every triangle with its share of area, a twentieth of the map covered at least); else generated: a planar
-/// mesh by the smallest rectangle around it, any other unwrapped into charts with gutters of two texels
-/// at a map of `nominal_side` texels. Deterministic.
+/// In this order: TEXCOORD_0 if the mesh is planar and the set is affine and covers the unit square; TEXCOORD_1, then
+/// TEXCOORD_0, if it is an injective map into the unit square (finite, inside, no overlap beyond borders, every
+/// triangle has its share of area, at least a twentieth of the map is covered); otherwise generated coordinates. A
+/// planar mesh is then projected onto its smallest enclosing rectangle; any other is unwrapped into charts with gutters
+/// of two texels at a map of `nominal_side` texels. Deterministic.
 pub fn parametrise(object: usize, mesh: &Mesh, nominal_side: usize) -> Option<Parametrisation> {
     let has_area = mesh.area_m2() > 0.0;
     let (uv_set, corner_uvs) = has_area.then(|| choose(mesh, nominal_side))??;
@@ -79,7 +78,7 @@ fn choose(mesh: &Mesh, nominal_side: usize) -> Option<(UvSet, Vec<[DVec2; 3]>)> 
     Some((UvSet::Generated, generated))
 }
 
-/// Sets of a mesh that cannot serve as map coordinates, and why.
+/// Coordinate sets of a mesh that cannot be used for its map, and why.
 pub fn refused_sets(mesh: &Mesh) -> Vec<(&'static str, Refusal)> {
     let sets = [
         ("TEXCOORD_0", mesh.uv0.as_ref()),
@@ -93,7 +92,7 @@ pub fn refused_sets(mesh: &Mesh) -> Vec<(&'static str, Refusal)> {
     sets.into_iter().filter_map(refusal).collect()
 }
 
-/// A planar mesh, by the smallest rectangle around it.
+/// Projects a planar mesh onto its smallest enclosing rectangle.
 fn project_flat(mesh: &Mesh, normal: glam::DVec3) -> Vec<[DVec2; 3]> {
     let points: Vec<_> = (0..mesh.triangles.len())
         .flat_map(|triangle| mesh.corners(triangle))
@@ -107,12 +106,12 @@ fn project_flat(mesh: &Mesh, normal: glam::DVec3) -> Vec<[DVec2; 3]> {
         .collect()
 }
 
-/// Share of a mean texel up to which its covered area is rounding, and up to which it is too little to be looked at.
+/// Covered fraction of a mean texel below which coverage is rounding error, and below which it is negligible.
 const ROUNDING: f64 = 1e-9;
 const SLIVER: f64 = 1e-3;
 
 impl Parametrisation {
-    /// Map coordinates that are known already: [0, 1], three corners per triangle of the mesh.
+    /// From known map coordinates: in [0, 1], three corners per triangle of the mesh.
     pub fn new(object: usize, mesh: &Mesh, uv_set: UvSet, corner_uvs: Vec<[DVec2; 3]>) -> Self {
         let triangle_areas_m2: Vec<f64> = (0..mesh.triangles.len())
             .map(|triangle| mesh.triangle_area_m2(triangle))
@@ -139,8 +138,8 @@ impl Parametrisation {
         self.triangle_areas_m2[triangle]
     }
 
-    /// The chart of a map for the front of the object, of `width` × `height` texels, both > 0, with the exact area of the surface under every
-    /// texel: triangles cut by texels, times the triangle's m² per texel².
+    /// The chart for the front of the object, in a map of `width` × `height` texels, both > 0. Texel areas are exact:
+    /// the area of each triangle clipped to each texel, times the triangle's m² per texel².
     pub fn chart(&self, width: usize, height: usize) -> Chart {
         let texel_areas_m2 = if self.uniform {
             vec![self.area_m2() / (width * height) as f64]
@@ -163,7 +162,7 @@ impl Parametrisation {
         }
     }
 
-    /// The chart of a map in tiles; `None` where the surface does not fill its map evenly.
+    /// The chart of a tiled map; `None` unless the surface fills its map evenly.
     pub fn tiled_chart(&self, layout: &Arc<TileLayout>) -> Option<Chart> {
         if !self.uniform {
             return None;
@@ -177,14 +176,14 @@ impl Parametrisation {
         Some(Chart {
             texel_areas_m2: areas.collect(),
             layout: Some(Arc::clone(layout)),
-            // Of a map row by row.
+            // Full maps have no gutters.
             beyond: Vec::new(),
             joints: Vec::new(),
             ..self.chart(width, height)
         })
     }
 
-    /// Whether the surface fills its map evenly, so that it may lie in tiles.
+    /// Whether the surface fills its map evenly, so that the map can be tiled.
     pub fn is_uniform(&self) -> bool {
         self.uniform
     }
@@ -209,7 +208,7 @@ impl Parametrisation {
     }
 }
 
-/// Whether the whole unit square is covered at one density, to the precision of files in single precision.
+/// Whether the whole unit square is covered at constant density, to the precision of single-precision files.
 fn is_uniform(corner_uvs: &[[DVec2; 3]], areas_m2: &[f64]) -> bool {
     let total_m2: f64 = areas_m2.iter().sum();
     (given::covered_share(corner_uvs) - 1.0).abs() < 1e-6
@@ -219,7 +218,7 @@ fn is_uniform(corner_uvs: &[[DVec2; 3]], areas_m2: &[f64]) -> bool {
         })
 }
 
-/// Root mean square of |∂P/∂u| over that of |∂P/∂v|, over the area.
+/// Root mean square of |∂P/∂u| over that of |∂P/∂v|, area-weighted.
 fn aspect(mesh: &Mesh, corner_uvs: &[[DVec2; 3]], areas_m2: &[f64]) -> f64 {
     let (mut across, mut down) = (0.0, 0.0);
     for (triangle, (uvs, area_m2)) in corner_uvs.iter().zip(areas_m2).enumerate() {

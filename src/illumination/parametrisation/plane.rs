@@ -4,29 +4,28 @@ use glam::{DVec2, DVec3};
 
 use crate::scene::Mesh;
 
-/// Right-handed axes of a rectangle on a surface: u × v = −normal, so that a map seen from outside, with v
-/// downwards, is not mirrored.
+/// Right-handed axes of a rectangle on a surface: u × v = −normal, so that a map with v downwards is not mirrored when
+/// seen from outside.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
-    /// Unit, across.
+    /// Unit vector to the right.
     pub u: DVec3,
-    /// Unit, down.
+    /// Unit vector downwards.
     pub v: DVec3,
 }
 
-/// A rectangle around points of a plane [m].
+/// A rectangle around points in a plane [m].
 #[derive(Clone, Copy, Debug)]
 pub struct Rectangle {
-    /// Its axes.
     pub frame: Frame,
-    /// Coordinates of its corner with least u and v [m].
+    /// Its corner of least u and v [m].
     pub low: DVec2,
-    /// Its sides [m].
+    /// Side lengths [m].
     pub size: DVec2,
 }
 
 impl Frame {
-    /// Axes with a given direction of u, perpendicular to the unit normal.
+    /// Axes with the given u, a unit vector perpendicular to the unit normal.
     pub fn new(u: DVec3, normal: DVec3) -> Self {
         Self {
             u,
@@ -40,7 +39,7 @@ impl Frame {
     }
 }
 
-/// Unit normal of the plane that a whole mesh lies in, with every triangle facing the same way; `None` where it is
+/// Unit normal of the plane that contains the whole mesh, with all triangles facing the same way; `None` if the mesh is
 /// bent, folded or without area.
 pub fn common_normal(mesh: &Mesh) -> Option<DVec3> {
     let area_vector = |triangle: usize| {
@@ -59,18 +58,18 @@ pub fn common_normal(mesh: &Mesh) -> Option<DVec3> {
         high = high.max(corner);
         off_plane = off_plane.max((corner - origin).dot(normal).abs());
     }
-    // Files store positions in single precision: they err by 2⁻²⁴ of their distance from the file's origin.
+    // Files store positions in single precision, with errors of 2⁻²⁴ of the distance from the file's origin.
     let tolerance = 1e-6 * (high - low).length() + 2.5e-7 * low.abs().max(high.abs()).max_element();
     let same_way = (0..mesh.triangles.len()).all(|triangle| area_vector(triangle).dot(normal) >= 0.0);
     (off_plane <= tolerance && same_way).then_some(normal)
 }
 
-/// The rectangle of least area around points of a plane with the given unit normal, its u along the longer side.
+/// The rectangle of smallest area around points in a plane with the given unit normal; its u is along the longer side.
 pub fn smallest_rectangle(points: &[DVec3], normal: DVec3) -> Rectangle {
     let base = Frame::new(normal.any_orthonormal_vector(), normal);
     let hull = convex_hull(points.iter().map(|point| base.project(*point)).collect());
-    // A rectangle of least area has a side along an edge of the hull (Freeman and Shapira 1975). A round hull's
-    // edges are as good as each other: some hundred of them are enough.
+    // A rectangle of smallest area has a side along an edge of the hull (Freeman and Shapira 1975). The edges of a
+    // round hull are nearly equivalent, so a few hundred are enough.
     let stride = hull.len().div_ceil(512);
     let mut best: Option<(f64, DVec2)> = None;
     for index in (0..hull.len()).step_by(stride.max(1)) {
@@ -79,7 +78,7 @@ pub fn smallest_rectangle(points: &[DVec3], normal: DVec3) -> Rectangle {
         };
         let (low, high) = extent(&hull, along);
         let size = high - low;
-        // Strictly better by more than rounding: equal edges of a square do not compete.
+        // The improvement must exceed rounding, so that equal edges of a square do not compete.
         if best.is_none_or(|(area, _)| size.x * size.y < area * (1.0 - 1e-9)) {
             let longer = if size.x >= size.y { along } else { along.perp() };
             best = Some((size.x * size.y, longer));
@@ -91,7 +90,7 @@ pub fn smallest_rectangle(points: &[DVec3], normal: DVec3) -> Rectangle {
 }
 
 impl Rectangle {
-    /// The rectangle along given axes.
+    /// The smallest rectangle along given axes.
     pub fn around(points: &[DVec3], frame: Frame) -> Self {
         let (low, high) = points
             .iter()
@@ -106,8 +105,8 @@ impl Rectangle {
         }
     }
 
-    /// The same rectangle turned by quarters to the way that people expect: on a floor u towards +x, on anything
-    /// else v downwards.
+    /// Turns the rectangle by multiples of 90° to the orientation that users expect: u towards +x on a floor, v
+    /// downwards on anything else.
     pub fn upright(self, points: &[DVec3], normal: DVec3) -> Self {
         let Frame { u, v } = self.frame;
         let goal = if normal.y.abs() > 0.9 {
@@ -126,7 +125,7 @@ impl Rectangle {
     }
 }
 
-/// Extent of points along a unit direction and across it.
+/// Bounds of points along a unit direction and perpendicular to it.
 fn extent(points: &[DVec2], along: DVec2) -> (DVec2, DVec2) {
     let across = along.perp();
     points

@@ -8,26 +8,26 @@ use uvunwrap::{Density, MeshInput, Options};
 use crate::files::cache::{self, ContentHash};
 use crate::scene::Mesh;
 
-/// Uncovered texels around every chart: a bilinear look-up at a border reads one of them.
+/// Uncovered texels around every chart: a bilinear lookup at a border reads one of them.
 const PADDING_TEXELS: u32 = 1;
 
-/// Largest angle between a facet and the mean of its chart [degrees].
+/// Maximum angle between a facet's normal and the mean of its chart [degrees].
 const CHART_ANGLE_DEG: f32 = 50.0;
 
-/// Largest ratio between a facet's share of the map and of the surface, either way.
+/// Maximum ratio, either way, between a facet's share of the map and its share of the surface.
 const DISTORTION: f32 = 1.5;
 
-/// Meshes of fewer triangles are unwrapped in no time.
+/// Meshes with fewer triangles unwrap fast enough not to be cached.
 const MIN_KEPT: usize = 2000;
 
-/// Changes with whatever changes the coordinates of a mesh: a new version of uvunwrap, other options.
+/// To be incremented whenever the coordinates of a mesh change: with a new version of uvunwrap or other options.
 const LAYOUT_VERSION: u64 = 2;
 
-/// Least and largest side of a map that charts are laid out for [texels].
+/// Range of the map side that charts are packed for [texels].
 const SIDES: (usize, usize) = (16, 8192);
 
-/// Map coordinates in [0, 1] of all triangles for a map of `side` texels at least: more where it cannot hold all charts
-/// with their gutters. `None` where the mesh cannot be unwrapped.
+/// Map coordinates in [0, 1] of all triangles, packed for a map of `side` texels, or more if that cannot hold all
+/// charts with their gutters. `None` if the mesh cannot be unwrapped.
 pub fn unwrap(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
     if mesh.triangles.len() < MIN_KEPT {
         return lay_out(mesh, side);
@@ -42,7 +42,7 @@ pub fn unwrap(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
     Some(made)
 }
 
-/// Of everything that the coordinates depend on.
+/// Hashes everything that the coordinates depend on.
 fn content_hash(mesh: &Mesh, side: usize) -> u64 {
     let mut hash = ContentHash::default();
     hash.take(LAYOUT_VERSION);
@@ -58,7 +58,7 @@ fn content_hash(mesh: &Mesh, side: usize) -> u64 {
     hash.value()
 }
 
-/// Single precision, as they are made; little-endian.
+/// Little-endian, in single precision, as they were generated.
 fn encode(corner_uvs: &[[DVec2; 3]]) -> Vec<u8> {
     let corners = corner_uvs.iter().flatten();
     corners
@@ -67,7 +67,7 @@ fn encode(corner_uvs: &[[DVec2; 3]]) -> Vec<u8> {
         .collect()
 }
 
-/// `None` where they are not those of so many triangles within the unit square.
+/// `None` unless the bytes hold this many triangles in the unit square.
 fn decode(bytes: &[u8], triangles: usize) -> Option<Vec<[DVec2; 3]>> {
     let (numbers, rest) = bytes.as_chunks::<4>();
     let numbers: Vec<f64> = numbers
@@ -89,17 +89,18 @@ fn decode(bytes: &[u8], triangles: usize) -> Option<Vec<[DVec2; 3]>> {
     is_sound.then(|| corners.iter().map(triangle).collect())
 }
 
-/// More vertices than this for each place are no seams any more: files split them all over for normals or coordinates.
+/// Vertices per position above which splits are no seams: the file splits vertices everywhere for normals or
+/// coordinates.
 const MAX_SPLIT: f64 = 1.5;
 
-/// Positions and indices of a mesh. Where most of its vertices differ in normals or coordinates alone, those of one place
-/// are one: a chart goes on over them, or there would be as many charts as facets.
+/// Positions and indices of a mesh. If most vertices differ only in normals or coordinates, those at the same position
+/// are welded: otherwise there would be as many charts as facets.
 fn welded(mesh: &Mesh, local: impl Fn(&glam::DVec3) -> [f32; 3]) -> (Vec<[f32; 3]>, Vec<u32>) {
     let split: Vec<[f32; 3]> = mesh.positions.iter().map(local).collect();
     let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
     let (mut positions, mut known) = (Vec::new(), HashMap::new());
     let mut vertex_at = |position: &[f32; 3]| {
-        // Both zeros are one.
+        // Turns −0 into +0.
         *known
             .entry(position.map(|value| (value + 0.0).to_bits()))
             .or_insert_with(|| {
@@ -117,11 +118,11 @@ fn welded(mesh: &Mesh, local: impl Fn(&glam::DVec3) -> [f32; 3]) -> (Vec<[f32; 3
     )
 }
 
-/// Unwraps, whatever was done before.
+/// Unwraps without the cache.
 fn lay_out(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
     let (low, high) = mesh.bounds()?;
     let size_m = (high - low).max_element();
-    // Single precision is for what lies around zero.
+    // Single precision is finest around zero.
     let local = |point: &glam::DVec3| ((*point - (low + high) * 0.5) / size_m).as_vec3().to_array();
     let (positions, indices) = welded(mesh, local);
     let input = MeshInput::new(&positions, &indices);

@@ -6,24 +6,25 @@ use super::{STORED, TILE, TilePool, Uploaded};
 use crate::gpu::Gpu;
 use crate::scene::texture::Wrap;
 
-/// Entry of a tile that is all zero: it takes no place. `EMPTY` in the shader.
+/// Page of an all-zero tile, which takes no slot. `EMPTY` in the shader.
 const EMPTY: u32 = u32::MAX;
 
-/// Entry of a tile that is no finer than the next level: it takes no place. `COARSER` in the shader.
+/// Page of a tile that is no finer than the next level and takes no slot. `COARSER` in the shader.
 const COARSER: u32 = EMPTY - 1;
 
-/// Levels of an image, from fine to coarse; from `finest` on the device holds them.
+/// An image with its mip levels, from fine to coarse. Levels from `finest` on are resident.
 #[derive(Debug)]
 pub(in super::super) struct PagedImage<T> {
     levels: Vec<Level<T>>,
     wrap: [Wrap; 2],
     finest: usize,
-    /// Of each level, row by row: the tile's place, [`EMPTY`] or [`COARSER`].
+    /// By level, row by row: the slot of a tile, [`EMPTY`] or [`COARSER`].
     pages: Vec<Vec<u32>>,
 }
 
 impl<T: Pod + PartialEq> PagedImage<T> {
-    /// Uploads levels, at least one, each half as large as the one before; of those before `finest` nothing.
+    /// Uploads an image from level `finest` on. There is at least one level, and each is half as large as the one
+    /// before.
     pub(in super::super) fn new(
         gpu: &Gpu,
         pool: &mut TilePool,
@@ -44,7 +45,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         (image, uploaded)
     }
 
-    /// Texels across and down of the whole image.
+    /// Size of the finest level [texels].
     pub(in super::super) fn size(&self) -> [usize; 2] {
         self.levels[0].size
     }
@@ -53,19 +54,19 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         self.levels.len()
     }
 
-    /// The finest level that the device holds.
+    /// The finest resident level.
     pub(in super::super) fn finest(&self) -> usize {
         self.finest
     }
 
-    /// Places that a level takes, or would take.
+    /// Number of slots that a level takes when resident.
     pub(in super::super) fn tiles_of_level(&self, level: usize) -> u64 {
         let level = &self.levels[level];
         let tiles = level.places();
         tiles.filter(|tile| !level.is_empty(self.wrap, *tile)).count() as u64
     }
 
-    /// Replaces the texels of all levels, of the same sizes; uploads the tiles in which any bit differs.
+    /// Replaces the texels of all levels, whose sizes stay, and uploads the tiles in which any bit differs.
     pub(in super::super) fn update(
         &mut self,
         gpu: &Gpu,
@@ -80,7 +81,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         uploaded
     }
 
-    /// Holds the levels from `finest` on, and no finer ones.
+    /// Makes levels from `finest` on resident and evicts finer ones.
     pub(in super::super) fn set_finest(&mut self, gpu: &Gpu, pool: &mut TilePool, finest: usize) -> Uploaded {
         let finest = finest.min(self.levels.len() - 1);
         for page in self.pages[..finest].iter_mut().flatten() {
@@ -94,7 +95,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         uploaded
     }
 
-    /// Gives all places back.
+    /// Frees all slots.
     pub(in super::super) fn release(&mut self, pool: &mut TilePool) {
         for page in self.pages.iter_mut().flatten() {
             release(pool, page);
@@ -102,7 +103,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         self.finest = self.levels.len();
     }
 
-    /// Uploads the tiles of a level that differ from `before`; all of them without.
+    /// Uploads the tiles of a level that differ from `before`, or all tiles if that is `None`.
     fn upload(
         &mut self,
         gpu: &Gpu,
@@ -131,7 +132,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
                 continue;
             }
             if *page >= COARSER {
-                // Where the device has no more room the tile stays dark; the budget keeps well below that.
+                // If the device has no room left, the tile stays dark; the budget keeps well below that.
                 if pool.reserve(gpu, 1).is_none() {
                     log::warn!(
                         "the device has no room for another tile of {} texels",
@@ -147,7 +148,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         uploaded
     }
 
-    /// The image's record for the shader, behind `words`: see `paged.wgsl`.
+    /// Appends the image's record for the shader to `words`: see `images.wgsl`.
     pub(in super::super) fn write_record(&self, words: &mut Vec<u32>, scale: f32) {
         let wrap = self.wrap.map(|wrap| match wrap {
             Wrap::ClampToEdge => 0,
@@ -184,22 +185,21 @@ fn release(pool: &mut TilePool, page: &mut u32) {
     *page = EMPTY;
 }
 
-/// An image at one resolution.
+/// One mip level of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub(in super::super) struct Level<T> {
     /// Texels across and down, > 0.
     pub(in super::super) size: [usize; 2],
-    /// Texels that the unit square of coordinates covers; the last ones may reach beyond it.
+    /// Texels that the unit square of coordinates spans; the last ones may extend beyond it.
     pub(in super::super) extent: [f32; 2],
     pub(in super::super) texels: Texels<T>,
 }
 
-/// The texels of a level.
 #[derive(Clone, Debug, PartialEq)]
 pub(in super::super) enum Texels<T> {
     /// Row by row.
     Rows(Vec<T>),
-    /// By tile, row by row: what is stored of it; `None` where it is no finer than the next level.
+    /// By tile, its stored texels row by row; `None` if it is no finer than the next level.
     Tiles(Vec<Option<Vec<T>>>),
 }
 
@@ -209,13 +209,13 @@ impl<T: Pod> Level<T> {
         self.size.map(|side| side.div_ceil(TILE))
     }
 
-    /// Column and row of all tiles, row by row.
+    /// Column and row of every tile, row by row.
     pub(super) fn places(&self) -> impl Iterator<Item = [usize; 2]> + use<T> {
         let [across, down] = self.tiles();
         (0..down).flat_map(move |row| (0..across).map(move |column| [column, row]))
     }
 
-    /// Whether a tile takes no place: it is all zero, or no finer than the next level.
+    /// Whether a tile takes no slot: it is all zero, or no finer than the next level.
     pub(super) fn is_empty(&self, wrap: [Wrap; 2], tile: [usize; 2]) -> bool {
         match &self.texels {
             Texels::Rows(texels) => {
@@ -227,8 +227,8 @@ impl<T: Pod> Level<T> {
         }
     }
 
-    /// Whether any bit of a tile differs from that of a level of the same size. What is stored beyond the image's end
-    /// repeats texels that are looked at.
+    /// Whether any bit of a tile differs from that of a level of the same size. Texels stored beyond the image's border
+    /// are copies and need no comparison.
     pub(super) fn differs(&self, before: &Self, tile: [usize; 2]) -> bool {
         let bits = bytemuck::cast_slice::<T, u8>;
         match (&self.texels, &before.texels) {
@@ -251,7 +251,7 @@ impl<T: Pod> Level<T> {
         }
     }
 
-    /// Adds what is stored of a tile; false where it is no finer than the next level.
+    /// Appends the stored texels of a tile; false if it is no finer than the next level.
     pub(super) fn gather(&self, wrap: [Wrap; 2], tile: [usize; 2], gathered: &mut Vec<T>) -> bool {
         match &self.texels {
             Texels::Rows(texels) => {
@@ -279,8 +279,8 @@ pub(super) fn is_zero<T: Pod>(texel: &T) -> bool {
     bytemuck::bytes_of(texel) == bytemuck::bytes_of(&T::zeroed())
 }
 
-/// Indices of what is stored for a tile, row by row: its texels and one more each way, which a bilinear look-up between
-/// its last ones needs.
+/// Indices of the stored texels of a tile, row by row: its own, and one more in each direction for bilinear lookups
+/// between its last ones.
 fn rows(
     [width, height]: [usize; 2],
     wrap: [Wrap; 2],
@@ -294,12 +294,12 @@ fn rows(
     })
 }
 
-/// How many texels are stored of a tile along a line of `size`: those that are there and one more.
+/// Number of stored texels of a tile along a side of `size` texels: those that exist, and one more.
 pub(in super::super) fn stored(tile: usize, size: usize) -> usize {
     STORED.min(size - tile * TILE + 1)
 }
 
-/// A place at or after the end of a line, brought back into it. Mirrored coordinates are folded before they are looked up.
+/// Wraps an index that may lie beyond the end of a side. Mirrored coordinates are folded before the lookup.
 fn beyond(index: usize, size: usize, wrap: Wrap) -> usize {
     match wrap {
         Wrap::Repeat => index % size,

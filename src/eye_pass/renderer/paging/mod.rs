@@ -12,24 +12,24 @@ pub(super) use image::{Level, Texels, stored};
 
 /// Side of a tile [texels]; `TILE` in the shader.
 pub(super) const TILE: usize = 64;
-/// Side of what is stored of it: with the texels that follow it, so that a look-up never needs two tiles.
+/// Side of a tile as stored: one texel more, so that a bilinear lookup never needs two tiles.
 pub(super) const STORED: usize = TILE + 1;
 
-/// Images are halved as long as a side is longer than this [texels]: smaller levels would take a place each and show
-/// little more.
+/// Images are halved while a side is longer than this [texels]: smaller levels would each take a whole slot for little
+/// benefit.
 const SMALLEST_LEVEL: usize = 16;
 
-/// Whether a coarser level follows one of this size.
+/// Whether a level of this size is followed by a coarser one.
 pub(super) fn is_halved(size: [usize; 2]) -> bool {
     size.into_iter().any(|side| side > SMALLEST_LEVEL)
 }
 
-/// What went to the device, by what had changed.
+/// What was uploaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Uploaded {
     /// Tiles of illumination maps on all levels, at most 64×64 texels each; black ones cost no bytes.
     pub tiles: u64,
-    /// Bytes of these tiles, with the texels of their neighbours that are stored with them.
+    /// Bytes of these tiles, including the texels of neighbouring tiles that are stored with them.
     pub tile_bytes: u64,
     /// Bytes of everything else: geometry, map coordinates, materials, textures.
     pub other_bytes: u64,
@@ -52,24 +52,24 @@ impl std::ops::AddAssign for Uploaded {
     }
 }
 
-/// Places side by side in a layer; `POOL_ACROSS` in the shader.
+/// Slots side by side in a layer; `POOL_ACROSS` in the shader.
 const ACROSS: u32 = 31;
-/// Places of a full layer.
+/// Slots of a full layer.
 const PER_LAYER: u32 = ACROSS * ACROSS;
 
-/// Places for tiles of one texel format, made as they are called for.
+/// Slots for tiles of one texel format. The texture grows on demand.
 #[derive(Debug)]
 pub(in super::super) struct TilePool {
     texture: wgpu::Texture,
     format: wgpu::TextureFormat,
     label: &'static str,
-    /// Rows of places in the only layer, or layers of full height.
+    /// Rows of slots in each layer; full height if there are several layers.
     rows: u32,
     layers: u32,
-    /// Places that were handed out at some time.
+    /// Slots handed out so far, including those that are free again.
     used: u32,
     free: Vec<u32>,
-    /// Whether the texture is another one than when this was last asked.
+    /// Whether the texture was replaced.
     is_new: bool,
 }
 
@@ -87,7 +87,7 @@ impl TilePool {
         }
     }
 
-    /// Room for this many more tiles; `None` where the device's textures cannot give it.
+    /// Makes room for this many more tiles; `None` if it exceeds the limits of the device's textures.
     fn reserve(&mut self, gpu: &Gpu, tiles: u32) -> Option<()> {
         let wanted = (self.used + tiles).saturating_sub(self.free.len() as u32);
         if wanted <= self.capacity() {
@@ -110,7 +110,7 @@ impl TilePool {
         Some(())
     }
 
-    /// A place that was reserved.
+    /// Takes a reserved slot.
     fn take(&mut self) -> u32 {
         self.free.pop().unwrap_or_else(|| {
             self.used += 1;
@@ -118,12 +118,11 @@ impl TilePool {
         })
     }
 
-    /// Gives a place back.
     fn release(&mut self, place: u32) {
         self.free.push(place);
     }
 
-    /// Fills a place from its corner on with texels, so many in a row.
+    /// Writes texels into a slot, `width` of them per row, starting at its corner.
     fn write<T: Pod>(&self, gpu: &Gpu, place: u32, texels: &[T], width: usize) {
         let within = place % PER_LAYER;
         let side = STORED as u32;
@@ -152,12 +151,12 @@ impl TilePool {
         );
     }
 
-    /// Places in use.
+    /// Slots in use.
     pub(in super::super) fn tiles(&self) -> u64 {
         u64::from(self.used) - self.free.len() as u64
     }
 
-    /// All places, as shaders read them.
+    /// All slots, as shaders read them.
     pub(in super::super) fn view(&self) -> wgpu::TextureView {
         self.texture.create_view(&wgpu::TextureViewDescriptor {
             dimension: Some(wgpu::TextureViewDimension::D2Array),
