@@ -141,21 +141,21 @@ impl Images {
             .maps
             .iter()
             .enumerate()
-            .filter_map(|(object, map)| Some((object, map.as_ref()?)))
+            .filter_map(|(receiver, map)| Some((receiver, map.as_ref()?)))
             .collect();
-        let costs = maps.iter().map(|(object, map)| Cost {
-            need: needs.get(*object).copied().unwrap_or(f64::INFINITY),
+        let costs = maps.iter().map(|(receiver, map)| Cost {
+            need: needs.get(*receiver).copied().unwrap_or(f64::INFINITY),
             tiles: (0..map.image.level_count())
                 .map(|level| map.image.tiles_of_level(level))
                 .collect(),
         });
         let finest = finest_levels(&costs.collect::<Vec<_>>(), self.budget_bytes / MAP_TILE_BYTES);
-        let wanted: Vec<(usize, usize)> = maps.iter().map(|(object, _)| *object).zip(finest).collect();
+        let wanted: Vec<(usize, usize)> = maps.iter().map(|(receiver, _)| *receiver).zip(finest).collect();
         let mut uploaded = Uploaded::default();
         // Evict first, to make room.
         for is_coarser in [true, false] {
-            for (object, finest) in &wanted {
-                if let Some(map) = &mut self.maps[*object]
+            for (receiver, finest) in &wanted {
+                if let Some(map) = &mut self.maps[*receiver]
                     && (*finest > map.image.finest()) == is_coarser
                 {
                     uploaded += map.image.set_finest(gpu, &mut self.map_pool, *finest);
@@ -193,8 +193,8 @@ impl Images {
             .count() as u64
     }
 
-    pub(super) fn map(&self, object: usize) -> Option<&DeviceMap> {
-        self.maps[object].as_ref()
+    pub(super) fn map(&self, receiver: Receiver) -> Option<&DeviceMap> {
+        self.maps[receiver.index()].as_ref()
     }
 
     pub(super) fn map_record(&self, receiver: Receiver) -> u32 {

@@ -180,8 +180,10 @@ impl Objects {
             })
             .collect();
         let peaks = (0..).zip(&self.list).map(|(index, look)| {
-            let peak_w_m2 = self.images.map(index).map_or(0.0, |map| f64::from(map.peak_w_m2));
-            look.peak_radiance(peak_w_m2)
+            let sides = [Receiver::front(index), Receiver::back(index)];
+            let maps = sides.into_iter().filter_map(|side| self.images.map(side));
+            let peak_w_m2 = maps.map(|map| map.peak_w_m2).fold(0.0, f32::max);
+            look.peak_radiance(f64::from(peak_w_m2))
         });
         self.peak_radiance = peaks.fold(0.0, f64::max);
         Uploaded::other(self.records.write(gpu, &records))

@@ -107,6 +107,19 @@ fn coarse_levels_are_the_mean_by_area() {
     assert!(mean_and_spread(&rig.picture(&from_above(61))).1 > 0.1 * grey);
 }
 
+/// Half floats overflow if the scale of a picture leaves out the map of the last object.
+#[test]
+fn maps_of_all_objects_set_the_scale() {
+    let mut scene = white_floor();
+    scene.objects.push(floor("bright", 0, 0.1));
+    let irradiance_w_m2 = 1e9_f32;
+    let mut rig = or_skip!(Rig::new(&scene, &[floor_map(1, 1, 1, vec![[irradiance_w_m2; 3]])]));
+    let expected = lambert(1.0, f64::from(irradiance_w_m2));
+    for found in red(&rig.picture(&from_above(8))) {
+        assert!((found / expected - 1.0).abs() <= 1e-3, "{found} {expected}");
+    }
+}
+
 /// What a mirror reflects of a check is the greyer the rougher it is: by a wider footprint.
 #[test]
 fn roughness_blurs_what_is_reflected() {
