@@ -25,7 +25,7 @@ const RECEIVER_QUERY: f64 = 0.4;
 const LEVEL_GROWTH: f64 = 4.0;
 
 /// Light whose photons have more segments than this goes more ways than patches should follow.
-const MAX_WAYS: f64 = 4.0;
+const MAX_PATHS: f64 = 4.0;
 
 /// Patches have to promise the target for this part of what photons take: they may promise too much, and what they took is
 /// lost with the change.
@@ -170,7 +170,7 @@ impl CausticLayer<'_> {
         let so_far = cost_of(&light_progress.levels, per_photon);
         let next = light_progress.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
         let promised = promised(light_progress, cost, most_share).unwrap_or(0.0);
-        let goes_many_ways = light_progress.levels.is_empty() && per_photon > MAX_WAYS;
+        let goes_many_ways = light_progress.levels.is_empty() && per_photon > MAX_PATHS;
         let is_late = are_photons_in_time(light_progress, state, course);
         let is_biased = is_biased(light_progress)
             && light_progress

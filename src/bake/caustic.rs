@@ -44,7 +44,7 @@ const ROUND_GAIN: f64 = 0.4;
 const MAX_ROUNDS: usize = 8;
 
 /// Patches with more of their light where a part of the spectrum is held in one place look finer than they are.
-const MAX_IN_ONE_PLACE: f64 = 0.3;
+const MAX_LUMPED_SHARE: f64 = 0.3;
 
 /// Part of the time that there is when light between surfaces is still to be gathered.
 const PART_BEFORE_INDIRECT: f64 = 0.85;
@@ -495,7 +495,7 @@ impl CausticLayer<'_> {
             }
             return Ok(());
         };
-        if light_progress.carrier == Carrier::Undecided && level.in_one_place > MAX_IN_ONE_PLACE {
+        if light_progress.carrier == Carrier::Undecided && level.lumped_share > MAX_LUMPED_SHARE {
             light_progress.turn_to_photons();
             light_progress.rival = None;
             return Ok(());

@@ -82,9 +82,9 @@ impl MapAssembler<'_> {
             }
         });
         let ledgers: Vec<LightLedger> = ledgers.collect();
-        let given_up = given_up_share(&ledgers);
-        let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(given_up));
-        let (estimated_visible, of_maps) = visible_error(&maps, given_up);
+        let truncated = truncated_share(&ledgers);
+        let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(truncated));
+        let (estimated_visible, of_maps) = visible_error(&maps, truncated);
         for (map, error) in maps.iter_mut().zip(of_maps) {
             map.estimated_visible = error;
         }
@@ -485,10 +485,10 @@ fn with_resolution(chart: &Chart, lit: &[LitMap], layers: &[Layer], error: Vec<f
 }
 
 /// Share of all light that no map shows though it should.
-fn given_up_share(ledgers: &[LightLedger]) -> f64 {
+fn truncated_share(ledgers: &[LightLedger]) -> f64 {
     let (mut lost_w, mut deposited_w) = (0.0, 0.0);
     for ledger in ledgers {
-        let share = accuracy::given_up_share(&ledger.energy_w);
+        let share = accuracy::truncated_share(&ledger.energy_w);
         lost_w += share * ledger.energy_w.deposited;
         deposited_w += ledger.energy_w.deposited;
     }

@@ -98,7 +98,7 @@ pub(super) struct LightLevel {
     /// closest-hit queries of photons and nothing.
     pub(super) work: (u64, u64),
     /// Of patches: share of their light that holds a part of the spectrum in one place.
-    pub(super) in_one_place: f64,
+    pub(super) lumped_share: f64,
     /// To be deposited again; `None` where that was too much to keep.
     pub(super) traced: Option<TracedLight>,
     /// Whether the maps have the light's colour already.

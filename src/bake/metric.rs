@@ -124,10 +124,10 @@ impl Counts {
     /// The error of a light's maps, of unit strength [1 per unit of strength].
     pub(super) fn of_light(&self, level: &LightLevel, error: &LightError) -> f64 {
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
-        let given_up = accuracy::given_up_share(&ledger);
+        let truncated = accuracy::truncated_share(&ledger);
         let images = accuracy::images(&level.maps, level.unit);
         let squares = images.iter().map(|(receiver, image)| {
-            let squares = self.squares(*receiver, image, error, given_up);
+            let squares = self.squares(*receiver, image, error, truncated);
             let by_area = squares.iter().enumerate();
             by_area
                 .map(|(texel, square)| square * image.area_m2(texel))
@@ -147,13 +147,13 @@ impl Counts {
     }
 
     /// Squared errors of texels, with what was given up of their light, as they count.
-    fn squares(&self, receiver: Receiver, image: &Image, error: &LightError, given_up: f64) -> Vec<f64> {
+    fn squares(&self, receiver: Receiver, image: &Image, error: &LightError, truncated: f64) -> Vec<f64> {
         let (Some(counts), Some(map)) = (self.0.get(&receiver), error.maps.get(&receiver)) else {
             return vec![0.0; image.luminance.len()];
         };
         let texels = counts.iter().zip(&map.texels).zip(&image.luminance);
         texels
-            .map(|((count, error), e)| count * (error * error + (given_up * e).powi(2)))
+            .map(|((count, error), e)| count * (error * error + (truncated * e).powi(2)))
             .collect()
     }
 }

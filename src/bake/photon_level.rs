@@ -90,15 +90,15 @@ impl CausticLayer<'_> {
         let known = last.and_then(|level| {
             let error = level.error.as_ref()?.estimate.relative_rmse;
             let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE);
-            let given_up = accuracy::given_up_share(&ledger.energy_w);
-            (error.is_finite() && error > 0.0).then_some((error, given_up))
+            let truncated = accuracy::truncated_share(&ledger.energy_w);
+            (error.is_finite() && error > 0.0).then_some((error, truncated))
         });
         let goal = aim.unwrap_or(target);
         let times = match known {
-            Some((error, given_up)) => {
+            Some((error, truncated)) => {
                 // More photons do not bring back what was given up.
-                let noise2 = error * error - given_up * given_up;
-                let wanted2 = (goal * goal - given_up * given_up).max((MIN_NOISE * goal).powi(2));
+                let noise2 = error * error - truncated * truncated;
+                let wanted2 = (goal * goal - truncated * truncated).max((MIN_NOISE * goal).powi(2));
                 if noise2 <= wanted2 {
                     return None;
                 }

@@ -113,7 +113,7 @@ impl CausticLayer<'_> {
             overshoots: report.overshoots,
             traced,
             work: (report.cells, report.receiver_queries),
-            in_one_place: report.in_one_place[1] as f64 / report.in_one_place[0].max(1) as f64,
+            lumped_share: report.lumped_flux[1] as f64 / report.lumped_flux[0].max(1) as f64,
             ..self.level(light, (key, unit), (maps, bands), report.ledger)
         }))
     }
@@ -140,7 +140,7 @@ impl CausticLayer<'_> {
             error: None,
             photons: None,
             work: (0, 0),
-            in_one_place: 0.0,
+            lumped_share: 0.0,
             traced: None,
             has_own_colour: self.spectra.has(light.light),
         }

@@ -4,6 +4,8 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use super::polygon::clipped;
+
 /// Minimum and maximum corner of a box [m].
 pub type Bounds = (DVec3, DVec3);
 
@@ -60,22 +62,6 @@ pub fn triangle_meets_box(corners: [DVec3; 3], (low, high): Bounds) -> bool {
         }
     }
     !polygon.is_empty()
-}
-
-/// The part of a convex polygon where a linear function is not negative (Sutherland and Hodgman 1974).
-fn clipped(polygon: &[DVec3], inside: impl Fn(DVec3) -> f64) -> Vec<DVec3> {
-    let mut part = Vec::with_capacity(polygon.len() + 1);
-    for (index, &a) in polygon.iter().enumerate() {
-        let b = polygon[(index + 1) % polygon.len()];
-        let (da, db) = (inside(a), inside(b));
-        if da >= 0.0 {
-            part.push(a);
-        }
-        if (da < 0.0) != (db < 0.0) {
-            part.push(a + (b - a) * (da / (da - db)));
-        }
-    }
-    part
 }
 
 #[cfg(test)]

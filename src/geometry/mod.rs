@@ -5,6 +5,7 @@ pub mod cube_face;
 pub mod enclosure;
 pub mod frustum;
 pub mod packed;
+pub mod polygon;
 pub mod ray;
 pub mod sampling;
 pub mod triangle;

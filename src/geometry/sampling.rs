@@ -6,6 +6,17 @@
 
 use glam::DVec2;
 
+/// Finaliser of SplitMix64, a hash of 64 bits without collisions (Steele, Lea and Flood, "Fast Splittable Pseudorandom
+/// Number Generators", OOPSLA 2014).
+pub fn mix64(mut bits: u64) -> u64 {
+    bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ bits >> 31
+}
+
+/// Increment of SplitMix64: 2⁶⁴ divided by the golden ratio.
+pub const GOLDEN_64: u64 = 0x9e37_79b9_7f4a_7c15;
+
 /// Direction numbers of Sobol's second dimension; the first is bit reversal.
 const fn second_dimension() -> [u32; 32] {
     let mut numbers = [0; 32];

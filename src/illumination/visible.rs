@@ -135,10 +135,10 @@ pub fn white(blocks: impl Iterator<Item = BlockLight>) -> Option<f64> {
     (counted_m2 > 0.0 && white.is_finite() && white > 0.0).then_some(white)
 }
 
-/// Visible error of all maps together, and of each. `given_up` is the share of traced light that was truncated, which
+/// Visible error of all maps together, and of each. `truncated` is the share of traced light that was truncated, which
 /// the error of the maps does not include. `None` if the error of a lit map is unknown, or if there is no caustic or
 /// indirect light.
-pub fn visible_error(maps: &[IlluminationMap], given_up: f64) -> (Option<f64>, Vec<Option<f64>>) {
+pub fn visible_error(maps: &[IlluminationMap], truncated: f64) -> (Option<f64>, Vec<Option<f64>>) {
     let none = || (None, vec![None; maps.len()]);
     let mut lit = Vec::with_capacity(maps.len());
     for map in maps {
@@ -152,7 +152,7 @@ pub fn visible_error(maps: &[IlluminationMap], given_up: f64) -> (Option<f64>, V
             [&all, &traced_of_texels].map(|values| blocks.means(&map.chart, |texel| values[texel]));
         let squares = blocks.means(&map.chart, |texel| {
             let error = map.error.as_ref().map_or(0.0, |error| f64::from(error[texel]));
-            error * error + (given_up * traced_of_texels[texel]).powi(2)
+            error * error + (truncated * traced_of_texels[texel]).powi(2)
         });
         let light: Vec<BlockLight> = blocks.lit(&all, &traced).collect();
         lit.push((light, squares));

@@ -341,9 +341,9 @@ pub fn estimate(
         let size = (image.width, image.height);
         error.maps.insert(receiver, MapError { size, texels, tiles });
     }
-    let given_up = given_up_share(ledger);
+    let truncated = truncated_share(ledger);
     let mean = flux_w / area_m2;
-    error.relative_rmse = (squares_sum / area_m2 / (mean * mean) + given_up * given_up).sqrt();
+    error.relative_rmse = (squares_sum / area_m2 / (mean * mean) + truncated * truncated).sqrt();
     (flux_w > 0.0).then_some(error)
 }
 
@@ -432,7 +432,7 @@ fn by_squares(
     let mean = flux_w / area_m2;
     error.relative_rmse = (squares_sum / area_m2 / (mean * mean))
         .sqrt()
-        .hypot(given_up_share(ledger));
+        .hypot(truncated_share(ledger));
     (flux_w > 0.0).then_some(error)
 }
 
@@ -456,7 +456,7 @@ fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<Receiver, (V
 
 /// Share of the light that is missing from the maps. Light that ended by depth or threshold is assumed to divide like
 /// the rest between maps, absorption and escape; all that could not be resolved, to be missing from the maps.
-pub fn given_up_share(ledger: &EnergyLedger) -> f64 {
+pub fn truncated_share(ledger: &EnergyLedger) -> f64 {
     let truncated = &ledger.truncated;
     let arrived = ledger.deposited + ledger.absorbed + ledger.escaped;
     let ended = truncated.depth + truncated.threshold;

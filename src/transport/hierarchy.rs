@@ -174,7 +174,7 @@ impl Hierarchy {
             };
             let is_nearer = best.as_ref().is_none_or(is_first);
             let is_there = || is_there(object as usize, triangle as usize, barycentric);
-            if !is_nearer || self.is_left((object, found)) || !is_there() {
+            if !is_nearer || self.is_stale((object, found)) || !is_there() {
                 return Some(f64::INFINITY);
             }
             let hit = RayHit {
@@ -204,7 +204,7 @@ impl Hierarchy {
             is_blocked = hit.is_some_and(|(hit_m, barycentric)| {
                 let (object, triangle) = self.triangle(found);
                 hit_m < distance_m
-                    && !self.is_left((object, found))
+                    && !self.is_stale((object, found))
                     && is_there(object as usize, triangle as usize, barycentric)
             });
             (!is_blocked).then_some(f64::INFINITY)
@@ -261,7 +261,7 @@ impl Hierarchy {
     }
 
     /// Whether a triangle belongs to the stale copy of a moved object.
-    fn is_left(&self, (object, (instance, _)): (u32, Found)) -> bool {
+    fn is_stale(&self, (object, (instance, _)): (u32, Found)) -> bool {
         instance.is_none() && self.is_moved(object as usize)
     }
 
@@ -391,7 +391,7 @@ impl<'a> SceneNode<'a> {
     }
 
     /// Whether the box may hold the stale copy of a moved object.
-    pub fn may_be_left(&self) -> bool {
+    pub fn may_be_stale(&self) -> bool {
         self.instance.is_none() && !self.hierarchy.moved.is_empty()
     }
 
@@ -401,7 +401,7 @@ impl<'a> SceneNode<'a> {
         self.node.slots().filter_map(move |slot| {
             let found = (instance, slot);
             let (object, _) = hierarchy.triangle(found);
-            (!hierarchy.is_left((object, found))).then(|| (object as usize, hierarchy.corners(found)))
+            (!hierarchy.is_stale((object, found))).then(|| (object as usize, hierarchy.corners(found)))
         })
     }
 }

@@ -471,7 +471,7 @@ impl Tracer {
     }
 
     /// Response of the diffuse component at a point of a triangle.
-    pub fn taking(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> DiffuseResponse {
+    pub fn diffuse_response(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> DiffuseResponse {
         let material = self.scene.material_of(object);
         let (share, polish) = match material.surface {
             SurfaceKind::Mixed => (1.0, material.polish),

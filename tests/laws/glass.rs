@@ -19,7 +19,7 @@ pub fn fill(t: &mut Table) {
     slabs_and_angles(t);
     bodies(t);
     absorption(t);
-    given_up(t);
+    truncated(t);
 }
 
 /// What goes through both surfaces of a slab at last: (1 − R)/(1 + R).
@@ -197,7 +197,7 @@ fn absorption(t: &mut Table) {
 }
 
 /// What is given up is booked by its cause, and is part of the estimated error; by both estimators.
-fn given_up(t: &mut Table) {
+fn truncated(t: &mut Table) {
     let slab = shapes::cuboid(DVec3::new(-1.0, 0.5, -1.0), DVec3::new(1.0, 0.7, 1.0));
     let scene = floor(0.5).sun(DVec3::NEG_Y).glass(1.5, slab);
     let r = dielectric_reflectance(1.0, 1.5);

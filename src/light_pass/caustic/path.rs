@@ -4,6 +4,7 @@ use glam::{DVec2, DVec3};
 
 use super::super::ledger_sum::{Account, LedgerSum};
 use crate::geometry::Ray;
+use crate::geometry::sampling::{GOLDEN_64, mix64};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
@@ -33,11 +34,8 @@ impl PathSignature {
     }
 
     fn mixed(self, word: u64) -> Self {
-        // Steele, Lea and Flood's SplitMix64 finaliser: distinct sequences collide with probability 2⁻⁶⁴.
-        let mut z = (self.0 ^ word).wrapping_add(0x9e37_79b9_7f4a_7c15);
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        Self(z ^ (z >> 31))
+        // Distinct sequences collide with probability 2⁻⁶⁴.
+        Self(mix64((self.0 ^ word).wrapping_add(GOLDEN_64)))
     }
 }
 

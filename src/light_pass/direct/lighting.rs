@@ -57,7 +57,7 @@ pub struct UnshadowedLight {
     /// Infinite for a sun.
     pub distance_m: f64,
     /// E at unit strength, before the coat reflects its share and the medium absorbs its own.
-    pub open: f64,
+    pub unoccluded: f64,
 }
 
 impl UnshadowedLight {
@@ -66,20 +66,20 @@ impl UnshadowedLight {
     pub fn from_beam(
         beam: &IncidentLight,
         point: &SurfacePoint,
-        taking: &DiffuseResponse,
-        within: &MediumAround,
+        response: &DiffuseResponse,
+        medium: &MediumAround,
     ) -> Option<Self> {
         if beam.to_light.dot(point.geometric_normal) < 0.0 {
             return None;
         }
         let cosine = beam.to_light.dot(point.shading_normal);
-        let open = beam.across_beam * cosine;
-        let strength = within.transmittance(beam.distance_m) * (open * taking.of(cosine, within.ior));
+        let unoccluded = beam.across_beam * cosine;
+        let strength = medium.transmittance(beam.distance_m) * (unoccluded * response.of(cosine, medium.ior));
         (strength.max_channel() > 0.0).then(|| Self {
             irradiance: beam.strength * strength,
             to_light: beam.to_light,
             distance_m: beam.distance_m,
-            open,
+            unoccluded,
         })
     }
 }

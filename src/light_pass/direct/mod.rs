@@ -108,7 +108,7 @@ fn begins_with_glance(sources: &[Option<DirectSource>]) -> bool {
         .iter()
         .flatten()
         .filter_map(|source| match &source.emission {
-            Emission::Soft(soft) => Some(soft.is_even),
+            Emission::Extended(soft) => Some(soft.is_even),
             Emission::Single(_) => None,
         });
     let even: Vec<bool> = soft.collect();
@@ -392,7 +392,9 @@ impl<'a> Baker<'a> {
     ) -> Sample {
         let point = facet.at(place);
         let object = self.chart.object();
-        let taking = self.tracer.taking(object, point.triangle, point.barycentric);
+        let response = self
+            .tracer
+            .diffuse_response(object, point.triangle, point.barycentric);
         let mut sample = Sample {
             irradiance: LinearSrgb::BLACK,
             mask: 0,
@@ -404,8 +406,9 @@ impl<'a> Baker<'a> {
             let Some(source) = source else { continue };
             match &source.emission {
                 Emission::Single(emitter) => {
-                    let arriving = IncidentLight::new(emitter, point.position)
-                        .and_then(|beam| UnshadowedLight::from_beam(&beam, &point, &taking, &source.within));
+                    let arriving = IncidentLight::new(emitter, point.position).and_then(|beam| {
+                        UnshadowedLight::from_beam(&beam, &point, &response, &source.medium)
+                    });
                     let Some(arriving) = arriving else { continue };
                     sample.shadow_rays += 1;
                     let ray = point.spawn(arriving.to_light);
@@ -417,10 +420,15 @@ impl<'a> Baker<'a> {
                         sample.mask ^= mark_of(light).rotate_left(1);
                     }
                 }
-                Emission::Soft(soft) => {
+                Emission::Extended(soft) => {
                     let run = soft.run(hash, index, look);
-                    let gathered =
-                        soft.gather(self.tracer, &point, (self.material, &taking), &source.within, run);
+                    let gathered = soft.gather(
+                        self.tracer,
+                        &point,
+                        (self.material, &response),
+                        &source.medium,
+                        run,
+                    );
                     sample.shadow_rays += gathered.shadow_rays;
                     sample.irradiance += gathered.irradiance;
                     sample.soft += gathered.irradiance.luminance();

@@ -2,6 +2,8 @@
 
 use glam::DVec3;
 
+use crate::geometry::polygon::clipped;
+
 /// A flat polygon that emits uniformly.
 #[derive(Clone, Debug)]
 pub struct Polygon {
@@ -40,25 +42,10 @@ impl Polygon {
             return 0.0;
         }
         let from_point: Vec<DVec3> = self.corners.iter().map(|corner| *corner - point).collect();
-        let above = clipped(&clipped(&from_point, geometric), shading);
+        let above = clipped(&from_point, |corner| geometric.dot(corner));
+        let above = clipped(&above, |corner| shading.dot(corner));
         cosine_integral(&above, shading)
     }
-}
-
-/// The part of a polygon on the positive side of a plane through the origin (Sutherland and Hodgman 1974).
-fn clipped(corners: &[DVec3], normal: DVec3) -> Vec<DVec3> {
-    let mut kept = Vec::with_capacity(corners.len() + 2);
-    for (index, &here) in corners.iter().enumerate() {
-        let next = corners[(index + 1) % corners.len()];
-        let (at, then) = (normal.dot(here), normal.dot(next));
-        if at >= 0.0 {
-            kept.push(here);
-        }
-        if (at >= 0.0) != (then >= 0.0) {
-            kept.push(here.lerp(next, at / (at - then)));
-        }
-    }
-    kept
 }
 
 /// ∫ cos θ dω over a polygon above the horizon of `normal`, seen from the origin: half the sum over its edges of the

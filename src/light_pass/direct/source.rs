@@ -15,7 +15,7 @@ use super::lighting::{IncidentLight, UnshadowedLight};
 use super::polygon::Polygon;
 use super::surroundings::MediumAround;
 use super::texel::SamplingDetail;
-use crate::geometry::sampling::even_point;
+use crate::geometry::sampling::{even_point, mix64};
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, EmitterSampler};
 use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
@@ -32,25 +32,25 @@ const MAX_POLYGONS: usize = 16;
 /// Corners of the polygon that approximates a disc.
 const DISC_CORNERS: usize = 64;
 /// Part of its length by which a shadow ray ends short of a light, so as not to hit the light's own surface.
-const BEFORE_LAMP: f64 = 1e-9;
+const SHADOW_RAY_MARGIN: f64 = 1e-9;
 const SEED: u64 = 0x6c69_6768_7473;
 
 /// A light prepared for sampling.
 pub struct DirectSource {
     pub emission: Emission,
     /// Medium that the light travels through.
-    pub within: MediumAround,
+    pub medium: MediumAround,
 }
 
 pub enum Emission {
     /// A single point or direction.
     Single(Emitter),
-    Soft(Soft),
+    Extended(ExtendedLight),
 }
 
 /// An extended light.
-pub struct Soft {
-    places: ManyPlaces,
+pub struct ExtendedLight {
+    places: LightSamples,
     /// Polygons of a simple light: its unoccluded E is analytic, and samples only estimate occlusion.
     shape: Option<Shape>,
     light: u64,
@@ -58,7 +58,7 @@ pub struct Soft {
     pub is_even: bool,
 }
 
-enum ManyPlaces {
+enum LightSamples {
     /// Each as if all light came from there.
     Emitters { all: Vec<Emitter>, area_m2: f64 },
     /// Directions: half of a run sampled from the sky, half by the cosine at the surface.
@@ -98,7 +98,7 @@ impl DirectSource {
     pub fn new(light: &Light, tracer: &Tracer, index: usize) -> Option<Self> {
         let scene = tracer.scene();
         let middle = Emitter::middle(light, scene);
-        let within = middle
+        let medium = middle
             .as_ref()
             .and_then(|middle| middle.kind.position())
             .map_or(MediumAround::VACUUM, |place| MediumAround::at(tracer, place));
@@ -107,8 +107,8 @@ impl DirectSource {
             let has_image =
                 matches!(light.kind, LightKind::Surface { object, .. } if scene.glows.contains_key(&object));
             let is_narrow = |size: LightSize| matches!(size, LightSize::Angle { diameter_rad } if diameter_rad <= NARROW_RAD);
-            Emission::Soft(Soft {
-                places: ManyPlaces::new(light, scene, index, shape.is_some())?,
+            Emission::Extended(ExtendedLight {
+                places: LightSamples::new(light, scene, index, shape.is_some())?,
                 light: index as u64,
                 is_even: (shape.is_some() && !has_image) || is_narrow(light.size),
                 shape,
@@ -116,11 +116,11 @@ impl DirectSource {
         } else {
             Emission::Single(middle?)
         };
-        Some(Self { emission, within })
+        Some(Self { emission, medium })
     }
 }
 
-impl ManyPlaces {
+impl LightSamples {
     /// A light with a shape is sampled uniformly by area.
     fn new(light: &Light, scene: &Scene, index: usize, has_shape: bool) -> Option<Self> {
         let sequence = |count: usize, pair| {
@@ -215,16 +215,16 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
     })
 }
 
-impl Soft {
+impl ExtendedLight {
     /// The light's samples for sample point `place` of a texel, which has `places` sample points.
     pub fn run(&self, texel: u64, place: usize, (places, look): (usize, SamplingDetail)) -> Range<usize> {
         let (ready, of_texel) = match self.places {
-            ManyPlaces::Sky { .. } => (2 * READY_OF_SKY, look.samples_of_sky),
+            LightSamples::Sky { .. } => (2 * READY_OF_SKY, look.samples_of_sky),
             _ => (READY, look.samples_of_lamp),
         };
         let each = (of_texel / places.max(1)).max(2);
         let runs = ready / (each * places.next_power_of_two());
-        let run = (mixed(texel ^ mixed(self.light)) % runs.max(1) as u64) as usize;
+        let run = (mix64(texel ^ mix64(self.light)) % runs.max(1) as u64) as usize;
         let first = (run * places + place) * each % ready;
         first..first + each
     }
@@ -234,8 +234,8 @@ impl Soft {
         &self,
         tracer: &Tracer,
         point: &SurfacePoint,
-        (material, taking): (&Material, &DiffuseResponse),
-        within: &MediumAround,
+        (material, response): (&Material, &DiffuseResponse),
+        medium: &MediumAround,
         run: Range<usize>,
     ) -> Gathered {
         let count = run.len() as f64;
@@ -243,11 +243,11 @@ impl Soft {
         for index in run.clone() {
             let arriving = self
                 .beam(index, &run, point, material)
-                .and_then(|beam| UnshadowedLight::from_beam(&beam, point, taking, within));
+                .and_then(|beam| UnshadowedLight::from_beam(&beam, point, response, medium));
             let Some(arriving) = arriving else { continue };
             sum.shadow_rays += 1;
-            sum.open += arriving.open;
-            let distance_m = arriving.distance_m * (1.0 - BEFORE_LAMP);
+            sum.unoccluded += arriving.unoccluded;
+            let distance_m = arriving.distance_m * (1.0 - SHADOW_RAY_MARGIN);
             let passing = tracer.passing_share(&point.spawn(arriving.to_light), distance_m);
             sum.blocked_rays += u64::from(passing < 1.0);
             sum.irradiance += arriving.irradiance * passing;
@@ -255,8 +255,8 @@ impl Soft {
         let irradiance = match &self.shape {
             // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018. The
             // ratio includes the image on a light, as it includes shadows.
-            Some(shape) if sum.open > 0.0 => {
-                sum.irradiance * (shape.seen_sr(point) / (sum.open * shape.area_m2))
+            Some(shape) if sum.unoccluded > 0.0 => {
+                sum.irradiance * (shape.projected_solid_angle_sr(point) / (sum.unoccluded * shape.area_m2))
             }
             Some(_) => LinearSrgb::BLACK,
             None => sum.irradiance / count,
@@ -277,7 +277,7 @@ impl Soft {
         material: &Material,
     ) -> Option<IncidentLight> {
         match &self.places {
-            ManyPlaces::Emitters { all, area_m2 } => {
+            LightSamples::Emitters { all, area_m2 } => {
                 let patch_m2 = if self.shape.is_some() {
                     0.0
                 } else {
@@ -285,7 +285,7 @@ impl Soft {
                 };
                 IncidentLight::of_patch(&all[index], point.position, patch_m2)
             }
-            ManyPlaces::Sky {
+            LightSamples::Sky {
                 sky,
                 strength,
                 to_light,
@@ -308,7 +308,7 @@ impl Soft {
                     strength: *strength * sky.radiance(to_light),
                 })
             }
-            ManyPlaces::Ball {
+            LightSamples::Ball {
                 centre,
                 radius_m,
                 radiance,
@@ -358,15 +358,15 @@ impl Cosines {
 #[derive(Default)]
 struct Sum {
     irradiance: LinearSrgb,
-    /// Σ [`UnshadowedLight::open`].
-    open: f64,
+    /// Σ [`UnshadowedLight::unoccluded`].
+    unoccluded: f64,
     shadow_rays: u64,
     blocked_rays: u64,
 }
 
 impl Shape {
     /// Unoccluded E/L [sr] at a point.
-    fn seen_sr(&self, point: &SurfacePoint) -> f64 {
+    fn projected_solid_angle_sr(&self, point: &SurfacePoint) -> f64 {
         let seen = self.polygons.iter().map(|polygon| {
             polygon.projected_solid_angle_sr(point.position, point.geometric_normal, point.shading_normal)
         });
@@ -404,11 +404,4 @@ fn ball(
         across_beam: TAU * cap,
         strength: radiance,
     })
-}
-
-/// 64-bit hash (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
-fn mixed(mut code: u64) -> u64 {
-    code = (code ^ (code >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    code = (code ^ (code >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    code ^ (code >> 31)
 }

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use crate::geometry::sampling::{GOLDEN_64, mix64};
 use crate::optics::LinearSrgb;
 
 /// Numbers of samples per texel.
@@ -63,10 +64,7 @@ impl LightsOfTexel {
 
 /// A light's mark in a mask. XOR combines marks; masks of different sets differ for any number of lights (SplitMix64).
 pub fn mark_of(light: usize) -> u64 {
-    let mut bits = (light as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    bits ^ bits >> 31
+    mix64((light as u64 + 1).wrapping_mul(GOLDEN_64))
 }
 
 /// Sums over the samples of one texel that lie on the surface.

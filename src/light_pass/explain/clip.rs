@@ -2,6 +2,8 @@
 
 use glam::DVec2;
 
+use crate::geometry::polygon::clipped;
+
 /// Triangles of less area count by the position of their centroid [unit squares].
 const MIN_AREA: f64 = 1e-12;
 
@@ -12,7 +14,6 @@ pub(super) fn share_in_square(triangle: [DVec2; 3]) -> f64 {
         let middle = (triangle[0] + triangle[1] + triangle[2]) / 3.0;
         return f64::from(u8::from(is_in_square(middle)));
     }
-    // Clipped against one side after the other (Sutherland and Hodgman, CACM 1974).
     let sides = [
         (DVec2::X, 0.0),
         (DVec2::NEG_X, -1.0),
@@ -21,19 +22,7 @@ pub(super) fn share_in_square(triangle: [DVec2; 3]) -> f64 {
     ];
     let mut polygon = triangle.to_vec();
     for (inwards, least) in sides {
-        let height = |point: DVec2| point.dot(inwards) - least;
-        let mut kept = Vec::with_capacity(polygon.len() + 1);
-        for (index, &to) in polygon.iter().enumerate() {
-            let from = polygon[(index + polygon.len() - 1) % polygon.len()];
-            let (a, b) = (height(from), height(to));
-            if (a >= 0.0) != (b >= 0.0) {
-                kept.push(from + (to - from) * (a / (a - b)));
-            }
-            if b >= 0.0 {
-                kept.push(to);
-            }
-        }
-        polygon = kept;
+        polygon = clipped(&polygon, |point| point.dot(inwards) - least);
     }
     (area(&polygon).abs() / whole).min(1.0)
 }

@@ -189,7 +189,7 @@ fn explain_light(
         let search = searcher.search();
         found.rays += search.rays;
         found.is_complete &= search.is_complete;
-        for pieces in hanging_together(search.pieces) {
+        for pieces in connected(search.pieces) {
             let way = pieces[0].way;
             let Some(mut path) = path_of(&searcher.walker, visible_light.light, &pieces) else {
                 continue;
@@ -209,7 +209,7 @@ fn explain_light(
 }
 
 /// Groups of pieces that are connected by corners and lie on the same path.
-fn hanging_together(pieces: Vec<LitCell>) -> Vec<Vec<LitCell>> {
+fn connected(pieces: Vec<LitCell>) -> Vec<Vec<LitCell>> {
     let mut groups: Vec<usize> = (0..pieces.len()).collect();
     fn root(groups: &mut [usize], mut at: usize) -> usize {
         while groups[at] != at {

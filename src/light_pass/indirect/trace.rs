@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::grid::{Grid, cosine_direction};
 use super::network::SurfaceGrids;
 use super::path::Follower;
-use crate::geometry::sampling::even_point;
+use crate::geometry::sampling::{GOLDEN_64, even_point, mix64};
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Mesh;
@@ -206,9 +206,11 @@ impl GatherPass<'_> {
         let point = grid.point(mesh, element, even_point(index, 0, seed))?;
         let direction = cosine_direction(&point, even_point(index, 1, seed));
         let own = grid.chart.object();
-        let taking = self.tracer().taking(own, point.triangle, point.barycentric);
+        let response = self
+            .tracer()
+            .diffuse_response(own, point.triangle, point.barycentric);
         let ior_around = media.ior(self.tracer().scene());
-        let share = taking.of(direction.dot(point.shading_normal), ior_around);
+        let share = response.of(direction.dot(point.shading_normal), ior_around);
         let first = part.links.len();
         let (links, counts) = (&mut part.links, &mut part.counts);
         let found = self.follower.follow(
@@ -253,7 +255,8 @@ impl GatherPass<'_> {
     fn seed_of(&self, grid: &Grid, element: usize) -> u64 {
         let element = grid.elements.all()[element];
         let place = (grid.chart.receiver.index() as u64) << 40 ^ u64::from(element.texel);
-        mixed(place ^ mixed(u64::from(element.piece) ^ mixed(self.seed)))
+        let hash = |code: u64| mix64(code.wrapping_add(GOLDEN_64));
+        hash(place ^ hash(u64::from(element.piece) ^ hash(self.seed)))
     }
 }
 
@@ -266,12 +269,4 @@ fn stance(ends: &[RayEnd]) -> ElementPoints {
     } else {
         ElementPoints::Outside
     }
-}
-
-/// 64-bit hash (the finaliser of SplitMix64: Steele, Lea and Flood 2014).
-fn mixed(code: u64) -> u64 {
-    let mut code = code.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    code = (code ^ (code >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    code = (code ^ (code >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    code ^ (code >> 31)
 }

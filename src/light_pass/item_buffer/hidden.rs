@@ -14,6 +14,7 @@ use super::CELLS_PER_SIDE;
 use super::bits::CellBits;
 use super::grid::Grid;
 use super::polygon::Polygon;
+use crate::geometry::polygon::clipped;
 use crate::light_pass::launch::Launch;
 
 /// Widths below this are rounding error [half sides of a face].
@@ -246,24 +247,8 @@ fn without(piece: Vec<DVec3>, facet: &Facet) -> Vec<Vec<DVec3>> {
         if lowest >= -sliver {
             continue;
         }
-        left.push(half(&inside, &heights, -1.0));
-        inside = half(&inside, &heights, 1.0);
+        left.push(clipped(&inside, |corner| -corner.dot(edge)));
+        inside = clipped(&inside, |corner| corner.dot(edge));
     }
     left
-}
-
-/// The part of a convex polygon whose heights have the given sign.
-fn half(polygon: &[DVec3], heights: &[f64], sign: f64) -> Vec<DVec3> {
-    let mut part = Vec::with_capacity(polygon.len() + 1);
-    for (index, &a) in polygon.iter().enumerate() {
-        let next = (index + 1) % polygon.len();
-        let (da, db) = (sign * heights[index], sign * heights[next]);
-        if da >= 0.0 {
-            part.push(a);
-        }
-        if (da < 0.0) != (db < 0.0) {
-            part.push(a + (polygon[next] - a) * (da / (da - db)));
-        }
-    }
-    part
 }

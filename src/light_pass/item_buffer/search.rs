@@ -8,6 +8,7 @@ use super::bits::CellBits;
 use super::grid::{CellRange, Grid};
 use super::hidden::Facet;
 use super::polygon::{Polygon, WIDENED};
+use crate::geometry::sampling::GOLDEN_64;
 use crate::light_pass::launch::Launch;
 use crate::scene::InScene;
 use crate::transport::SceneNode;
@@ -183,7 +184,7 @@ impl<'a> Search<'a> {
             let before = open.count();
             for sample in batch * BATCH..(batch + 1) * BATCH {
                 // Multiples of the golden ratio fill an interval evenly.
-                let share = sample.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+                let share = sample.wrapping_mul(GOLDEN_64);
                 let triangle = (u128::from(share) * u128::from(count)) >> 64;
                 let vertex = mesh.triangle(triangle as usize)[0];
                 self.close_at(mesh.position(vertex as usize), open);
@@ -247,7 +248,7 @@ impl<'a> Search<'a> {
 
     /// Whether a node has a wanted triangle.
     fn holds_wanted(&self, node: SceneNode) -> bool {
-        if !node.may_be_left() && !overlaps(node.bounds(), self.others) {
+        if !node.may_be_stale() && !overlaps(node.bounds(), self.others) {
             return true;
         }
         let mut waiting = vec![node];

@@ -385,7 +385,7 @@ mod tests {
     fn triangles_cover_a_square() {
         const CORNERS: [[f64; 2]; 4] = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]];
         for number in 0..1000_u64 {
-            let point = in_square(number.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+            let point = in_square(number.wrapping_mul(crate::geometry::sampling::GOLDEN_64));
             let (triangle, [middle, first, second]) = triangle_at(point);
             let [a, b] = super::super::survey::TRIANGLES[triangle].map(|corner| DVec2::from(CORNERS[corner]));
             assert!([middle, first, second].iter().all(|part| *part >= 0.0), "{point}");

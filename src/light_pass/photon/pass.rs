@@ -11,6 +11,7 @@ use super::bundles::{Bundles, Carried};
 use super::launch::{PhotonLaunch, Start};
 use super::survey::Surveyor;
 use super::walk::{Hit, PhotonArrival, PhotonRules, PhotonWalk};
+use crate::geometry::sampling::GOLDEN_64;
 use crate::illumination::accumulator::FluxCount;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::caustic::pass::{PassReport, ProgressScope, Stopwatch};
@@ -285,5 +286,5 @@ fn set_of(band: Option<usize>, sets: usize) -> usize {
 pub fn half_seed(seed: u64, half: usize) -> u64 {
     seed.wrapping_mul(2)
         .wrapping_add(half as u64)
-        .wrapping_mul(0x9e37_79b9_7f4a_7c15)
+        .wrapping_mul(GOLDEN_64)
 }

@@ -23,7 +23,7 @@ const MIN_SHARE: f64 = 0.01;
 const MAX_STEPS: usize = 12;
 
 /// Maximum number of paths of a point; further ones are left to photons.
-const MAX_WAYS: usize = 16;
+const MAX_PATHS: usize = 16;
 
 /// Photons per cell below which bundles are not worth a survey: for light from one point or direction, and for an
 /// extended light, which takes more points to follow.
@@ -298,7 +298,7 @@ impl Surveyor<'_> {
         if !from.steps.is_empty() && taken_w.max_channel() > 0.0 {
             let receiver = Receiver::new(hit.object, Side::met(from.ray.direction, hit.geometric_normal));
             let place = self.place(receiver, hit);
-            match place.filter(|_| taken_w.is_finite() && light.arrivals.len() < MAX_WAYS) {
+            match place.filter(|_| taken_w.is_finite() && light.arrivals.len() < MAX_PATHS) {
                 Some(place) if taken_w.max_channel() >= least_w => light.arrivals.push(Arrival {
                     key: from.key.at(receiver.index(), 0),
                     steps: from.steps.as_slice().into(),
@@ -315,7 +315,7 @@ impl Surveyor<'_> {
         let mut go_on = |branch: Branch| {
             let flux_w = flux_w * branch.share;
             let is_followed = from.steps.len() < MAX_STEPS.min(self.rules.max_depth as usize)
-                && waiting.len() < MAX_WAYS
+                && waiting.len() < MAX_PATHS
                 && flux_w.is_finite();
             if !is_followed || flux_w.max_channel() < least_w {
                 light.lose(flux_w);
@@ -356,7 +356,7 @@ impl Candidate {
         let of_way = |middle| {
             (
                 middle,
-                self.bent_texels(middle) / MAX_BENT_TEXELS,
+                self.deviation_texels(middle) / MAX_BENT_TEXELS,
                 self.moves(middle),
             )
         };
@@ -430,7 +430,7 @@ impl Candidate {
     }
 
     /// Deviation of the centre's arrival from the mean of opposite corners on the same path [texels].
-    fn bent_texels(&self, middle: &Arrival) -> f64 {
+    fn deviation_texels(&self, middle: &Arrival) -> f64 {
         let bends = [[0, 3], [1, 2]].map(|opposite| {
             let [a, b] = opposite.map(|corner| self.corners[corner].find(middle.key));
             let bend = (0.5 * (a?.place + b?.place) - middle.place).abs();

@@ -6,7 +6,7 @@ use super::bundles::{Bundle, Carried, Step};
 use super::launch::{LAMP_DIMENSION, Start};
 use super::spectrum::{Hue, PhotonSpectrum};
 use crate::geometry::Ray;
-use crate::geometry::sampling::{even_number, even_point};
+use crate::geometry::sampling::{GOLDEN_64, even_number, even_point, mix64};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -415,10 +415,7 @@ impl Random {
     }
 
     fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 * (-53_f64).exp2()
+        self.0 = self.0.wrapping_add(GOLDEN_64);
+        (mix64(self.0) >> 11) as f64 * (-53_f64).exp2()
     }
 }

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use glam::DVec2;
 
-use super::strand::{LatticeRay, PathSegment};
+use super::lattice_ray::{LatticeRay, PathSegment};
 
 /// Address of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -35,8 +35,8 @@ impl Samples {
         &self.chunks[id.chunk as usize][id.index as usize]
     }
 
-    pub fn strand(&self, id: SampleId, strand: u16) -> &PathSegment {
-        &self.get(id).strands[usize::from(strand)]
+    pub fn segment(&self, id: SampleId, segment: u16) -> &PathSegment {
+        &self.get(id).segments[usize::from(segment)]
     }
 }
 

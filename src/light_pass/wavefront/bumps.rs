@@ -3,7 +3,7 @@
 
 use glam::DVec2;
 
-use super::strand::LatticeRay;
+use super::lattice_ray::LatticeRay;
 use crate::transport::RayDifferential;
 
 /// Cells per period of the bumps in the finest lattice: a cubic patch then follows a sine to about 2 %.

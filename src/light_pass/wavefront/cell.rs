@@ -5,10 +5,10 @@ use glam::DVec2;
 use super::band::{Corner, SampleId, Workspace};
 use super::cell_tests::worst_mismatch;
 use super::edge::{Edge, EdgeCutter, EdgeReach, SUSPICION, may_bulge, mismatch};
+use super::lattice_ray::LatticeRay;
 use super::refine::{Refinement, RoundSet};
 use super::regions::{Outline, regions, triangles};
 use super::spectrum::{LightPart, NODES};
-use super::strand::LatticeRay;
 use super::subcell_features::SubcellFeatures;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::caustic::path::PathSignature;
@@ -228,10 +228,10 @@ impl CellCutter<'_> {
                 self.scatter(cell, work, out)
             };
         }
-        let strands = signatures(cell, work, |sample, found| {
-            found.extend(sample.strands.iter().map(|strand| strand.signature));
+        let segments = signatures(cell, work, |sample, found| {
+            found.extend(sample.segments.iter().map(|segment| segment.signature));
         });
-        for signature in strands.into_iter().filter(|signature| !self.is_done(*signature)) {
+        for signature in segments.into_iter().filter(|signature| !self.is_done(*signature)) {
             for region in light_regions(cell, signature, work) {
                 self.emit(cell, &region, signature, work, out);
             }
@@ -308,9 +308,9 @@ impl CellCutter<'_> {
     /// Emits the patches of a cell whose corners agree.
     pub(super) fn patches(&self, cell: &Cell, work: &mut Workspace, out: &mut CellOutput) {
         let ids = cell.corners.map(|corner| corner.sample);
-        for strand in 0..work.get(ids[0]).strands.len() {
-            if !self.is_done(work.get(ids[0]).strands[strand].signature) {
-                let corners = ids.map(|id| (id, strand as u16));
+        for segment in 0..work.get(ids[0]).segments.len() {
+            if !self.is_done(work.get(ids[0]).segments[segment].signature) {
+                let corners = ids.map(|id| (id, segment as u16));
                 self.rectangle(cell, corners, work, out);
             }
         }
@@ -325,8 +325,8 @@ impl CellCutter<'_> {
         out: &mut CellOutput,
     ) {
         let corners = cell.corners.map(|corner| {
-            let strand = work.get(corner.sample).find(signature);
-            (corner.sample, strand.expect("all corners have it") as u16)
+            let segment = work.get(corner.sample).find(signature);
+            (corner.sample, segment.expect("all corners have it") as u16)
         });
         self.rectangle(cell, corners, work, out);
     }
@@ -485,13 +485,13 @@ impl CellCutter<'_> {
         let (low, high) = (corner.square.min(centre), corner.square.max(centre));
         let area = (high.x - low.x) * (high.y - low.y);
         let sample = work.get(corner.sample);
-        for strand in 0..sample.strands.len() {
-            if self.is_done(sample.strands[strand].signature) {
+        for segment in 0..sample.segments.len() {
+            if self.is_done(sample.segments[segment].signature) {
                 continue;
             }
             out.splats += 1;
             out.patches.push(Patch {
-                corners: [(corner.sample, strand as u16); 4],
+                corners: [(corner.sample, segment as u16); 4],
                 squares: [corner.square, low, high, high],
                 kind: PatchKind::SingleRay,
                 tone: self.tone,
@@ -514,10 +514,10 @@ impl CellCutter<'_> {
         out: &mut CellOutput,
     ) {
         let corner = |outline: &Outline| {
-            let strand = work.get(outline.sample).find(signature);
+            let segment = work.get(outline.sample).find(signature);
             (
                 outline.sample,
-                strand.expect("regions are made of samples that have the strand") as u16,
+                segment.expect("regions are made of samples that have the segment") as u16,
             )
         };
         if region.len() == 4
@@ -534,14 +534,14 @@ impl CellCutter<'_> {
             let corners = [a, b, c, c].map(|outline| corner(&outline));
             let worst = (0..3)
                 .map(|i| {
-                    let strand = |i: usize| {
-                        let (id, strand) = corners[i];
-                        &work.get(id).strands[usize::from(strand)]
+                    let segment = |i: usize| {
+                        let (id, segment) = corners[i];
+                        &work.get(id).segments[usize::from(segment)]
                     };
                     let next = (i + 1) % 3;
                     mismatch(
-                        strand(i),
-                        strand(next),
+                        segment(i),
+                        segment(next),
                         triangle[next].square - triangle[i].square,
                     )
                 })
@@ -584,7 +584,7 @@ impl CellCutter<'_> {
     /// Books what a surface did with the light of some samples, each weighted by its area of the unit square. What it
     /// passed on is booked against the flux of the segments.
     pub(super) fn book(&self, weighted: &[(SampleId, usize, f64)], work: &Workspace, out: &mut CellOutput) {
-        let sum = |of: fn(&super::strand::SurfaceFluxRecord) -> LinearSrgb| {
+        let sum = |of: fn(&super::lattice_ray::SurfaceFluxRecord) -> LinearSrgb| {
             let sum = weighted.iter().fold(LinearSrgb::BLACK, |sum, &(id, node, area)| {
                 sum + of(&work.get(id).nodes[node]) * area
             });

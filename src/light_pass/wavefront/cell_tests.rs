@@ -5,8 +5,8 @@ use glam::DVec2;
 use super::band::{SampleId, Workspace};
 use super::cell::{CHECK_MISMATCH, Cell, CellCutter, EDGE_ENDS, reach_of};
 use super::edge::{EdgeReach, mismatch};
+use super::lattice_ray::LatticeRay;
 use super::patch::PatchShape;
-use super::strand::LatticeRay;
 use crate::geometry::Ray;
 use crate::light_pass::caustic::path::PathSignature;
 
@@ -46,9 +46,9 @@ impl CellCutter<'_> {
     pub(super) fn needs_check_ray(&self, cell: &Cell, work: &mut Workspace) -> bool {
         let ids = cell.corners.map(|corner| corner.sample);
         let brightest_w = ids.iter().map(|id| work.get(*id).brightest_w).fold(0.0, f64::max);
-        (0..work.get(ids[0]).strands.len()).any(|strand| {
-            let corners = ids.map(|id| (id, strand as u16));
-            let flux_w = work.get(ids[0]).strands[strand].flux_w.luminance();
+        (0..work.get(ids[0]).segments.len()).any(|segment| {
+            let corners = ids.map(|id| (id, segment as u16));
+            let flux_w = work.get(ids[0]).segments[segment].flux_w.luminance();
             flux_w > BRIGHT_SHARE * brightest_w
                 && worst_mismatch(cell, corners, work) > CHECK_MISMATCH
                 && self.check(cell, corners, cell.step(), work).is_none_or(
@@ -74,9 +74,9 @@ impl CellCutter<'_> {
     ) -> Option<Check> {
         let middle = cell.corners[0].square + step * 0.5;
         let middle = self.edges.corner(middle, work);
-        let strands = corners.map(|(id, strand)| &work.get(id).strands[usize::from(strand)]);
+        let segments = corners.map(|(id, segment)| &work.get(id).segments[usize::from(segment)]);
         let check = work.get(middle.sample);
-        let found = &check.strands[check.find(strands[0].signature)?];
+        let found = &check.segments[check.find(segments[0].signature)?];
         let reach_m = found.landing.distance_m();
         let reach_m = if reach_m.is_finite() { reach_m } else { 1.0 };
         let apart = |a: &Ray, b: &Ray| {
@@ -85,9 +85,9 @@ impl CellCutter<'_> {
         };
         let error = |shape: &PatchShape| apart(&shape.ray(DVec2::splat(0.5)), &found.ray);
         Some(Check {
-            cubic: error(&PatchShape::coons(strands, step)),
-            bilinear: error(&PatchShape::bilinear(strands)),
-            width: apart(&strands[0].ray, &strands[2].ray).max(apart(&strands[1].ray, &strands[3].ray)),
+            cubic: error(&PatchShape::coons(segments, step)),
+            bilinear: error(&PatchShape::bilinear(segments)),
+            width: apart(&segments[0].ray, &segments[2].ray).max(apart(&segments[1].ray, &segments[3].ray)),
         })
     }
 
@@ -154,9 +154,9 @@ fn least_bright_w(samples: [&LatticeRay; 4]) -> f64 {
 
 /// Signatures of a sample's bright light.
 fn bright(sample: &LatticeRay, least_w: f64) -> Vec<PathSignature> {
-    let strands = sample.strands.iter();
-    let bright = strands.filter(|strand| strand.flux_w.luminance() > least_w);
-    bright.map(|strand| strand.signature).collect()
+    let segments = sample.segments.iter();
+    let bright = segments.filter(|segment| segment.flux_w.luminance() > least_w);
+    bright.map(|segment| segment.signature).collect()
 }
 
 /// All signatures, ascending and without duplicates.
@@ -169,13 +169,13 @@ fn all_bright(ways: impl Iterator<Item = Vec<PathSignature>>) -> Vec<PathSignatu
 
 /// Largest mismatch along a cell's edges.
 pub(super) fn worst_mismatch(cell: &Cell, corners: [(SampleId, u16); 4], work: &Workspace) -> f64 {
-    let strand = |corner: usize| {
-        let (id, strand) = corners[corner];
-        &work.get(id).strands[usize::from(strand)]
+    let segment = |corner: usize| {
+        let (id, segment) = corners[corner];
+        &work.get(id).segments[usize::from(segment)]
     };
     EDGE_ENDS
         .into_iter()
         .enumerate()
-        .map(|(edge, (from, to))| mismatch(strand(from), strand(to), cell.edge_step(edge)))
+        .map(|(edge, (from, to))| mismatch(segment(from), segment(to), cell.edge_step(edge)))
         .fold(0.0, f64::max)
 }

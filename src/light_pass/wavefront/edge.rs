@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::band::{Corner, SampleId, Workspace};
-use super::strand::{LatticeRay, PathSegment};
+use super::lattice_ray::{LatticeRay, PathSegment};
 use super::trace::StrandTracer;
 use crate::light_pass::caustic::path::PathSignature;
 
@@ -63,14 +63,14 @@ impl Step {
     /// `step` is the vector between the segments in the unit square.
     fn between(a: &PathSegment, b: &PathSegment, step: DVec2) -> Self {
         let reach_m = [a, b]
-            .map(|strand| strand.landing.distance_m())
+            .map(|segment| segment.landing.distance_m())
             .into_iter()
             .filter(|distance| distance.is_finite())
             .fold(0.0, f64::max);
         let reach_m = if reach_m > 0.0 { reach_m } else { 1.0 };
         let length = |origin: DVec3, direction: DVec3| origin.length() + reach_m * direction.length();
-        let tangent = |strand: &PathSegment| {
-            let d = &strand.differential;
+        let tangent = |segment: &PathSegment| {
+            let d = &segment.differential;
             (
                 d.across.origin * step.x + d.down.origin * step.y,
                 d.across.direction * step.x + d.down.direction * step.y,
@@ -110,7 +110,7 @@ fn stretch(a: &PathSegment, b: &PathSegment, step: DVec2) -> f64 {
 
 fn is_stretched(a: &LatticeRay, b: &LatticeRay, signature: PathSignature, step: DVec2, most: f64) -> bool {
     match (a.find(signature), b.find(signature)) {
-        (Some(i), Some(j)) => stretch(&a.strands[i], &b.strands[j], step) > most,
+        (Some(i), Some(j)) => stretch(&a.segments[i], &b.segments[j], step) > most,
         _ => false,
     }
 }
@@ -128,11 +128,11 @@ pub fn is_suspicious(a: &LatticeRay, b: &LatticeRay, signature: PathSignature, s
 
 /// Whether light takes the same paths at two samples.
 pub fn same_ways(a: &LatticeRay, b: &LatticeRay) -> bool {
-    a.strands.len() == b.strands.len()
+    a.segments.len() == b.segments.len()
         && a.nodes.len() == b.nodes.len()
-        && a.strands
+        && a.segments
             .iter()
-            .zip(&b.strands)
+            .zip(&b.segments)
             .all(|(a, b)| a.signature == b.signature)
         && a.nodes
             .iter()
@@ -151,9 +151,9 @@ impl Edge {
     /// Whether light takes the same paths at both ends, on one sheet.
     pub fn is_plain(a: &LatticeRay, b: &LatticeRay, step: DVec2) -> bool {
         same_ways(a, b)
-            && a.strands
+            && a.segments
                 .iter()
-                .zip(&b.strands)
+                .zip(&b.segments)
                 .all(|(a, b)| stretch(a, b, step) <= SUSPICIOUS_STRETCH)
     }
 
@@ -211,8 +211,8 @@ impl Edge {
     fn share(&self, work: &Workspace, signature: PathSignature) -> f64 {
         let ends = [0, self.samples.len() - 1].map(|end| work.get(self.samples[end].1));
         let brightest_w = ends[0].brightest_w.max(ends[1].brightest_w);
-        let flux_w = |sample: &LatticeRay| Some(sample.strands[sample.find(signature)?].flux_w.luminance());
-        if ends.iter().all(|sample| sample.strands.len() <= MANY_CHANGES) {
+        let flux_w = |sample: &LatticeRay| Some(sample.segments[sample.find(signature)?].flux_w.luminance());
+        if ends.iter().all(|sample| sample.segments.len() <= MANY_CHANGES) {
             return 1.0;
         }
         ends.into_iter()
@@ -287,10 +287,10 @@ pub fn may_bulge(ends: [&LatticeRay; 2], beyond: [&LatticeRay; 2]) -> bool {
     let has = |sample: &LatticeRay, signature| sample.find(signature).is_some();
     // One side of the border has the light: one of the ends, or one of the samples beyond.
     [ends[0], beyond[0]].into_iter().any(|sample| {
-        let bright = |strand: &&PathSegment| strand.flux_w.luminance() > BULGE_SHARE * brightest_w;
-        sample.strands.iter().filter(bright).any(|strand| {
-            let here = ends.map(|sample| has(sample, strand.signature));
-            let there = beyond.map(|sample| has(sample, strand.signature));
+        let bright = |segment: &&PathSegment| segment.flux_w.luminance() > BULGE_SHARE * brightest_w;
+        sample.segments.iter().filter(bright).any(|segment| {
+            let here = ends.map(|sample| has(sample, segment.signature));
+            let there = beyond.map(|sample| has(sample, segment.signature));
             here[0] == here[1] && there[0] == there[1] && here[0] != there[0]
         })
     })
@@ -325,12 +325,12 @@ impl EdgeCutter<'_> {
         let most_bits = (cut_bits - whole.log2().round() as i32).clamp(2, cut_bits);
         let mut changes: Vec<(PathSignature, i32, bool)> = Vec::new();
         for (sample, other) in [(first, last), (last, first)] {
-            for strand in &sample.strands {
-                let share = strand.flux_w.luminance() / brightest_w;
+            for segment in &sample.segments {
+                let share = segment.flux_w.luminance() / brightest_w;
                 let bits = (most_bits + share.log2().floor().max(-60.0) as i32).clamp(0, most_bits);
-                match other.find(strand.signature) {
-                    None => changes.push((strand.signature, bits, false)),
-                    Some(_) if std::ptr::eq(sample, first) => changes.push((strand.signature, bits, true)),
+                match other.find(segment.signature) {
+                    None => changes.push((segment.signature, bits, false)),
+                    Some(_) if std::ptr::eq(sample, first) => changes.push((segment.signature, bits, true)),
                     Some(_) => {}
                 }
             }

@@ -7,9 +7,9 @@ use super::band::{Corner, SampleId, Samples, Workspace};
 use super::cell::{Cell, CellCutter, CellOutput, Patch, SpectralTag, SubdivisionLimits};
 use super::edge::{Edge, EdgeCutter, may_bulge};
 use super::kept_rays::{RayCache, TracedRay};
+use super::lattice_ray::LatticeRay;
 use super::refine::Refinement;
 use super::spectrum::LightPart;
-use super::strand::LatticeRay;
 use super::subcell_features::SubcellFeatures;
 use super::trace::StrandTracer;
 use crate::illumination::accumulator::FluxUnit;
@@ -84,17 +84,17 @@ const NONE: u32 = u32::MAX;
 impl TracedBand {
     /// Approximate memory [bytes].
     pub fn bytes(&self) -> u64 {
-        let strands: usize = self
+        let segments: usize = self
             .samples
             .chunks
             .iter()
             .flatten()
             .map(|sample| {
-                size_of::<LatticeRay>() + size_of_val(&sample.strands[..]) + size_of_val(&sample.nodes[..])
+                size_of::<LatticeRay>() + size_of_val(&sample.segments[..]) + size_of_val(&sample.nodes[..])
             })
             .sum();
         let patches: usize = self.patches.iter().map(|row| size_of_val(&row[..])).sum();
-        (strands + patches) as u64
+        (segments + patches) as u64
     }
 }
 
@@ -259,8 +259,8 @@ impl WavefrontLattice<'_> {
             traced.patches.push(output.patches);
         }
         for sample in samples.chunks.iter_mut().flatten() {
-            traced.rays += u64::from(sample.segments > 0);
-            traced.segments += u64::from(sample.segments);
+            traced.rays += u64::from(sample.queries > 0);
+            traced.segments += u64::from(sample.queries);
             traced.fresh.extend(sample.fresh.take().map(|fresh| *fresh));
         }
         traced.samples = samples;

@@ -161,7 +161,7 @@ impl WavefrontDepositor<'_> {
                 report.receiver_queries += part.queries;
                 report.statistics.merge(&part.statistics);
                 report.overshoots.extend_from_slice(&part.overshoots);
-                let flux = report.in_one_place.iter_mut().zip(part.in_one_place);
+                let flux = report.lumped_flux.iter_mut().zip(part.lumped_flux);
                 flux.for_each(|(sum, flux)| *sum += flux);
             }
             let triangles: usize = parts.iter().map(SpreadOutput::triangle_count).sum();

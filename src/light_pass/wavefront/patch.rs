@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::strand::PathSegment;
+use super::lattice_ray::PathSegment;
 use crate::geometry::Ray;
 
 /// A ray, or a derivative of one along the patch's own coordinates.
@@ -13,16 +13,16 @@ struct Node {
 }
 
 impl Node {
-    fn of(strand: &PathSegment) -> Self {
+    fn of(segment: &PathSegment) -> Self {
         Self {
-            origin: strand.ray.origin,
-            direction: strand.ray.direction,
+            origin: segment.ray.origin,
+            direction: segment.ray.direction,
         }
     }
 
     /// Derivative along a step in the unit square.
-    fn slope(strand: &PathSegment, step: DVec2) -> Self {
-        let d = &strand.differential;
+    fn slope(segment: &PathSegment, step: DVec2) -> Self {
+        let d = &segment.differential;
         Self {
             origin: d.across.origin * step.x + d.down.origin * step.y,
             direction: d.across.direction * step.x + d.down.direction * step.y,
@@ -82,25 +82,25 @@ pub struct BezierTriangle {
 
 impl PatchShape {
     /// Over the rectangle of size `step` between four segments.
-    pub fn coons(strands: [&PathSegment; 4], step: DVec2) -> Self {
+    pub fn coons(segments: [&PathSegment; 4], step: DVec2) -> Self {
         Self::Coons(Box::new(CoonsPatch {
-            corners: strands.map(Node::of),
-            across: strands.map(|strand| Node::slope(strand, DVec2::new(step.x, 0.0))),
-            down: strands.map(|strand| Node::slope(strand, DVec2::new(0.0, step.y))),
+            corners: segments.map(Node::of),
+            across: segments.map(|segment| Node::slope(segment, DVec2::new(step.x, 0.0))),
+            down: segments.map(|segment| Node::slope(segment, DVec2::new(0.0, step.y))),
         }))
     }
 
     /// Without derivatives.
-    pub fn bilinear(strands: [&PathSegment; 4]) -> Self {
-        Self::Bilinear(Box::new(strands.map(|strand| strand.ray)))
+    pub fn bilinear(segments: [&PathSegment; 4]) -> Self {
+        Self::Bilinear(Box::new(segments.map(|segment| segment.ray)))
     }
 
     /// Over a triangle of the unit square.
-    pub fn bezier(strands: [&PathSegment; 3], squares: [DVec2; 3]) -> Self {
-        let corners = strands.map(Node::of);
+    pub fn bezier(segments: [&PathSegment; 3], squares: [DVec2; 3]) -> Self {
+        let corners = segments.map(Node::of);
         // Control point a third of the way from corner i to corner j.
         let towards = |i: usize, j: usize| {
-            corners[i].plus(Node::slope(strands[i], squares[j] - squares[i]).times(1.0 / 3.0))
+            corners[i].plus(Node::slope(segments[i], squares[j] - squares[i]).times(1.0 / 3.0))
         };
         let edges = [
             towards(0, 1),
@@ -120,14 +120,14 @@ impl PatchShape {
     }
 
     /// Without derivatives.
-    pub fn linear(strands: [&PathSegment; 3]) -> Self {
-        Self::Linear(Box::new(strands.map(|strand| strand.ray)))
+    pub fn linear(segments: [&PathSegment; 3]) -> Self {
+        Self::Linear(Box::new(segments.map(|segment| segment.ray)))
     }
 
     /// Over the rectangle of size `step` around one segment, from its derivatives alone; `low` is the rectangle's
     /// corner relative to the segment.
-    pub fn around(strand: &PathSegment, low: DVec2, step: DVec2) -> Self {
-        let at = |offset: DVec2| Node::of(strand).plus(Node::slope(strand, offset)).ray();
+    pub fn around(segment: &PathSegment, low: DVec2, step: DVec2) -> Self {
+        let at = |offset: DVec2| Node::of(segment).plus(Node::slope(segment, offset)).ray();
         Self::Bilinear(Box::new([
             at(low),
             at(low + DVec2::new(step.x, 0.0)),

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec2;
 
+use super::lattice_ray::{LatticeRay, PathSegment, SegmentEnd};
 use super::overshoot::PatchOvershoot;
 use super::receivers::Receivers;
-use super::strand::{LatticeRay, PathSegment, SegmentEnd};
 use crate::illumination::Receiver;
 use crate::light_pass::caustic::path::PathSignature;
 
@@ -140,8 +140,8 @@ impl Refinement<'_> {
             return true;
         }
         bright_signatures(samples).into_iter().any(|signature| {
-            let strands = strands_of(samples, signature);
-            self.falls_on(&strands, tiles)
+            let segments = segments_of(samples, signature);
+            self.falls_on(&segments, tiles)
         })
     }
 
@@ -156,9 +156,9 @@ impl Refinement<'_> {
             if own.iter().all(|sample| sample.find(signature).is_some()) {
                 continue;
             }
-            let strands = strands_of(beside, signature);
+            let segments = segments_of(beside, signature);
             for (round, Round { tiles, .. }) in self.rounds.iter().enumerate() {
-                if self.falls_on(&strands, tiles) {
+                if self.falls_on(&segments, tiles) {
                     rounds |= 1 << round;
                 }
             }
@@ -170,13 +170,13 @@ impl Refinement<'_> {
     /// light.
     fn falls_on(&self, corners: &[&PathSegment], tiles: &RoughTiles) -> bool {
         let mut lit: Vec<(Receiver, DVec2, DVec2)> = Vec::new();
-        for strand in corners {
+        for segment in corners {
             let SegmentEnd::Receiver {
                 receiver,
                 triangle,
                 barycentric,
                 ..
-            } = strand.landing
+            } = segment.landing
             else {
                 continue;
             };
@@ -200,20 +200,20 @@ fn bright_signatures(samples: &[&LatticeRay]) -> Vec<PathSignature> {
         .iter()
         .map(|sample| sample.brightest_w)
         .fold(0.0, f64::max);
-    let is_bright = |strand: &&PathSegment| strand.flux_w.luminance() >= MIN_SHARE * brightest_w;
-    let strands = samples
+    let is_bright = |segment: &&PathSegment| segment.flux_w.luminance() >= MIN_SHARE * brightest_w;
+    let segments = samples
         .iter()
-        .flat_map(|sample| &sample.strands)
+        .flat_map(|sample| &sample.segments)
         .filter(is_bright);
-    let mut signatures: Vec<PathSignature> = strands.map(|strand| strand.signature).collect();
+    let mut signatures: Vec<PathSignature> = segments.map(|segment| segment.signature).collect();
     signatures.sort_unstable();
     signatures.dedup();
     signatures
 }
 
-fn strands_of<'s>(samples: &[&'s LatticeRay], signature: PathSignature) -> Vec<&'s PathSegment> {
+fn segments_of<'s>(samples: &[&'s LatticeRay], signature: PathSignature) -> Vec<&'s PathSegment> {
     samples
         .iter()
-        .filter_map(|sample| Some(&sample.strands[sample.find(signature)?]))
+        .filter_map(|sample| Some(&sample.segments[sample.find(signature)?]))
         .collect()
 }

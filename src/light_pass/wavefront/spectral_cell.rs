@@ -7,9 +7,9 @@ use super::cell::{
     surface_regions,
 };
 use super::edge::{Edge, EdgeCutter, EdgeReach, is_suspicious, same_ways};
+use super::lattice_ray::LatticeRay;
 use super::regions::{Outline, triangles};
 use super::spectrum::{LightPart, LightSpectrum, NODES};
-use super::strand::LatticeRay;
 use super::subcell_features::SubcellFeatures;
 use crate::light_pass::caustic::path::PathSignature;
 
@@ -156,13 +156,13 @@ impl CellCutter<'_> {
         work: &mut Workspace,
         out: &mut CellOutput,
     ) {
-        let strands = signatures(cell, work, |sample, found| {
-            found.extend(sample.strands.iter().map(|strand| strand.signature));
+        let segments = signatures(cell, work, |sample, found| {
+            found.extend(sample.segments.iter().map(|segment| segment.signature));
         });
-        let has_strand = |sample: &LatticeRay, signature| sample.find(signature).is_some();
-        for signature in strands {
+        let has_segment = |sample: &LatticeRay, signature| sample.find(signature).is_some();
+        for signature in segments {
             if let Err(place) = shared.done.binary_search(&signature)
-                && is_at_the_same_corners(nodes, work, |sample| has_strand(sample, signature))
+                && is_at_the_same_corners(nodes, work, |sample| has_segment(sample, signature))
                 && self.emit_shared(cell, signature, work, out)
             {
                 shared.done.insert(place, signature);
@@ -336,9 +336,9 @@ impl UnsharedLight {
             .iter()
             .map(|sample| sample.brightest_w)
             .fold(0.0, f64::max);
-        let strands = samples.iter().flat_map(|sample| &sample.strands);
-        let rest = strands.filter(|strand| shared.done.binary_search(&strand.signature).is_err());
-        let most_w = rest.map(|strand| strand.flux_w.luminance()).reduce(f64::max);
+        let segments = samples.iter().flat_map(|sample| &sample.segments);
+        let rest = segments.filter(|segment| shared.done.binary_search(&segment.signature).is_err());
+        let most_w = rest.map(|segment| segment.flux_w.luminance()).reduce(f64::max);
         let is_booked = samples
             .iter()
             .flat_map(|sample| &sample.nodes)
@@ -398,6 +398,6 @@ fn alike(cell: &Cell, nodes: &NodeCorners, work: &Workspace) -> Vec<PathSignatur
         is_everywhere && is_whole() && nodes[1..].iter().all(is_smooth)
     };
     let first = work.get(nodes[0][0]);
-    let signatures = first.strands.iter().map(|strand| strand.signature);
+    let signatures = first.segments.iter().map(|segment| segment.signature);
     signatures.filter(is_alike).collect()
 }

@@ -6,7 +6,7 @@
 
 use std::ops::RangeInclusive;
 
-use super::strand::{PathSegment, SegmentEnd};
+use super::lattice_ray::{PathSegment, SegmentEnd};
 use crate::geometry::Ray;
 use crate::light_pass::spectral_node::{SpectralNode, channels_within, place_of, wavelength_at};
 use crate::optics::spectrum::{Spectrum, xyz_bar};
@@ -244,41 +244,41 @@ impl Slice {
     /// channels.
     ///
     /// `parted`: whether each node stands for the wavelengths around it, because other light of its cell is dispersed.
-    pub fn strand(&self, nodes: [&PathSegment; NODES], parted: bool) -> PathSegment {
+    pub fn segment(&self, nodes: [&PathSegment; NODES], parted: bool) -> PathSegment {
         let mix = |of: &dyn Fn(&PathSegment) -> glam::DVec3| {
             let weighted = nodes.iter().zip(self.weights);
-            weighted.fold(glam::DVec3::ZERO, |sum, (strand, weight)| {
-                sum + of(strand) * weight
+            weighted.fold(glam::DVec3::ZERO, |sum, (segment, weight)| {
+                sum + of(segment) * weight
             })
         };
         let derivative = |of: &dyn Fn(&PathSegment) -> RayDerivative| RayDerivative {
-            origin: mix(&|strand| of(strand).origin),
-            direction: mix(&|strand| of(strand).direction),
+            origin: mix(&|segment| of(segment).origin),
+            direction: mix(&|segment| of(segment).direction),
         };
         let parts = nodes.iter().zip(self.matrices(parted));
-        let flux_w = parts.fold(LinearSrgb::BLACK, |sum, (strand, matrix)| {
-            sum + matrix.apply(strand.flux_w)
+        let flux_w = parts.fold(LinearSrgb::BLACK, |sum, (segment, matrix)| {
+            sum + matrix.apply(segment.flux_w)
         });
         let nearest = (0..NODES)
             .max_by(|a, b| self.weights[*a].total_cmp(&self.weights[*b]))
             .unwrap_or(0);
-        let mut strand = *nodes[nearest];
-        strand.ray = Ray {
-            origin: mix(&|strand| strand.ray.origin),
-            direction: mix(&|strand| strand.ray.direction).normalize_or_zero(),
+        let mut segment = *nodes[nearest];
+        segment.ray = Ray {
+            origin: mix(&|segment| segment.ray.origin),
+            direction: mix(&|segment| segment.ray.direction).normalize_or_zero(),
         };
-        strand.differential.across = derivative(&|strand| strand.differential.across);
-        strand.differential.down = derivative(&|strand| strand.differential.down);
+        segment.differential.across = derivative(&|segment| segment.differential.across);
+        segment.differential.down = derivative(&|segment| segment.differential.down);
         // Extrapolated beyond the outer nodes, a share that falls to zero would become negative; the ledger's
         // quadrature takes the difference.
-        strand.flux_w = flux_w.map(|channel| channel.max(0.0));
-        strand
+        segment.flux_w = flux_w.map(|channel| channel.max(0.0));
+        segment
     }
 
     /// Maps an RGB factor on the light of such segments to the light's channels.
     pub fn factors(&self, nodes: [&PathSegment; NODES], parted: bool) -> ColourMatrix {
         let parts = nodes.iter().zip(self.matrices(parted));
-        let parts = parts.map(|(strand, matrix)| matrix.weighing(strand.flux_w));
+        let parts = parts.map(|(segment, matrix)| matrix.weighing(segment.flux_w));
         parts.sum::<ColourMatrix>().per_channel()
     }
 
@@ -290,7 +290,7 @@ impl Slice {
 /// Whether light of one signature lands on one surface at all nodes.
 pub fn lands_alike(nodes: [&PathSegment; NODES]) -> bool {
     let first = &nodes[0].landing;
-    nodes.iter().all(|strand| match (first, &strand.landing) {
+    nodes.iter().all(|segment| match (first, &segment.landing) {
         (SegmentEnd::Receiver { receiver, .. }, SegmentEnd::Receiver { receiver: other, .. }) => {
             receiver == other
         }

@@ -6,13 +6,13 @@ use glam::DVec2;
 use super::band::{SampleId, Samples};
 use super::cell::{Patch, PatchKind, SpectralTag};
 use super::coverage::FluxTriangle;
+use super::lattice_ray::{PathSegment, SegmentEnd};
 use super::mesh::{PatchMesh, even_grid};
 use super::overshoot::PatchOvershoot;
 use super::patch::{CoonsPatch, PatchShape};
 use super::receivers::{PatchBeam, Receivers};
 use super::shares::{difference, mean, scaled};
 use super::spectrum::{LightPart, LightSpectrum, NODES, lands_alike};
-use super::strand::{PathSegment, SegmentEnd};
 use super::virtual_vertex::VirtualRays;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
@@ -62,7 +62,7 @@ pub struct SpreadOutput {
     pub overshoots: Vec<PatchOvershoot>,
     /// Luminous flux [counts] of all patches, and of those that concentrate a part of the spectrum in one place because
     /// other wavelengths take other paths.
-    pub in_one_place: [i128; 2],
+    pub lumped_flux: [i128; 2],
 }
 
 impl SpreadOutput {
@@ -106,8 +106,8 @@ impl PatchColour {
     };
 
     /// For a band of which one wavelength is traced.
-    fn of_node(channels: ColourMatrix, strands: &[&PathSegment]) -> Self {
-        let grey_w = mean(strands.iter().map(|strand| strand.flux_w));
+    fn of_node(channels: ColourMatrix, segments: &[&PathSegment]) -> Self {
+        let grey_w = mean(segments.iter().map(|segment| segment.flux_w));
         Self {
             channels,
             factors: channels.weighing(grey_w).per_channel(),
@@ -131,27 +131,27 @@ enum PatchFate {
 
 impl Spreader<'_> {
     pub fn spread(&self, patch: &Patch, out: &mut SpreadOutput) {
-        let strands: [&PathSegment; 4] = patch
+        let segments: [&PathSegment; 4] = patch
             .corners
-            .map(|(sample, strand)| self.samples.strand(sample, strand));
-        let own = &strands[..patch.corner_count()];
+            .map(|(sample, segment)| self.samples.segment(sample, segment));
+        let own = &segments[..patch.corner_count()];
         match (patch.tone, self.light) {
             (SpectralTag::Spectrum { others, parted }, LightPart::Spectrum(spectrum)) => {
-                self.spread_spectrum(patch, strands, (others, parted), spectrum, out);
+                self.spread_spectrum(patch, segments, (others, parted), spectrum, out);
             }
             (SpectralTag::Node(node), light) => {
-                let before = out.in_one_place[0];
+                let before = out.lumped_flux[0];
                 let node = light.node(usize::from(node));
                 let tint = node.map_or(PatchColour::WHITE, |node| {
                     PatchColour::of_node(node.channels, own)
                 });
-                self.spread_strands(patch, own, tint, out);
+                self.spread_segments(patch, own, tint, out);
                 if matches!(light, LightPart::Spectrum(_)) {
-                    out.in_one_place[1] += out.in_one_place[0] - before;
+                    out.lumped_flux[1] += out.lumped_flux[0] - before;
                 }
             }
             (SpectralTag::White | SpectralTag::Spectrum { .. }, _) => {
-                self.spread_strands(patch, own, PatchColour::WHITE, out)
+                self.spread_segments(patch, own, PatchColour::WHITE, out)
             }
         }
     }
@@ -171,8 +171,8 @@ impl Spreader<'_> {
                 None => first,
                 Some(other) => {
                     let sample = self.samples.get(others[other][corner]);
-                    let strand = sample.find(first.signature);
-                    &sample.strands[strand.expect("the patch has it at all wavelengths")]
+                    let segment = sample.find(first.signature);
+                    &sample.segments[segment.expect("the patch has it at all wavelengths")]
                 }
             })
         });
@@ -181,23 +181,23 @@ impl Spreader<'_> {
         let share = (first[0].flux_w.luminance() / brightest_w).clamp(0.0, 1.0);
         let apart = self.smear(&nodes) * SLICES_PER_TEXEL * share;
         for slice in spectrum.slices(apart) {
-            let strands = nodes.map(|nodes| slice.strand(nodes, parted));
-            let strands = strands.each_ref();
+            let segments = nodes.map(|nodes| slice.segment(nodes, parted));
+            let segments = segments.each_ref();
             let tint = PatchColour {
                 channels: ColourMatrix::IDENTITY,
                 factors: slice.factors(nodes[0], parted),
                 is_spectral: true,
                 lands_alike,
             };
-            self.spread_strands(patch, &strands[..patch.corner_count()], tint, out);
+            self.spread_segments(patch, &segments[..patch.corner_count()], tint, out);
         }
     }
 
     /// Distance between the landing points of a patch's outer wavelengths [texels].
     fn smear(&self, nodes: &[[&PathSegment; NODES]; 4]) -> f64 {
         let of_corner = |nodes: &[&PathSegment; NODES]| {
-            let texel_m = nodes.iter().find_map(|strand| {
-                let surface = self.receivers.get(strand.landing.receiver()?)?;
+            let texel_m = nodes.iter().find_map(|segment| {
+                let surface = self.receivers.get(segment.landing.receiver()?)?;
                 let texels = (surface.chart.width * surface.chart.height) as f64;
                 Some((surface.area_m2 / texels).sqrt())
             });
@@ -212,16 +212,16 @@ impl Spreader<'_> {
         nodes.iter().map(of_corner).fold(0.0, f64::max)
     }
 
-    fn spread_strands(
+    fn spread_segments(
         &self,
         patch: &Patch,
-        strands: &[&PathSegment],
+        segments: &[&PathSegment],
         tint: PatchColour,
         out: &mut SpreadOutput,
     ) {
-        let colours = strands
+        let colours = segments
             .iter()
-            .map(|strand| tint.channels.apply(strand.flux_w))
+            .map(|segment| tint.channels.apply(segment.flux_w))
             .collect::<Vec<_>>();
         let channels_w = mean(colours.iter().copied()) * patch.area();
         let flux = self.unit.count(channels_w);
@@ -232,35 +232,35 @@ impl Spreader<'_> {
             channels_w
         };
         out.ledger.book(Account::Quadrature, flux.map(|count| -count));
-        out.in_one_place[0] += i128::from(flux[1]);
+        out.lumped_flux[0] += i128::from(flux[1]);
         let before: Vec<usize> = out.triangles.iter().map(|(_, list)| list.len()).collect();
         let course = if tint.lands_alike {
-            self.course(strands)
+            self.course(segments)
         } else {
             PatchFate::Mixed
         };
         match course {
             PatchFate::Escapes => out.ledger.book(Account::Escaped, flux),
-            PatchFate::Onward => self.onward(strands, flux, tint, out),
+            PatchFate::Onward => self.onward(segments, flux, tint, out),
             PatchFate::Plane(receiver) => {
                 let light = (flux, flux_w, &colours[..]);
-                self.over(patch, strands, light, tint, Some(receiver), out);
+                self.over(patch, segments, light, tint, Some(receiver), out);
             }
-            PatchFate::Mixed => self.over(patch, strands, (flux, flux_w, &colours), tint, None, out),
+            PatchFate::Mixed => self.over(patch, segments, (flux, flux_w, &colours), tint, None, out),
         }
-        self.note_overshoot(patch, strands, &before, out);
+        self.note_overshoot(patch, segments, &before, out);
     }
 
     /// Whether the light of a segment is absorbed on the way from the surface it left.
-    pub(super) fn absorbs(&self, strand: &PathSegment) -> bool {
-        self.absorption && strand.media.absorbs(self.receivers.tracer.scene())
+    pub(super) fn absorbs(&self, segment: &PathSegment) -> bool {
+        self.absorption && segment.media.absorbs(self.receivers.tracer.scene())
     }
 
     /// Records the patch's triangles, those beyond the given counts, if they lie far from its traced rays.
     fn note_overshoot(
         &self,
         patch: &Patch,
-        strands: &[&PathSegment],
+        segments: &[&PathSegment],
         before: &[usize],
         out: &mut SpreadOutput,
     ) {
@@ -268,7 +268,7 @@ impl Spreader<'_> {
         let middle = squares.iter().sum::<DVec2>() / squares.len() as f64;
         for (index, (receiver, list)) in out.triangles.iter().enumerate() {
             let new = &list[before.get(index).copied().unwrap_or(0)..];
-            let traced = strands.iter().filter_map(|strand| match strand.landing {
+            let traced = segments.iter().filter_map(|segment| match segment.landing {
                 SegmentEnd::Receiver {
                     receiver: lit,
                     triangle,
@@ -282,14 +282,15 @@ impl Spreader<'_> {
         }
     }
 
-    fn course(&self, strands: &[&PathSegment]) -> PatchFate {
-        let landing = |wanted: fn(&SegmentEnd) -> bool| strands.iter().all(|strand| wanted(&strand.landing));
+    fn course(&self, segments: &[&PathSegment]) -> PatchFate {
+        let landing =
+            |wanted: fn(&SegmentEnd) -> bool| segments.iter().all(|segment| wanted(&segment.landing));
         if landing(|landing| matches!(landing, SegmentEnd::Specular { .. })) {
             return PatchFate::Onward;
         }
-        let receiver = strands.iter().find_map(|strand| strand.landing.receiver());
-        let beam = self.beam(strands);
-        let from = strands[0].from;
+        let receiver = segments.iter().find_map(|segment| segment.landing.receiver());
+        let beam = self.beam(segments);
+        let from = segments[0].from;
         let Some(receiver) = receiver else {
             let escapes = landing(|landing| matches!(landing, SegmentEnd::Escaped))
                 && !self.receivers.meets_others(&beam, [from; 2]);
@@ -305,11 +306,11 @@ impl Spreader<'_> {
         let Some(plane) = surface.plane.filter(|_| surface.is_diffuse) else {
             return PatchFate::Mixed;
         };
-        let only = strands.iter().all(|strand| {
-            matches!(strand.landing, SegmentEnd::Escaped) || strand.landing.receiver() == Some(receiver)
+        let only = segments.iter().all(|segment| {
+            matches!(segment.landing, SegmentEnd::Escaped) || segment.landing.receiver() == Some(receiver)
         });
         if only
-            && (plane.fills_map || !goes_out(strands))
+            && (plane.fills_map || !goes_out(segments))
             && !self
                 .receivers
                 .meets_others(&beam, [from, receiver.object() as u32])
@@ -321,24 +322,24 @@ impl Spreader<'_> {
     }
 
     /// The traced rays from their origins to where they land or leave the scene.
-    fn beam(&self, strands: &[&PathSegment]) -> PatchBeam {
-        PatchBeam::new(strands.iter().map(|strand| {
-            let end = strand.landing_point();
+    fn beam(&self, segments: &[&PathSegment]) -> PatchBeam {
+        PatchBeam::new(segments.iter().map(|segment| {
+            let end = segment.landing_point();
             [
-                strand.ray.origin,
-                end.unwrap_or_else(|| self.receivers.exit_point(&strand.ray)),
+                segment.ray.origin,
+                end.unwrap_or_else(|| self.receivers.exit_point(&segment.ray)),
             ]
         }))
     }
 
     /// Passes all of it on, except for absorption.
-    fn onward(&self, strands: &[&PathSegment], flux: FluxCount, tint: PatchColour, out: &mut SpreadOutput) {
+    fn onward(&self, segments: &[&PathSegment], flux: FluxCount, tint: PatchColour, out: &mut SpreadOutput) {
         let mut passed = flux;
-        if self.absorbs(strands[0]) {
+        if self.absorbs(segments[0]) {
             let scene = self.receivers.tracer.scene();
             let transmittance =
-                |strand: &&PathSegment| strand.media.transmittance(scene, strand.landing.distance_m());
-            let left = tint.factors.apply(mean(strands.iter().map(transmittance)));
+                |segment: &&PathSegment| segment.media.transmittance(scene, segment.landing.distance_m());
+            let left = tint.factors.apply(mean(segments.iter().map(transmittance)));
             passed = scaled(flux, left);
             out.ledger.book(Account::Absorbed, difference(flux, passed));
         }
@@ -348,20 +349,20 @@ impl Spreader<'_> {
     fn over(
         &self,
         patch: &Patch,
-        strands: &[&PathSegment],
+        segments: &[&PathSegment],
         (flux, flux_w, colours): (FluxCount, LinearSrgb, &[LinearSrgb]),
         tint: PatchColour,
         plane: Option<Receiver>,
         out: &mut SpreadOutput,
     ) {
-        let shape = shape_of(patch, strands);
+        let shape = shape_of(patch, segments);
         // Light past the border of a plane may escape only where traced light does.
-        let goes_out = goes_out(strands);
+        let goes_out = goes_out(segments);
         let plane = plane.filter(|&receiver| goes_out || self.stays_on_map(&shape, receiver));
-        let mut rays = VirtualRays::new(self, &shape, strands, plane, tint.factors);
+        let mut rays = VirtualRays::new(self, &shape, segments, plane, tint.factors);
         let steps = self.steps(&shape, &mut rays, plane.is_some(), flux_w, out);
         if let (PatchShape::Coons(coons), Some(receiver)) = (&shape, plane)
-            && !self.absorbs(strands[0])
+            && !self.absorbs(segments[0])
             && let Some(grid) = self.plane_grid(coons, receiver, steps)
         {
             out.queries += rays.queries + grid.len() as u64;
@@ -373,7 +374,7 @@ impl Spreader<'_> {
             rays,
             colours,
             out,
-            absorbs: self.absorbs(strands[0]),
+            absorbs: self.absorbs(segments[0]),
             goes_out,
         };
         if shape.is_rectangle() {
@@ -408,15 +409,15 @@ impl Spreader<'_> {
 }
 
 /// Whether any traced ray leaves the scene.
-fn goes_out(strands: &[&PathSegment]) -> bool {
-    strands
+fn goes_out(segments: &[&PathSegment]) -> bool {
+    segments
         .iter()
-        .any(|strand| matches!(strand.landing, SegmentEnd::Escaped))
+        .any(|segment| matches!(segment.landing, SegmentEnd::Escaped))
 }
 
-fn shape_of(patch: &Patch, strands: &[&PathSegment]) -> PatchShape {
+fn shape_of(patch: &Patch, segments: &[&PathSegment]) -> PatchShape {
     let step = patch.squares[2] - patch.squares[0];
-    match (patch.kind, strands) {
+    match (patch.kind, segments) {
         (PatchKind::Rectangle, [a, b, c, d]) => PatchShape::coons([a, b, c, d], step),
         (PatchKind::BilinearRectangle, [a, b, c, d]) => PatchShape::bilinear([a, b, c, d]),
         (PatchKind::LinearTriangle, [a, b, c]) => PatchShape::linear([a, b, c]),
@@ -426,7 +427,7 @@ fn shape_of(patch: &Patch, strands: &[&PathSegment]) -> PatchShape {
         }
         _ => {
             let [at, low, high, _] = patch.squares;
-            PatchShape::around(strands[0], low - at, high - low)
+            PatchShape::around(segments[0], low - at, high - low)
         }
     }
 }

@@ -5,8 +5,8 @@ use glam::{DVec2, DVec3};
 use super::bumps::BumpCells;
 use super::edge_search::EdgeSearch;
 use super::kept_rays::{CachedHit, CachedRay, RayCache, RayKey, TracedRay};
+use super::lattice_ray::{LatticeRay, PathSegment, SegmentEnd, SurfaceFluxRecord};
 use super::spectrum::LightPart;
-use super::strand::{LatticeRay, PathSegment, SegmentEnd, SurfaceFluxRecord};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::caustic::path::{PathLimits, PathSignature};
@@ -53,7 +53,7 @@ struct QueuedRay {
     signature: PathSignature,
     depth: u32,
     /// Index of its segment; `None` for the light's own ray.
-    strand: Option<usize>,
+    segment: Option<usize>,
     /// Whether it is identical to a ray in the cache, where there is one.
     is_known: bool,
     /// Whether no dispersive surface has refracted it yet, so that it is the same at all wavelengths.
@@ -151,26 +151,26 @@ impl<'a> StrandTracer<'a> {
             media: *self.launch.media(),
             signature: PathSignature::default(),
             depth: 0,
-            strand: None,
+            segment: None,
             is_known: search.known.is_some(),
             is_common: other.is_some(),
         }];
         while let Some(next) = waiting.pop() {
             self.step(next, floor_w, &mut search, &mut sample, &mut waiting);
         }
-        sample.segments = search.searches;
+        sample.queries = search.searches;
         if search.searches > 0 {
             sample.fresh = Some(Box::new(TracedRay {
                 key,
                 hits: search.hits.into_boxed_slice(),
             }));
         }
-        sample.strands.sort_by_key(|strand| strand.signature);
+        sample.segments.sort_by_key(|segment| segment.signature);
         sample.nodes.sort_by_key(|node| node.signature);
         sample.brightest_w = sample
-            .strands
+            .segments
             .iter()
-            .map(|strand| strand.flux_w.luminance())
+            .map(|segment| segment.flux_w.luminance())
             .fold(0.0, f64::max);
         sample
     }
@@ -186,24 +186,24 @@ impl<'a> StrandTracer<'a> {
         let (place, is_known) = search.closest(self.tracer, &from);
         let from = &QueuedRay { is_known, ..from };
         let Some(hit) = place.map(|place| self.tracer.surface_at(&place)) else {
-            if from.strand.is_none() {
+            if from.segment.is_none() {
                 sample.not_emitted = from.flux_w;
             }
             return;
         };
         let material = self.tracer.scene().material_of(hit.object);
-        match from.strand {
-            Some(strand) => {
-                sample.strands[strand].landing = landing(
+        match from.segment {
+            Some(segment) => {
+                sample.segments[segment].landing = landing(
                     &hit,
-                    sample.strands[strand].ray.direction,
+                    sample.segments[segment].ray.direction,
                     material.surface.is_receiver(),
                 );
             }
             None => sample.stopped_m = material.is_opaque().then_some(hit.distance_m),
         }
         if !material.surface.is_specular() {
-            if from.strand.is_none() {
+            if from.segment.is_none() {
                 sample.not_emitted = from.flux_w;
             }
             return;
@@ -247,13 +247,13 @@ impl<'a> StrandTracer<'a> {
         let group = self.tracer.smoothing_group(hit.object, hit.triangle);
         let at_surface = from.signature.at(hit.object, group);
         // Patches book absorption between surfaces; before the first surface there is no patch.
-        let taken_before = match from.strand {
+        let taken_before = match from.segment {
             Some(_) => LinearSrgb::BLACK,
             None => from.flux_w - incident,
         };
         let mut node = SurfaceFluxRecord {
             signature: at_surface,
-            first: from.strand.is_none(),
+            first: from.segment.is_none(),
             incident: incident + taken_before,
             absorbed: incident * interaction.absorbed + taken_before,
             depth: LinearSrgb::BLACK,
@@ -279,7 +279,7 @@ impl<'a> StrandTracer<'a> {
                 node.depth += flux_w;
             } else if flux_w.luminance() < floor_w {
                 node.threshold += flux_w;
-            } else if sample.strands.len() >= MAX_BRANCHES {
+            } else if sample.segments.len() >= MAX_BRANCHES {
                 node.unresolved += flux_w;
             } else {
                 let surface = if is_too_fine {
@@ -328,7 +328,7 @@ impl<'a> StrandTracer<'a> {
 
 #[allow(
     clippy::too_many_arguments,
-    reason = "one call site; a strand is made of this"
+    reason = "one call site; a segment is made of this"
 )]
 fn push(
     from: &QueuedRay,
@@ -348,11 +348,11 @@ fn push(
         media: branch.media,
         signature,
         depth: from.depth + 1,
-        strand: Some(sample.strands.len()),
+        segment: Some(sample.segments.len()),
         is_known: from.is_known,
         is_common: from.is_common && (!is_dispersive || branch.event == Event::Reflection),
     });
-    sample.strands.push(PathSegment {
+    sample.segments.push(PathSegment {
         signature,
         ray: branch.ray,
         differential,

@@ -3,10 +3,10 @@
 use glam::{DVec2, DVec3};
 
 use super::facets::FacetPlace;
+use super::lattice_ray::{PathSegment, SegmentEnd};
 use super::patch::PatchShape;
 use super::receivers::{ReceiverSurface, Receivers};
 use super::spread::Spreader;
-use super::strand::{PathSegment, SegmentEnd};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
@@ -112,19 +112,19 @@ impl<'a> VirtualRays<'a> {
     pub fn new(
         spreader: &Spreader<'a>,
         shape: &'a PatchShape,
-        strands: &[&PathSegment],
+        segments: &[&PathSegment],
         plane: Option<Receiver>,
         factors: ColourMatrix,
     ) -> Self {
-        let first = strands[0];
-        let spread_m = strands
+        let first = segments[0];
+        let spread_m = segments
             .iter()
-            .map(|strand| strand.ray.origin.distance(first.ray.origin))
+            .map(|segment| segment.ray.origin.distance(first.ray.origin))
             .fold(0.0, f64::max);
         // A traced ray that returns sooner is no artefact.
-        let nearest_own_m = strands
+        let nearest_own_m = segments
             .iter()
-            .filter_map(|strand| match strand.landing {
+            .filter_map(|segment| match segment.landing {
                 SegmentEnd::Specular { object, distance_m } if object == first.from => Some(distance_m),
                 _ => None,
             })
@@ -138,8 +138,8 @@ impl<'a> VirtualRays<'a> {
             absorbs: spreader.absorbs(first),
             from: (first.from, first.from_group),
             skin_m: spread_m.min(0.5 * nearest_own_m),
-            origins: strands.iter().map(|strand| strand.ray.origin).collect(),
-            lit: strands.iter().find_map(|strand| strand.landing.receiver()),
+            origins: segments.iter().map(|segment| segment.ray.origin).collect(),
+            lit: segments.iter().find_map(|segment| segment.landing.receiver()),
             queries: 0,
         }
     }

@@ -82,10 +82,10 @@ fn a_rough_white_mirror_loses_nothing() {
     let result = bake(scene, &photons(1e6, 16));
     let energy = result.ledgers[0].energy_w;
     assert_eq!(energy_fault(&result), None);
-    let given_up = energy.truncated.total();
-    let lost = energy.emitted - energy.deposited - given_up - energy.sampling;
+    let truncated = energy.truncated.total();
+    let lost = energy.emitted - energy.deposited - truncated - energy.sampling;
     assert!(lost.abs() < 1e-9 * energy.emitted, "{energy:?}");
-    assert!(given_up.abs() < 1e-3 * energy.emitted, "{energy:?}");
+    assert!(truncated.abs() < 1e-3 * energy.emitted, "{energy:?}");
     assert_eq!(energy.absorbed, 0.0);
 }
 

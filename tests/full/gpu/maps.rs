@@ -113,7 +113,10 @@ fn maps_of_all_objects_set_the_scale() {
     let mut scene = white_floor();
     scene.objects.push(floor("bright", 0, 0.1));
     let irradiance_w_m2 = 1e9_f32;
-    let mut rig = or_skip!(Rig::new(&scene, &[floor_map(1, 1, 1, vec![[irradiance_w_m2; 3]])]));
+    let mut rig = or_skip!(Rig::new(
+        &scene,
+        &[floor_map(1, 1, 1, vec![[irradiance_w_m2; 3]])]
+    ));
     let expected = lambert(1.0, f64::from(irradiance_w_m2));
     for found in red(&rig.picture(&from_above(8))) {
         assert!((found / expected - 1.0).abs() <= 1e-3, "{found} {expected}");

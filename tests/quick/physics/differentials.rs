@@ -2,7 +2,7 @@
 
 use nephroid::light_pass::caustic::path::PathLimits;
 use nephroid::light_pass::caustic::setup::{CullMode, LightVisibility};
-use nephroid::light_pass::wavefront::strand::{PathSegment, SegmentEnd};
+use nephroid::light_pass::wavefront::lattice_ray::{PathSegment, SegmentEnd};
 use nephroid::light_pass::wavefront::trace::StrandTracer;
 use nephroid::settings::ItemBufferKind;
 use nephroid::transport::EffectSet;
@@ -10,7 +10,7 @@ use nephroid::transport::EffectSet;
 use crate::prelude::*;
 use support::effect_scenes::by_image;
 
-/// Compares derivatives of the strand that carries most, at places over the domain, with central differences over a
+/// Compares derivatives of the segment that carries most, at places over the domain, with central differences over a
 /// step of the unit square; returns the root mean square of the relative difference and how many places there were.
 fn mismatch(scene: Scene, step: f64) -> (f64, usize) {
     let tracer = Tracer::new(Arc::new(scene));
@@ -28,13 +28,13 @@ fn mismatch(scene: Scene, step: f64) -> (f64, usize) {
     for face in 0..launch.face_count() {
         for index in 0..900 {
             let square = (DVec2::new((index % 30) as f64, (index / 30) as f64) + 0.47) / 30.0;
-            let strand = |offset: DVec2| -> Option<PathSegment> {
+            let segment = |offset: DVec2| -> Option<PathSegment> {
                 let sample = rays.trace(face, square + offset);
-                let lands = |strand: &&PathSegment| matches!(strand.landing, SegmentEnd::Receiver { .. });
-                sample.strands.iter().find(lands).copied()
+                let lands = |segment: &&PathSegment| matches!(segment.landing, SegmentEnd::Receiver { .. });
+                sample.segments.iter().find(lands).copied()
             };
             for (axis, along) in [(0, DVec2::X), (1, DVec2::Y)] {
-                let found = [DVec2::ZERO, along * -step, along * step].map(strand);
+                let found = [DVec2::ZERO, along * -step, along * step].map(segment);
                 let [Some(here), Some(before), Some(after)] = found else {
                     continue;
                 };

@@ -117,7 +117,7 @@ pub struct LatticeRay {
     /// Start in the unit square of its face.
     pub square: DVec2,
     /// Outgoing rays, ascending by signature.
-    pub strands: Vec<PathSegment>,
+    pub segments: Vec<PathSegment>,
     /// Specular surfaces hit, ascending by signature.
     pub nodes: Vec<SurfaceFluxRecord>,
     /// Distance to the first hit [m], if that is opaque.
@@ -131,7 +131,7 @@ pub struct LatticeRay {
     /// Whether bumps along its path are finer than any cell.
     pub is_rough: bool,
     /// Closest-hit queries; 0 where the cache had every hit.
-    pub segments: u32,
+    pub queries: u32,
     /// Its hits, unless the cache had all of them.
     pub fresh: Option<Box<TracedRay>>,
 }
@@ -140,9 +140,9 @@ impl LatticeRay {
     /// Index of the segment with a signature.
     pub fn find(&self, signature: PathSignature) -> Option<usize> {
         // With so few segments, linear search is fastest.
-        self.strands
+        self.segments
             .iter()
-            .position(|strand| strand.signature == signature)
+            .position(|segment| segment.signature == signature)
     }
 
     /// Index of the surface record with a signature.
