@@ -162,7 +162,7 @@ fn lit_point(point: SurfacePoint, is_front: bool, gaze: Gaze) -> LitPoint {
         margin,
         side * point.geometric_normal,
         side * point.interpolated_normal,
-        taking_of(object, mixture),
+        diffuse_response_of(object, mixture),
     );
 }
 

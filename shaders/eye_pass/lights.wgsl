@@ -32,7 +32,7 @@ struct LitPoint {
     margin: f32,
     geometric_normal: vec3f,
     shading_normal: vec3f,
-    taking: Taking,
+    response: DiffuseResponse,
 }
 
 // Fraction of the intensity along a direction: the cone of a spot (KHR_lights_punctual), the cosine of a facet, else 1.
@@ -73,9 +73,9 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
         }
         let cosine = dot(to_light, point.shading_normal);
         var taken = select(0.0, 1.0, dot(to_light, point.geometric_normal) >= 0.0);
-        taken *= point.taking.share;
-        if point.taking.polish > 0.0 {
-            taken *= 1.0 - point.taking.polish * dielectric_reflectance(cosine, object.ior / light.ior);
+        taken *= point.response.share;
+        if point.response.polish > 0.0 {
+            taken *= 1.0 - point.response.polish * dielectric_reflectance(cosine, object.ior / light.ior);
         }
         let share = across_beam * cosine * taken;
         if share > 0.0 {

@@ -26,21 +26,21 @@ fn mixture_of(object: ObjectRecord, factors: vec3f, alpha: f32) -> Mixture {
 }
 
 // What the body receives of incident light: its share of the surface, and its coverage by the coat.
-struct Taking {
+struct DiffuseResponse {
     share: f32,
     polish: f32,
 }
 
-fn taking_of(object: ObjectRecord, mixture: Mixture) -> Taking {
+fn diffuse_response_of(object: ObjectRecord, mixture: Mixture) -> DiffuseResponse {
     switch object.surface {
         case SURFACE_MIXED: {
-            return Taking(1.0, object.polish);
+            return DiffuseResponse(1.0, object.polish);
         }
         case SURFACE_VARIED: {
-            return Taking(mixture.body, mixture.polish);
+            return DiffuseResponse(mixture.body, mixture.polish);
         }
         default: {
-            return Taking(1.0, 0.0);
+            return DiffuseResponse(1.0, 0.0);
         }
     }
 }

@@ -16,8 +16,8 @@ fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -
         let factors = looked_up(object.variation, fragment.uvs, 0.0).rgb;
         mixture = mixture_of(object, factors, looked_up(object.texture, fragment.uvs, 0.0).a);
     }
-    let taking = taking_of(object, mixture);
-    let point = LitPoint(place, margin, towards_eye * normalize(across), shading_normal, taking);
+    let response = diffuse_response_of(object, mixture);
+    let point = LitPoint(place, margin, towards_eye * normalize(across), shading_normal, response);
     let baked = own_irradiance(fragment, is_front);
     let irradiance = baked.rgb + direct_irradiance(point, object);
     let diffuse = own_base_colour(fragment) * irradiance / PI;

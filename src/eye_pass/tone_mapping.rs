@@ -1,10 +1,8 @@
 //! From radiance to display colours: exposure, tone mapping, sRGB encoding. The twin of `shaders/shared/tone_map.wgsl`.
 
 use super::{Picture, ToneMap};
+use crate::illumination::visible::MIDDLE_GREY;
 use crate::optics::{LinearSrgb, luminance};
-
-/// Auto exposure maps the log-average luminance to this, the 18 % grey card.
-const MIDDLE_GREY: f64 = 0.18;
 
 /// Khronos PBR Neutral: exact below its shoulder, preserves hue above it.
 /// Source: <https://github.com/KhronosGroup/ToneMapping/tree/main/PBR_Neutral>.

@@ -24,11 +24,12 @@ pub fn file_bytes(path: &Path) -> Result<u64> {
     // Checked before opening, since opening a pipe waits for its other end.
     let metadata = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?;
     if !metadata.is_file() {
-        return Err(Error::failure(
-            path.display().to_string(),
-            "is not a regular file",
-            "name a file",
-        ));
+        let what = if metadata.is_dir() {
+            "is a folder"
+        } else {
+            "is not a regular file"
+        };
+        return Err(Error::failure(path.display().to_string(), what, "name a file"));
     }
     Ok(metadata.len())
 }
@@ -61,16 +62,7 @@ pub fn read_part(path: &Path, from: u64, bytes: u64) -> Result<Vec<u8>> {
 /// # Errors
 /// No such file; a folder, device or pipe of that name; a larger file; a file that cannot be read.
 pub fn read_file(path: &Path, max_bytes: u64) -> Result<Vec<u8>> {
-    // Checked before opening, since opening a pipe waits for its other end.
-    let metadata = std::fs::metadata(path).map_err(|error| unreadable(path, &error))?;
-    if !metadata.is_file() {
-        let what = if metadata.is_dir() {
-            "is a folder"
-        } else {
-            "is not a regular file"
-        };
-        return Err(Error::failure(path.display().to_string(), what, "name a file"));
-    }
+    file_bytes(path)?;
     let file = File::open(path).map_err(|error| unreadable(path, &error))?;
     let mut bytes = Vec::new();
     // Reading one byte more than allowed detects a file that is too large, even if its stated size is wrong.

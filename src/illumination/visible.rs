@@ -20,8 +20,8 @@ const NIGHT: f64 = 1e-4;
 /// Share of the area among the darkest and among the brightest blocks that does not affect it, either.
 const TRIMMED: f64 = 0.1;
 
-/// Exposure maps the log-average luminance to this fraction of white.
-const MIDDLE_GREY: f64 = 0.18;
+/// Fraction of white to which exposure maps the log-average luminance: the 18 % grey card.
+pub const MIDDLE_GREY: f64 = 0.18;
 
 /// Luminance, relative to white, below which errors are relative to a constant: see [`BlockLight::scale`].
 const DARKEST: f64 = 1.0 / 256.0;

@@ -69,8 +69,6 @@ pub(in super::super) struct TilePool {
     /// Slots handed out so far, including those that are free again.
     used: u32,
     free: Vec<u32>,
-    /// Whether the texture was replaced.
-    is_new: bool,
 }
 
 impl TilePool {
@@ -83,7 +81,6 @@ impl TilePool {
             layers: 1,
             used: 0,
             free: Vec::new(),
-            is_new: true,
         }
     }
 
@@ -106,7 +103,7 @@ impl TilePool {
             self.texture.size(),
         );
         gpu.queue.submit([encoder.finish()]);
-        (self.texture, self.rows, self.layers, self.is_new) = (grown, rows, layers, true);
+        (self.texture, self.rows, self.layers) = (grown, rows, layers);
         Some(())
     }
 
