@@ -29,9 +29,9 @@ choices! {
     pub enum LayerKind {
         /// LS+D: light that met at least one specular surface.
         Caustic,
-        /// LD: straight from the lights, stopped by every surface.
+        /// LD: light straight from the lamps; every surface casts a shadow.
         Direct,
-        /// LD+D: light that other diffuse surfaces send.
+        /// LD+D: light reflected by other diffuse surfaces.
         Indirect,
     }
 }
@@ -49,12 +49,12 @@ impl LayerKind {
 choices! {
     /// How the light pass turns rays into irradiance.
     pub enum Estimator {
-        /// Photons for lights with a size, for light on rough surfaces, and without a target; else patches or, of a single
-        /// light, whichever a pilot of both measures to be cheaper for the target.
+        /// Photons for extended lights, for rough surfaces, and without a target. Otherwise patches; for a single light,
+        /// whichever of the two a pilot of both measures to be cheaper for the target.
         Auto,
         /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
         Wavefront,
-        /// Photons: paths that go one way at every surface, each counted into the texel it hits.
+        /// Photons: random paths that follow one branch at every surface; each is counted in the texel it hits.
         Photon,
         /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
         Splat,
@@ -63,10 +63,10 @@ choices! {
     /// How the error is measured.
     #[derive(Default)]
     pub enum ErrorMetric {
-        /// As an eye sees it: relative to how bright a place is, with what exposure makes of the dark.
+        /// Relative to the local brightness as the eye sees it; in the dark, relative to what the exposure reveals.
         #[default]
         Visible,
-        /// Root mean square over all maps, over their mean: ruled by the brightest light.
+        /// Root mean square over all maps, relative to their mean; the brightest light dominates it.
         Rmse,
     }
 
@@ -85,19 +85,19 @@ choices! {
 
     /// How texels sample a kernel.
     pub enum KernelSampling {
-        /// Its integral over each texel.
+        /// The kernel's integral over each texel.
         Integrated,
-        /// Its value at each texel's centre, as the paper does; for studies.
+        /// The kernel's value at each texel's centre, as in the paper; for studies.
         Point,
     }
 
     /// What determines the size and shape of a splat.
     pub enum Footprint {
-        /// The ellipse that the neighbouring rays span.
+        /// The ellipse spanned by the neighbouring rays.
         Ellipse,
-        /// The disc of the area that the neighbouring rays span (section 3.2.1 of the paper).
+        /// A disc with the area spanned by the neighbouring rays (section 3.2.1 of the paper).
         Disc,
-        /// A disc that grows with the length of the path.
+        /// A disc that grows with the path length.
         Distance,
         /// The same disc for every ray of a light.
         Fixed,
@@ -105,9 +105,9 @@ choices! {
 
     /// Where in its lattice cell a light ray starts.
     pub enum RayPlacement {
-        /// At the centre.
+        /// At the centre of the cell.
         Lattice,
-        /// Anywhere, by the seed (section 3.1.2 of the paper).
+        /// At a random place in the cell (section 3.1.2 of the paper).
         Jittered,
     }
 
@@ -165,7 +165,7 @@ choices! {
     pub enum SpectralSampling {
         /// Every ray is traced at every wavelength.
         Split,
-        /// Every ray has one wavelength: rays are dealt out among the wavelengths evenly.
+        /// Every ray has one wavelength; the wavelengths share the rays evenly.
         Stochastic,
     }
 
