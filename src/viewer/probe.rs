@@ -199,18 +199,18 @@ fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) ->
     if scale > 0.0 { scale } else { MIN_SHARE }
 }
 
-/// The point that is asked about, and what is known of it.
+/// The probed point and what is known of it.
 #[derive(Debug)]
 pub struct Prober {
     gaze: Option<Ray>,
-    /// Whether the gaze is still to be followed.
+    /// Whether the ray still has to be traced.
     is_due: bool,
     shown: Option<Probed>,
     coming: Background<(), Explanation>,
 }
 
 impl Prober {
-    /// Asks nothing yet; the window is woken when there is something.
+    /// No point is probed yet. `wake` is called when light paths are found.
     pub fn new(wake: &Wake) -> Self {
         Self {
             gaze: None,
@@ -220,7 +220,7 @@ impl Prober {
         }
     }
 
-    /// Asks about what is seen along a ray; about nothing without one.
+    /// Probes what is visible along a ray; `None` clears the probe.
     pub fn ask(&mut self, gaze: Option<Ray>) {
         self.gaze = gaze;
         self.is_due = gaze.is_some();
@@ -228,22 +228,21 @@ impl Prober {
         self.shown = None;
     }
 
-    /// Asks again: the scene or its maps are others.
+    /// Repeats the probe because the scene or its maps have changed.
     pub fn ask_again(&mut self) {
         self.is_due = self.gaze.is_some();
     }
 
-    /// Whether there is something to be found that needs the scene's surfaces.
+    /// Whether [`look`](Self::look) has to be called with the scene's surfaces.
     pub fn is_due(&self) -> bool {
         self.is_due
     }
 
-    /// What is known.
     pub fn shown(&self) -> Option<&Probed> {
         self.shown.as_ref()
     }
 
-    /// Follows the gaze that is due.
+    /// Traces the pending ray and starts to search light paths.
     pub fn look(&mut self, tracer: &Arc<Tracer>, maps: &[IlluminationMap], limits: Limits) {
         let Some(gaze) = self.gaze.filter(|_| self.is_due) else {
             return;
@@ -264,7 +263,7 @@ impl Prober {
         self.shown = Some(probed);
     }
 
-    /// Looks whether the paths were found since the last time.
+    /// Takes the light paths; returns whether they have been found since the last call.
     pub fn poll(&mut self) -> bool {
         let Some(((), outcome)) = self.coming.take() else {
             return false;
@@ -277,13 +276,13 @@ impl Prober {
     }
 }
 
-/// Paths that are drawn: the strongest.
+/// Number of the strongest paths that are drawn.
 const MAX_PATHS: usize = 24;
 const CAUSTIC: Color32 = Color32::from_rgb(255, 196, 64);
 const DIRECT: Color32 = Color32::from_rgb(120, 190, 255);
 const POINT: Color32 = Color32::from_rgb(255, 80, 80);
 
-/// Draws the paths over a picture as the camera sees them: the wider, the larger their share.
+/// Draws the paths over the picture; stronger paths are wider.
 pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
     let painter = painter.with_clip_rect(lens.picture);
     let paths = probed.explanation.iter().flat_map(|told| &told.paths);
