@@ -12,7 +12,7 @@ use crate::units::LUMENS_PER_WATT;
 /// Ratio of the lower to the upper end of an automatic logarithmic scale.
 const DECADES: f64 = 1e-4;
 
-/// What of the maps the picture shows; the panel tells it of each.
+/// Quantity that the picture shows. The panel shows the comment of each variant as its tooltip.
 #[derive(
     Clone,
     Copy,
