@@ -416,7 +416,7 @@ impl App {
             FrameOutcome::Hidden => Duration::MAX,
             FrameOutcome::Later => RETRY_AFTER,
             FrameOutcome::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
-            // Animations of the panel continue while refinement waits for the user's hands to rest.
+            // The panel keeps scrolling while refinement pauses after input.
             FrameOutcome::Yes if self.is_refining => self.pace.pause(now).min(repaint_after),
             FrameOutcome::Yes if self.model.state.is_working() && self.is_software() => {
                 repaint_after.min(BAKING_FRAME_OF_SOFTWARE)

@@ -18,7 +18,7 @@ use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::{IDENTITY, Matrix3};
 use crate::scene::Scene;
 
-/// Smallest inner size of the window [logical pixels]: the panel beside a picture of the same width.
+/// Smallest inner size of the window [logical pixels]: room for the panel and a picture about as wide.
 const SMALLEST: LogicalSize<u32> = LogicalSize::new(700, 400);
 /// Multisampling: samples per pixel.
 pub(super) const SAMPLES: u32 = 4;

@@ -10,7 +10,7 @@ use super::files::config::KeptViews;
 use super::walking::{self, Collider, Walker};
 use crate::scene::{Camera, Scene};
 
-/// Time constant with which the velocity approaches the wanted velocity [s].
+/// Time constant with which the velocity approaches its target [s].
 const SETTLING_S: f64 = 0.08;
 /// Fraction of the flying speed below which the camera stops once no key is held.
 const STILL: f64 = 1e-3;
@@ -288,8 +288,8 @@ impl Navigator {
             || (self.travel == NavigationMode::Walk && self.walker.is_moving())
     }
 
-    /// Advances by a time [s, ≥ 0] without collisions. The velocity approaches the wanted velocity exponentially and
-    /// the path is its exact integral, so one long frame ends where many short ones do.
+    /// Advances by a time [s, ≥ 0] without collisions. The velocity approaches its target exponentially and the path
+    /// is the exact integral, so one long frame ends where many short ones do.
     pub fn advance(&mut self, seconds: f64) {
         let path = self.drift(seconds);
         match self.travel {
