@@ -36,12 +36,11 @@ use crate::illumination::IlluminationMap;
 use crate::progress::Control;
 use serde_json::{Value, json};
 
-/// What other threads tell the window.
+/// Messages from other threads.
 #[derive(Debug)]
 pub enum UserEvent {
-    /// The baking thread moved on.
+    /// News from a background thread.
     Baker,
-    /// A screen reader asks for something.
     Accessibility(accessibility::Event),
 }
 
@@ -51,104 +50,102 @@ impl From<accessibility::Event> for UserEvent {
     }
 }
 
-/// A scroll of this many pixels counts as one notch of the wheel.
+/// Scrolling by this many pixels counts as one wheel notch.
 const PIXELS_PER_NOTCH: f64 = 40.0;
-/// How often a window at rest looks whether it was asked to stop.
+/// Interval at which an idle window checks whether it was asked to stop.
 const LOOK_FOR_STOP: Duration = Duration::from_millis(100);
-/// Time between frames that only show how a bake gets on; where the processor draws them, the bake waits for them.
+/// Interval between frames that only show the progress of a bake. It is longer on a software rasterizer, which takes
+/// CPU time from the bake.
 const BAKING_FRAME: Duration = Duration::from_millis(100);
 const BAKING_FRAME_OF_SOFTWARE: Duration = Duration::from_millis(500);
-/// Where the processor draws, a bake waits for so long after a frame of a walk.
+/// On a software rasterizer, a bake pauses for this time after each frame of a moving camera.
 const BAKE_WAITS: Duration = Duration::from_millis(500);
-/// Where the processor draws, a level of a bake is shown for so long before another one is made ready.
+/// On a software rasterizer, the time between two levels of a bake that are handed out.
 const LEVEL_OF_SOFTWARE: Duration = Duration::from_secs(3);
-/// Time between a picture and the frame that tells what it took.
+/// Delay between a picture and the frame that reports its GPU time.
 const REPORT_AFTER: Duration = Duration::from_millis(40);
-/// A device that has not told in so many frames how long a picture took is not asked again until the next one.
+/// Limit of the frames that wait for the GPU time of one picture.
 const MAX_REPORTS: u32 = 25;
-/// Longest time that one frame flies: after a stall the camera is not thrown through the scene.
+/// Upper limit of the camera's time step: a stall must not throw the camera through the scene.
 const LONGEST_STEP: Duration = Duration::from_millis(500);
-/// A device that was lost this often within [`LOSSES_WITHIN`] is given up.
+/// After more than this many device losses within [`LOSSES_WITHIN`] the window gives up.
 const MAX_LOSSES: usize = 3;
 const LOSSES_WITHIN: Duration = Duration::from_secs(60);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct MapsOnDevice {
     shown: MapsShown,
-    /// Whether direct light is traced, and not in them.
+    /// Whether direct light is traced per pixel and left out of the maps.
     traces_lights: bool,
 }
 
-/// The maps beside the picture, and how they are shown.
+/// The maps of the comparison's right part, and their display.
 type BesideShown = (Arc<[IlluminationMap]>, MapStyle);
 
-/// The whole program behind one window.
+/// The application: model, panel and window.
 pub struct App {
     model: Model,
     panel: Panel,
     graphics: Option<Graphics>,
     proxy: EventLoopProxy<UserEvent>,
     stop: Option<Arc<Control>>,
-    /// Inner size of the window to be opened [logical pixels].
+    /// Initial inner size of the window [logical pixels].
     size: (u32, u32),
-    /// Where the picture lies in the window [points].
+    /// Rectangle of the picture in the window [points].
     picture_rect: egui::Rect,
-    /// Where the mouse was when it took the gaze [pixels].
+    /// Position of the pointer when it began to turn the camera [pixels]; `None` if it does not.
     looking_from: Option<PhysicalPosition<f64>>,
     pointer: PhysicalPosition<f64>,
-    /// Handles in the picture.
     gizmo: Gizmo,
-    /// Where the left button went down on the picture, until it is a drag [pixels].
+    /// Where the left button was pressed on the picture, until the press becomes a drag [pixels].
     clicks_at: Option<PhysicalPosition<f64>>,
-    /// Until when the camera has moved.
+    /// Time up to which the camera has been advanced.
     moved_until: Instant,
-    /// When the next frame is due though nothing happens.
+    /// When the next frame is due without any event.
     wake_at: Option<Instant>,
-    /// Compiles what mirrors and glass take.
+    /// Compiles the shaders for chains in advance.
     warm_up: WarmUp,
     exposure: AutoExposure,
-    /// When the exposure was last brought on its way.
+    /// When the exposure was last updated.
     exposed: Instant,
-    /// As the model had them in the last frame.
+    /// The maps shown in the last frame.
     shown: MapsShown,
-    /// As the device has them; `None` where it has to be given all.
+    /// The maps on the device; `None` if everything has to be uploaded.
     on_device: Option<MapsOnDevice>,
-    /// What the picture's right part was told to show.
     beside: Option<BesideShown>,
-    /// Where the picture's two parts meet, as a share of its width.
+    /// Position of the divider between the two parts of a comparison, as a fraction of the picture's width.
     divider: f32,
-    /// What keys asked for since the last frame.
+    /// Commands by keys since the last frame.
     pressed: Vec<Command>,
     losses: Vec<Instant>,
-    /// Chooses how well pictures are made.
     pace: Pace,
-    /// Whether the picture is still to become better though nothing changes.
+    /// Whether the picture is still being refined although nothing changes.
     is_refining: bool,
-    /// Why there are no chains, as it was told.
+    /// Last reason for missing chains that was shown to the user.
     shown_refusal: Option<String>,
     pictures: u64,
     frames: u64,
     /// Number of pictures when the log last reported an idle window.
     rested_at: u64,
-    /// Frames that may still come only to tell what the last picture took.
+    /// Number of further frames that may be drawn only to report the GPU time of the last picture.
     reports_due: u32,
-    /// Told over the picture until the next key press.
+    /// Message over the picture until the next key press.
     notice: Option<String>,
-    /// Held now: Ctrl, Shift and the like.
+    /// Modifier keys held.
     modifiers: ModifiersState,
     dialog: Dialog,
     failure: Option<Error>,
 }
 
 impl App {
-    /// Starts baking; the window comes with the first event.
+    /// Starts baking. The window is opened by the first event.
     ///
     /// # Errors
     /// As [`Model::new`].
     pub fn new(options: &ViewerOptions, proxy: EventLoopProxy<UserEvent>) -> Result<Self> {
         let of_baker = proxy.clone();
         let wake = &Wake::new(move || {
-            // Fails only once the window is gone.
+            // Fails only once the event loop has ended.
             let _ = of_baker.send_event(UserEvent::Baker);
         });
         let model = Model::new(options, wake)?;
@@ -189,7 +186,7 @@ impl App {
         })
     }
 
-    /// What ended the window, if it was not the user.
+    /// The error that ended the window, if any.
     pub fn failure(self) -> Option<Error> {
         self.failure
     }
@@ -226,7 +223,7 @@ impl App {
         event_loop.exit();
     }
 
-    /// The window has gone: nothing of it may be touched any more, not even to be dropped.
+    /// Leaks the graphics: the window no longer exists, so its objects must not be used, not even dropped.
     pub fn lose_window(&mut self) {
         std::mem::forget(self.graphics.take());
         self.closing();
@@ -247,7 +244,7 @@ impl App {
         event_loop.exit();
     }
 
-    /// Throws window and device away and makes them anew, unless that was tried too often.
+    /// Recreates window and device, unless they were lost too often.
     fn recover(&mut self, event_loop: &ActiveEventLoop) {
         let reason = self
             .graphics
@@ -292,7 +289,7 @@ impl App {
         }
     }
 
-    /// Flies up to now: called before keys change and before each frame.
+    /// Advances the camera up to now. Must be called before held keys change and before each frame.
     fn fly(&mut self) {
         let now = Instant::now();
         let step = now.duration_since(self.moved_until).min(LONGEST_STEP);
@@ -300,7 +297,7 @@ impl App {
         self.moved_until = now;
     }
 
-    /// One frame.
+    /// Handles input, draws and presents one frame.
     fn redraw(&mut self, event_loop: &ActiveEventLoop) {
         self.fly();
         self.poll_files();
@@ -315,7 +312,7 @@ impl App {
             .iter()
             .any(|command| matches!(command, Command::Choose(_)))
         {
-            // Handles and legends come with the next frame.
+            // Handles and legends were laid out before this change.
             self.request_redraw();
         }
         let of_window = self.model.act(commands, Instant::now());
@@ -336,7 +333,7 @@ impl App {
             return;
         };
         let shown = graphics.show(&mut painting);
-        // A broken window is reported once it is restored.
+        // The error of a lost device is reported by `recover`.
         if shown != FrameOutcome::Broken
             && let Some(error) = graphics.gpu().take_error()
         {
@@ -353,14 +350,14 @@ impl App {
         self.schedule(event_loop, shown, painting.repaint_after);
     }
 
-    /// Tells over the picture what the graphics device could not do.
+    /// Shows an error of the graphics device over the picture.
     fn tell_fault(&mut self, error: &Error) {
         let sentence = error.to_string();
         self.model.log.write("fault", json!({"sentence": sentence}));
         self.notice = Some(sentence);
     }
 
-    /// Shows panel and picture to egui; what the user asks for, in the order in which it is done.
+    /// Runs panel and overlays in egui. Returns the commands in the order in which they are to be applied.
     fn run_interface(&mut self) -> Option<(Painting, Vec<Command>)> {
         let lost = self.losses.last();
         self.model.picture.lost_device = lost.is_some_and(|loss| loss.elapsed() < LOSSES_WITHIN);
@@ -405,7 +402,7 @@ impl App {
         graphics.is_some_and(|graphics| graphics.gpu().is_software())
     }
 
-    /// Decides when the next frame comes.
+    /// Schedules the next frame.
     fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: FrameOutcome, repaint_after: Duration) {
         let now = Instant::now();
         if self.is_software() && (self.model.is_moving() || self.looking_from.is_some()) {
@@ -419,7 +416,7 @@ impl App {
             FrameOutcome::Hidden => Duration::MAX,
             FrameOutcome::Later => RETRY_AFTER,
             FrameOutcome::Yes if self.model.is_moving() || self.is_exposing() => Duration::ZERO,
-            // The panel glides on while the picture waits for hands to rest.
+            // The panel keeps scrolling while refinement pauses after input.
             FrameOutcome::Yes if self.is_refining => self.pace.pause(now).min(repaint_after),
             FrameOutcome::Yes if self.model.state.is_working() && self.is_software() => {
                 repaint_after.min(BAKING_FRAME_OF_SOFTWARE)
@@ -446,7 +443,7 @@ impl App {
             .into_iter()
             .flatten()
             .min();
-        // A frame that could not be shown yet is no rest.
+        // A frame that could not be presented is not idle.
         let is_working = self.model.state.is_working() || self.is_refining || is_report_due;
         let is_coming = self.is_exposing() || self.warm_up.is_coming();
         let is_working = is_working || shown == FrameOutcome::Later || self.model.is_moving() || is_coming;
@@ -510,7 +507,7 @@ impl ApplicationHandler<UserEvent> for App {
         if is_by_hand {
             self.pace.touch(Instant::now());
         }
-        // Egui counts each frame as one that needs another; the schedule knows better.
+        // egui asks for another frame after each frame; `schedule` decides that here.
         if graphics.interface().on_event(&window, &event) && event != WindowEvent::RedrawRequested {
             window.request_redraw();
             if is_by_hand {
@@ -567,7 +564,7 @@ impl ApplicationHandler<UserEvent> for App {
     }
 }
 
-/// Whether an event is one of keys or mouse.
+/// Whether an event is keyboard or mouse input.
 fn is_by_hand(event: &WindowEvent) -> bool {
     matches!(
         event,

@@ -13,7 +13,6 @@ use crate::progress::{Control, Progress, Stage};
 pub struct Wake(Arc<dyn Fn() + Send + Sync>);
 
 impl Wake {
-    /// By this.
     pub fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
         Self(Arc::new(wake))
     }
@@ -29,10 +28,10 @@ impl fmt::Debug for Wake {
     }
 }
 
-/// What a piece of work is stopped by, and tells its progress to.
+/// Cancellation and progress of a task.
 #[derive(Debug)]
 pub struct Task {
-    /// Cancelled once the result is not needed any more.
+    /// Cancelled when the result is no longer needed.
     pub control: Control,
     done: Mutex<Option<(u64, u64)>>,
     wake: Wake,
@@ -45,7 +44,7 @@ impl Progress for Task {
     }
 }
 
-/// Work of one kind, one piece at a time, each with what it is for. Dropping it asks the present piece to stop.
+/// Runs tasks of one kind on a thread, one at a time, each with a key. Dropping it cancels the running task.
 #[derive(Debug)]
 pub struct Background<K, T> {
     name: &'static str,
@@ -62,7 +61,7 @@ struct Running<K, T> {
 }
 
 impl<K, T> Background<K, T> {
-    /// Nothing is under way; the window is woken when something is done.
+    /// No task is running. `wake` is called on progress and when a task ends.
     pub(super) fn new(name: &'static str, wake: &Wake) -> Self {
         Self {
             name,
@@ -71,31 +70,31 @@ impl<K, T> Background<K, T> {
         }
     }
 
-    /// What the piece under way is for.
+    /// Key of the running task.
     pub(super) fn of(&self) -> Option<&K> {
         self.running.as_ref().map(|running| &running.of)
     }
 
-    /// How much of how much was done, as it told last.
+    /// Last reported progress: done and total.
     pub(super) fn progress(&self) -> Option<(u64, u64)> {
         let task = &self.running.as_ref()?.task;
         *task.done.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks it to stop; what comes of it is still taken.
+    /// Cancels the running task; its outcome can still be taken.
     pub(super) fn cancel(&self) {
         if let Some(running) = &self.running {
             running.task.control.cancel();
         }
     }
 
-    /// Stops it, and forgets it.
+    /// Cancels the running task and discards its outcome.
     pub(super) fn stop(&mut self) {
         self.cancel();
         self.running = None;
     }
 
-    /// Waits for its end.
+    /// Waits until the running task ends and discards its outcome.
     pub(super) fn wait(&mut self) {
         if let Some(running) = self.running.take()
             && running.thread.join().is_err()
@@ -106,10 +105,10 @@ impl<K, T> Background<K, T> {
 }
 
 impl<K, T: Send + 'static> Background<K, T> {
-    /// Starts a piece of work in the place of one that is still under way.
+    /// Starts a task; a running one is stopped.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot create a thread.
     pub(super) fn start(&mut self, of: K, work: impl FnOnce(&Task) -> T + Send + 'static) -> Result<()> {
         self.stop();
         let (give, outcome) = channel();
@@ -135,7 +134,7 @@ impl<K, T: Send + 'static> Background<K, T> {
         Ok(())
     }
 
-    /// What came of it, once it is done: `None` for an outcome where it broke off.
+    /// Key and outcome of a task that has ended; the outcome is `None` if the task panicked.
     pub(super) fn take(&mut self) -> Option<(K, Option<T>)> {
         let outcome = match self.running.as_ref()?.outcome.try_recv() {
             Ok(outcome) => Some(outcome),
@@ -153,7 +152,7 @@ impl<K, T> Drop for Background<K, T> {
     }
 }
 
-/// Says that the system gives no thread.
+/// Error for a thread that the system cannot create.
 pub(super) fn no_thread(location: &str, error: &std::io::Error) -> Error {
     Error::failure(
         location,

@@ -6,18 +6,18 @@ use crate::illumination::{Chart, IlluminationMap};
 use crate::optics::luminance;
 use crate::scene::Scene;
 
-/// A place of a surface.
+/// A point on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BrightSpot {
-    /// Where [m].
+    /// [m].
     pub point: DVec3,
-    /// Unit, away from the side that is lit.
+    /// Unit, on the side that the map belongs to.
     pub normal: DVec3,
-    /// Luminance of all layers [W/m²].
+    /// Luminance of the irradiance in all layers [W/m²].
     pub irradiance_w_m2: f64,
 }
 
-/// The middle of the texel with the most light of all; `None` where no light fell.
+/// The centre of the brightest texel; `None` if the maps are dark.
 pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<BrightSpot> {
     let brightest = maps.iter().filter_map(|map| {
         let total = map.total();
@@ -37,7 +37,7 @@ pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<BrightSpot> {
     })
 }
 
-/// The point of the surface at a texel's middle, or the nearest to it where the surface does not reach that.
+/// The surface point at a texel's centre, or the nearest one if the centre is not covered.
 fn place(scene: &Scene, chart: &Chart, texel: usize) -> Option<(DVec3, DVec3)> {
     let uv = middle(chart, texel)?;
     let mesh = scene.objects.get(chart.object())?.mesh_in_scene();
@@ -56,7 +56,7 @@ fn place(scene: &Scene, chart: &Chart, texel: usize) -> Option<(DVec3, DVec3)> {
     Some((point, normal * chart.receiver.side().sign()))
 }
 
-/// The middle of a texel in map coordinates.
+/// The centre of a texel in map coordinates.
 fn middle(chart: &Chart, texel: usize) -> Option<DVec2> {
     let all = (0..chart.height).flat_map(|row| (0..chart.width).map(move |column| (column, row)));
     let mut of_texel = all.filter(|(column, row)| chart.texel_at(*column, *row) == texel);
@@ -70,7 +70,7 @@ fn middle(chart: &Chart, texel: usize) -> Option<DVec2> {
     Some((DVec2::new(column as f64, row as f64) + half) / size)
 }
 
-/// Shares of a triangle's corners in a point; `None` where it has no area.
+/// Barycentric coordinates of a point; `None` if the triangle has no area.
 fn barycentric([a, b, c]: &[DVec2; 3], point: DVec2) -> Option<[f64; 3]> {
     let (ab, ac, ap) = (*b - *a, *c - *a, point - *a);
     let area = ab.perp_dot(ac);

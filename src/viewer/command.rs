@@ -11,29 +11,28 @@ use crate::effect::Effect;
 use crate::scene::Edit;
 use crate::settings::BakeSettings;
 
-/// What the user has set.
+/// The user's present choices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Choices {
-    /// Of the next bake.
+    /// Settings of the next bake.
     pub settings: BakeSettings,
-    /// Whether a change bakes by itself.
+    /// Whether changes are baked automatically.
     pub automatic: bool,
-    /// Of the picture.
+    /// How the picture is shown.
     pub display: Display,
-    /// The camera's path.
     pub film: Film,
-    /// What is edited, and held by the mouse.
+    /// What is edited in the panel and has handles in the picture.
     pub selection: Selection,
-    /// Whether a click on the picture asks what lights the surface there.
+    /// Whether a click on the picture probes the surface.
     pub probes: bool,
-    /// What is drawn of the light's way.
+    /// What the path preview draws.
     pub sketched: PreviewFlags,
-    /// Whether the scene is read again when its files change.
+    /// Whether the scene is reloaded when its files change.
     pub watches: bool,
 }
 
 impl Choices {
-    /// These settings, everything else at its default.
+    /// Choices with these settings, and defaults for everything else.
     pub fn new(settings: BakeSettings) -> Self {
         Self {
             settings,
@@ -48,92 +47,91 @@ impl Choices {
     }
 }
 
-/// What the user asks for.
+/// A request by the user.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Command {
-    /// Set this.
+    /// Replace the choices.
     Choose(Box<Choices>),
-    /// Change the scene.
+    /// Edit the scene.
     Edit(Edit),
-    /// The next change is a step of its own: the mouse is up, and no number is being typed.
+    /// Close the undo step: the mouse is up and no number is being typed.
     Release,
-    /// Take the last change back.
+    /// Undo the last change.
     Undo,
-    /// Do again what was taken back last.
+    /// Redo the last undone change.
     Redo,
     /// Bake now.
     Rebake,
-    /// Stop the bake.
+    /// Cancel the bake.
     Cancel,
-    /// Find what this effect is worth to the maps that are shown.
+    /// Compute the contribution of this effect to the maps shown.
     EffectDifference(Effect),
-    /// Compare, or stop comparing.
+    /// Begin or end a comparison.
     Compare(CompareCommand),
-    /// Record, play or film the camera's path.
+    /// Record, play or film the camera path.
     Film(FilmCommand),
-    /// Let the scene's time go on, or choose a moment.
+    /// Control the scene's time.
     Play(PlayCommand),
     /// Write maps to files.
     Export(Export),
-    /// Forget the point that was asked about.
+    /// Clear the probe.
     ClearProbe,
-    /// Go to the brightest spot, and ask about it.
+    /// Go to the brightest spot and probe it.
     Brightest,
-    /// Add a light before what is looked at.
+    /// Add a light near what the camera looks at.
     AddLight(NewLight),
-    /// Open this scene: a path as it was typed, or `builtin:NAME`.
+    /// Open this scene: a path as typed, or `builtin:NAME`.
     Open(String),
-    /// Of the window: choose a scene to open in the system's dialog.
+    /// For the window: choose a scene in the system's file dialog.
     Browse,
-    /// Of the window: choose a file for the edited scene.
+    /// For the window: choose a file for the edited scene.
     SaveScene,
-    /// Of the window: write the picture to files.
+    /// For the window: write the picture to files.
     SavePicture,
-    /// Of the window: choose the exposure from the picture.
+    /// For the window: measure the exposure of the picture.
     MeasureExposure,
 }
 
-/// What is to become of the comparison.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum CompareCommand {
-    /// Hold what comes against the present maps.
+    /// Keep the present maps as the reference.
     Keep,
-    /// Hold the present maps against those of a folder.
+    /// Load the reference from a folder of maps.
     Load(PathBuf),
     End,
 }
 
-/// What is to become of the scene's time.
+/// Control of the scene's time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum PlayCommand {
-    /// Go on, or stand still.
+    /// Start or stop the playback.
     Play(bool),
-    /// Seconds of the scene in one second [1].
+    /// Scene seconds per second [1].
     Speed(f64),
-    /// Stand at this moment [s].
+    /// Go to this time [s].
     GoTo(f64),
 }
 
-/// What is to become of the camera's path.
+/// Command of the section *Camera path*.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum FilmCommand {
-    /// Note the present camera: as a new key, or in the place of one.
+    /// Record the present camera: as a new key, or in place of the key with this index.
     Record(Option<usize>),
-    /// Go to a key.
+    /// Move the camera to the key with this index.
     GoTo(usize),
-    /// Play it, or end that.
+    /// Start or stop the playback.
     Play(bool),
-    /// Make it one past the scene's cameras, and play that.
+    /// Replace the path by a tour of the scene's cameras, and play it.
     Tour,
-    /// Write it to a file.
+    /// Write the path to a file.
     Save,
-    /// Read it from a file.
+    /// Read the path from a file.
     Load(PathBuf),
-    /// Draw its frames, or those of a turn around the scene, and write them.
+    /// Draw and write the frames of the path, or of a turntable.
     Shoot {
-        /// Around the scene.
+        /// Film a turntable around the scene instead of the path.
         turns: bool,
     },
-    /// Draw no more frames.
+    /// Stop drawing frames.
     Stop,
 }

@@ -13,24 +13,24 @@ use crate::illumination::IlluminationMap;
 use crate::illumination::difference::difference;
 use crate::scene::Scene;
 
-/// The maps to compare with.
 #[derive(Clone, Debug)]
 pub struct SavedMaps {
-    /// What it is called in the window.
+    /// Name in the window.
     pub name: String,
-    /// The scene as it is shown with it.
+    /// The scene that is shown with the maps.
     pub scene: Arc<Scene>,
-    /// Its maps, all layers.
+    /// All layers.
     pub maps: Arc<[IlluminationMap]>,
-    /// sqrt(mean((present − reference)²)) / mean(reference) by area, of the luminance of all layers; or why there is none.
+    /// sqrt(mean((present − reference)²)) / mean(reference), weighted by area, of the luminance of all layers; or the
+    /// reason why it is undefined.
     pub relative_rmse: std::result::Result<f64, String>,
 }
 
 impl SavedMaps {
-    /// The present maps, kept.
+    /// Keeps the present maps as the reference.
     ///
     /// # Errors
-    /// There are none.
+    /// There are no maps.
     pub fn kept(scene: &Arc<Scene>, maps: &[IlluminationMap]) -> Result<Self> {
         if maps.is_empty() {
             return Err(Error::usage(
@@ -42,7 +42,7 @@ impl SavedMaps {
         Ok(Self::new("before", scene, maps.to_vec()))
     }
 
-    /// Maps of the scene that were baked into a folder.
+    /// Reads maps of the scene from a folder.
     ///
     /// # Errors
     /// As [`MapSet::read_all`].
@@ -61,7 +61,7 @@ impl SavedMaps {
         }
     }
 
-    /// How far the present maps are from it, in words.
+    /// The difference between the present maps and the reference, in words.
     pub fn told(&self) -> String {
         match &self.relative_rmse {
             Ok(rmse) => format!(
@@ -73,7 +73,7 @@ impl SavedMaps {
         }
     }
 
-    /// Holds other present maps against it.
+    /// Compares with new present maps.
     pub fn compare(&mut self, present: &[IlluminationMap]) {
         self.relative_rmse = match difference(&self.maps, present) {
             Ok(found) => found
@@ -84,16 +84,16 @@ impl SavedMaps {
     }
 }
 
-/// Its name to assistive technology.
+/// Name for assistive technology.
 const DIVIDER: &str = "Divider";
-/// Width that takes the mouse [points].
+/// Width of the divider's drag area [points].
 const GRIP: f32 = 12.0;
-/// Left free above and below it [points].
+/// Space above and below the drag area [points].
 const BORDER: f32 = 20.0;
-/// Nearest to the picture's border, as a share of its width.
+/// Smallest distance of the divider from the picture's border, as a fraction of the picture's width.
 const LEAST: f32 = 0.02;
 
-/// Shows the right part over the whole picture, and lets the divider be dragged.
+/// Draws the reference right of the divider, over the picture, and handles drags of the divider.
 pub fn show(
     ui: &mut Ui,
     picture: Rect,

@@ -11,29 +11,27 @@ use crate::error::Result;
 use crate::scene::{Edit, EditState, Scene};
 use crate::settings::BakeSettings;
 
-/// Steps that can be taken back.
+/// Limit of undo steps.
 const MAX_STEPS: usize = 1000;
 
-/// A scene with its history, and that of the settings it is baked and shown with.
+/// A scene with its undo history, which includes the settings it is baked and shown with.
 #[derive(Clone, Debug)]
 pub struct EditedScene {
     loaded: Arc<Scene>,
     scene: Arc<Scene>,
-    /// Of the loaded scene, and of the edited one.
+    /// Edit states of the loaded scene and of the edited one.
     states: [Arc<EditState>; 2],
     history: History,
 }
 
-/// One of the things that a step changes, as it was before the step or as it is since.
+/// State of one of the things that a step changes, before or after the step.
 #[derive(Clone, Debug)]
 pub enum EditedItem {
     Scene(Arc<EditState>),
     Settings(Box<BakeSettings>),
-    /// The camera's path.
     Film(Box<Film>),
-    /// Whether changes are baked by themselves.
+    /// Whether changes are baked automatically.
     Automatic(bool),
-    /// How the picture shows the maps.
     Display(Display),
 }
 
@@ -41,14 +39,14 @@ pub enum EditedItem {
 struct Step {
     /// What was changed, in the panel's words.
     text: String,
-    /// What of the scene.
+    /// The edited part of the scene; `None` if the step changes none.
     target: Option<String>,
     before: EditedItem,
     after: EditedItem,
 }
 
 impl Step {
-    /// Whether a drag that did this step goes on in the next one.
+    /// Whether `next` continues the same drag.
     fn goes_on_in(&self, next: &Self) -> bool {
         let is_of_same = discriminant(&self.after) == discriminant(&next.after)
             && self.text == next.text
@@ -59,17 +57,18 @@ impl Step {
     }
 }
 
-/// Steps that were done, and steps that were taken back and can be done again.
+/// Undo and redo steps.
 #[derive(Clone, Debug, Default)]
 pub struct History {
     done: Vec<Step>,
     undone: Vec<Step>,
-    /// Whether the newest step still goes on: the mouse is down, or a number is being typed.
+    /// Whether the newest step may still be extended: the mouse is down, or a number is being typed.
     is_open: bool,
 }
 
 impl History {
-    /// Adds a step. Steps of the same while one goes on are taken back together; what was taken back is forgotten.
+    /// Adds a step, or extends the newest one if that is still open and changes the same thing. Clears the redo
+    /// steps.
     fn record(&mut self, step: Step) {
         self.undone.clear();
         match self.done.last_mut() {
@@ -84,24 +83,23 @@ impl History {
         self.is_open = true;
     }
 
-    /// Steps that can be taken back.
+    /// Number of steps that can be undone.
     pub fn undoable(&self) -> usize {
         self.done.len()
     }
 
-    /// What would be taken back.
+    /// Name of the step that would be undone.
     pub fn next_undo(&self) -> Option<&str> {
         self.done.last().map(|step| step.text.as_str())
     }
 
-    /// What would be done again.
+    /// Name of the step that would be redone.
     pub fn next_redo(&self) -> Option<&str> {
         self.undone.last().map(|step| step.text.as_str())
     }
 }
 
 impl EditedScene {
-    /// Nothing is edited yet.
     pub fn new(scene: Arc<Scene>) -> Self {
         let state = Arc::new(EditState::of(&scene));
         Self {
@@ -112,25 +110,24 @@ impl EditedScene {
         }
     }
 
-    /// As it is now.
+    /// The edited scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
     }
 
-    /// As it was before every edit.
+    /// The scene as loaded.
     pub fn loaded(&self) -> &Arc<Scene> {
         &self.loaded
     }
 
-    /// What can be taken back and done again.
     pub fn history(&self) -> &History {
         &self.history
     }
 
-    /// Edits the scene. Edits of one target while the mouse is down are taken back together.
+    /// Applies an edit. Edits of one target while the mouse is down form one undo step.
     ///
     /// # Errors
-    /// What the edit is refused for; nothing is changed then.
+    /// As [`Edit::apply`]; nothing is changed then.
     pub fn edit(&mut self, edit: &Edit) -> Result<()> {
         let scene = edit.apply(&self.scene)?;
         let after = Arc::new(EditState::of(&scene));
@@ -154,7 +151,7 @@ impl EditedScene {
         });
     }
 
-    /// Notes that settings were changed, if they were.
+    /// Records a change of the settings, if there is one.
     pub fn note_settings(&mut self, before: &BakeSettings, after: &BakeSettings) {
         if before != after {
             let parts = [before, after].map(|settings| EditedItem::Settings(Box::new(settings.clone())));
@@ -163,7 +160,7 @@ impl EditedScene {
         }
     }
 
-    /// Notes that the maps are shown in another way, if they are.
+    /// Records a change of the display, if there is one.
     pub fn note_display(&mut self, before: Display, after: Display) {
         if before != after {
             self.note(
@@ -174,13 +171,13 @@ impl EditedScene {
         }
     }
 
-    /// Notes another path for the camera.
+    /// Records a change of the camera path.
     pub fn note_film(&mut self, before: &Film, after: &Film) {
         let [from, to] = [before, after].map(|film| EditedItem::Film(Box::new(film.clone())));
         self.note(before.change_to(after).into(), from, to);
     }
 
-    /// Notes that baking by itself was switched.
+    /// Records that automatic baking was switched.
     pub fn note_automatic(&mut self, after: bool) {
         self.note(
             "automatic".into(),
@@ -189,13 +186,13 @@ impl EditedScene {
         );
     }
 
-    /// The next step is one of its own.
+    /// Closes the newest step: the next change is a step of its own.
     pub fn release(&mut self) {
         self.history.is_open = false;
     }
 
-    /// Takes the newest step back, or does the one again that was taken back last: its name, and what was changed, from
-    /// what to what. The scene is changed here.
+    /// Undoes the newest step, or redoes the last undone one. Returns its name and the state before and after; a
+    /// change of the scene is already applied.
     pub fn turn(&mut self, is_back: bool) -> Option<(String, [EditedItem; 2])> {
         let History {
             done,
@@ -222,7 +219,7 @@ impl EditedScene {
     }
 }
 
-/// The names of fields that differ, without their units.
+/// Names of the fields that differ, without their units.
 fn changed<T: Serialize>(before: &T, after: &T) -> String {
     let [before, after] = [before, after].map(|part| serde_json::to_value(part).unwrap_or_default());
     let fields = after.as_object().into_iter().flatten();

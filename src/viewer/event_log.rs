@@ -11,7 +11,7 @@ use super::exporting::ExportState;
 use super::worker::{BakedLevel, EffectDifference};
 use crate::error::{Error, Result};
 
-/// What a bake that gave whole maps was like.
+/// Figures of a level.
 pub(super) fn baked(baked: &BakedLevel) -> Value {
     json!({
         "request": baked.serial,
@@ -27,7 +27,7 @@ pub(super) fn baked(baked: &BakedLevel) -> Value {
     })
 }
 
-/// What an effect is worth.
+/// Figures of the contribution of an effect.
 pub(super) fn compared(worth: &EffectDifference) -> Value {
     let effect = worth.effect.name();
     match &worth.difference {
@@ -41,7 +41,7 @@ pub(super) fn compared(worth: &EffectDifference) -> Value {
     }
 }
 
-/// The file, or nothing where none was asked for.
+/// Writes events to a file, if one was requested.
 #[derive(Debug)]
 pub struct EventLog {
     file: Option<File>,
@@ -49,7 +49,7 @@ pub struct EventLog {
 }
 
 impl EventLog {
-    /// Opens the file anew; `None` keeps no log.
+    /// Creates or truncates the file; `None` writes no log.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -69,13 +69,12 @@ impl EventLog {
         })
     }
 
-    /// Whether events are written.
     pub fn is_kept(&self) -> bool {
         self.file.is_some()
     }
 
-    /// Writes one line: what happened, and more of it by name. A log that can no longer be written is given up with a
-    /// warning: the window matters more.
+    /// Writes one line: the event's name and further fields. If the log cannot be written any more, logging ends with
+    /// a warning; the window stays open.
     pub fn write(&mut self, event: &str, more: Value) {
         let Some(file) = &mut self.file else { return };
         let mut line = json!({"event": event});
@@ -89,7 +88,7 @@ impl EventLog {
         }
     }
 
-    /// Writes how an export got on.
+    /// Writes the state of an export.
     pub(super) fn write_export(&mut self, state: &ExportState) {
         match state {
             ExportState::Failed(sentence) => self.write("not_exported", json!({"sentence": sentence})),

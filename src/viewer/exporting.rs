@@ -13,53 +13,53 @@ use crate::optics::spectrum::xyz::Matrix3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Which maps are to be written.
+/// Which maps to export.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Export {
-    /// One of the maps that are shown, to a file of its own in the working folder.
+    /// One of the maps shown, by index, to a new file in the working folder.
     Map(usize),
-    /// All of them with their manifest, to a folder of their own.
+    /// All maps with their manifest, to this folder in the working folder.
     All(PathBuf),
 }
 
-/// How the last export got on.
+/// State of the last export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum ExportState {
-    /// Nothing was exported yet.
+    /// Nothing has been exported yet.
     #[default]
     Idle,
-    /// The thread writes maps.
+    /// Maps are being written.
     Writing,
-    /// The thread draws and writes frames.
+    /// Frames are being drawn and written.
     Filming {
-        /// Frames that are written.
+        /// Frames written.
         done: u64,
-        /// Frames that there will be.
+        /// Frames in all.
         total: u64,
     },
-    /// Where the maps or frames are: a file or a folder.
+    /// File or folder of the exported maps or frames.
     Done(PathBuf),
     /// One sentence: what failed, where, what to do.
     Failed(String),
 }
 
 impl ExportState {
-    /// Whether the thread is at work.
+    /// Whether an export is running.
     pub fn is_running(&self) -> bool {
         matches!(self, Self::Writing | Self::Filming { .. })
     }
 }
 
-/// Writes on a thread. Dropping it stops what is filmed and waits until files are whole.
+/// Exports on a thread. Dropping it stops filming and waits until the files are complete.
 #[derive(Debug)]
 pub struct Exporter {
-    /// How the last export got on, as of the last [`poll`](Self::poll).
+    /// State as of the last [`poll`](Self::poll).
     pub state: ExportState,
     work: Background<(), Result<PathBuf>>,
 }
 
 impl Exporter {
-    /// Nothing is written yet; the window is woken when something was.
+    /// An idle exporter. `wake` is called on progress and at the end of an export.
     pub fn new(wake: &Wake) -> Self {
         Self {
             state: ExportState::Idle,
@@ -67,19 +67,20 @@ impl Exporter {
         }
     }
 
-    /// Writes maps into a working folder. Does nothing while anything is written.
+    /// Starts to write maps into a working folder. Does nothing while another export runs.
     pub fn start(&mut self, export: Export, level: Arc<BakedLevel>, folder: PathBuf) {
         self.run(ExportState::Writing, move |_| write(&export, &level, &folder));
     }
 
-    /// Draws frames and writes them into a folder within a working folder. Does nothing while anything is written.
+    /// Starts to draw frames and write them into a new folder within a working folder. Does nothing while another
+    /// export runs.
     pub fn film(&mut self, shooting: FilmJob, folder: PathBuf) {
         let total = shooting.cameras.len() as u64;
         let begun = ExportState::Filming { done: 0, total };
         self.run(begun, move |task| shooting.shoot(&folder, task, &task.control));
     }
 
-    /// Stops what is being filmed after the present frame; those that are written stay.
+    /// Stops filming after the present frame; frames already written stay.
     pub fn stop(&self) {
         self.work.cancel();
     }
@@ -93,7 +94,7 @@ impl Exporter {
         }
     }
 
-    /// Looks what the thread did; tells whether it ended since the last call.
+    /// Updates the state; returns whether an export ended since the last call.
     pub fn poll(&mut self) -> bool {
         if let (ExportState::Filming { .. }, Some((done, total))) = (&self.state, self.work.progress()) {
             self.state = ExportState::Filming { done, total };
@@ -121,7 +122,7 @@ fn write(export: &Export, level: &BakedLevel, folder: &Path) -> Result<PathBuf> 
     let (scene, settings) = (&level.request.scene, &level.request.settings);
     match export {
         Export::All(path) => {
-            // One that is there already belongs to others unless a bake wrote it.
+            // An existing folder is overwritten only if a bake wrote it.
             let path = folder.join(path);
             MapFolder::open(&path, false)?.write(scene, settings, &level.result)?;
             Ok(path)
@@ -141,16 +142,17 @@ fn write(export: &Export, level: &BakedLevel, folder: &Path) -> Result<PathBuf> 
     }
 }
 
-/// The folder that all maps of a scene go to unless another is named.
+/// Default name of the folder for all maps of a scene.
 pub fn folder_name(scene: &str) -> String {
     format!("nephroid-{}-maps", files::slug(scene, "scene"))
 }
 
-/// Writes `nephroid-SCENE-NNNN.png`, `picture` as `view` shows it in this white balance, and with `has_radiance` `.exr`, its radiance
-/// [W/(m² sr)]. The number is the first of which the folder holds neither. Returns what was written.
+/// Writes `nephroid-SCENE-NNNN.png`: `picture` with the exposure and tone map of `view` and this white balance. With
+/// `has_radiance`, also writes the radiance [W/(m² sr)] to `.exr`. NNNN is the first number for which neither file
+/// exists. Returns the paths.
 ///
 /// # Errors
-/// A place that cannot be written, a disk that is full, a folder without a free number: nothing is left there then.
+/// The folder cannot be written; the disk is full; no number is free. No file is left behind then.
 pub fn save_picture(
     folder: &Path,
     scene: &str,
@@ -171,14 +173,14 @@ pub fn save_picture(
     let radiance = radiance_exr(picture, &exr.display().to_string())?;
     files::write_atomically(&exr, |writer| writer.write_all(&radiance))?;
     if let Err(error) = files::write_atomically(&png, |writer| writer.write_all(&shown)) {
-        // Half a pair would take its number; the first error says more than one about tidying up.
+        // Half a pair would occupy its number. An error while removing it matters less than the first one.
         let _ = files::remove_file(&exr);
         return Err(error);
     }
     Ok(vec![png, exr])
 }
 
-/// The message about written files.
+/// Message about written files.
 pub fn told(files: &[PathBuf]) -> String {
     let names: Vec<_> = files.iter().map(|file| file.display().to_string()).collect();
     format!("Saved {}.", names.join(" and "))

@@ -2,33 +2,34 @@
 
 use std::time::Duration;
 
-/// Most that better maps of the same scene move it [stops].
+/// Limit of how far better maps of the same scene may move the exposure from the first measurement [stops].
 const MAX_STOPS: f64 = 0.5;
-/// Beyond this, the first maps said nothing of the light that there is [stops].
+/// A deviation from the first measurement above this means that the first maps were useless: the limit is lifted
+/// [stops].
 const MISTAKEN_STOPS: f64 = 2.0;
-/// Less than this is not worth another picture [stops].
+/// Smallest change of the goal that is worth redrawing the picture [stops].
 const MIN_STOPS: f64 = 0.1;
-/// By then, all but 1/e of a move is made [s].
+/// Time constant of the exponential approach to the goal [s].
 const PACE_S: f64 = 0.2;
-/// One picture makes no more of a move than that of so long.
+/// Upper limit of the time step between two pictures.
 const LONGEST_STEP: Duration = Duration::from_millis(100);
-/// What is left of a move when it ends [stops].
+/// Distance from the goal at which the exposure snaps to it [stops].
 const END_STOPS: f64 = 0.02;
 
-/// Chooses exposures.
+/// Measures the exposure and moves it smoothly.
 #[derive(Clone, Debug)]
 pub struct AutoExposure {
     must_measure: bool,
-    /// The first that suited these maps [stops].
+    /// The first measurement on these maps [stops]; `None` before it.
     first: Option<f64>,
-    /// Where it goes [stops].
+    /// Exposure that is approached [stops].
     goal: f64,
-    /// The value set last [stops]; any other value was set by the user.
+    /// Exposure that was set last [stops]. If the picture shows any other value, the user has changed it.
     set: f64,
 }
 
 impl AutoExposure {
-    /// Measures the first picture, or leaves the exposure alone until it is asked to.
+    /// With `measures`, measures the first picture; otherwise leaves the exposure alone until [`ask`](Self::ask).
     pub fn new(measures: bool) -> Self {
         Self {
             must_measure: measures,
@@ -38,13 +39,13 @@ impl AutoExposure {
         }
     }
 
-    /// Measures the next picture, whatever was chosen before.
+    /// Measures the next picture and discards earlier measurements.
     pub fn ask(&mut self) {
         *self = Self::new(true);
     }
 
-    /// Whether a picture with light is to be measured: the first one, and those of better maps while the exposure is
-    /// as it was chosen here. `shown`: the present one [stops].
+    /// Whether to measure a picture that shows light: the first one, and pictures of better maps unless the user has
+    /// changed the exposure. `shown`: present exposure [stops].
     pub fn wants(&self, has_better_maps: bool, shown: f64) -> bool {
         self.must_measure || has_better_maps && self.is_own(shown)
     }
@@ -53,8 +54,8 @@ impl AutoExposure {
         self.first.is_some() && shown == self.set
     }
 
-    /// Takes up what suits a picture that was shown with an exposure; returns that of the next one [stops]. The first is
-    /// shown at once.
+    /// Takes a measured exposure `suits`, of a picture drawn with exposure `shown`. Returns the exposure of the next
+    /// picture [stops]. The first measurement is applied at once, later ones through [`next`](Self::next).
     pub fn take(&mut self, suits: f64, shown: f64) -> f64 {
         let Some(first) = self.first else {
             *self = Self {
@@ -76,7 +77,7 @@ impl AutoExposure {
         shown
     }
 
-    /// The exposure [stops] so long after a picture with another one.
+    /// Exposure of the next picture [stops], `since` after a picture with exposure `shown` [stops].
     pub fn next(&mut self, shown: f64, since: Duration) -> f64 {
         if !self.is_own(shown) {
             return shown;
@@ -91,12 +92,12 @@ impl AutoExposure {
         self.set
     }
 
-    /// Where it goes [stops].
+    /// Exposure that is approached [stops].
     pub fn goal(&self) -> f64 {
         self.goal
     }
 
-    /// Whether it is on its way.
+    /// Whether the exposure has yet to reach its goal.
     pub fn is_moving(&self, shown: f64) -> bool {
         self.is_own(shown) && self.set != self.goal
     }

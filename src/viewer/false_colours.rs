@@ -10,7 +10,7 @@ use crate::optics::spectrum::{Hue, Xyz, dominant, xyz_bar};
 use crate::optics::{LinearSrgb, Nanometres};
 use crate::settings::LayerKind;
 
-/// A map of colours in linear light, to be shown as they are.
+/// A map of linear colours that are shown unchanged.
 fn coloured(chart: &Arc<Chart>, colours: impl Iterator<Item = [f32; 3]>) -> IlluminationMap {
     IlluminationMap::of_layer(Arc::clone(chart), LayerKind::Caustic, colours.collect())
 }
@@ -19,10 +19,10 @@ fn decoded(code: [u8; 3]) -> [f32; 3] {
     code.map(|code| LinearSrgb::decode_channel(code) as f32)
 }
 
-/// Relative errors at the ends of the scale, logarithmic between them: 0.1 % and 100 % of the map's mean.
+/// Range of the scale of relative errors, logarithmic: 0.1 % to 100 % of the map's mean.
 pub const ERROR_RANGE: (f64, f64) = (1e-3, 1.0);
 
-/// Display colours (sRGB) at even steps of the scale: dark and cool where the light is exact, bright where it is not.
+/// sRGB colours at equal steps of the scale: dark and cool for small errors, bright for large ones.
 const STOPS: [[u8; 3]; 5] = [
     [16, 24, 64],
     [40, 84, 140],
@@ -31,20 +31,20 @@ const STOPS: [[u8; 3]; 5] = [
     [250, 90, 50],
 ];
 
-/// Display colour (sRGB) of an error relative to the map's mean, ≥ 0; both ends of the scale go on.
+/// sRGB colour of an error relative to the map's mean, ≥ 0; clamped to the scale.
 pub fn error_colour(relative: f64) -> [u8; 3] {
     let (low, high) = ERROR_RANGE;
     let place = ((relative / low).log10() / (high / low).log10()).clamp(0.0, 1.0);
-    // NaN has no place on the scale, and is as wrong as can be.
+    // NaN counts as the largest error.
     mixed(&STOPS, if place.is_nan() { 1.0 } else { place })
 }
 
-/// Whether the maps tell how far they may be off.
+/// Whether any map has estimated errors.
 pub fn has_errors(maps: &[IlluminationMap]) -> bool {
     maps.iter().any(|map| map.error.is_some())
 }
 
-/// The maps' errors as colours in linear light, to be shown as they are. Maps without an error are left out.
+/// The errors of the maps as linear colours that are shown unchanged. Maps without errors are left out.
 pub fn error_maps(maps: &[IlluminationMap]) -> Vec<IlluminationMap> {
     maps.iter()
         .filter_map(|map| {
@@ -59,7 +59,7 @@ pub fn error_maps(maps: &[IlluminationMap]) -> Vec<IlluminationMap> {
         .collect()
 }
 
-/// Mean luminance of a map over its surface [W/m²]: flux by area.
+/// Mean luminance of a map's irradiance over its surface [W/m²].
 fn mean_luminance(map: &IlluminationMap) -> f64 {
     let flux_w: f64 = map
         .layers
@@ -71,30 +71,30 @@ fn mean_luminance(map: &IlluminationMap) -> f64 {
     if area_m2 > 0.0 { flux_w / area_m2 } else { 0.0 }
 }
 
-/// The differences as colours in linear light, to be shown as they are.
+/// The differences as linear colours that are shown unchanged.
 pub fn difference_maps(difference: &Difference) -> Vec<IlluminationMap> {
     let maps = difference.maps.iter();
     maps.map(|map| coloured(&map.chart, difference_colours::of_map(map).map(decoded)))
         .collect()
 }
 
-/// Ends of the legend [nm]; what lies beyond has their colours.
+/// Range of the legend [nm]; wavelengths beyond it are clamped.
 pub const RANGE_NM: (f64, f64) = (400.0, 700.0);
-/// Texels darker than this, of the brightest, are black.
+/// Texels with a luminance below this fraction of the largest are black.
 const DARK: f64 = 1e-3;
-/// Of white light.
+/// Colour for white light.
 const GREY: LinearSrgb = LinearSrgb::new(0.25, 0.25, 0.25);
-/// Of light that no single wavelength looks like.
+/// Colour for purple light, which has no dominant wavelength.
 const PURPLE: LinearSrgb = LinearSrgb::new(0.16, 0.02, 0.16);
 
-/// Colour of a wavelength in linear light, its strongest channel 1.
+/// Linear colour of a wavelength; its largest channel is 1.
 pub fn wavelength_colour(wavelength: Nanometres) -> LinearSrgb {
     let within = Nanometres(wavelength.0.clamp(RANGE_NM.0, RANGE_NM.1));
     let seen = to_display_gamut(Xyz::from(xyz_bar(within)).to_linear_srgb());
     seen * seen.max_channel().recip()
 }
 
-/// The maps' light as colours in linear light, to be shown as they are.
+/// The dominant wavelengths of the maps' light as linear colours that are shown unchanged.
 pub fn wavelength_maps(maps: &[IlluminationMap]) -> Vec<IlluminationMap> {
     let totals: Vec<Vec<[f32; 3]>> = maps.iter().map(IlluminationMap::total).collect();
     let of = |texel: &[f32; 3]| LinearSrgb::from(texel.map(f64::from));
@@ -103,7 +103,7 @@ pub fn wavelength_maps(maps: &[IlluminationMap]) -> Vec<IlluminationMap> {
     let shown = |texel: &[f32; 3]| {
         let light = of(texel);
         if !light.is_finite() {
-            // To be shown as what it is.
+            // Kept, so that the picture marks it as a fault.
             return *texel;
         }
         let hue = dominant(light).filter(|_| light.luminance() >= least);

@@ -20,26 +20,25 @@ use crate::progress::{Control, Progress};
 use crate::scene::camera_path::{Key, MAX_FRAMES, PathPlan};
 use crate::scene::{Camera, CameraPath, Scene};
 
-/// Frames that a path is played with [1/s].
+/// Frame rate of the playback [1/s].
 pub const FRAMES_PER_S: f64 = 30.0;
-/// From one camera to the next on a tour: 4 s.
+/// Frames between two cameras of a tour: 4 s.
 const FRAMES_OF_LEG: usize = 120;
-/// A camera leans no less than this [degrees].
+/// Roll below this is rounding error [degrees].
 const LEVEL_DEG: f64 = 1e-6;
-/// What errors name.
+/// Location in error messages.
 const LOCATION: &str = "camera path";
 
-/// A path that is being recorded, with how it is filmed.
+/// A camera path, and how it is filmed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Film {
-    /// From where to where, in the coordinates of the scene's file; equally long in time between any two.
+    /// In world coordinates; equal times between consecutive keys.
     pub keys: Vec<Key>,
-    /// Of the whole path, or of one turn.
+    /// Frames of the whole path, or of one turn of a turntable.
     pub frames: usize,
-    /// Of the camera that set the last key [degrees].
+    /// Vertical field of view of the camera that recorded the last key [degrees].
     pub vertical_fov_deg: f64,
-    /// Pixels of each frame.
     pub size: (u32, u32),
 }
 
@@ -54,7 +53,7 @@ impl Default for Film {
     }
 }
 
-/// How far a camera leans to its right from where a level one stands [degrees]; what rounding leaves is no lean.
+/// Roll of a camera relative to a level one in the same direction, to the right [degrees].
 fn lean_deg(level: &Key, camera: &Camera) -> f64 {
     let upright = level.camera(String::new(), DVec3::ZERO, camera.vertical_fov_rad);
     let lean_deg = camera
@@ -66,7 +65,7 @@ fn lean_deg(level: &Key, camera: &Camera) -> f64 {
 }
 
 impl Film {
-    /// Notes where a camera is: at the end, or in the place of a key. What it looks at lies `reach_m` before it.
+    /// Records a camera: as a new key, or in place of a key. The target is `reach_m` ahead of the camera.
     pub fn record(&mut self, key: Option<usize>, camera: &Camera, origin_world: DVec3, reach_m: f64) {
         let position_m = camera.position + origin_world;
         let new = Key {
@@ -86,7 +85,7 @@ impl Film {
         self.vertical_fov_deg = camera.vertical_fov_rad.to_degrees();
     }
 
-    /// A path past cameras, and back to the first; pictures keep their size.
+    /// A closed path through all cameras; the frame size stays.
     #[must_use]
     pub fn tour(&self, cameras: &[Camera], origin_world: DVec3, reach_m: f64) -> Self {
         let mut tour = Self {
@@ -100,14 +99,14 @@ impl Film {
         tour
     }
 
-    /// The camera of a key, in scene coordinates.
+    /// Camera of a key, in scene coordinates.
     pub fn camera_at(&self, key: usize, origin_world: DVec3) -> Option<Camera> {
         let found = self.keys.get(key)?;
         let vertical_fov_rad = self.vertical_fov_deg.to_radians();
         Some(found.camera(format!("key {}", key + 1), origin_world, vertical_fov_rad))
     }
 
-    /// What of it differs from another, in words.
+    /// Names what has changed, for the undo list.
     pub fn change_to(&self, other: &Self) -> &'static str {
         if self.keys == other.keys {
             "frames of the camera's path"
@@ -116,7 +115,7 @@ impl Film {
         }
     }
 
-    /// Takes over a file's path; pictures keep their size.
+    /// Takes over a path read from a file; the frame size stays.
     pub fn take(&mut self, plan: PathPlan) {
         self.frames = plan.frames;
         self.vertical_fov_deg = plan.vertical_fov_deg;
@@ -131,7 +130,7 @@ impl Film {
         }
     }
 
-    /// The way through all keys.
+    /// The path through all keys.
     ///
     /// # Errors
     /// As [`PathPlan::path`].
@@ -139,10 +138,10 @@ impl Film {
         self.plan().path(LOCATION)
     }
 
-    /// Writes the path to a file of its own in a folder; tells which.
+    /// Writes the path to a new file in a folder; returns its path.
     ///
     /// # Errors
-    /// As [`path`](Self::path); the file cannot be written; the folder is full of them.
+    /// As [`path`](Self::path); the file cannot be written; no number is free.
     pub fn save(&self, folder: &Path, scene: &str) -> Result<PathBuf> {
         self.path()?;
         let path = free_name(folder, scene, "path", ".json")?;
@@ -151,7 +150,7 @@ impl Film {
     }
 }
 
-/// What goes on while a path is played.
+/// State of a path's playback.
 #[derive(Clone, Debug)]
 pub struct Player {
     cameras: Vec<Camera>,
@@ -159,7 +158,7 @@ pub struct Player {
 }
 
 impl Player {
-    /// At the first camera; `None` where there is none.
+    /// Starts at the first camera; `None` if there is none.
     pub fn new(cameras: Vec<Camera>) -> Option<Self> {
         (!cameras.is_empty()).then_some(Self {
             cameras,
@@ -167,7 +166,7 @@ impl Player {
         })
     }
 
-    /// Lets time pass [s, ≥ 0]; the camera to show next, and whether it is the last.
+    /// Advances by a time [s, ≥ 0]; returns the camera to show and whether it is the last.
     pub fn advance(&mut self, seconds: f64) -> (&Camera, bool) {
         self.seconds += seconds;
         let last = self.cameras.len() - 1;
@@ -176,30 +175,28 @@ impl Player {
     }
 }
 
-/// All that frames are made of.
+/// Everything needed to draw the frames of a film.
 #[derive(Debug)]
 pub struct FilmJob {
-    /// What is filmed.
     pub scene: Arc<Scene>,
-    /// Its light.
     pub maps: Vec<IlluminationMap>,
-    /// One for each frame.
+    /// One camera per frame.
     pub cameras: Vec<Camera>,
     /// Size, exposure and tone map of every frame.
     pub view: View,
-    /// Whether mirrors and glass show what is seen in them, and glass parts wavelengths.
+    /// Switches of chains and dispersion.
     pub effects: EffectSwitches,
-    /// What radiance is multiplied by before tone mapping.
+    /// Matrix applied to radiance before tone mapping.
     pub white_balance: Matrix3,
-    /// What the frames' folder is called by: `path` or `turntable`.
+    /// Part of the frame folder's name: `frames` or `turntable`.
     pub name: &'static str,
 }
 
 impl FilmJob {
-    /// Draws every frame on a device of its own and writes it to a new folder in `folder`; tells which.
+    /// Draws every frame on a device of its own and writes it to a new folder in `folder`; returns its path.
     ///
     /// # Errors
-    /// No graphics adapter; a frame that it cannot hold; a file that cannot be written; stopped before the end.
+    /// No graphics adapter; a frame that does not fit on the device; a file that cannot be written; cancellation.
     pub fn shoot(&self, folder: &Path, progress: &dyn Progress, control: &Control) -> Result<PathBuf> {
         let gpu = Gpu::headless()?;
         let path = free_name(folder, &self.scene.name, self.name, "")?;

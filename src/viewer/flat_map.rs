@@ -10,41 +10,41 @@ use crate::settings::LayerKind;
 
 /// Longest side of a thumbnail [pixels].
 pub const THUMBNAIL: usize = 64;
-/// Most texels across that a pixel is the mean of; more are skipped.
+/// Largest number of samples per pixel along a side.
 const MAX_SAMPLES: f64 = 4.0;
 
-/// What of a map a picture shows.
+/// The part of a map that a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MapCrop {
-    /// Column at the picture's left edge [finest texels]; may lie outside.
+    /// Column at the picture's left edge [finest texels]; may lie outside the map.
     pub left: f64,
-    /// Row at its upper edge [finest texels]; may lie outside.
+    /// Row at the picture's top edge [finest texels]; may lie outside the map.
     pub top: f64,
-    /// Texels across a pixel, > 0.
+    /// Texels per pixel along a side, > 0.
     pub texels_per_pixel: f64,
 }
 
-/// Pixels as the display shows them.
+/// Encoded pixels of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShownPixels {
-    /// Pixels across and down.
+    /// Width and height.
     pub size: [usize; 2],
-    /// sRGB and opacity, row by row; nothing beside the map.
+    /// sRGB and opacity, row by row; transparent outside the map.
     pub rgba: Vec<u8>,
 }
 
-/// A map's values at a place.
+/// The values of a map's texel.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapReading {
     /// Column and row [finest texels].
     pub texel: [usize; 2],
-    /// Luminance of the irradiance of each layer [W/m²].
+    /// Luminance of the irradiance in each layer [W/m²].
     pub layers_w_per_m2: Vec<(LayerKind, f64)>,
-    /// Of their sum, where it was estimated [W/m²].
+    /// Estimated error of their sum [W/m²]; `None` if it was not estimated.
     pub error_w_per_m2: Option<f64>,
 }
 
-/// The whole map, at most [`THUMBNAIL`] pixels long and wide, in an exposure that suits it alone.
+/// The whole map, at most [`THUMBNAIL`] pixels wide and high, with an exposure of its own.
 pub fn thumbnail(map: &IlluminationMap) -> ShownPixels {
     let longest = map.width().max(map.height()) as f64;
     let texels_per_pixel = longest / THUMBNAIL as f64;
@@ -58,7 +58,7 @@ pub fn thumbnail(map: &IlluminationMap) -> ShownPixels {
     show(map, part, size, exposure_stops(map))
 }
 
-/// Exposure that suits a map alone [stops].
+/// Exposure that suits the map alone [stops].
 pub fn exposure_stops(map: &IlluminationMap) -> f64 {
     let side = 64;
     let step = |length: usize, index: usize| (2 * index + 1) * length / (2 * side);
@@ -72,7 +72,8 @@ pub fn exposure_stops(map: &IlluminationMap) -> f64 {
     picture.auto_exposure_stops()
 }
 
-/// A part of a map in a picture of so many pixels, exposed by so many stops: as white paper under that light.
+/// A part of a map as a picture of `size` pixels, exposed by that many stops. It looks like white paper lit by the
+/// map's light.
 pub fn show(map: &IlluminationMap, part: MapCrop, size: [usize; 2], exposure_stops: f64) -> ShownPixels {
     let places = (0..size[0] * size[1]).map(|index| [index % size[0], index / size[0]]);
     let means: Vec<Option<[f32; 3]>> = places.map(|place| mean(map, part, place)).collect();
@@ -90,7 +91,7 @@ pub fn show(map: &IlluminationMap, part: MapCrop, size: [usize; 2], exposure_sto
     ShownPixels { size, rgba }
 }
 
-/// Values at a place [finest texels]; `None` beside the map.
+/// The values at a point [finest texels]; `None` outside the map.
 pub fn read(map: &IlluminationMap, x: f64, y: f64) -> Option<MapReading> {
     let (column, row) = inside(map, x, y)?;
     let texel = map.chart.texel_at(column, row);
@@ -101,7 +102,7 @@ pub fn read(map: &IlluminationMap, x: f64, y: f64) -> Option<MapReading> {
     })
 }
 
-/// Luminance of the irradiance of each layer [W/m²] of a texel.
+/// Luminance of the irradiance in each layer of a texel [W/m²].
 pub fn layers_at(map: &IlluminationMap, texel: usize) -> Vec<(LayerKind, f64)> {
     let layers = map.layers.iter();
     layers
@@ -114,7 +115,7 @@ fn inside(map: &IlluminationMap, x: f64, y: f64) -> Option<(usize, usize)> {
     is_inside.then_some((x as usize, y as usize))
 }
 
-/// Mean radiance of a pixel; `None` where its middle lies beside the map.
+/// Mean radiance of a pixel; `None` if its centre is outside the map.
 fn mean(map: &IlluminationMap, part: MapCrop, [x, y]: [usize; 2]) -> Option<[f32; 3]> {
     let at = |origin: f64, pixel: usize, share: f64| origin + (pixel as f64 + share) * part.texels_per_pixel;
     inside(map, at(part.left, x, 0.5), at(part.top, y, 0.5))?;
@@ -132,7 +133,7 @@ fn mean(map: &IlluminationMap, part: MapCrop, [x, y]: [usize; 2]) -> Option<[f32
     Some(sum.map(|channel| channel / count.max(1.0)))
 }
 
-/// What white paper sends on of all layers [W/(m² sr)].
+/// Radiance of white paper under the light of all layers [W/(m² sr)].
 fn radiance(map: &IlluminationMap, column: usize, row: usize) -> [f32; 3] {
     let texel = map.chart.texel_at(column, row);
     let of_layers = map.layers.iter().map(|layer| layer.irradiance[texel]);

@@ -9,41 +9,37 @@ use crate::scene::{Edit, LightEdit, Motion, Scene};
 
 /// Length of the axes [points].
 const LENGTH: f64 = 90.0;
-/// Radius of the circle of the turn, of the axes' length.
+/// Radius of the rotation ring, as a fraction of the axes' length.
 const RING: f64 = 0.7;
-/// Half the side of what takes the mouse [points].
+/// Half the side of a handle's drag area [points].
 const REACH: f32 = 11.0;
 const TIP: f32 = 6.0;
-/// Corners of the circle.
+/// Segments of the ring.
 const CORNERS: usize = 48;
-/// Gazes nearer to an axis, or to the plane of the turn, than this sine say nothing of it.
+/// Smallest sine of the angle between a view ray and an axis, or the ring's plane, at which a drag is well defined.
 const FLATTEST: f64 = 0.02;
 const LAMP: Color32 = Color32::from_rgb(255, 214, 110);
 
-/// What the mouse moves.
+/// What the handles move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GizmoTarget {
-    /// A light with a place, by its index.
+    /// A light with a position, by index.
     Light(usize),
-    /// An object with all parts of its node, by its index.
+    /// An object with all parts of its node, by index.
     Object(usize),
 }
 
-/// What is pulled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Handle {
-    /// Along x.
     X,
-    /// Up.
     Y,
-    /// Along z.
     Z,
-    /// About the vertical.
+    /// Rotation about the vertical.
     Turn,
 }
 
 impl Handle {
-    /// Its name to assistive technology.
+    /// Name for assistive technology.
     fn name(self) -> &'static str {
         match self {
             Self::X => "Move x",
@@ -62,7 +58,7 @@ impl Handle {
         }
     }
 
-    /// Unit, of those that move.
+    /// Unit axis; `None` for the rotation.
     fn axis(self) -> Option<DVec3> {
         match self {
             Self::X => Some(DVec3::X),
@@ -72,8 +68,8 @@ impl Handle {
         }
     }
 
-    /// What a gaze points at: how far along the axis from `origin` [m], or at which angle about the vertical from z
-    /// towards x [rad]. `None` where it runs along the axis, or in the plane of the turn.
+    /// The coordinate that a view ray points at: distance from `origin` along the axis [m], or angle about the
+    /// vertical from z towards x [rad]. `None` if the ray is almost parallel to the axis, or to the ring's plane.
     pub fn reach(self, origin: DVec3, gaze: &Ray) -> Option<f64> {
         let Some(axis) = self.axis() else {
             let down = gaze.direction.y;
@@ -81,7 +77,7 @@ impl Handle {
             let met = gaze.origin + gaze.direction * along_m - origin;
             return (down.abs() > FLATTEST && along_m > 0.0).then(|| met.x.atan2(met.z));
         };
-        // The point of the axis that is nearest to the gaze.
+        // The point on the axis nearest to the ray.
         let from = gaze.origin - origin;
         let slant = axis.dot(gaze.direction);
         let sine_squared = 1.0 - slant * slant;
@@ -90,7 +86,7 @@ impl Handle {
     }
 }
 
-/// Where what is held was when it was taken.
+/// Pose of the target at the start of a drag.
 #[derive(Clone, Copy, Debug)]
 enum Pose {
     Light(usize, DVec3),
@@ -98,13 +94,13 @@ enum Pose {
         object: usize,
         yaw_rad: f64,
         offset_m: DVec3,
-        /// Where its middle was in the file [m].
+        /// Pivot of the object in the file [m].
         rest: DVec3,
     },
 }
 
 impl Pose {
-    /// `None` for what has no place, or is tilted.
+    /// `None` for a light without a position, or a tilted object.
     fn of(held: GizmoTarget, scene: &Scene) -> Option<Self> {
         match held {
             GizmoTarget::Light(light) => Some(Self::Light(light, scene.lights.get(light)?.kind.position()?)),
@@ -134,7 +130,7 @@ impl Pose {
         }
     }
 
-    /// The edit that pulls it so far [m, rad].
+    /// The edit that moves or turns the target by this much [m, rad].
     fn pulled(&self, handle: Handle, by: f64) -> Edit {
         let step = handle.axis().map_or(DVec3::ZERO, |axis| axis * by);
         match *self {
@@ -152,16 +148,16 @@ impl Pose {
     }
 }
 
-/// A handle in the hand.
+/// A drag in progress.
 #[derive(Clone, Copy, Debug)]
 struct Grip {
     handle: Handle,
     from: Pose,
-    /// What the first gaze pointed at.
+    /// Coordinate at the start of the drag.
     begun: f64,
 }
 
-/// The handles, and the hand at them.
+/// The handles in the picture and the drag in progress.
 #[derive(Clone, Debug, Default)]
 pub struct Gizmo {
     grip: Option<Grip>,
@@ -169,12 +165,12 @@ pub struct Gizmo {
 }
 
 impl Gizmo {
-    /// Whether the mouse is at a handle: clicks are not for what is behind it.
+    /// Whether the mouse is on a handle, which then takes the click.
     pub fn is_hot(&self) -> bool {
         self.is_hot
     }
 
-    /// Shows the handles of what is held over the picture; the edit that a pull asks for.
+    /// Shows the handles of the target over the picture; returns the edit of a drag.
     pub fn show(
         &mut self,
         ui: &Ui,
@@ -203,7 +199,7 @@ impl Gizmo {
         edit
     }
 
-    /// Lets a handle be dragged.
+    /// Handles drags of one handle.
     fn pull(
         &mut self,
         ui: &Ui,
@@ -241,12 +237,12 @@ impl Gizmo {
     }
 }
 
-/// Where a handle is in the scene.
+/// Position of a handle in the scene.
 fn tip(handle: Handle, pose: &Pose, origin: DVec3, length_m: f64) -> DVec3 {
     match (handle.axis(), pose) {
         (Some(axis), _) => origin + axis * length_m,
         (None, Pose::Object { yaw_rad, .. }) => {
-            // Between two axes, where it hides none.
+            // Between two axes, so that it hides neither.
             origin + on_ring(yaw_rad + std::f64::consts::FRAC_PI_4, length_m)
         }
         (None, Pose::Light(..)) => origin,
@@ -279,7 +275,7 @@ fn draw(ui: &Ui, lens: &Viewport<'_>, handle: Handle, (origin, tip): (DVec3, DVe
     painter.circle_filled(lens.place(tip), TIP, handle.colour());
 }
 
-/// Marks every light that has a place, so that it can be clicked.
+/// Marks every light that has a position, so that it can be clicked.
 fn lamps(ui: &Ui, lens: &Viewport<'_>, scene: &Scene) {
     let painter = ui.painter().with_clip_rect(lens.picture);
     for light in &scene.lights {
@@ -291,7 +287,7 @@ fn lamps(ui: &Ui, lens: &Viewport<'_>, scene: &Scene) {
     }
 }
 
-/// The light that is seen at a place of the picture, if one is.
+/// The light whose mark is at this point of the picture, if any.
 pub fn light_at(lens: &Viewport<'_>, scene: &Scene, place: Pos2) -> Option<usize> {
     let seen = scene.lights.iter().enumerate().filter_map(|(index, light)| {
         let position = light.kind.position()?;

@@ -18,35 +18,35 @@ use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::{IDENTITY, Matrix3};
 use crate::scene::Scene;
 
-/// Smallest inner size of the window [logical pixels]: the panel and a picture of its width.
+/// Smallest inner size of the window [logical pixels]: room for the panel and a picture about as wide.
 const SMALLEST: LogicalSize<u32> = LogicalSize::new(700, 400);
-/// Samples per pixel of the scene's edges.
+/// Multisampling: samples per pixel.
 pub(super) const SAMPLES: u32 = 4;
 
-/// Format of pictures: holds encoded values, which egui blends and shows as they are.
+/// Format of pictures. It holds encoded values because egui blends and shows them as they are.
 pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-/// Whether a frame reached the window.
+/// Outcome of showing a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FrameOutcome {
-    /// It did.
+    /// The frame was shown.
     Yes,
-    /// The window is hidden or has no area; an event will tell when it can be seen.
+    /// The window is hidden or has no area; an event will come when it is visible again.
     Hidden,
-    /// Not this time: try again soon.
+    /// No frame is available at present: try again after [`RETRY_AFTER`].
     Later,
-    /// Everything has to be made anew.
+    /// Window and device have to be recreated.
     Broken,
 }
 
-/// How pictures are made.
+/// How pictures are rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RenderOptions {
-    /// What is seen in mirrors and through glass.
+    /// Whether reflections and refractions are traced.
     pub chains: EffectSwitch,
-    /// What glass that parts wavelengths does.
+    /// Whether refraction depends on wavelength.
     pub dispersion: EffectSwitch,
-    /// What radiance is multiplied by before tone mapping.
+    /// Matrix applied to radiance before tone mapping.
     pub white_balance: Matrix3,
 }
 
@@ -60,11 +60,11 @@ impl Default for RenderOptions {
     }
 }
 
-/// A picture in the window, with what draws it.
+/// A picture in the window and its renderer.
 struct Canvas {
     picture: Picture,
     renderer: Renderer,
-    /// As the renderer has it.
+    /// The scene on the device.
     scene: Arc<Scene>,
     style: MapStyle,
     making: RenderOptions,
@@ -118,7 +118,7 @@ impl Canvas {
         self.renderer.set_chains(gpu, making.chains)
     }
 
-    /// Draws a view that it does not show yet in that quality; tells whether it drew.
+    /// Draws a view, unless the picture shows it already in that quality; returns whether it drew.
     fn draw(
         &mut self,
         gpu: &Gpu,
@@ -138,7 +138,8 @@ impl Canvas {
         })
     }
 
-    /// Makes the picture that it shows better by another sample.
+    /// Adds a sample to the mean that the picture shows, or draws the view if the picture does not show it in that
+    /// quality.
     fn refine(
         &mut self,
         gpu: &Gpu,
@@ -157,28 +158,29 @@ impl Canvas {
     }
 }
 
-/// A window and its device.
+/// A window, its graphics device and its pictures.
 pub struct Graphics {
     interface: Interface,
     main: Canvas,
-    /// The picture's other part, where there is one.
+    /// The right part of the picture in a comparison.
     beside: Option<Canvas>,
     screen: Screen,
     gpu: Gpu,
 }
 
 impl Graphics {
-    /// Opens a window on a scene.
+    /// Opens a window for a scene.
     ///
     /// # Errors
-    /// No window or no adapter is to be had.
+    /// The system offers no window or no graphics adapter.
     pub fn new(
         event_loop: &ActiveEventLoop,
         proxy: EventLoopProxy<UserEvent>,
         scene: &Arc<Scene>,
         (width, height): (u32, u32),
     ) -> Result<Self> {
-        // Hidden until everything is ready: assistive technology has to be told first, and nothing flashes.
+        // Hidden until everything is ready: assistive technology has to be connected first, and an empty window would
+        // flash.
         let attributes = WindowAttributes::default()
             .with_title(format!("Nephroid – {}", scene.name))
             .with_inner_size(LogicalSize::new(width, height))
@@ -213,30 +215,28 @@ impl Graphics {
         &self.screen.window
     }
 
-    /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 
-    /// The panel's side.
     pub fn interface(&mut self) -> &mut Interface {
         &mut self.interface
     }
 
-    /// The picture's name in egui.
+    /// egui's id of the picture.
     pub fn picture_id(&self) -> egui::TextureId {
         self.main.picture.id
     }
 
-    /// The name in egui of the picture's other part.
+    /// egui's id of the comparison's right part, if there is one.
     pub fn beside_id(&self) -> Option<egui::TextureId> {
         self.beside.as_ref().map(|beside| beside.picture.id)
     }
 
-    /// Shows other maps, of a scene, beside the picture from the next one on; nothing without.
+    /// Sets the maps of the comparison's right part and their scene; `None` ends the comparison.
     ///
     /// # Errors
-    /// The device cannot hold them.
+    /// The maps do not fit on the device.
     pub fn set_beside(&mut self, shown: Option<(&Arc<Scene>, &[IlluminationMap], MapStyle)>) -> Result<()> {
         let egui = &mut self.interface.renderer;
         let before = self.beside.take();
@@ -258,58 +258,58 @@ impl Graphics {
         Ok(())
     }
 
-    /// The window's size changed.
+    /// To be called when the window's size has changed.
     pub fn resize(&mut self) {
         self.screen.resize(&self.gpu.device);
     }
 
-    /// Shows an edited scene from the next picture on; tells what of it had changed. Where that is anything, the maps
-    /// have to be set again: surfaces may have come to receive light.
+    /// Uploads an edited scene and returns what had to be uploaded. If that is anything, the maps have to be set
+    /// again, as surfaces may have become receivers.
     ///
     /// # Errors
-    /// The device cannot hold it.
+    /// The scene does not fit on the device.
     pub fn set_scene(&mut self, scene: &Arc<Scene>) -> Result<Uploaded> {
         self.main.set_scene(&self.gpu, scene)
     }
 
-    /// Shows other maps from the next picture on; tells what of them had changed.
+    /// Uploads maps and returns what had to be uploaded.
     ///
     /// # Errors
-    /// The device cannot hold them: what was shown stays.
+    /// The maps do not fit on the device; the previous ones stay.
     pub fn set_maps(&mut self, maps: &[IlluminationMap], style: MapStyle) -> Result<Uploaded> {
         self.main.set_maps(&self.gpu, maps, style)
     }
 
-    /// Shows the maps that there are by something else from the next picture on.
+    /// Changes how the present maps are displayed.
     pub fn set_map_style(&mut self, style: MapStyle) {
         self.main.set_style(style);
     }
 
-    /// Whether direct light is traced from the next picture on; the maps are then to be set without it.
+    /// Whether direct light is traced per pixel. If so, maps have to be set without direct light.
     pub fn set_traces_lights(&mut self, traces: bool) {
         self.main.picture.invalidate();
         self.main.renderer.set_traces_lights(traces);
     }
 
-    /// Makes pictures otherwise from the next one on.
+    /// Sets how pictures are rendered.
     ///
     /// # Errors
-    /// The device cannot hold what that takes.
+    /// The resources needed do not fit on the device.
     pub fn set_making(&mut self, making: RenderOptions) -> Result<()> {
         self.main.set_making(&self.gpu, making)
     }
 
-    /// Whether mirrors are grey where chains are switched off, from the next picture on.
+    /// Whether mirrors are grey instead of black while chains are switched off.
     pub fn set_stand_in(&mut self, has_stand_in: bool) {
         self.main.renderer.set_stand_in(has_stand_in);
     }
 
-    /// What the picture takes.
+    /// Resource counts of the picture's renderer.
     pub fn counts(&self) -> EyeCounts {
         self.main.renderer.counts()
     }
 
-    /// Whether the device can tell how long pictures take.
+    /// Whether the device can measure GPU times.
     pub fn tells_times(&self) -> bool {
         self.gpu
             .device
@@ -317,23 +317,23 @@ impl Graphics {
             .contains(wgpu::Features::TIMESTAMP_QUERY)
     }
 
-    /// How long the last picture took of which the device has told since this was asked.
+    /// GPU time of the latest picture for which it is known; `None` if there is none since the last call.
     pub fn take_times(&mut self) -> Option<GpuMs> {
         let is_new = self.main.renderer.collect_times(&self.gpu);
         self.counts().gpu_ms.filter(|_| is_new)
     }
 
-    /// Whether the device has still to tell how long a picture took.
+    /// Whether GPU times of a picture are still to come.
     pub fn awaits_times(&self) -> bool {
         self.main.renderer.awaits_times()
     }
 
-    /// Exposure that suits the picture [stops].
+    /// Measures the exposure that suits the picture [stops].
     ///
     /// # Errors
     /// The device was lost.
     pub fn measure_exposure(&mut self, view: &View) -> Result<f64> {
-        // An eighth of the picture's pixels tells as much about its brightness as all of them.
+        // One pixel in 64 is enough to measure the brightness.
         let part = View {
             width: view.width.div_ceil(8),
             height: view.height.div_ceil(8),
@@ -343,25 +343,25 @@ impl Graphics {
         Ok(picture.auto_exposure_stops())
     }
 
-    /// Radiance of every pixel of the picture that is shown.
+    /// Radiance of every pixel of the picture shown.
     ///
     /// # Errors
-    /// A picture without area or above the device's limit; the device was lost.
+    /// A picture with no area or above the device's limits; a lost device.
     pub fn radiance(&mut self, view: &View) -> Result<eye_pass::Picture> {
         self.main.renderer.shown_radiance(&self.gpu, view)
     }
 
-    /// How well the picture is made.
+    /// Quality of the picture shown.
     pub fn quality(&self) -> EyeQuality {
         self.main.renderer.quality()
     }
 
-    /// Why mirrors and glass are shown without what is seen in them, if that was called for.
+    /// Why reflections and refractions are not drawn although they were requested.
     pub fn chain_refusal(&self) -> Option<&Error> {
         self.main.renderer.chain_refusal()
     }
 
-    /// Whether the picture shows a view.
+    /// Whether the picture, with both parts of a comparison, shows a view.
     pub fn shows(&self, view: &View) -> bool {
         self.main.picture.shows(view)
             && self
@@ -370,10 +370,10 @@ impl Graphics {
                 .is_none_or(|beside| beside.picture.shows(view))
     }
 
-    /// Draws a view in another quality than it is shown in, or makes the picture that is shown better by another sample.
+    /// Adds a sample to the picture shown, or draws the view if it is not shown in that quality.
     ///
     /// # Errors
-    /// The device cannot hold a picture of that size.
+    /// A picture of that size does not fit on the device.
     pub fn refine_picture(&mut self, view: &View, quality: EyeQuality) -> Result<()> {
         for canvas in [Some(&mut self.main), self.beside.as_mut()].into_iter().flatten() {
             canvas.refine(&self.gpu, &mut self.interface.renderer, view, quality)?;
@@ -381,10 +381,10 @@ impl Graphics {
         Ok(())
     }
 
-    /// Draws the scene where the view changed since the last time; tells whether it drew.
+    /// Draws the view unless it is shown already; returns whether it drew.
     ///
     /// # Errors
-    /// The device cannot hold a picture of that size.
+    /// A picture of that size does not fit on the device.
     pub fn draw_picture(&mut self, view: &View, quality: EyeQuality) -> Result<bool> {
         let egui = &mut self.interface.renderer;
         if let Some(beside) = &mut self.beside {
@@ -394,7 +394,7 @@ impl Graphics {
         self.main.draw(&self.gpu, egui, view, quality)
     }
 
-    /// Shows a painting of the interface.
+    /// Presents the interface, which contains the picture.
     pub fn show(&mut self, painting: &mut Painting) -> FrameOutcome {
         self.interface.upload(&self.gpu.device, &self.gpu.queue, painting);
         let shown = self.show_frame(painting);
@@ -438,7 +438,7 @@ impl Graphics {
     }
 }
 
-/// How long to wait before a frame that came [`FrameOutcome::Later`] is tried again.
+/// Delay before the next attempt after [`FrameOutcome::Later`].
 pub const RETRY_AFTER: Duration = Duration::from_millis(50);
 
 fn window_error(what: &str) -> Error {
@@ -449,18 +449,18 @@ fn window_error(what: &str) -> Error {
     )
 }
 
-/// A texture of the picture's size with what it shows.
+/// Render target of a picture, and the view drawn in it.
 #[derive(Debug)]
 struct Picture {
     texture: wgpu::TextureView,
     id: egui::TextureId,
     size: [u32; 2],
-    /// What it shows; `None` where that is out of date.
+    /// `None` if the picture is out of date.
     shown: Option<View>,
 }
 
 impl Picture {
-    /// A picture of one pixel, known to egui by its `id`.
+    /// A picture of one pixel, registered with egui.
     fn new(device: &wgpu::Device, egui: &mut egui_wgpu::Renderer) -> Self {
         let size = [1, 1];
         let texture = texture(device, size);
@@ -473,20 +473,19 @@ impl Picture {
         }
     }
 
-    /// The scene or its maps changed: draw it next time whatever the view.
+    /// Forces the next call to draw, whatever the view: the scene or its maps changed.
     fn invalidate(&mut self) {
         self.shown = None;
     }
 
-    /// Whether it shows a view.
     fn shows(&self, view: &View) -> bool {
         self.shown.as_ref() == Some(view)
     }
 
-    /// Draws `view` unless it is shown already; tells whether it drew.
+    /// Draws `view` unless it is shown already; returns whether it drew.
     ///
     /// # Errors
-    /// That of `draw`: the picture stays as it was.
+    /// Those of `draw`.
     fn update(
         &mut self,
         device: &wgpu::Device,
@@ -531,27 +530,27 @@ pub(super) fn texture(device: &wgpu::Device, [width, height]: [u32; 2]) -> wgpu:
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }
 
-/// A window with a surface on it.
+/// A window and its surface.
 #[derive(Debug)]
 struct Screen {
-    /// Declared first: it has to go before its window.
+    /// Declared first so that it is dropped before its window.
     surface: wgpu::Surface<'static>,
     config: wgpu::SurfaceConfiguration,
     window: Arc<Window>,
-    /// False while the window has no area: there is nothing to configure or to draw on.
+    /// False while the window has no area: its surface cannot be configured then.
     has_area: bool,
 }
 
-/// What came of asking for the next frame.
+/// Outcome of acquiring the next frame.
 #[derive(Debug)]
 enum Acquired {
-    /// Draw on it and hand it to [`Screen::present`].
+    /// To be drawn on and passed to [`Screen::present`].
     Frame(wgpu::SurfaceTexture),
-    /// Nothing to draw on for the time being; an event will tell when there is.
+    /// Nothing to draw on at present; an event will come when there is.
     Hidden,
-    /// Not this time: ask again soon.
+    /// No frame is available at present: try again soon.
     Later,
-    /// The surface could not be mended: make everything anew.
+    /// The surface could not be restored: recreate everything.
     Broken,
 }
 
@@ -559,7 +558,7 @@ impl Screen {
     /// Configures a surface for a window.
     ///
     /// # Errors
-    /// The adapter cannot draw on it.
+    /// The adapter cannot draw on the surface.
     fn new(
         window: Arc<Window>,
         surface: wgpu::Surface<'static>,
@@ -576,7 +575,7 @@ impl Screen {
                     "choose another driver, or use `bake` and `render`, which need no window",
                 )
             })?;
-        // The panel blends in display values, so the surface must not convert them.
+        // egui blends in encoded values, so the surface must not convert to sRGB.
         let formats = surface.get_capabilities(adapter).formats;
         if let Some(format) = formats.into_iter().find(|format| !format.is_srgb()) {
             config.format = format;
@@ -592,7 +591,7 @@ impl Screen {
         Ok(screen)
     }
 
-    /// Takes over the window's present size.
+    /// Adapts the surface to the window's size.
     fn resize(&mut self, device: &wgpu::Device) {
         let size = self.window.inner_size();
         self.has_area = size.width > 0 && size.height > 0;
@@ -604,7 +603,7 @@ impl Screen {
         }
     }
 
-    /// Asks for the next frame; mends the surface once where that helps.
+    /// Acquires the next frame; reconfigures or recreates the surface once if that may help.
     fn acquire(&mut self, device: &wgpu::Device, instance: &wgpu::Instance) -> Acquired {
         for _ in 0..2 {
             if !self.has_area {
@@ -612,7 +611,7 @@ impl Screen {
             }
             use wgpu::CurrentSurfaceTexture as Current;
             match self.surface.get_current_texture() {
-                // A suboptimal frame shows well enough; the event that made it so brings a resize.
+                // A suboptimal frame is good enough: a resize event follows.
                 Current::Success(frame) | Current::Suboptimal(frame) => return Acquired::Frame(frame),
                 Current::Timeout => return Acquired::Later,
                 Current::Occluded => return Acquired::Hidden,
@@ -634,7 +633,6 @@ impl Screen {
         Acquired::Later
     }
 
-    /// Shows a frame.
     fn present(&self, queue: &wgpu::Queue, frame: wgpu::SurfaceTexture) {
         self.window.pre_present_notify();
         queue.present(frame);

@@ -7,30 +7,29 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
-/// egui's state for one window, and what paints it.
+/// egui's state for one window, and its renderer.
 pub struct Interface {
-    /// egui's own state.
     pub context: egui::Context,
     state: egui_winit::State,
-    /// Paints egui's triangles and knows its textures.
+    /// Draws egui's triangles and owns its textures.
     pub renderer: egui_wgpu::Renderer,
     /// Last rectangles of the controls; `None` unless requested.
     controls: Option<Vec<Control>>,
 }
 
-/// What one pass of the interface gave: to be painted once.
+/// Output of one egui pass, to be painted once.
 pub struct Painting {
     primitives: Vec<egui::ClippedPrimitive>,
     textures: egui::TexturesDelta,
     pixels_per_point: f32,
-    /// When egui wants to be shown again; zero at once.
+    /// When egui wants another pass; zero means at once.
     pub repaint_after: Duration,
     /// Rectangles of the controls, if requested and changed.
     pub moved_controls: Option<Vec<Control>>,
 }
 
 impl Interface {
-    /// For a window that was never shown: assistive technology has to be told before.
+    /// Must be called before the window is first shown, as accessibility requires.
     pub fn new<T: From<accessibility::Event> + Send>(
         event_loop: &ActiveEventLoop,
         window: &Window,
@@ -58,23 +57,23 @@ impl Interface {
         }
     }
 
-    /// Tells from now on where controls are.
+    /// Reports the rectangles of the controls from now on.
     pub fn watch_controls(&mut self) {
         self.context.enable_accesskit();
         self.controls = Some(Vec::new());
     }
 
-    /// Passes an event on; tells whether the window should be drawn again.
+    /// Passes an event to egui; returns whether a redraw is needed.
     pub fn on_event(&mut self, window: &Window, event: &WindowEvent) -> bool {
         self.state.on_window_event(window, event).repaint
     }
 
-    /// Answers a screen reader.
+    /// Handles a request of a screen reader.
     pub fn on_accessibility(&mut self, event: accessibility::Event) {
         accessibility::answer(event, &mut self.state, &self.context, self.controls.is_some());
     }
 
-    /// Runs one pass of the interface.
+    /// Runs one egui pass.
     pub fn run(&mut self, window: &Window, show: impl FnMut(&mut egui::Ui)) -> Painting {
         let input = self.state.take_egui_input(window);
         let output = self.context.run_ui(input, show);
@@ -104,7 +103,8 @@ impl Interface {
         Some(found)
     }
 
-    /// Takes over new textures. Has to be called for every painting, shown or not: textures come only once.
+    /// Uploads new textures. Must be called for every painting, even if it is not shown: egui sends textures only
+    /// once.
     pub fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, painting: &mut Painting) {
         for (id, deltas) in painting.textures.set.drain() {
             for delta in &deltas {
@@ -113,14 +113,14 @@ impl Interface {
         }
     }
 
-    /// Lets old textures go, once the painting was shown or could not be.
+    /// Frees old textures. Must be called after the painting was shown or could not be.
     pub fn release(&mut self, painting: &mut Painting) {
         for id in painting.textures.free.drain() {
             self.renderer.free_texture(&id);
         }
     }
 
-    /// Paints over the whole of `target`, which is `size` pixels large.
+    /// Paints over the whole of `target`, `size` in pixels.
     pub fn paint(
         &mut self,
         device: &wgpu::Device,
@@ -156,18 +156,17 @@ impl Interface {
     }
 }
 
-/// A control on the screen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Control {
-    /// What kind of control, by AccessKit's name for it.
+    /// AccessKit's name of the role.
     pub role: String,
-    /// Its own text, or that of the label in front of it, or else its value.
+    /// Its own label, else that of the label in front of it, else its value.
     pub name: String,
     /// Left, top, right and bottom in the window [pixels].
     pub rect: [f64; 4],
 }
 
-/// The controls of an interface of so many pixels per point, from top to bottom.
+/// The controls in an update of the accessibility tree, from top to bottom.
 pub fn of(update: &TreeUpdate, pixels_per_point: f64) -> Vec<Control> {
     let name_of = |id: &NodeId| {
         let node = update.nodes.iter().find(|(candidate, _)| candidate == id);
@@ -208,7 +207,7 @@ fn is_control(role: Role) -> bool {
     )
 }
 
-/// Screen readers, where this build has them: on Linux by the feature `accessibility`, elsewhere always.
+/// Screen readers. On Linux they need the feature `accessibility`.
 #[cfg(any(feature = "accessibility", not(target_os = "linux")))]
 pub mod accessibility {
     use egui_winit::accesskit_winit;
@@ -216,7 +215,7 @@ pub mod accessibility {
     use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
     use winit::window::Window;
 
-    /// Connects a window that was never shown: the system has to be told before.
+    /// Connects a window to the system's accessibility interface. Must be called before the window is first shown.
     pub fn connect<T: From<Event> + Send>(
         state: &mut egui_winit::State,
         event_loop: &ActiveEventLoop,
@@ -226,7 +225,7 @@ pub mod accessibility {
         state.init_accesskit(event_loop, window, proxy);
     }
 
-    /// Answers a screen reader; `keep_tree` where others read the tree of widgets too.
+    /// Handles a request of a screen reader. `keep_tree`: something else reads the widget tree too.
     pub fn answer(event: Event, state: &mut egui_winit::State, context: &egui::Context, keep_tree: bool) {
         match event.window_event {
             accesskit_winit::WindowEvent::InitialTreeRequested => context.enable_accesskit(),
@@ -246,7 +245,7 @@ pub mod accessibility {
     use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
     use winit::window::Window;
 
-    /// Never happens in this build.
+    /// Never occurs in this build.
     #[derive(Debug)]
     pub enum Event {}
 

@@ -6,27 +6,27 @@ use glam::DVec3;
 use crate::geometry::Ray;
 use crate::scene::Camera;
 
-/// A camera with the picture that it makes.
+/// A camera and the rectangle of its picture.
 #[derive(Clone, Copy, Debug)]
 pub struct Viewport<'a> {
-    /// Whose vertical angle of view is that of the picture's height.
+    /// Its vertical field of view is that of the picture's height.
     pub camera: &'a Camera,
-    /// Where the picture lies [points].
+    /// Rectangle of the picture in the window [points].
     pub picture: Rect,
 }
 
 impl Viewport<'_> {
-    /// Distance along the camera's axis [m].
+    /// Distance along the view axis [m].
     pub fn depth_m(&self, point: DVec3) -> f64 {
         (point - self.camera.position).dot(self.camera.forward)
     }
 
-    /// Whether a point is before the camera, and so has a place in its plane.
+    /// Whether a point is in front of the near plane, so that it can be projected.
     pub fn is_before(&self, point: DVec3) -> bool {
         self.depth_m(point) > self.camera.near_m
     }
 
-    /// Where a point before the camera is seen; it may be beside the picture.
+    /// Projection of a point in front of the near plane; may lie outside the picture.
     pub fn place(&self, point: DVec3) -> Pos2 {
         let offset = point - self.camera.position;
         let scale = 1.0 / self.m_per_point(point);
@@ -34,13 +34,13 @@ impl Viewport<'_> {
         self.picture.center() + vec2((scale * x) as f32, (-scale * y) as f32)
     }
 
-    /// What one point of the picture spans where a point of the scene is [m].
+    /// Length at the depth of `point` that projects to one point of the picture [m].
     pub fn m_per_point(&self, point: DVec3) -> f64 {
         let half_height_m = (0.5 * self.camera.vertical_fov_rad).tan() * self.depth_m(point);
         half_height_m / (0.5 * f64::from(self.picture.height()))
     }
 
-    /// The part of a line that is before the camera.
+    /// Projection of a line segment, clipped at the near plane; `None` if it is behind it.
     pub fn line(&self, from: DVec3, to: DVec3) -> Option<[Pos2; 2]> {
         let near = self.camera.near_m;
         let depths = [from, to].map(|point| self.depth_m(point) - near);
@@ -54,7 +54,7 @@ impl Viewport<'_> {
         .map(|ends| ends.map(|end| self.place(end)))
     }
 
-    /// The ray from the eye through a place of the picture.
+    /// The view ray through a point of the picture.
     pub fn gaze(&self, place: Pos2) -> Ray {
         let picture = self.picture;
         let share = |at: f32, from: f32, length: f32| 2.0 * f64::from((at - from) / length) - 1.0;

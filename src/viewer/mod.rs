@@ -47,36 +47,37 @@ use crate::progress::Control;
 use crate::scene::Scene;
 use crate::settings::BakeSettings;
 
-/// What the window starts with.
+/// Options of the viewer at its start.
 #[derive(Clone, Debug)]
 pub struct ViewerOptions {
-    /// The scene; lights added for it (`--default-light`) are already in it.
+    /// Already contains the lights that `--default-light` adds.
     pub scene: Arc<Scene>,
-    /// First settings; the panel changes them.
+    /// Initial settings; the panel changes them.
     pub settings: BakeSettings,
-    /// Maps that were baked before; `None` bakes on start.
+    /// Maps of an earlier bake; `None` bakes on start.
     pub maps: Option<Vec<IlluminationMap>>,
     /// Inner size of the window [logical pixels], each > 0.
     pub size: (u32, u32),
-    /// Name of the file's camera to start from; `None` takes the first, or frames the scene where there is none.
+    /// Name of the scene's camera to start from. `None` takes its first camera, or frames the scene if it has none.
     pub camera: Option<String>,
-    /// Exposure [stops]; `None` chooses it from the first picture.
+    /// Exposure [stops]; `None` measures it on the first picture.
     pub exposure_stops: Option<f64>,
-    /// Closes the window soon after it is cancelled; `None` where only the user closes it.
+    /// Closes the window soon after this is cancelled; `None` if only the user closes it.
     pub stop: Option<Arc<Control>>,
-    /// One JSON line per change of state is written here: for support and for tests.
+    /// Receives one JSON line per change of state, for support and for tests.
     pub event_log: Option<PathBuf>,
-    /// How scenes are opened in the window.
+    /// How the window opens scenes.
     pub files: FilesOptions,
 }
 
-/// Location of the error that [`run`] returns where there is no display.
+/// Location of the error that [`run`] returns if there is no display.
 const DISPLAY: &str = "display";
 
 /// Opens the window and returns when it is closed.
 ///
 /// # Errors
-/// No display (see [`is_no_display`]); no graphics adapter; a device that was lost and did not come back.
+/// No display (see [`is_no_display`]); no graphics adapter; a graphics device that was lost and could not be
+/// recreated.
 pub fn run(options: ViewerOptions) -> Result<()> {
     let event_loop = event_loop()?;
     let mut app = App::new(&options, event_loop.create_proxy())?;
@@ -94,7 +95,7 @@ pub fn run(options: ViewerOptions) -> Result<()> {
 }
 
 fn event_loop() -> Result<EventLoop<UserEvent>> {
-    // Where a library of the window system is missing, winit panics instead of telling.
+    // winit panics instead of returning an error if a library of the window system is missing.
     let built = panic::catch_unwind(|| EventLoop::<UserEvent>::with_user_event().build());
     let reason = match built {
         Ok(Ok(event_loop)) => return Ok(event_loop),
@@ -108,17 +109,18 @@ fn event_loop() -> Result<EventLoop<UserEvent>> {
     ))
 }
 
-/// Whether [`run`] failed because there is no display to open a window on.
+/// Whether [`run`] failed because there is no display.
 pub fn is_no_display(error: &Error) -> bool {
     error.location == DISPLAY
 }
 
-/// Whether winit has panicked: where somebody else destroys its window, as `xdotool windowclose` does, it takes it that the X
-/// server still knows it.
+/// Whether winit has panicked. It does so when another program destroys its window, as `xdotool windowclose` does,
+/// because it assumes that the X server still knows the window.
 static IS_ORPHANED: AtomicBool = AtomicBool::new(false);
 
-/// Notes a panic of winit, and tells whether it is one: then the window has gone, and [`run`] ends as if it
-/// had been closed. For the program's panic hook, which need not report it; without that the panic goes on.
+/// Records a panic and returns whether it came from winit. If so, the window is gone and [`run`] ends as if it had
+/// been closed. To be called by the program's panic hook, which need not report such a panic; without that call the
+/// panic propagates.
 pub fn is_orphaned(info: &PanicHookInfo<'_>) -> bool {
     let is_of_winit = info
         .location()
@@ -127,7 +129,7 @@ pub fn is_orphaned(info: &PanicHookInfo<'_>) -> bool {
     is_of_winit
 }
 
-/// Runs the window; `None` where winit panicked.
+/// Runs the event loop; `None` if winit panicked.
 fn unless_orphaned<T>(window: impl FnOnce() -> T) -> Option<T> {
     match panic::catch_unwind(AssertUnwindSafe(window)) {
         Ok(outcome) => Some(outcome),

@@ -42,105 +42,101 @@ use crate::settings::BakeSettings;
 use crate::transport::Tracer;
 use serde_json::{Value, json};
 
-/// Quiet time after the last change before it is baked.
+/// Time without further changes after which a change is baked.
 pub const QUIET: Duration = Duration::from_millis(150);
-/// Rays that a probe may take for each place of a light.
+/// Limit of the rays that a probe traces per sample position of a light.
 const MAX_PROBE_RAYS: u64 = 3_000_000;
 
-/// Cells of the lattice of rays that is drawn, for each light.
+/// Lattice cells of the path preview, per light.
 const SKETCHED_CELLS: usize = 3000;
-/// Least share of a ray that is drawn [1].
+/// Smallest share of its light from which a branch is drawn in the path preview [1].
 const SKETCHED_SHARE: f64 = 0.05;
 
-/// The state behind the window.
+/// State of the viewer, without window and device.
 #[derive(Debug)]
 pub struct Model {
-    /// What is shown, with its history: as it is at rest.
+    /// The edited scene, at rest, with its undo history.
     edits: EditedScene,
     playback: Playback,
-    /// What the user has set.
     pub choices: Choices,
-    /// From where it is seen.
     pub navigator: Navigator,
-    /// What happened.
     pub log: EventLog,
-    /// Bakes.
+    /// The baking thread.
     pub worker: Worker,
-    /// Writes maps to files.
     pub exporter: Exporter,
     surroundings: CollisionScene,
-    /// Where the bake stood at the last [`poll`](Self::poll).
+    /// State of the worker at the last [`poll`](Self::poll).
     pub state: BakeState,
-    /// The maps that the picture shows.
+    /// The maps that are shown; `None` before the first bake.
     pub last: Option<Arc<BakedLevel>>,
-    /// What an effect is worth to these maps, where that was asked for.
+    /// Contribution of an effect to the maps shown, if it was asked for and found.
     pub worth: Option<EffectDifference>,
-    /// Maps that were baked before the start; until the first bake.
+    /// Maps of an earlier bake that are shown until the first bake in the window.
     pub given: Vec<IlluminationMap>,
-    /// When a change is baked unless another one follows.
+    /// When the pending change is baked, unless another one follows.
     bake_due: Option<Instant>,
     /// Counts changes of what a bake depends on.
     revision: u64,
-    /// The last one that was waited for, or asked for.
+    /// The revision that was last scheduled or baked.
     seen: u64,
-    /// The last request with its number; before the first one what the given maps are taken to be baked with.
+    /// The last request and its number. Before the first one, the settings that the maps given at the start are
+    /// assumed to be baked with.
     asked: Option<(u64, BakeRequest)>,
-    /// The first request for the scene in the window; maps of those before are of another.
+    /// Number of the first request for the present scene; maps of earlier requests show another scene.
     first_request: u64,
-    /// Why the last edit was refused.
+    /// Why the last edit or comparison was refused.
     pub refusal: Option<String>,
-    /// What the maps that were shown last hold.
+    /// Statistics of the maps shown, for scales and legends.
     pub survey: MapSurvey,
-    /// Counts the maps that were shown.
+    /// Counts the changes of the maps shown.
     maps_revision: u64,
     prober: Prober,
     sketcher: PreviewTask,
-    /// The maps to compare with.
+    /// The maps that the present ones are compared with.
     pub reference: Option<SavedMaps>,
-    /// What is to be picked once surfaces are known.
+    /// Ray to pick along as soon as the collision surfaces are built.
     picking: Option<Ray>,
-    /// The light in the mouse's hand.
+    /// The light that the mouse drags.
     placing: picking::DraggedLight,
-    /// What waits for the surfaces of the scene.
+    /// Tasks that wait for the collision surfaces.
     pending_search: pending_search::PendingSearch,
-    /// The camera's path, while it is played.
+    /// Plays the camera path; `None` if it is not being played.
     player: Option<Player>,
-    /// What became of the last file of a path.
+    /// Outcome of the last command of the camera path.
     pub film_told: Option<String>,
-    /// The scene that was asked about.
+    /// The scene that was last probed.
     probed_scene: Option<Arc<Scene>>,
-    /// Whether the exposure is that of an earlier time.
+    /// Whether the exposure was restored from an earlier session.
     pub exposure_is_kept: bool,
-    /// What was kept of it and not taken over.
+    /// Saved state that was not restored.
     left_alone: saved_state::IgnoredState,
-    /// The scene in the window by its full path.
+    /// Full path or name of the scene in the window.
     full_source: String,
-    /// What is read from files, and from which.
+    /// Opens, saves and watches scene files.
     pub files: Files,
-    /// How pictures are made.
     pub picture: PictureReport,
 }
 
-/// What the window tells of its pictures.
+/// What the window reports about the rendering of its pictures.
 #[derive(Clone, Debug, Default)]
 pub struct PictureReport {
-    /// What draws them.
+    /// Name of the graphics adapter.
     pub adapter: String,
-    /// Whether the one that is shown has the eye's chains, and why.
+    /// Whether the picture is drawn with chains, and why.
     pub chains: Option<EffectLine>,
-    /// How long the last ones took; `None` where the device cannot tell.
+    /// GPU times of the last pictures; `None` if the device cannot measure them.
     pub frame_times: Option<FrameTimes>,
-    /// From events to frames.
+    /// Latencies from input events to frames.
     pub latencies: Latencies,
-    /// Whether the graphics device was lost a short while ago, and came back.
+    /// Whether the graphics device was lost and recreated a short while ago.
     pub lost_device: bool,
 }
 
 impl Model {
-    /// Starts the baking thread, and a bake unless there are maps. The window is woken when a thread has news.
+    /// Starts the baking thread, and a bake unless there are maps already. `wake` is called when a thread has news.
     ///
     /// # Errors
-    /// The event log cannot be written; the system gives no thread.
+    /// The event log cannot be written; the system cannot create a thread.
     pub fn new(options: &ViewerOptions, wake: &Wake) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
         let worker = Worker::spawn(Baker::new, wake)?;
@@ -194,7 +190,7 @@ impl Model {
         self.surroundings.of(self.edits.scene())
     }
 
-    /// Gets about in another way from now on.
+    /// Changes how the camera moves.
     pub fn travel(&mut self, travel: NavigationMode) {
         let surfaces = self.surfaces();
         let solid = surfaces.as_deref().map(|tracer| tracer as &dyn Collider);
@@ -202,7 +198,7 @@ impl Model {
         self.log.write("travel", json!({"way": travel.name()}));
     }
 
-    /// Moves the camera by some time [s].
+    /// Advances the scene's time, the camera path and the camera by a time [s].
     pub fn advance(&mut self, seconds: f64) {
         if self.playback.is_playing {
             self.playback.advance(seconds, self.edits.scene());
@@ -211,7 +207,7 @@ impl Model {
             return;
         }
         if self.navigator.travel() == NavigationMode::Walk {
-            // Stands until there is something to stand on.
+            // The camera does not move before there is ground to walk on.
             if let Some(surfaces) = self.surfaces() {
                 self.navigator.advance_among(seconds, &*surfaces);
             }
@@ -220,49 +216,48 @@ impl Model {
         }
     }
 
-    /// What is shown, as it is now.
+    /// The scene shown: edited, at the present moment of its animation.
     pub fn scene(&self) -> &Arc<Scene> {
         self.playback.shown(self.edits.scene())
     }
 
-    /// The scene with its history.
     pub fn edits(&self) -> &EditedScene {
         &self.edits
     }
 
-    /// What was loaded.
+    /// The scene as it was loaded.
     pub fn loaded(&self) -> &Arc<Scene> {
         self.edits.loaded()
     }
 
-    /// When something is to be done though nothing happens.
+    /// When the next task is due that no event triggers.
     pub fn due(&self) -> Option<Instant> {
         let autosaver = self.files.autosaver.as_ref();
         let dues = [self.bake_due, autosaver.and_then(Autosaver::due)];
         dues.into_iter().flatten().min()
     }
 
-    /// Maps with every layer that was baked; empty before the first bake.
+    /// The maps shown, with all baked layers; empty before the first bake.
     pub fn maps(&self) -> &[IlluminationMap] {
         self.last.as_ref().map_or(&self.given, |last| &last.result.maps)
     }
 
-    /// Asks what lights the surface along a ray; forgets what was asked without one.
+    /// Probes the surface along a ray; `None` clears the probe.
     pub fn probe(&mut self, gaze: Option<Ray>) {
         self.prober.ask(gaze);
     }
 
-    /// What is known of the point that was asked about.
+    /// Result of the probe so far.
     pub fn probed(&self) -> Option<&Probed> {
         self.prober.shown()
     }
 
-    /// How light runs, where that is drawn.
+    /// The path preview, if it is drawn.
     pub fn sketch(&self) -> Option<&Arc<PathPreview>> {
         self.sketcher.shown()
     }
 
-    /// Follows the light through the scene as it is now, while that is drawn.
+    /// Traces the path preview of the present scene while it is drawn.
     fn poll_sketch(&mut self) {
         if !self.choices.sketched.is_any() {
             return self.sketcher.forget();
@@ -285,8 +280,7 @@ impl Model {
         }
     }
 
-    /// Gets on with what was asked about: as soon as the surfaces of the scene are known, and again when it or its maps
-    /// are others.
+    /// Continues the probe: as soon as the collision surfaces are built, and again when the scene or its maps change.
     fn poll_probe(&mut self, has_maps: bool) {
         let is_other = |scene: &Arc<Scene>| !Arc::ptr_eq(scene, self.edits.scene());
         let is_settled = has_maps && self.last.as_ref().is_some_and(|last| last.is_final);
@@ -313,12 +307,13 @@ impl Model {
         }
     }
 
-    /// Looks what the baking thread did; tells whether there are new maps to be shown.
+    /// Takes news from all threads; returns whether there are new maps to show.
     pub fn poll(&mut self) -> bool {
         if self.exporter.poll() {
             self.log.write_export(&self.exporter.state);
         }
-        // The state first: maps that come in between are taken by the next call, which the thread wakes.
+        // Reads the state first: the next call, for which the thread wakes the window, takes maps that arrive in
+        // between.
         let state = self.worker.state();
         let mut has_maps = false;
         let level = self.worker.take_level();
@@ -337,7 +332,7 @@ impl Model {
             }
             if has_maps {
                 self.last = Some(Arc::new(level));
-                // It was found on other maps.
+                // It was computed for other maps.
                 self.worth = None;
             }
         }
@@ -369,8 +364,8 @@ impl Model {
         has_maps
     }
 
-    /// Whether maps are to replace those that are shown. Coarse maps of other light do, since what is shown is wrong
-    /// then; coarse maps of the same light only where they are better than what is shown.
+    /// Whether new maps should replace those shown. Coarse maps of a changed scene or changed settings do because the
+    /// maps shown are wrong then; coarse maps of the same light only if they are more accurate than those shown.
     fn improves_on_what_is_shown(&self, new: &BakedLevel) -> bool {
         let Some(shown) = &self.last else {
             return true;
@@ -391,19 +386,19 @@ impl Model {
         }
     }
 
-    /// What the user asks for now.
+    /// The request that matches the present scene and settings.
     fn wanted(&self) -> BakeRequest {
         let scene = self.playback.wanted(self.edits.scene());
         BakeRequest::new(Arc::clone(scene), self.choices.settings.clone())
     }
 
-    /// Does what was asked for, and bakes what was changed; returns what the window is to do.
+    /// Applies commands and bakes changes; returns the commands that the window has to carry out.
     ///
-    /// A change is baked at once where the request before it has shown something: while a slider is dragged, the
-    /// picture follows at the pace of first levels, and no request is stopped before it had one. Where nothing was
-    /// shown yet, the change waits for that, or until it has come to rest.
+    /// A change is baked at once if the previous request has already shown maps: the picture then follows a dragged
+    /// slider at the rate of first levels, and every request gets to show one. Otherwise the change waits for the
+    /// first level, or until it has been left alone for [`QUIET`].
     pub fn act(&mut self, mut commands: Vec<Command>, now: Instant) -> Vec<Command> {
-        // A slow frame may bring the end of a drag together with the wish to take it back.
+        // One slow frame may contain both the end of a drag and its undo: apply the changes first.
         commands.sort_by_key(|command| match command {
             Command::Choose(_) => 0,
             Command::Edit(_) => 1,
@@ -428,7 +423,7 @@ impl Model {
         of_window
     }
 
-    /// Does one thing that was asked for, or returns it where the window is to do it.
+    /// Applies one command, or returns it if the window has to carry it out.
     pub fn apply(&mut self, command: Command) -> Option<Command> {
         match command {
             Command::Choose(choices) => self.choose(*choices),
@@ -454,7 +449,7 @@ impl Model {
         None
     }
 
-    /// Has maps written that were baked here, into the working folder.
+    /// Starts to export baked maps into the working folder.
     fn export(&mut self, export: Export) {
         let Some(last) = &self.last else {
             return;
@@ -464,20 +459,19 @@ impl Model {
         self.log.write_export(&self.exporter.state);
     }
 
-    /// Whether something else is wanted than what was asked for last.
+    /// Whether the wanted bake differs from the last request.
     fn is_changed(&self) -> bool {
         self.asked
             .as_ref()
             .is_none_or(|(_, asked)| !asked.is_same(&self.wanted()))
     }
 
-    /// Whether the last request has shown maps, or will not any more.
+    /// Whether the last request has shown maps, or never will.
     fn has_answered(&self) -> bool {
         let is_shown = |serial: u64| self.last.as_ref().is_some_and(|last| last.serial == serial);
         !self.state.is_baking() || self.asked.as_ref().is_none_or(|(serial, _)| is_shown(*serial))
     }
 
-    /// Takes over what the user has set.
     fn choose(&mut self, choices: Choices) {
         let before = std::mem::replace(&mut self.choices, choices);
         let (edits, now) = (&mut self.edits, &self.choices);
@@ -493,7 +487,7 @@ impl Model {
         self.note_settings_since(before.settings);
     }
 
-    /// Whether a bake depends on what is set otherwise than before.
+    /// Schedules a bake if it depends on settings that differ from `before`.
     fn note_settings_since(&mut self, before: BakeSettings) {
         let wanted = self.wanted();
         if wanted.settings != BakeRequest::new(Arc::clone(&wanted.scene), before).settings {
@@ -502,7 +496,7 @@ impl Model {
         }
     }
 
-    /// Edits the scene; tells whether that was possible.
+    /// Applies an edit to the scene; returns whether it was accepted.
     fn edit(&mut self, edit: &Edit) -> bool {
         self.log.write("edit", json!({"target": edit.target()}));
         let outcome = self.edits.edit(edit);
@@ -512,7 +506,7 @@ impl Model {
         self.refusal.is_none()
     }
 
-    /// Takes the last change back, or does again what was taken back.
+    /// Undoes the last change, or redoes the last undone one.
     fn turn_back(&mut self, is_back: bool) {
         self.refusal = None;
         let Some((text, [from, to])) = self.edits.turn(is_back) else {
@@ -531,7 +525,7 @@ impl Model {
                 self.choices.automatic = automatic;
                 self.revision += 1;
             }
-            // The scene, which is changed already.
+            // The scene: `turn` has already restored it.
             _ => {
                 self.revision += 1;
                 self.stand_at_moment();
@@ -539,7 +533,7 @@ impl Model {
         }
     }
 
-    /// Bakes with the panel's settings, unless one of them is out of its range: the panel tells so.
+    /// Bakes with the panel's settings unless one of them is out of range; the panel reports that.
     pub fn rebake(&mut self) {
         let wanted = self.wanted();
         if wanted.settings.validate().is_err() {
@@ -551,14 +545,14 @@ impl Model {
         self.state = self.worker.state();
     }
 
-    /// Stops the bake and keeps the maps that are shown; what plays stands still.
+    /// Stops the bake and the playback; the maps shown stay.
     pub fn cancel(&mut self) {
         self.playback.stop();
         self.settle();
         self.worker.cancel();
     }
 
-    /// No change waits to be baked.
+    /// Discards the pending change.
     fn settle(&mut self) {
         self.seen = self.revision;
         self.bake_due = None;

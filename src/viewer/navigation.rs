@@ -10,58 +10,58 @@ use super::files::config::KeptViews;
 use super::walking::{self, Collider, Walker};
 use crate::scene::{Camera, Scene};
 
-/// Time after which the velocity has closed 1 − 1/e of its gap to what the keys ask for [s].
+/// Time constant with which the velocity approaches its target [s].
 const SETTLING_S: f64 = 0.08;
-/// Below this share of the flying speed a camera without a key held stands still.
+/// Fraction of the flying speed below which the camera stops once no key is held.
 const STILL: f64 = 1e-3;
-/// Turn per counted step of the mouse [rad]: half a turn in about 1250 steps.
+/// Rotation per mouse count [rad]: half a turn in about 1250 counts.
 const LOOK_RAD_PER_COUNT: f64 = 0.0025;
-/// Speed factor of one notch of the wheel.
+/// Speed factor per wheel notch.
 const WHEEL_FACTOR: f64 = 1.05;
-/// Speed factor while running.
+/// Speed factor while Shift is held.
 const RUN_FACTOR: f64 = 4.0;
-/// Slowest and fastest flying speed, in scene radii per second.
+/// Range of the flying speed, in scene radii per second.
 const SPEED_RANGE: (f64, f64) = (1e-3, 1e2);
-/// First flying speed, in scene radii per second.
+/// Initial flying speed, in scene radii per second.
 const FIRST_SPEED: f64 = 0.6;
-/// Angle of view of a camera that the file does not give: 45° [rad].
+/// Vertical field of view if the scene has no camera: 45° [rad].
 const DEFAULT_FOV_RAD: f64 = std::f64::consts::FRAC_PI_4;
 
-/// Shape of picture (width/height) that cameras are composed for: a narrower one still shows all that this would.
+/// Aspect ratio (width/height) that cameras are composed for: a narrower picture still shows all that this one would.
 const COMPOSED_FOR: f64 = 16.0 / 9.0;
 
-/// Speed factor while taking care.
+/// Speed factor while Ctrl is held.
 const CREEP_FACTOR: f64 = 0.25;
-/// Slowest and fastest walking speed [m/s].
+/// Range of the walking speed [m/s].
 const WALKING_RANGE: (f64, f64) = (0.1, 20.0);
-/// Nearest that an orbit comes, in scene radii.
+/// Smallest orbit radius, in scene radii.
 const NEAREST_ORBIT: f64 = 1e-3;
-/// Nearest that is shown, of the distance to what is framed.
+/// Largest near-plane distance, as a fraction of the distance to the framed object.
 const NEAR_OF_FRAMED: f64 = 0.01;
-/// Views that can be kept.
+/// Number of bookmarks.
 pub const BOOKMARKS: usize = 9;
 
-/// How the camera gets about.
+/// How the camera moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr, VariantArray)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum NavigationMode {
-    /// Anywhere, through walls.
+    /// Free flight, through walls.
     #[default]
     Fly,
-    /// On foot: eyes 1.6 m above the ground, stopped by walls.
+    /// On foot: eyes 1.6 m above the ground, collides with walls.
     Walk,
-    /// Around a point.
+    /// Orbits around a point.
     Orbit,
 }
 
 impl NavigationMode {
-    /// Its name in the panel and in the event log.
+    /// Name in the panel and in the event log.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// The one after it.
+    /// The next mode, cyclically.
     #[must_use]
     pub fn next(self) -> Self {
         Self::VARIANTS[(self as usize + 1) % Self::VARIANTS.len()]
@@ -90,7 +90,7 @@ pub struct HeldKeys {
 }
 
 impl HeldKeys {
-    /// Right, up and forward, each −1, 0 or 1.
+    /// Components right, up and forward, each −1, 0 or 1.
     fn direction(self) -> DVec3 {
         let axis = |plus: bool, minus: bool| f64::from(i8::from(plus) - i8::from(minus));
         DVec3::new(
@@ -101,18 +101,17 @@ impl HeldKeys {
     }
 }
 
-/// Position, gaze and speed of the fly camera, in scene coordinates [m], y up.
+/// Pose and speed of the camera, in scene coordinates [m], y up.
 #[derive(Clone, Debug)]
 pub struct Navigator {
-    /// What is held down now.
     pub keys: HeldKeys,
     position: DVec3,
     velocity_m_per_s: DVec3,
-    /// 0 looks along −z, positive turns to the right.
+    /// 0 looks along −z; positive turns to the right.
     yaw_rad: f64,
-    /// Positive looks up, [−π/2, π/2]; both ends are proper views, as the horizon stays defined by the yaw.
+    /// Positive looks up, [−π/2, π/2]. Both ends are valid views because the yaw still defines the horizon.
     pitch_rad: f64,
-    /// Of a tilted camera of the file; kept while flying.
+    /// Roll of a tilted scene camera; kept while flying.
     roll_rad: f64,
     vertical_fov_rad: f64,
     near_m: f64,
@@ -120,18 +119,18 @@ pub struct Navigator {
     centre: DVec3,
     radius_m: f64,
     cameras: Vec<Camera>,
-    /// Which of the file's cameras `C` shows next.
+    /// Index of the scene camera that `C` shows next.
     next_camera: usize,
     travel: NavigationMode,
     walker: Walker,
     walking_m_per_s: f64,
-    /// Distance of the point that is orbited, straight ahead [m].
+    /// Distance of the orbit's pivot, straight ahead [m].
     orbit_m: f64,
     bookmarks: [Option<Camera>; BOOKMARKS],
 }
 
 impl Navigator {
-    /// Starts at the file's camera of that name, else at its first camera, else so that the scene fills the picture.
+    /// Starts at the scene camera of that name, else at the scene's first camera, else frames the whole scene.
     pub fn new(scene: &Scene, camera: Option<&str>) -> Self {
         let (low, high) = scene.bounds().unwrap_or((DVec3::splat(-1.0), DVec3::ONE));
         let half_diagonal_m = 0.5 * (high - low).length();
@@ -170,7 +169,7 @@ impl Navigator {
         navigator
     }
 
-    /// The camera as the file has it, or as it was flown to.
+    /// The present camera.
     pub fn camera(&self) -> Camera {
         let (right, level_up, forward) = self.level_axes();
         Camera {
@@ -183,13 +182,13 @@ impl Navigator {
         }
     }
 
-    /// Half the diagonal of the scene's box [m, > 0].
+    /// Half the diagonal of the scene's bounding box [m, > 0].
     pub fn radius_m(&self) -> f64 {
         self.radius_m
     }
 
-    /// The camera for a picture of that aspect (width/height). Beside the panel a picture is narrower than most cameras
-    /// are composed for: the view is widened then, so that nothing falls off its sides.
+    /// The camera for a picture of that aspect ratio (width/height). The picture beside the panel is narrower than
+    /// most cameras are composed for, so the field of view is widened to keep everything at its sides in view.
     pub fn camera_for(&self, aspect: f64) -> Camera {
         Camera {
             vertical_fov_rad: self.vertical_fov_for(aspect),
@@ -197,13 +196,13 @@ impl Navigator {
         }
     }
 
-    /// Pictures higher than wide are widened no further than square ones.
+    /// Pictures taller than wide are widened no more than square ones.
     fn vertical_fov_for(&self, aspect: f64) -> f64 {
         let widened = (COMPOSED_FOR / aspect.max(1.0)).max(1.0);
         2.0 * ((0.5 * self.vertical_fov_rad).tan() * widened).atan()
     }
 
-    /// Speed without running [m/s].
+    /// Speed without modifier keys [m/s].
     pub fn speed_m_per_s(&self) -> f64 {
         match self.travel {
             NavigationMode::Walk => self.walking_m_per_s,
@@ -211,12 +210,12 @@ impl Navigator {
         }
     }
 
-    /// How it gets about.
     pub fn travel(&self) -> NavigationMode {
         self.travel
     }
 
-    /// Gets about in another way from now on; an orbit is around what is straight ahead, or else around the scene.
+    /// Changes the mode. The pivot of an orbit is the surface straight ahead; if there is none, the point on the view
+    /// axis nearest to the scene's centre; if that is behind the camera, a point one scene radius ahead.
     pub fn set_travel(&mut self, travel: NavigationMode, solid: Option<&dyn Collider>) {
         if travel == self.travel {
             return;
@@ -238,14 +237,14 @@ impl Navigator {
         };
     }
 
-    /// Keeps the present view under a number from 0 on; false where there is no such number.
+    /// Stores the present view as a bookmark, numbered from 0; false if there is no such number.
     pub fn set_bookmark(&mut self, number: usize) -> bool {
         let camera = self.camera();
         let kept = self.bookmarks.get_mut(number);
         kept.map(|kept| *kept = Some(camera)).is_some()
     }
 
-    /// Goes to a view that was kept; false where there is none.
+    /// Goes to a bookmark; false if it is not set.
     pub fn go_to_bookmark(&mut self, number: usize) -> bool {
         let Some(camera) = self.bookmarks.get(number).cloned().flatten() else {
             return false;
@@ -254,7 +253,7 @@ impl Navigator {
         true
     }
 
-    /// What is kept for the next time.
+    /// The views that are saved for the next start.
     pub fn views(&self) -> KeptViews {
         KeptViews {
             camera: Some(self.camera()),
@@ -263,7 +262,7 @@ impl Navigator {
         }
     }
 
-    /// Takes over what was kept: bookmarks, and the camera where that is wanted.
+    /// Restores saved bookmarks and mode, and with `with_camera` the camera.
     pub fn restore(&mut self, kept: &KeptViews, with_camera: bool) {
         self.bookmarks.clone_from(&kept.bookmarks);
         if !with_camera {
@@ -275,7 +274,7 @@ impl Navigator {
         self.set_travel(kept.travel, None);
     }
 
-    /// The same place, gaze and way to get about in a scene that was read again.
+    /// Adopts a reloaded scene with the same pose, mode and bookmarks.
     pub fn stay_in(&mut self, scene: &Scene) {
         let mut there = Self::new(scene, None);
         there.restore(&self.views(), true);
@@ -289,8 +288,8 @@ impl Navigator {
             || (self.travel == NavigationMode::Walk && self.walker.is_moving())
     }
 
-    /// Lets time pass [s, ≥ 0] where nothing is in the way. The velocity approaches what the keys ask for exponentially and
-    /// the path is its exact integral, so that one long frame ends where many short ones do.
+    /// Advances by a time [s, ≥ 0] without collisions. The velocity approaches its target exponentially and the path
+    /// is the exact integral, so one long frame ends where many short ones do.
     pub fn advance(&mut self, seconds: f64) {
         let path = self.drift(seconds);
         match self.travel {
@@ -299,12 +298,12 @@ impl Navigator {
         }
     }
 
-    /// The same among surfaces: those who walk stand on them and are stopped by them.
+    /// Advances by a time [s, ≥ 0] with collisions: a walking camera stands on surfaces and is stopped by walls.
     pub fn advance_among(&mut self, seconds: f64, solid: &dyn Collider) {
         if self.travel != NavigationMode::Walk || seconds <= 0.0 {
             return self.advance(seconds);
         }
-        // Whoever has come past a corner walks on where he wants to, within one long frame too.
+        // Sub-steps let a walker who has passed a corner turn freely even within one long frame.
         let looks = (seconds / walking::LOOK_S).ceil();
         for _ in 0..looks as u64 {
             self.look_and_step(seconds / looks, solid);
@@ -316,12 +315,12 @@ impl Navigator {
         let (eye, left_m_per_s) = self.walker.step(self.position, asked_m_per_s, seconds, solid);
         self.position = eye;
         if left_m_per_s != asked_m_per_s {
-            // A wall took some of it.
+            // A wall stopped part of the motion.
             self.velocity_m_per_s = left_m_per_s;
         }
     }
 
-    /// The path of some time, and the velocity after it.
+    /// Displacement over a time [s]; updates the velocity.
     fn drift(&mut self, seconds: f64) -> DVec3 {
         let wanted = self.wanted_velocity();
         let remaining = (-seconds / SETTLING_S).exp();
@@ -333,7 +332,7 @@ impl Navigator {
         wanted * seconds + gap * (SETTLING_S * (1.0 - remaining))
     }
 
-    /// Steps towards the point that is orbited, or moves it aside with the camera.
+    /// Moves forward towards the orbit's pivot; shifts the pivot sideways along with the camera.
     fn move_pivot(&mut self, path: DVec3) {
         let (_, _, forward) = self.level_axes();
         let ahead_m = path.dot(forward);
@@ -342,7 +341,7 @@ impl Navigator {
         self.position = pivot - forward * self.orbit_m;
     }
 
-    /// Turns the gaze by a movement of the mouse [counts, x to the right, y down].
+    /// Turns the camera by a mouse movement [counts, x to the right, y down].
     pub fn look(&mut self, counts: DVec2) {
         let pivot = self.position + self.level_axes().2 * self.orbit_m;
         self.yaw_rad = (self.yaw_rad + counts.x * LOOK_RAD_PER_COUNT).rem_euclid(std::f64::consts::TAU);
@@ -352,8 +351,8 @@ impl Navigator {
         }
     }
 
-    /// Changes the speed by notches of the wheel, 5 % each: when flying it stays within 0.001 to 100 scene radii per second,
-    /// on foot within 0.1 to 20 m/s. In orbit the same notches bring the camera nearer.
+    /// Changes the speed by wheel notches of 5 % each: within 0.001 to 100 scene radii per second when flying, within
+    /// 0.1 to 20 m/s on foot. In orbit the same notches change the distance instead.
     pub fn wheel(&mut self, notches: f64) {
         let factor = WHEEL_FACTOR.powf(notches);
         match self.travel {
@@ -373,13 +372,13 @@ impl Navigator {
         self.speed_m_per_s = (self.speed_m_per_s * factor).clamp(slowest, fastest);
     }
 
-    /// Releases every key and stands still: the window lost the keyboard.
+    /// Releases every key and stops; for when the window loses the keyboard focus.
     pub fn stop(&mut self) {
         self.keys = HeldKeys::default();
         self.velocity_m_per_s = DVec3::ZERO;
     }
 
-    /// Goes to the file's next camera and tells its name; `None` where the file has no camera.
+    /// Goes to the scene's next camera and returns its name; `None` if the scene has no camera.
     pub fn next_camera(&mut self) -> Option<&str> {
         let index = self.next_camera.checked_rem(self.cameras.len())?;
         self.next_camera = index + 1;
@@ -388,12 +387,12 @@ impl Navigator {
         Some(&self.cameras[index].name)
     }
 
-    /// Steps back or forth along the gaze until the scene fills a picture of that aspect (width/height).
+    /// Moves along the view axis until the scene fills a picture of that aspect ratio (width/height).
     pub fn frame(&mut self, aspect: f64) {
         self.frame_ball(self.centre, self.radius_m, aspect);
     }
 
-    /// The same for a ball around a point of the scene [m, radius > 0].
+    /// The same for a sphere [m, radius > 0].
     pub fn frame_ball(&mut self, centre: DVec3, radius_m: f64, aspect: f64) {
         let half_height = 0.5 * self.vertical_fov_for(aspect);
         let half_width = (half_height.tan() * aspect).atan();
@@ -402,12 +401,12 @@ impl Navigator {
         self.velocity_m_per_s = DVec3::ZERO;
         self.position = centre - forward * distance_m;
         self.orbit_m = distance_m;
-        // Small things are not cut away.
+        // Keeps small objects out of the near plane.
         self.near_m = self.near_m.min(NEAR_OF_FRAMED * distance_m);
         self.walker.look_again();
     }
 
-    /// Stands there and looks at a point [m], its horizon level.
+    /// Moves to `eye` and looks at a point [m], with a level horizon.
     pub fn look_at(&mut self, eye: DVec3, point: DVec3) {
         let mut camera = self.camera();
         let forward = (point - eye).normalize_or(camera.forward);
@@ -420,7 +419,7 @@ impl Navigator {
         self.near_m = self.near_m.min(NEAR_OF_FRAMED * self.orbit_m);
     }
 
-    /// Stands where a camera does and looks where it looks.
+    /// Takes over the pose and field of view of a camera.
     pub fn stand_at(&mut self, camera: &Camera) {
         let forward = camera.forward;
         let across = DVec2::new(forward.x, forward.z);
@@ -431,7 +430,7 @@ impl Navigator {
         self.yaw_rad = if across.length() > 1e-9 {
             across.x.atan2(-across.y)
         } else {
-            // Straight up or down: the picture's upper edge tells the heading.
+            // Looking straight up or down: the camera's up vector defines the heading.
             let heading = camera.up * -forward.y.signum();
             heading.x.atan2(-heading.z)
         };
@@ -442,7 +441,7 @@ impl Navigator {
         self.near_m = camera.near_m.min(1e-3 * self.radius_m);
     }
 
-    /// Right, up and forward of the camera without its roll: orthonormal at every pitch.
+    /// Right, up and forward of the camera without roll: orthonormal at every pitch.
     fn level_axes(&self) -> (DVec3, DVec3, DVec3) {
         let (sin_yaw, cos_yaw) = self.yaw_rad.sin_cos();
         let (sin_pitch, cos_pitch) = self.pitch_rad.sin_cos();
@@ -453,7 +452,8 @@ impl Navigator {
         (right, up, forward)
     }
 
-    /// What the held keys ask for [m/s]: along the gaze, sideways, and straight up; on foot along the ground.
+    /// Velocity that the held keys ask for [m/s]: along the view axis, sideways and straight up; on foot along the
+    /// ground.
     fn wanted_velocity(&self) -> DVec3 {
         let keys = self.keys.direction();
         let (right, _, forward) = self.level_axes();

@@ -8,49 +8,47 @@ use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
 use crate::transport::Tracer;
 use crate::units::{Irradiance, Radiance, RadiantIntensity};
 
-/// Irradiance of what is looked at, at exposure 0 [W/m²]: a grey surface is neither dark nor overexposed then.
+/// Irradiance at the view target for exposure 0 [W/m²]; a grey surface is then well exposed.
 const SUITABLE_W_M2: f64 = 4.0;
-/// Farthest from what it lights, in scene radii.
+/// Largest distance from the view target, in scene radii.
 const FARTHEST: f64 = 0.45;
-/// A place nearer than this, in scene radii, is taken only where there is no other.
+/// Positions nearer than this are used only if there is no other, in scene radii.
 const NEAR: f64 = 0.2;
-/// How much of the way to what stands above it goes [1].
+/// Fraction of the free distance at which a light is placed [1].
 const OF_ROOM: f64 = 0.7;
-/// Leaves the surface by this much, in scene radii.
+/// Offset of ray origins from the surface, in scene radii.
 const OFF: f64 = 1e-6;
-/// Half-angles of a spot [rad].
+/// Inner and outer half-angle of a spot [rad].
 const CONE_RAD: (f64, f64) = (0.35, 0.5);
-/// Side of a panel, as a share of its distance [1].
+/// Side of a panel, as a fraction of its distance [1].
 const SIDE: f64 = 0.25;
-/// How far a sun leans from the way that is looked [1].
+/// Tangent of the angle by which new lights lean from the vertical towards the camera [1].
 const LEANING: f64 = 0.4;
 
-/// What can be added.
+/// Kinds of lights that can be added.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NewLight {
-    /// The same in every direction.
+    /// A point light.
     Lamp,
-    /// A cone.
     Spot,
-    /// Parallel light.
     Sun,
-    /// A flat lamp.
+    /// A square area light.
     Panel,
 }
 
-/// What is looked at.
+/// The surface point that the camera looks at.
 #[derive(Clone, Copy, Debug)]
 pub struct ViewTarget {
-    /// Where [m].
+    /// [m].
     pub point: DVec3,
-    /// Unit, towards the eye.
+    /// Unit, on the side of the camera.
     pub normal: DVec3,
-    /// Unit, from the point to the eye.
+    /// Unit, from the point to the camera.
     pub to_eye: DVec3,
 }
 
 impl ViewTarget {
-    /// What a gaze meets; the point `otherwise` where it meets nothing.
+    /// The first surface along a view ray; `otherwise` if there is none.
     pub fn of(surfaces: &Tracer, gaze: &Ray, otherwise: DVec3) -> Self {
         let to_eye = -gaze.direction;
         match surfaces.intersect(gaze) {
@@ -72,7 +70,7 @@ impl ViewTarget {
 }
 
 impl NewLight {
-    /// All, in the order of the panel.
+    /// In the order of the panel.
     pub const ALL: [Self; 4] = [Self::Lamp, Self::Spot, Self::Sun, Self::Panel];
 
     pub fn name(self) -> &'static str {
@@ -84,8 +82,8 @@ impl NewLight {
         }
     }
 
-    /// The light, white, with a name of its own, to light what is looked at in a scene of that radius [m] that is shown
-    /// with that exposure.
+    /// A white light with a unique name that lights the target, in a scene of radius `radius_m` that is shown with
+    /// this exposure.
     pub fn make(
         self,
         (surfaces, radius_m): (&Tracer, f64),
@@ -134,13 +132,13 @@ impl NewLight {
     }
 }
 
-/// Up, leaning towards the eye [1, of the height]; unit.
+/// Unit vector upwards, leaning towards the camera; `leaning` is the tangent of the angle.
 fn above(aim: &ViewTarget, leaning: f64) -> DVec3 {
     let level = DVec3::new(aim.to_eye.x, 0.0, aim.to_eye.z).normalize_or(DVec3::X);
     (DVec3::Y + level * leaning).normalize()
 }
 
-/// Where a light has room: above what is looked at, or else before it, or else towards the eye [m].
+/// A free position for the light [m]: preferably above the target, else along its normal, else towards the camera.
 fn place(surfaces: &Tracer, aim: &ViewTarget, radius_m: f64) -> DVec3 {
     let from = aim.point + aim.normal * (OFF * radius_m);
     let room = |direction: DVec3| {
@@ -154,7 +152,7 @@ fn place(surfaces: &Tracer, aim: &ViewTarget, radius_m: f64) -> DVec3 {
         (OF_ROOM * free_m).min(FARTHEST * radius_m)
     };
     let ways = [above(aim, LEANING), DVec3::Y, aim.normal, aim.to_eye];
-    // Behind the surface is no room.
+    // Directions below the surface are not free.
     let open = ways.into_iter().filter(|way| way.dot(aim.normal) > 0.0);
     let open: Vec<(DVec3, f64)> = open.map(|way| (way, room(way))).collect();
     let roomy = open.iter().find(|(_, room_m)| *room_m > NEAR * radius_m);
@@ -163,7 +161,7 @@ fn place(surfaces: &Tracer, aim: &ViewTarget, radius_m: f64) -> DVec3 {
     from + way * room_m
 }
 
-/// The name, with a number where another light has it.
+/// The name, with a number if another light has the same.
 fn own_name(name: &str, scene: &Scene) -> String {
     let is_free = |name: &String| scene.lights.iter().all(|light| light.name != *name);
     let numbered = (2..).map(|number| format!("{name} {number}"));

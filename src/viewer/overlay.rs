@@ -15,7 +15,7 @@ use crate::optics::{LinearSrgb, Nanometres};
 const TEXT: Color32 = Color32::from_gray(230);
 const SIZE: f32 = 16.0;
 
-/// Shows the picture in the remaining space, with messages over it; returns its rectangle.
+/// Shows the picture in the remaining space, with messages and legends over it; returns its rectangle.
 pub fn show(ui: &mut Ui, picture: egui::TextureId, model: &Model, notice: Option<&str>) -> Rect {
     let (quantity, choice) = (model.quantity(), &model.choices.display.scale);
     let rect = ui.available_rect_before_wrap();
@@ -71,7 +71,7 @@ fn wavelength_legend(ui: &Ui, picture: Rect) {
     );
 }
 
-/// Five values of a scale, times a factor.
+/// Legend with five marks, whose values are multiplied by `factor`.
 fn scale_legend(ui: &Ui, picture: Rect, title: &str, scale: &ColourScale, factor: f64) {
     let marks = (0..=4).map(|mark| f64::from(mark) / 4.0);
     let marks: Vec<_> = marks
@@ -85,7 +85,7 @@ fn error_legend(ui: &Ui, picture: Rect) {
     let (low, high) = ERROR_RANGE;
     let at = |share: f64| low * (high / low).powf(share);
     let marks = (0..=3).map(|mark| f64::from(mark) / 3.0);
-    // Without what rounding leaves.
+    // Rounds off floating-point noise.
     let marks: Vec<_> = marks
         .map(|share| (share, format!("{} %", (1e5 * at(share)).round() / 1e3)))
         .collect();
@@ -115,7 +115,7 @@ fn difference_legend(ui: &Ui, picture: Rect, effect: Effect) {
     legend(ui, picture, &title, &colour, &marks.collect::<Vec<_>>());
 }
 
-/// Says what false colours mean, at the picture's lower edge: `colour` and `marks` by their share of the scale.
+/// Draws a legend at the picture's lower edge. `colour` and `marks` are given by position on the scale, [0, 1].
 fn legend(ui: &Ui, picture: Rect, title: &str, colour: &dyn Fn(f64) -> [u8; 3], marks: &[(f64, String)]) {
     const BAR: egui::Vec2 = vec2(300.0, 14.0);
     const STEPS: usize = 150;
@@ -144,7 +144,7 @@ fn legend(ui: &Ui, picture: Rect, title: &str, colour: &dyn Fn(f64) -> [u8; 3], 
     }
 }
 
-/// Says why the picture is dark or coarse.
+/// Explains why the picture is dark or coarse.
 fn caveat(model: &Model) -> Option<String> {
     let is_dark = model.layers().is_empty();
     match &model.state {

@@ -5,33 +5,33 @@ use std::time::{Duration, Instant};
 
 use crate::eye_pass::renderer::{EyeQuality, GpuMs};
 
-/// Traced pixels per pixel along a side that are chosen from.
+/// Available resolutions of the traced image, in pixels per pixel of the frame along a side.
 const SCALES: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
-/// The scale of pictures before anything is known.
+/// Index of the scale before any time is known.
 const WHOLE: usize = 2;
-/// A picture of a walk that takes longer than this [ms] is late.
+/// A frame of a moving camera that takes longer than this is late [ms].
 const LATE_MS: f64 = 33.0;
-/// A finer picture has to be expected within this [ms].
+/// The scale is raised only if frames are expected to take less than this [ms].
 const EARLY_MS: f64 = 14.0;
-/// What a picture at rest may take [ms]: the next key press waits for it.
+/// Limit of the GPU time of a picture at rest [ms]: the next key press waits for it.
 const REST_MS: f64 = 250.0;
-/// Pictures whose mean the picture at rest becomes.
+/// Largest number of samples of a picture at rest.
 const MAX_SAMPLES: u32 = 64;
-/// As many are made in any case, however long they take.
+/// Smallest number of samples of a picture at rest, however long they take.
 const MIN_SAMPLES: u32 = 4;
-/// Nothing is refined for so long after a key or the mouse was used.
+/// Refinement pauses for this time after input.
 const PAUSE: Duration = Duration::from_millis(400);
-/// For how long further ones are made.
+/// Time for which samples beyond the minimum are added.
 const REFINES_FOR: Duration = Duration::from_secs(2);
 
-/// Chooses the quality of each picture from the times of those before.
+/// Chooses the quality of each picture from the GPU times of earlier ones.
 #[derive(Clone, Debug)]
 pub struct Pace {
     walking: usize,
     resting: usize,
-    /// When the picture at rest was first drawn.
+    /// When the camera came to rest and refinement began.
     rests_since: Option<Instant>,
-    /// When a hand last moved.
+    /// Time of the last input.
     touched: Option<Instant>,
 }
 
@@ -47,7 +47,7 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// For a device that is software, before anything is known of it.
+    /// Start values for a software rasterizer.
     pub fn of_software() -> Self {
         Self {
             walking: 0,
@@ -57,7 +57,7 @@ impl Pace {
         }
     }
 
-    /// While the view changes.
+    /// Quality while the view changes.
     pub fn walking(&self) -> EyeQuality {
         EyeQuality {
             traced_scale: SCALES[self.walking],
@@ -65,7 +65,7 @@ impl Pace {
         }
     }
 
-    /// While it does not.
+    /// Quality while the view rests.
     pub fn resting(&self) -> EyeQuality {
         EyeQuality {
             traced_scale: SCALES[self.resting],
@@ -73,8 +73,8 @@ impl Pace {
         }
     }
 
-    /// Takes up what a picture of a quality took. Pictures at rest teach nothing: they would change how the next one is
-    /// made, and so be thrown away.
+    /// Adapts the scales to the GPU time of a picture of a given quality. Times of pictures at rest are ignored: a
+    /// change of their scale would discard the samples taken so far.
     pub fn learn(&mut self, ms: GpuMs, quality: EyeQuality) {
         let traced_scale = quality.traced_scale;
         if ms.specular <= 0.0 || quality.branching_depth != EyeQuality::WALKING.branching_depth {
@@ -90,7 +90,7 @@ impl Pace {
         } else if let Some(finer) = finest_within(EARLY_MS) {
             self.walking = finer.max(self.walking);
         }
-        // A mean of many is fine enough without being traced finer than the picture.
+        // The mean of many samples needs no supersampled tracing.
         self.resting = finest_within(REST_MS).unwrap_or(0).min(WHOLE);
     }
 
@@ -99,18 +99,18 @@ impl Pace {
         self.rests_since = None;
     }
 
-    /// A key or the mouse was used: what follows is not to wait for a picture.
+    /// The user has pressed a key or used the mouse: the response must not wait for a picture.
     pub fn touch(&mut self, now: Instant) {
         self.touched = Some(now);
     }
 
-    /// How long the picture at rest is left as it is for the sake of hands.
+    /// Remaining time of the pause after input.
     pub fn pause(&self, now: Instant) -> Duration {
         let since = self.touched.map_or(PAUSE, |touched| now.duration_since(touched));
         PAUSE.saturating_sub(since)
     }
 
-    /// Whether the mean of so many pictures of a view at rest is to be made better.
+    /// Whether to add a sample to a picture at rest that is the mean of `samples`.
     pub fn refines(&mut self, samples: u32, now: Instant) -> bool {
         let since = *self.rests_since.get_or_insert(now);
         samples < MIN_SAMPLES || (samples < MAX_SAMPLES && now.duration_since(since) < REFINES_FOR)

@@ -17,45 +17,44 @@ use crate::settings::LayerKind;
 use crate::transport::{MediumStack, SurfaceHit, Tracer, media_at};
 use crate::units::LUMENS_PER_WATT;
 
-/// Mirrors and glass that the eye looks through to what it points at.
+/// Largest number of specular surfaces between the camera and the probed point.
 const MAX_SEEN_THROUGH: usize = 32;
-/// Of the mean of its map: texels that are darker are explained no more closely.
+/// Texels darker than this fraction of their map's mean are explained with no finer threshold.
 const MIN_SHARE: f64 = 1e-3;
 
-/// What is known of a point.
+/// Result of a probe.
 #[derive(Clone, Debug)]
 pub struct Probed {
     /// Name of the object.
     pub surface: String,
-    /// Where [m].
+    /// Position [m].
     pub point: DVec3,
-    /// Which side of it.
     pub side: Side,
-    /// Its texel; `None` where the surface has no map.
+    /// `None` if the surface has no map.
     pub texel: Option<ProbedTexel>,
-    /// What lights it; `None` until that is found.
+    /// The light paths; `None` until they are found.
     pub explanation: Option<Explanation>,
 }
 
-/// What a map holds of a point.
+/// The map's texel at a probed point.
 #[derive(Clone, Debug)]
 pub struct ProbedTexel {
     /// Column and row, in texels of the map's finest size.
     pub corner: [usize; 2],
-    /// Of these it is so many wide.
+    /// Width in finest texels.
     pub size: usize,
-    /// Texels of the map across and down.
+    /// Width and height of the map in finest texels.
     pub map: [usize; 2],
-    /// Area of the surface under it [m²].
+    /// Surface area of the texel [m²].
     pub area_m2: f64,
-    /// Luminance of each layer [W/m²].
+    /// Luminance of the irradiance in each layer [W/m²].
     pub layers: Vec<(LayerKind, f64)>,
-    /// Estimated error of their sum [W/m²], where it was estimated.
+    /// Estimated error of the total [W/m²]; `None` if it was not estimated.
     pub error_w_m2: Option<f64>,
 }
 
 impl ProbedTexel {
-    /// Luminance of all layers [W/m²].
+    /// Luminance of the irradiance in all layers [W/m²].
     pub fn total_w_m2(&self) -> f64 {
         self.layers.iter().map(|(_, luminance)| luminance).sum()
     }
@@ -67,7 +66,7 @@ impl ProbedTexel {
 }
 
 impl Probed {
-    /// Share of a path in all light of the texel: that of all paths, and what other surfaces send as the map has it.
+    /// Share of a path in the texel's light: the light of all paths found plus the map's indirect light.
     pub fn share(&self, path: &LightPath) -> f64 {
         let indirect = self
             .texel
@@ -85,7 +84,6 @@ impl Probed {
         }
     }
 
-    /// For the event log.
     pub fn to_json(&self) -> Value {
         let texel = self.texel.as_ref().map(|texel| {
             let layers = texel.layers.iter();
@@ -129,16 +127,17 @@ impl Probed {
     }
 }
 
-/// What is looked at, and from where.
+/// A probed surface and the direction from which it is seen.
 #[derive(Clone, Copy, Debug)]
 pub struct ProbeTarget {
-    /// Of a matte surface.
+    /// On a matte surface.
     pub hit: SurfaceHit,
-    /// Unit, the way the gaze came.
+    /// Unit direction of the ray towards the surface.
     pub direction: DVec3,
 }
 
-/// The matte surface that a gaze ends at: through glass and over mirrors, always the stronger way on.
+/// The matte surface that a ray ends on. At glass and mirrors it follows the stronger branch. `None` if it ends on
+/// none.
 pub fn seen(tracer: &Tracer, gaze: &Ray) -> Option<ProbeTarget> {
     let mut ray = *gaze;
     let mut media: MediumStack = media_at(tracer, gaze.origin);
@@ -161,7 +160,7 @@ pub fn seen(tracer: &Tracer, gaze: &Ray) -> Option<ProbeTarget> {
     None
 }
 
-/// Reads the maps at what is seen.
+/// Reads the maps at the probed surface. The target for [`explain`] is `None` if the surface has no map.
 pub fn read(tracer: &Tracer, maps: &[IlluminationMap], seen: &ProbeTarget) -> (Probed, Option<Target>) {
     let found = maps.iter().find_map(|map| {
         let target = Target::new(tracer, &map.chart, &seen.hit, seen.direction)?;
@@ -185,7 +184,7 @@ pub fn read(tracer: &Tracer, maps: &[IlluminationMap], seen: &ProbeTarget) -> (P
     (probed, found.map(|(_, target)| target))
 }
 
-/// About how bright a texel is: what its paths are to be looked for by [W/m²].
+/// Scale of the texel's brightness, relative to which paths are searched [W/m²].
 fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) -> f64 {
     let map = maps.iter().find(|map| map.chart.receiver == target.receiver);
     let mean = map.map_or(0.0, |map| {
@@ -200,18 +199,18 @@ fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) ->
     if scale > 0.0 { scale } else { MIN_SHARE }
 }
 
-/// The point that is asked about, and what is known of it.
+/// The probed point and what is known of it.
 #[derive(Debug)]
 pub struct Prober {
     gaze: Option<Ray>,
-    /// Whether the gaze is still to be followed.
+    /// Whether the ray still has to be traced.
     is_due: bool,
     shown: Option<Probed>,
     coming: Background<(), Explanation>,
 }
 
 impl Prober {
-    /// Asks nothing yet; the window is woken when there is something.
+    /// No point is probed yet. `wake` is called when light paths are found.
     pub fn new(wake: &Wake) -> Self {
         Self {
             gaze: None,
@@ -221,7 +220,7 @@ impl Prober {
         }
     }
 
-    /// Asks about what is seen along a ray; about nothing without one.
+    /// Probes what is visible along a ray; `None` clears the probe.
     pub fn ask(&mut self, gaze: Option<Ray>) {
         self.gaze = gaze;
         self.is_due = gaze.is_some();
@@ -229,22 +228,21 @@ impl Prober {
         self.shown = None;
     }
 
-    /// Asks again: the scene or its maps are others.
+    /// Repeats the probe because the scene or its maps have changed.
     pub fn ask_again(&mut self) {
         self.is_due = self.gaze.is_some();
     }
 
-    /// Whether there is something to be found that needs the scene's surfaces.
+    /// Whether [`look`](Self::look) has to be called with the scene's surfaces.
     pub fn is_due(&self) -> bool {
         self.is_due
     }
 
-    /// What is known.
     pub fn shown(&self) -> Option<&Probed> {
         self.shown.as_ref()
     }
 
-    /// Follows the gaze that is due.
+    /// Traces the pending ray and starts to search light paths.
     pub fn look(&mut self, tracer: &Arc<Tracer>, maps: &[IlluminationMap], limits: Limits) {
         let Some(gaze) = self.gaze.filter(|_| self.is_due) else {
             return;
@@ -265,7 +263,7 @@ impl Prober {
         self.shown = Some(probed);
     }
 
-    /// Looks whether the paths were found since the last time.
+    /// Takes the light paths; returns whether they have been found since the last call.
     pub fn poll(&mut self) -> bool {
         let Some(((), outcome)) = self.coming.take() else {
             return false;
@@ -278,13 +276,13 @@ impl Prober {
     }
 }
 
-/// Paths that are drawn: the strongest.
+/// Number of the strongest paths that are drawn.
 const MAX_PATHS: usize = 24;
 const CAUSTIC: Color32 = Color32::from_rgb(255, 196, 64);
 const DIRECT: Color32 = Color32::from_rgb(120, 190, 255);
 const POINT: Color32 = Color32::from_rgb(255, 80, 80);
 
-/// Draws the paths over a picture as the camera sees them: the wider, the larger their share.
+/// Draws the paths over the picture; stronger paths are wider.
 pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
     let painter = painter.with_clip_rect(lens.picture);
     let paths = probed.explanation.iter().flat_map(|told| &told.paths);

@@ -11,35 +11,34 @@ use crate::transport::Tracer;
 
 const HIT: Color32 = Color32::from_rgb(255, 214, 110);
 const OUTLINE: Color32 = Color32::from_rgb(120, 220, 255);
-/// Radius of a landing [points].
+/// Radius of the dots [points].
 const DOT: f32 = 1.2;
 
-/// What of it is drawn.
+/// Which parts of the path preview are drawn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct PreviewFlags {
-    /// Where rays land.
+    /// Points where light paths end.
     pub hits: bool,
-    /// Patches of wavefronts.
+    /// Wavefront patches.
     pub patches: bool,
 }
 
 impl PreviewFlags {
-    /// Whether anything is.
     pub fn is_any(self) -> bool {
         self.hits || self.patches
     }
 }
 
-/// Finds it, and keeps what it found.
+/// Traces the path preview and keeps the last one.
 #[derive(Debug)]
 pub struct PreviewTask {
-    /// Of these surfaces.
+    /// The preview and what it was traced with.
     shown: Option<(Arc<Tracer>, SketchLimits, Arc<PathPreview>)>,
     coming: Background<(Arc<Tracer>, SketchLimits), PathPreview>,
 }
 
 impl PreviewTask {
-    /// Nothing yet; the window is woken when there is something.
+    /// No preview yet. `wake` is called when one is ready.
     pub fn new(wake: &Wake) -> Self {
         Self {
             shown: None,
@@ -47,19 +46,19 @@ impl PreviewTask {
         }
     }
 
-    /// What was found last.
+    /// The last preview.
     pub fn shown(&self) -> Option<&Arc<PathPreview>> {
         self.shown.as_ref().map(|(.., sketch)| sketch)
     }
 
-    /// Nothing is drawn any more.
+    /// Drops the preview and stops tracing.
     pub fn forget(&mut self) {
         self.shown = None;
         self.coming.stop();
     }
 
-    /// Keeps what is shown that of these surfaces; tells whether something new was found. While a search goes on, surfaces
-    /// that come after its own wait.
+    /// Traces a preview of these surfaces unless the last one is of them; returns whether a new one is ready. One
+    /// preview is traced at a time: newer surfaces wait until it ends.
     pub fn follow(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) -> bool {
         let found = self.coming.take();
         let is_new = matches!(found, Some((_, Some(_))));
@@ -83,7 +82,7 @@ impl PreviewTask {
     }
 }
 
-/// Draws it over a picture as the camera sees it, in front of everything.
+/// Draws the preview over the picture, in front of everything.
 pub fn draw(painter: &Painter, lens: &Viewport<'_>, sketch: &PathPreview, what: PreviewFlags) {
     let painter = painter.with_clip_rect(lens.picture);
     if what.patches {

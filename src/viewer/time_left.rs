@@ -8,18 +8,18 @@ use crate::plan::is_wanted;
 use crate::progress::Stage;
 use crate::settings::LayerKind;
 
-/// A forecast that may be wrong by more than this is not told [1].
+/// Forecasts with a larger factor of uncertainty than this are not shown [1].
 const MAX_FACTOR: f64 = 2.0;
 
-/// Less of a stage than this tells nothing of its pace [1].
+/// Least completed fraction of a stage from which its remaining time is extrapolated [1].
 const MIN_FRACTION: f64 = 0.1;
 
-/// Time until a bake is done [s, ≥ 0], rounded by nobody; `None` where nothing is known yet or no bake is running. `wanted` is
-/// what is baked, `last` the newest maps.
+/// Time until a bake is done [s, ≥ 0], not rounded. `None` while no bake is running or nothing is known yet. `wanted`
+/// is the request that is being baked, `last` the newest maps.
 ///
-/// Where the caustics are refined towards an error, their course so far tells what that will cost, unless indirect light
-/// follows, of which it tells nothing; without such an error, the pace of the present stage tells when that ends. It never
-/// takes longer than it may.
+/// Where the caustics are refined to a target error, the convergence so far gives the remaining cost, unless indirect
+/// light follows: its cost is unknown then. Without a target error, the remaining time is extrapolated from the
+/// completed fraction of the stage. The time limit of the settings is an upper bound in either case.
 pub fn time_left_s(
     state: &BakeState,
     wanted: &BakeRequest,
@@ -46,7 +46,7 @@ pub fn time_left_s(
             return None;
         }
         let more_cpu_s = expected.cpu_s - spent_cpu_s;
-        // Threads work as they did up to that level.
+        // Assumes that as many threads stay busy as up to that level.
         let seconds_per_cpu_s = level.seconds / spent_cpu_s;
         let left_s = more_cpu_s * seconds_per_cpu_s - (elapsed_s - level.seconds);
         left_s.is_finite().then_some(left_s.max(0.0))
@@ -66,7 +66,7 @@ pub fn time_left_s(
     }
 }
 
-/// A time for people: no more exact than a forecast can be.
+/// The time in words, no more precise than the forecast.
 pub fn in_words(seconds: f64) -> String {
     let seconds = Duration::try_from_secs_f64(seconds).map_or(u64::MAX, |time| time.as_secs());
     match seconds {

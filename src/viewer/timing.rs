@@ -1,7 +1,7 @@
 //! GPU times of pictures, and the latency from an input event to the picture that shows its effect.
 //!
-//! A window that is busy meets events late, and nobody tells it when they came. Each is taken to have come at the
-//! earliest moment that it can have: what is said here is never too short, but for the way through the system.
+//! A busy window receives events late, and the system does not tell when they occurred. The earliest possible time is
+//! assumed for each, so latencies are never underestimated, except for the time that the system itself takes.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -10,28 +10,28 @@ use serde::Serialize;
 
 use crate::eye_pass::renderer::GpuMs;
 
-/// Pictures that are remembered.
+/// Number of pictures kept.
 pub const PICTURES: usize = 120;
 
-/// Times of the last pictures that the device has told of, the oldest first. A picture whose times come back together
-/// with those of a later one is left out.
+/// GPU times of the last pictures, oldest first. If the times of several pictures arrive together, only the latest
+/// are recorded.
 #[derive(Clone, Debug, Default)]
 pub struct FrameTimes {
     pictures: VecDeque<GpuMs>,
     made: Option<FrameStats>,
 }
 
-/// How the picture that is shown was made.
+/// How the picture shown was rendered.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameStats {
-    /// Traced pixels per pixel along a side; `None` where nothing specular is in view.
+    /// Pixels of the traced image per pixel along a side; `None` if nothing specular is in view.
     pub traced_scale: Option<f64>,
-    /// Pictures of which it is the mean.
+    /// Number of samples in its mean.
     pub samples: u32,
 }
 
 impl FrameTimes {
-    /// One more; the oldest goes where there are too many.
+    /// Adds the times of a picture; drops the oldest at the limit.
     pub fn push(&mut self, ms: GpuMs) {
         if self.pictures.len() == PICTURES {
             self.pictures.pop_front();
@@ -39,59 +39,53 @@ impl FrameTimes {
         self.pictures.push_back(ms);
     }
 
-    /// Says how the picture that is shown was made.
     pub fn set_made(&mut self, made: FrameStats) {
         self.made = Some(made);
     }
 
-    /// How the picture that is shown was made.
     pub fn made(&self) -> Option<FrameStats> {
         self.made
     }
 
-    /// The oldest first.
+    /// Oldest first.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = &GpuMs> {
         self.pictures.iter()
     }
 
-    /// The last one.
     pub fn newest(&self) -> Option<&GpuMs> {
         self.pictures.back()
     }
 
-    /// The longest of all passes together [ms]; 0 where there is none.
+    /// Longest total time of a picture [ms]; 0 if there is none.
     pub fn longest_ms(&self) -> f64 {
         self.iter().copied().map(sum_ms).fold(0.0, f64::max)
     }
 }
 
-/// All passes of a picture [ms].
+/// Total time of all passes [ms].
 pub fn sum_ms(ms: GpuMs) -> f64 {
     ms.opaque + ms.specular + ms.tone_mapping
 }
 
-/// Waits that are remembered of each kind: the last ones.
+/// Number of latencies kept of each kind.
 const MAX_WAITS: usize = 10_000;
-/// Whoever asks the system for events and gets none at once has met all that came before.
+/// If asking the system for events blocked for longer than this, no events were pending.
 const WAITED: Duration = Duration::from_millis(1);
 
-/// Waits of one kind, from the shortest to the longest: the least that so many of them do not exceed.
+/// Percentiles of latencies: the smallest latency that the given fraction does not exceed.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Percentiles {
-    /// How many there are; at least 1.
+    /// Number of latencies, ≥ 1.
     pub count: usize,
-    /// Of half of them [ms].
+    /// Median [ms].
     pub p50_ms: f64,
-    /// Of 95 % [ms].
     pub p95_ms: f64,
-    /// Of 99 % [ms].
     pub p99_ms: f64,
-    /// The longest [ms].
     pub max_ms: f64,
 }
 
 impl Percentiles {
-    /// Of some waits; `None` where there are none.
+    /// `None` without latencies.
     pub fn of(waits: impl IntoIterator<Item = Duration>) -> Option<Self> {
         let mut sorted: Vec<_> = waits.into_iter().collect();
         sorted.sort_unstable();
@@ -108,42 +102,42 @@ impl Percentiles {
     }
 }
 
-/// Waits between events and frames, those during a bake and the others apart.
+/// Latencies from events to frames, with those during a bake kept apart.
 #[derive(Clone, Debug, Default)]
 pub struct Latencies {
     while_baking: VecDeque<Duration>,
     otherwise: VecDeque<Duration>,
-    /// Events that no frame has shown yet: when they can have come, and whether a bake ran.
+    /// Events that no frame has shown yet: earliest possible time, and whether a bake was running.
     pending: Vec<(Instant, bool)>,
-    /// When the present turn of events and frames began.
+    /// Start of the present turn of the event loop.
     turn: Option<Instant>,
-    /// When the turn before it ended.
+    /// End of the previous turn.
     ended: Option<Instant>,
-    /// The earliest moment at which events of the present turn can have come.
+    /// Earliest possible time of events received in the present turn.
     earliest: Option<Instant>,
 }
 
 impl Latencies {
-    /// A turn begins: the system has been asked for events.
+    /// Begins a turn of the event loop: the system was asked for events.
     pub fn begin_turn(&mut self, now: Instant) {
         let has_waited = self.ended.is_some_and(|ended| now.duration_since(ended) > WAITED);
-        // Otherwise they may have come while the turn before was at work.
+        // Otherwise events may have occurred during the previous turn.
         let earliest = if has_waited { None } else { self.turn };
         self.earliest = earliest.or(Some(now));
         self.turn = Some(now);
     }
 
-    /// The turn ends: the system is asked next.
+    /// Ends a turn of the event loop: the system will be asked next.
     pub fn end_turn(&mut self, now: Instant) {
         self.ended = Some(now);
     }
 
-    /// An event is met that the next frame is to show.
+    /// Records an event whose effect the next frame will show.
     pub fn meet(&mut self, now: Instant, is_baking: bool) {
         self.pending.push((self.earliest.unwrap_or(now), is_baking));
     }
 
-    /// A frame was handed to the system that shows all that was met.
+    /// Records that a frame was presented that shows the effect of all events so far.
     pub fn show(&mut self, now: Instant) {
         for (came, is_baking) in self.pending.drain(..) {
             let waits = if is_baking {
@@ -158,12 +152,12 @@ impl Latencies {
         }
     }
 
-    /// Of events during a bake.
+    /// Latencies during bakes; `None` if there are none.
     pub fn while_baking(&self) -> Option<Percentiles> {
         Percentiles::of(self.while_baking.iter().copied())
     }
 
-    /// Of all others.
+    /// Latencies at other times; `None` if there are none.
     pub fn otherwise(&self) -> Option<Percentiles> {
         Percentiles::of(self.otherwise.iter().copied())
     }

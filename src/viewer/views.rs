@@ -9,10 +9,10 @@ use crate::illumination::false_colours::ColourScale;
 use crate::optics::luminance;
 use crate::units::LUMENS_PER_WATT;
 
-/// Least of most on a logarithmic scale that follows the maps.
+/// Ratio of the lower to the upper end of an automatic logarithmic scale.
 const DECADES: f64 = 1e-4;
 
-/// What of the maps the picture shows; the panel tells it of each.
+/// Quantity that the picture shows. The panel shows the comment of each variant as its tooltip.
 #[derive(
     Clone,
     Copy,
@@ -55,12 +55,12 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// Its name in the event log and in the panel's list.
+    /// Name in the event log and in the panel.
     pub fn name(self) -> &'static str {
         self.into()
     }
 
-    /// By what surfaces are shown on the device, where that is not their light or colours.
+    /// The property that the device computes in place of light; `None` if the quantity is light or a map of colours.
     fn inspected(self) -> Option<Inspected> {
         match self {
             Self::Light | Self::Error | Self::Difference | Self::Wavelength => None,
@@ -73,7 +73,7 @@ impl Quantity {
         }
     }
 
-    /// What the values of maps that are to show it stand for.
+    /// How maps are displayed to show this quantity.
     pub fn map_style(self, scale: ColourScale) -> MapStyle {
         match (self, self.inspected()) {
             (Self::Light, _) => MapStyle::Lit,
@@ -89,7 +89,7 @@ pub enum IrradianceUnit {
     /// W/m², luminous-equivalent.
     #[default]
     WattsPerM2,
-    /// lx = 683 of these.
+    /// 1/683 W/m².
     Lux,
 }
 
@@ -101,7 +101,7 @@ impl IrradianceUnit {
         }
     }
 
-    /// How many of it one W/m² is.
+    /// The value of 1 W/m² in this unit.
     pub fn per_w_m2(self) -> f64 {
         match self {
             Self::WattsPerM2 => 1.0,
@@ -110,17 +110,16 @@ impl IrradianceUnit {
     }
 }
 
-/// How irradiance is shown in false colours.
+/// The scale of irradiance in false colours.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ScaleChoice {
-    /// What the legend says.
+    /// Unit in the legend.
     pub unit: IrradianceUnit,
-    /// Whether equal ratios are equal steps.
     pub is_logarithmic: bool,
-    /// Whether the scale follows the maps.
+    /// Whether the scale adapts to the maps.
     pub is_automatic: bool,
-    /// Ends of a scale that does not [W/m²]: 0 < low < high.
+    /// Ends of a fixed scale [W/m²]: 0 < low < high.
     pub typed_w_m2: [f64; 2],
 }
 
@@ -135,19 +134,19 @@ impl Default for ScaleChoice {
     }
 }
 
-/// What is known of the maps that are shown, as a whole.
+/// Statistics of the maps shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MapSurvey {
-    /// Largest luminance of a texel [W/m²]; 0 where there is no light.
+    /// Largest luminance of a texel [W/m²]; 0 without light.
     pub peak_w_m2: f64,
-    /// Texels per metre of the coarsest and the finest map, mean over each; `None` without maps.
+    /// Mean texels per metre of the coarsest and of the finest map; `None` without maps.
     pub texels_per_m: Option<[f64; 2]>,
-    /// Texels that hold something that is no finite number.
+    /// Number of texels with a value that is not finite.
     pub faults: usize,
 }
 
 impl MapSurvey {
-    /// Looks at all texels of some maps.
+    /// Scans all texels of the maps.
     pub fn of(maps: &[IlluminationMap]) -> Self {
         let mut survey = Self::default();
         for map in maps {
@@ -169,11 +168,11 @@ impl MapSurvey {
         survey
     }
 
-    /// The scale that a quantity is shown on, in its own unit.
+    /// Scale of a quantity, in its own unit.
     pub fn scale(&self, quantity: Quantity, choice: &ScaleChoice) -> ColourScale {
         match quantity {
             Quantity::Irradiance => self.irradiance_scale(choice),
-            // An octave beyond either end: texels of one map differ too.
+            // One octave beyond either end, because the density also varies within a map.
             _ => {
                 let [least, most] = self.texels_per_m.unwrap_or([1.0; 2]);
                 ColourScale {
@@ -200,11 +199,11 @@ impl MapSurvey {
     }
 }
 
-/// The next of 1, 2 and 5 times a power of ten.
+/// Rounds up to 1, 2 or 5 times a power of ten.
 fn rounded_up(value: f64) -> f64 {
     let decade = 10.0_f64.powf(value.log10().floor());
     let steps = [1.0, 2.0, 5.0, 10.0];
-    // What rounding adds is no reason for the next step.
+    // Rounding errors must not lead to the next step.
     let step = steps
         .into_iter()
         .find(|step| step * decade >= value * (1.0 - 1e-9));

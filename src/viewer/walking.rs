@@ -11,25 +11,25 @@ use crate::transport::Tracer;
 
 /// Height of the eyes above the ground [m].
 pub const EYE_M: f64 = 1.6;
-/// Walking speed [m/s], of people on even ground (Bohannon 1997).
+/// Mean walking speed of people on even ground [m/s] (Bohannon 1997).
 pub const SPEED_M_PER_S: f64 = 1.4;
 /// Steps up to this height are climbed [m].
 const STEP_M: f64 = 0.35;
-/// Walls stay so far from the eyes [m].
+/// Distance kept between eyes and walls [m].
 const BODY_M: f64 = 0.25;
-/// Acceleration of what falls [m/s²].
+/// Gravity [m/s²].
 const GRAVITY_M_PER_S2: f64 = 9.81;
-/// Fastest fall [m/s]: a floor is not missed between two looks.
+/// Terminal velocity [m/s]: low enough not to miss a floor within one sub-step.
 const FASTEST_FALL_M_PER_S: f64 = 50.0;
-/// Time after which feet have closed 1 − 1/e of a step's height [s].
+/// Time constant of climbing a step [s].
 const CLIMBING_S: f64 = 0.08;
-/// Longest time between two looks around [s].
+/// Longest sub-step [s].
 pub(super) const LOOK_S: f64 = 1.0 / 120.0;
-/// Ground farther below than this is ignored [m]: you cannot fall out of the scene.
+/// Ground farther below than this is ignored [m], so that nobody falls out of the scene.
 const DEEPEST_M: f64 = 1e4;
-/// Feet this near to the ground stand on it [m].
+/// Feet nearer to the ground than this stand on it [m].
 const STANDING_M: f64 = 1e-4;
-/// Largest push away from a wall that is too near [m per step].
+/// Largest push away from a wall that is too near [m per sub-step].
 const PUSH_M: f64 = 0.01;
 
 /// Motion in walk mode; the position is kept by the caller.
@@ -40,18 +40,18 @@ pub struct Walker {
 }
 
 impl Walker {
-    /// Whether the eyes still move without input: falling, or climbing a step.
+    /// Whether the camera still moves without input: falling, or climbing a step.
     pub fn is_moving(&self) -> bool {
         !self.stands
     }
 
-    /// The ground may have gone: looks again.
+    /// Forces a new check for ground, after a jump or an edit.
     pub fn look_again(&mut self) {
         self.stands = false;
     }
 
-    /// The eyes after the time from one look around to the next [s, > 0] at a velocity along the ground [m/s], and what
-    /// walls left of that.
+    /// One sub-step of `seconds` [> 0] at a velocity along the ground [m/s]. Returns the new eye position and the
+    /// velocity that walls left.
     pub fn step(
         &mut self,
         mut eye: DVec3,
@@ -63,7 +63,8 @@ impl Walker {
             let wanted = velocity_m_per_s * seconds;
             let Allowed { along, away } = beside_walls(eye, wanted, solid);
             if along != wanted {
-                // Being pushed off a wall gives no speed: in a short step it would be any.
+                // Only the motion along the wall counts: the push off the wall divided by a short time could give any
+                // speed.
                 velocity_m_per_s = along / seconds;
             }
             eye += along + away;
@@ -72,16 +73,16 @@ impl Walker {
         (eye, velocity_m_per_s)
     }
 
-    /// How far the eyes rise or fall.
+    /// Vertical displacement of the eyes [m].
     fn settle(&mut self, eye: DVec3, seconds: f64, solid: &dyn Collider) -> f64 {
-        // From the eyes: who comes flying lands on whatever is below.
+        // Cast from the eyes: a camera that arrives flying lands on whatever is below.
         let Some((below_m, _)) = solid.meets(eye, DVec3::NEG_Y, DEEPEST_M) else {
-            // Over nothing.
+            // No ground below.
             self.fall_m_per_s = 0.0;
             self.stands = true;
             return 0.0;
         };
-        // Of the feet over the ground; negative on a step.
+        // Height of the feet above the ground; negative in front of a higher step.
         let over_m = below_m - EYE_M;
         self.stands = over_m.abs() < STANDING_M;
         if over_m > STEP_M || (self.fall_m_per_s > 0.0 && over_m > 0.0) {
@@ -96,7 +97,7 @@ impl Walker {
 /// What walls leave of a step along the ground [m].
 #[derive(Clone, Copy)]
 struct Allowed {
-    /// Of what was wanted.
+    /// Remaining part of the wanted step.
     along: DVec3,
     /// Push away from walls that are too near.
     away: DVec3,
@@ -109,13 +110,13 @@ impl Allowed {
     };
 }
 
-/// The part of a step along the ground that walls leave.
+/// Shortens a step along the ground and pushes it away from walls.
 fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
     let mut allowed = Allowed {
         along: wanted,
         away: DVec3::ZERO,
     };
-    // A corner takes two walls.
+    // A corner has two walls.
     for _ in 0..3 {
         let step = allowed.along + allowed.away;
         let Some(forward) = step.try_normalize() else {
@@ -130,7 +131,7 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
             right,
             -right,
         ];
-        // Eyes, chest, knees: what is lower is climbed.
+        // At the height of eyes, chest and knees; lower obstacles are climbed.
         let heights = [0.0, 0.5 * EYE_M, EYE_M - STEP_M - 0.05];
         let mut worst: Option<(f64, DVec3)> = None;
         for down_m in heights {
@@ -140,7 +141,7 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
                 else {
                     continue;
                 };
-                // Floors, ceilings and ramps are no walls.
+                // Floors, ceilings and ramps do not block.
                 let Some(wall) = DVec3::new(normal.x, 0.0, normal.z).try_normalize() else {
                     continue;
                 };
@@ -161,14 +162,14 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
         allowed.along += wall * missing_m.min(inward_m);
         allowed.away += wall * (missing_m - inward_m).clamp(0.0, PUSH_M);
     }
-    // In a narrow corner: nowhere.
+    // Stuck in a narrow corner.
     Allowed::NOTHING
 }
 
-/// Surfaces that stop a person.
+/// Surfaces that block a walker.
 pub trait Collider {
-    /// Distance [m] along a unit direction to the first surface that is nearer than `within_m`, and its unit normal on the
-    /// side it is met from.
+    /// Distance [m] along a unit direction to the first surface nearer than `within_m`, and its unit normal on the
+    /// side of the ray's origin.
     fn meets(&self, from: DVec3, direction: DVec3, within_m: f64) -> Option<(f64, DVec3)>;
 }
 
@@ -183,7 +184,6 @@ impl Collider for Tracer {
     }
 }
 
-/// The collision surfaces of the scene, built on first use.
 #[derive(Debug)]
 pub struct CollisionScene {
     found: Option<(Arc<Scene>, Arc<Tracer>)>,
@@ -191,7 +191,7 @@ pub struct CollisionScene {
 }
 
 impl CollisionScene {
-    /// Nothing yet; the window is woken when there is something.
+    /// Nothing is built yet. `wake` is called when a build ends.
     pub fn new(wake: &Wake) -> Self {
         Self {
             found: None,
@@ -199,7 +199,7 @@ impl CollisionScene {
         }
     }
 
-    /// The surfaces of a scene; `None` until they are found, and where the system gives no thread to find them on.
+    /// The surfaces of a scene; `None` until they are built, and if the system cannot create a thread.
     pub fn of(&mut self, scene: &Arc<Scene>) -> Option<Arc<Tracer>> {
         if let Some((of, Some(tracer))) = self.coming.take() {
             self.found = Some((of, Arc::new(tracer)));

@@ -14,18 +14,18 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
 use crate::settings::BakeSettings;
 
-/// What the worker bakes with.
+/// Interface of [`Baker`] that the worker uses; tests replace it.
 pub trait LevelBaker {
     /// See [`Baker::set_scene`].
     ///
     /// # Errors
-    /// As the session's.
+    /// As [`Baker::set_scene`].
     fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()>;
 
     /// See [`Baker::bake_levels`].
     ///
     /// # Errors
-    /// As the session's.
+    /// As [`Baker::bake_levels`].
     fn bake_levels(
         &mut self,
         settings: &BakeSettings,
@@ -51,31 +51,28 @@ impl LevelBaker for Baker {
     }
 }
 
-/// Where the bake stands.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum BakeState {
-    /// Nothing was asked for yet.
+    /// No bake was requested yet.
     #[default]
     Idle,
-    /// At work, or about to be.
+    /// A bake is running or about to start.
     Baking {
-        /// What it is doing.
         stage: Stage,
-        /// Of this stage, [0, 1].
+        /// Completed fraction of the stage, [0, 1].
         fraction: f64,
-        /// When it was asked for.
+        /// When the bake was requested.
         since: Instant,
     },
-    /// At work on what an effect is worth; the maps belong to the settings last asked for.
+    /// The contribution of an effect is being computed; the maps match the last request.
     Comparing {
-        /// What is left out.
+        /// The effect that is left out.
         effect: Effect,
-        /// What it is doing.
         stage: Stage,
-        /// Of this stage, [0, 1].
+        /// Completed fraction of the stage, [0, 1].
         fraction: f64,
     },
-    /// The maps belong to the settings last asked for.
+    /// The maps match the last request.
     Done,
     /// Stopped by the user; the maps are those of an earlier bake.
     Cancelled,
@@ -84,39 +81,37 @@ pub enum BakeState {
 }
 
 impl BakeState {
-    /// Whether a bake is running or about to.
+    /// Whether a bake is running or about to start.
     pub fn is_baking(&self) -> bool {
         matches!(self, Self::Baking { .. })
     }
 
-    /// Whether anything is running or about to that can be stopped.
+    /// Whether anything is running, or about to start, that can be cancelled.
     pub fn is_working(&self) -> bool {
         matches!(self, Self::Baking { .. } | Self::Comparing { .. })
     }
 }
 
-/// What a bake is asked for.
+/// What to bake.
 #[derive(Clone, Debug)]
 pub struct BakeRequest {
-    /// What is lit.
     pub scene: Arc<Scene>,
-    /// How it is baked.
     pub settings: BakeSettings,
 }
 
 impl BakeRequest {
-    /// A request for what is baked of these settings: how the eye's chains are switched is none of a bake's.
+    /// A request with the settings that affect the bake: the switch for the eye's chains is reset.
     pub fn new(scene: Arc<Scene>, mut settings: BakeSettings) -> Self {
         settings.effects.set(Effect::Chains, EffectSwitch::Auto);
         Self { scene, settings }
     }
 
-    /// Whether both ask for the very same: this scene and these settings.
+    /// Whether both request the same scene and the same settings.
     pub fn is_same(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.scene, &other.scene) && self.settings == other.settings
     }
 
-    /// Whether both ask for the same maps but for how accurate they are.
+    /// Whether both request the same maps except for their accuracy.
     pub fn differs_in_accuracy_only(&self, other: &Self) -> bool {
         let accuracy_of_other = BakeSettings {
             density_per_sr: other.settings.density_per_sr,
@@ -133,32 +128,30 @@ impl BakeRequest {
 /// Complete maps of a level of the requested bake.
 #[derive(Clone, Debug)]
 pub struct BakedLevel {
-    /// Number of the request that it answers, as [`Worker::request`] gave it.
+    /// Number of the request, as returned by [`Worker::request`].
     pub serial: u64,
-    /// The request; `threads` as asked, before a core was set aside.
+    /// The request, with `threads` as requested, before a core is reserved for the window.
     pub request: BakeRequest,
-    /// Counted from 1 within its request.
+    /// Counted from 1 within the request.
     pub level: u32,
-    /// Whether the bake is done with it.
+    /// Whether these are the last maps of the bake.
     pub is_final: bool,
-    /// Maps and accounts.
     pub result: Bake,
-    /// From the request to these maps, wall clock [s].
+    /// Wall-clock time from the request to these maps [s].
     pub seconds: f64,
 }
 
-/// What the light of a scene owes to an effect.
+/// Contribution of an effect to the light of a scene.
 #[derive(Clone, Debug)]
 pub struct EffectDifference {
-    /// The effect that was left out.
     pub effect: Effect,
-    /// The bake with it.
+    /// The bake that includes the effect.
     pub with: Arc<BakedLevel>,
-    /// That bake minus the one without, or one sentence on what failed.
+    /// That bake minus the one without the effect, or one sentence on what failed.
     pub difference: std::result::Result<Difference, String>,
 }
 
-/// Threads that leave one core to the window where none are asked for (`asked` = 0), at least 1.
+/// Number of baking threads, ≥ 1: `asked`, or if that is 0, all cores but one, which is left to the window.
 pub fn baking_threads(asked: usize, cores: usize) -> usize {
     if asked == 0 {
         cores.saturating_sub(1).max(1)
@@ -167,10 +160,10 @@ pub fn baking_threads(asked: usize, cores: usize) -> usize {
     }
 }
 
-/// How long a bake is waited for that was asked to stop.
+/// How long to wait for a cancelled bake to end.
 const ENDS_WITHIN: Duration = Duration::from_millis(300);
 
-/// Handle of the thread; dropping it cancels the bake, and waits a moment for the thread's end.
+/// Handle of the baking thread. Dropping it cancels the bake and waits briefly for the thread to end.
 #[derive(Debug)]
 pub struct Worker {
     shared: Arc<Shared>,
@@ -178,11 +171,11 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Starts the thread. `make_baker` is called there with the scene of the first request, and again after a bake
-    /// that panicked. The window is woken when there is news, but not for mere progress.
+    /// Starts the thread. It calls `make_baker` with the scene of the first request, and again after a bake that
+    /// panicked. Wakes the window when there is news, but not for mere progress.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot create a thread.
     pub fn spawn<B: LevelBaker>(
         make_baker: impl Fn(Arc<Scene>) -> Result<B> + Send + 'static,
         wake: &Wake,
@@ -203,8 +196,8 @@ impl Worker {
         })
     }
 
-    /// Asks for a bake, replaces what was asked before, and stops what is running: nothing of that is handed out from
-    /// now on. Returns the request's number; later ones are higher.
+    /// Requests a bake, replaces pending requests and cancels what is running: none of its results are handed out any
+    /// more. Returns the number of the request; numbers increase.
     pub fn request(&self, asked: BakeRequest) -> u64 {
         let mut slot = self.shared.lock();
         slot.serial += 1;
@@ -213,8 +206,8 @@ impl Worker {
         serial
     }
 
-    /// Asks what an effect is worth to a bake: the same is baked without it, by a session of its own. Replaces another
-    /// comparison, and gives way to every later request. Tells whether it is taken on: not while maps are baked.
+    /// Starts to compute the contribution of an effect to a bake: the same is baked without it, by a [`Baker`] of its
+    /// own. Replaces another comparison; any later request cancels it. Returns false while maps are being baked.
     pub fn compare(&self, effect: Effect, with: Arc<BakedLevel>) -> bool {
         let mut slot = self.shared.lock();
         if [&slot.waiting, &slot.running]
@@ -231,21 +224,21 @@ impl Worker {
         true
     }
 
-    /// Lets what is running wait for so long.
+    /// Pauses the running bake for this time.
     pub fn hold(&self, time: Duration) {
         if let Some(running) = &self.shared.lock().running {
             running.control.hold(time);
         }
     }
 
-    /// Tells the running bake to hand out no level for this long.
+    /// Tells the running bake not to hand out levels for this time.
     pub fn look_away(&self, time: Duration) {
         if let Some(running) = &self.shared.lock().running {
             running.control.look_away(time);
         }
     }
 
-    /// Stops what is running and forgets what is waiting; unfinished maps are dropped.
+    /// Cancels what is running and what is waiting; unfinished maps are dropped.
     pub fn cancel(&self) {
         let mut slot = self.shared.lock();
         slot.cancel_running();
@@ -255,19 +248,18 @@ impl Worker {
         }
     }
 
-    /// Where the bake stands now.
     pub fn state(&self) -> BakeState {
         let slot = self.shared.lock();
         let job = slot.waiting.as_ref().or(slot.running.as_ref());
         job.map_or_else(|| slot.settled.clone(), |job| job.state())
     }
 
-    /// What the last comparison found, unless that was taken or something else was asked for since.
+    /// Takes the result of the last comparison; `None` if there is none or another request has come since.
     pub fn take_worth(&self) -> Option<EffectDifference> {
         self.shared.lock().worth.take()
     }
 
-    /// The newest complete maps not taken yet; older ones are dropped.
+    /// Takes the newest complete maps; older ones are dropped.
     pub fn take_level(&self) -> Option<BakedLevel> {
         self.shared.lock().newest.take()
     }
@@ -292,12 +284,11 @@ impl Drop for Worker {
     }
 }
 
-/// What maps are baked for.
 #[derive(Debug)]
 enum BakePurpose {
-    /// They are handed out under this number.
+    /// For the window, under this request number.
     Maps { serial: u64 },
-    /// For a comparison.
+    /// For a comparison with the bake `with`.
     EffectDifference { effect: Effect, with: Arc<BakedLevel> },
 }
 
@@ -308,7 +299,7 @@ struct Job {
     since: Instant,
     purpose: BakePurpose,
     control: Control,
-    /// What it is doing, and how much of that is done.
+    /// Current stage and its completed fraction.
     progress: Mutex<(Stage, f64)>,
 }
 
@@ -341,14 +332,14 @@ impl Progress for Job {
     }
 }
 
-/// What both threads look at, under one lock.
+/// State shared by both threads, under one lock.
 #[derive(Debug, Default)]
 struct Slot {
-    /// Of the newest request for maps, waiting or not.
+    /// Number of the newest request for maps.
     serial: u64,
     waiting: Option<Arc<Job>>,
     running: Option<Arc<Job>>,
-    /// The state while nothing is asked for or running.
+    /// The state while no job is waiting or running.
     settled: BakeState,
     newest: Option<BakedLevel>,
     worth: Option<EffectDifference>,
@@ -371,12 +362,12 @@ struct Shared {
 }
 
 impl Shared {
-    /// No code that can panic runs under the lock, so a poisoned one still holds a valid slot.
+    /// No code that can panic runs under the lock, so a poisoned lock still holds a valid slot.
     fn lock(&self) -> MutexGuard<'_, Slot> {
         self.slot.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Asks for a bake in the place of every other.
+    /// Replaces all jobs by a new one.
     fn put(&self, slot: &mut Slot, asked: BakeRequest, purpose: BakePurpose) {
         slot.cancel_running();
         slot.worth = None;
@@ -390,7 +381,7 @@ impl Shared {
         self.news.notify_all();
     }
 
-    /// Waits for a job and marks it as running; `None` when it is time to end.
+    /// Waits for a job and marks it as running; `None` when the thread is to end.
     fn next(&self) -> Option<Arc<Job>> {
         let mut slot = self.lock();
         while !slot.quit {
@@ -403,7 +394,7 @@ impl Shared {
         None
     }
 
-    /// Hands whole maps to the window, unless something else was asked for in between.
+    /// Hands complete maps to the window, unless a newer request has come.
     fn hand_out(&self, level: BakedLevel) {
         let mut slot = self.lock();
         if slot.serial == level.serial {
@@ -413,7 +404,7 @@ impl Shared {
         }
     }
 
-    /// Nothing is running any more.
+    /// Ends the running job and updates the slot.
     fn end(&self, note: impl FnOnce(&mut Slot)) {
         let mut slot = self.lock();
         slot.running = None;
@@ -423,7 +414,7 @@ impl Shared {
     }
 }
 
-/// The thread's life.
+/// Main loop of the baking thread.
 fn serve<B: LevelBaker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Result<B>) {
     let mut baker = None;
     while let Some(job) = shared.next() {
@@ -432,15 +423,15 @@ fn serve<B: LevelBaker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Res
             BakePurpose::Maps { serial } => {
                 let state = bake_in_levels(shared, &mut baker, make_baker, &job, *serial);
                 shared.end(|slot| {
-                    // Complete before it noticed that a newer request came, which was itself cancelled.
+                    // The job finished before it noticed a newer request, which was itself cancelled.
                     let outdated = state == BakeState::Done && *serial != slot.serial;
                     slot.settled = if outdated { BakeState::Cancelled } else { state };
                 });
             }
             BakePurpose::EffectDifference { effect, with } => {
-                // The session of the maps that are shown keeps all it has.
+                // The baker of the maps shown keeps its state.
                 let outcome = bake(&mut None, make_baker, &job, &mut |_| ());
-                // Asking may wait, which is not to be done under the lock.
+                // `is_cancelled` may block while the bake is paused, so it must not be called under the lock.
                 let worth = worth(*effect, with, outcome).filter(|_| !job.control.is_cancelled());
                 shared.end(|slot| slot.worth = worth);
             }
@@ -448,7 +439,7 @@ fn serve<B: LevelBaker>(shared: &Shared, make_baker: &impl Fn(Arc<Scene>) -> Res
     }
 }
 
-/// Bakes, hands out every level, and tells how it ended.
+/// Bakes and hands out every level; returns the final state.
 fn bake_in_levels<B: LevelBaker>(
     shared: &Shared,
     baker: &mut Option<B>,
@@ -482,7 +473,7 @@ fn bake_in_levels<B: LevelBaker>(
     }
 }
 
-/// What a bake without an effect tells; `None` where it was stopped.
+/// Contribution of an effect, from the bakes with and without it; `None` if the latter was cancelled.
 fn worth(
     effect: Effect,
     with: &Arc<BakedLevel>,
@@ -500,7 +491,7 @@ fn worth(
     })
 }
 
-/// One bake; where it did not come to its end, the state that it leaves.
+/// Runs one bake; returns the state to show if it did not finish.
 fn bake<B: LevelBaker>(
     baker: &mut Option<B>,
     make_baker: &impl Fn(Arc<Scene>) -> Result<B>,
@@ -530,7 +521,7 @@ fn bake<B: LevelBaker>(
         Ok(Err(_)) if control.is_cancelled() => Err(BakeState::Cancelled),
         Ok(Err(error)) => Err(BakeState::Failed(error.to_string())),
         Err(panic) => {
-            // What it left behind may be half-built.
+            // Its state may be inconsistent.
             *baker = None;
             Err(BakeState::Failed(panic_sentence(panic.as_ref())))
         }

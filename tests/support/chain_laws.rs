@@ -7,27 +7,27 @@ use nephroid::optics::fresnel::{dielectric_reflectance, metal_reflectance};
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Camera, Material, Mesh, Scene};
 
-/// Refractive index of water, of glass.
+/// Refractive indices.
 pub const WATER: f64 = 1.333;
 const GLASS: f64 = 1.5;
-/// Radiance that floors emit, and that of the background [W/(m² sr)].
+/// Radiance of floors and of the background [W/(m² sr)].
 pub const FLOOR: f64 = 2.0;
 pub const SKY: f64 = 7.0;
-/// Most specular surfaces on a chain.
+/// Largest number of specular surfaces on a chain.
 const MAX_SURFACES: f64 = 32.0;
 
-/// A scene and what is seen of it.
+/// A scene and the expected radiance in a view of it.
 pub struct Law {
     pub name: &'static str,
     pub scene: Scene,
     pub view: View,
-    /// Radiance that comes against a direction from the eye; `None` where rounding or the limits of chains decide.
+    /// Radiance seen in a direction from the eye; `None` where rounding errors or the limits of chains decide.
     pub expected: Box<dyn Fn(DVec3) -> Option<f64>>,
-    /// No pixel can have more.
+    /// Upper bound of the radiance of any pixel.
     pub most: f64,
-    /// Share that is lost where only the stronger way on is followed after four surfaces.
+    /// Share that is lost if only the stronger branch is followed after four surfaces.
     pub left_out: f64,
-    /// Whether there are chains that no light comes along.
+    /// Whether the view contains chains without any light.
     pub ends_black: bool,
 }
 
@@ -43,8 +43,8 @@ pub fn all() -> Vec<Law> {
 }
 
 impl Law {
-    /// How many pixels have a known radiance, and how many of them are black; or where a picture is not finite, or off
-    /// by more than a relative tolerance.
+    /// Counts the pixels with a known radiance, and the black ones among them. An error if a pixel is not finite, is
+    /// out of range, or deviates by more than a relative tolerance.
     pub fn check(&self, picture: &Picture, tolerance: f64) -> Result<[usize; 2], String> {
         let (mut known, mut black) = (0, 0);
         for (pixel, radiance) in picture.radiance.iter().enumerate() {
@@ -63,7 +63,7 @@ impl Law {
         Ok([known, black])
     }
 
-    /// Fails unless a picture keeps to the law, and one that is a hundredth darker does not.
+    /// Asserts that a picture satisfies the law, and that the same picture darkened by 1 % does not.
     #[track_caller]
     pub fn assert_kept(&self, picture: &Picture, tolerance: f64) {
         let [known, black] = self
@@ -87,7 +87,7 @@ impl Law {
     }
 }
 
-/// The direction through a pixel's centre.
+/// Direction through the centre of a pixel.
 pub fn direction(view: &View, pixel: usize) -> DVec3 {
     let (column, row) = (pixel as u32 % view.width, pixel as u32 / view.width);
     let x = (f64::from(column) + 0.5) / f64::from(view.width) * 2.0 - 1.0;
@@ -111,7 +111,7 @@ fn wide(half_m: f64, height_m: f64) -> Mesh {
     shapes::floor([-half_m, half_m], [-half_m, half_m], height_m)
 }
 
-/// A large floor that shines by itself.
+/// A mesh above a large floor that emits light.
 fn over_a_shining_floor(name: &str, height_m: f64, mesh: Mesh, material: Material) -> Scene {
     let mut scene = Scene {
         name: name.into(),
@@ -126,7 +126,7 @@ fn over_a_shining_floor(name: &str, height_m: f64, mesh: Mesh, material: Materia
     scene
 }
 
-/// Straight up from under water: half the picture's height is tan of 60 degrees.
+/// The view straight up from under water, with a vertical field of view of 120°.
 fn looking_up(name: &'static str, water: Mesh) -> Law {
     let eye = DVec3::new(0.2, 0.5, 0.1);
     let critical = (1.0 / WATER).asin();
@@ -145,26 +145,27 @@ fn looking_up(name: &'static str, water: Mesh) -> Law {
     }
 }
 
-/// An open sheet: all below it is water.
+/// An open sheet; everything below it is water.
 pub fn under_a_sheet_of_water() -> Law {
     looking_up("under a sheet of water", wide(90.0, 1.0))
 }
 
-/// A closed body around the eye and the floor.
+/// A closed body that contains the eye and the floor.
 pub fn within_a_body_of_water() -> Law {
     let body = shapes::cuboid(DVec3::new(-90.0, -0.5, -90.0), DVec3::new(90.0, 1.0, 90.0));
     looking_up("within a body of water", body)
 }
 
-/// A plate's share of light let through and sent back, all orders.
+/// Transmittance and reflectance of a plate, summed over all orders.
 fn plate(cos_incident: f64, eta: f64) -> (f64, f64) {
     let r = dielectric_reflectance(cos_incident, eta);
     ((1.0 - r) / (1.0 + r), 2.0 * r / (1.0 + r))
 }
 
-/// The long side of a right-angled prism turns the view down to the floor, losing nothing.
+/// The long face of a right-angled prism turns the view down to the floor by total internal reflection.
 fn through_a_prism() -> Law {
-    // Front at z = 1/2, bottom at y = 0, the long side from the front's top to the bottom's back.
+    // The front face is at z = 1/2, the bottom at y = 0; the long face runs from the front's top edge to the bottom's
+    // back edge.
     let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
     let [front_low, front_high, back] = [(0.0, 0.5), (1.0, 0.5), (0.0, -0.5)];
     let at = |x: f64, (y, z): (f64, f64)| corner(x, y, z);
@@ -195,8 +196,8 @@ fn through_a_prism() -> Law {
         name: "through a prism",
         scene: over_a_shining_floor("prism", -0.5, prism, parts::dielectric("glass", GLASS)),
         view: square_view(DVec3::new(0.0, 0.5, 2.5), DVec3::new(0.0, 0.5, 0.0), 0.03, 24),
-        // Unfolded at its long side it is a plate. What that sends back goes on as the view does, to the floor where it
-        // falls by more than 1 m in 100 m.
+        // Unfolded at its long face, the prism is a plate. Light that the plate reflects continues in the view's
+        // direction; it reaches the floor if it falls by more than 1 m in 100 m.
         expected: Box::new(|direction| {
             let (through, back) = plate(-direction.z, GLASS);
             let fall = direction.y / direction.z;
@@ -210,7 +211,8 @@ fn through_a_prism() -> Law {
     }
 }
 
-/// Down from within a plate of glass: beyond the critical angle light never leaves it, and the chain ends black.
+/// The view down from within a glass plate: beyond the critical angle light never leaves the plate, and the chain
+/// ends black.
 fn within_a_plate() -> Law {
     let mesh = shapes::cuboid(DVec3::new(-90.0, 0.4, -90.0), DVec3::new(90.0, 0.7, 90.0));
     let eye = DVec3::new(0.1, 0.6, 0.2);
@@ -223,7 +225,7 @@ fn within_a_plate() -> Law {
             if r == 1.0 {
                 return Some(0.0);
             }
-            // Next to the critical angle many orders count.
+            // Near the critical angle many orders contribute.
             (r < 0.1).then(|| GLASS * GLASS * (FLOOR + r * SKY) / (1.0 + r))
         }),
         most: SKY * GLASS * GLASS,
@@ -232,7 +234,7 @@ fn within_a_plate() -> Law {
     }
 }
 
-/// Within a ball under the same sky all around everything is n² as bright.
+/// Within a ball under a uniform sky, the radiance is n² times that of the sky.
 fn within_a_ball() -> Law {
     let centre = DVec3::new(0.4, 2.0, -0.3);
     let mut scene = Scene::default();
@@ -250,8 +252,8 @@ fn within_a_ball() -> Law {
     }
 }
 
-/// Between two mirrors, x = ±1, that send nine tenths back: a floor below, the sky above y = 2, and between them what
-/// is met again and again and ends after 32 surfaces.
+/// Two mirrors at x = ±1 with a reflectance of 0.9, a floor below and the sky above y = 2. Near the horizon, chains
+/// reflect again and again and end after 32 surfaces.
 fn between_mirrors() -> Law {
     const F0: f64 = 0.9;
     const TOP: f64 = 2.0;
@@ -272,7 +274,7 @@ fn between_mirrors() -> Law {
         view: square_view(eye, eye + DVec3::X, 0.4, 160),
         expected: Box::new(move |direction| {
             let height = if direction.y < 0.0 { eye.y } else { TOP - eye.y };
-            // Where it ends in the row of images of the hall.
+            // Where the ray ends in the unfolded hall.
             let end = eye.x + direction.x / direction.y.abs() * height;
             let surfaces = (0.5 * (end + 1.0)).floor();
             if surfaces > MAX_SURFACES {

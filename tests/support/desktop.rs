@@ -1,4 +1,4 @@
-//! A screen without a monitor, the program on it, and hands: Xvfb, xdotool and ImageMagick.
+//! A virtual screen, the program on it, and simulated input: Xvfb, xdotool and ImageMagick.
 
 use std::cell::Cell;
 use std::fs;
@@ -24,23 +24,23 @@ use crate::program::program;
 use crate::skip;
 use crate::tools::builtin_scene;
 
-/// Far longer than anything here takes; only a failing test waits for it.
+/// Timeout far above what anything here takes; only a failing test reaches it.
 const PATIENCE: Duration = Duration::from_secs(300);
 
 /// Size of the screen and of the window [pixels].
 pub const SIZE: (u32, u32) = (1280, 720);
 
-/// Share of pixels by which two pictures of the same view at rest may differ visibly: each is the mean of as many samples
-/// as time allowed, which shows at the edges of what is seen in the mirror.
+/// Fraction of the pixels that may differ visibly between two pictures of the same view at rest. Each picture is the
+/// mean of as many samples as time allowed, which shows at edges seen in mirrors.
 pub const ALIKE: f64 = 0.005;
 
-/// Height of what the panel says between the button that bakes and its sections, at most [pixels].
+/// Upper bound of the height of the header below the button *Re-bake* [pixels].
 const BELOW_BAKE: f64 = 160.0;
 
-/// Beginnings of the names of what stands above the sections and does not scroll.
+/// Prefixes of the names of controls in the header, which does not scroll.
 const ABOVE: [&str; 5] = ["Re-bake", "Cancel", "automatic", "Undo", "Redo"];
 
-/// The same, with something to tell where there is none.
+/// [`wait_until`] with a message computed at the timeout.
 #[track_caller]
 fn poll<T>(what: &dyn Fn() -> String, mut ask: impl FnMut() -> Option<T>) -> T {
     let start = Instant::now();
@@ -53,20 +53,20 @@ fn poll<T>(what: &dyn Fn() -> String, mut ask: impl FnMut() -> Option<T>) -> T {
     }
 }
 
-/// Asks until there is an answer.
+/// Polls until there is an answer; fails at the timeout.
 #[track_caller]
 pub fn wait_until<T>(what: &str, ask: impl FnMut() -> Option<T>) -> T {
     poll(&|| format!("never: {what}"), ask)
 }
 
-/// An X server of its own on a display number that was free.
+/// An X server of its own on a free display.
 pub struct Screen {
     server: Child,
     display: String,
 }
 
 impl Screen {
-    /// `None`, after a counted skip, where a tool is missing.
+    /// If a tool is missing, counts a skip and returns `None`.
     pub fn start() -> Option<Self> {
         for (tool, question) in [("Xvfb", "-help"), ("xdotool", "version"), ("import", "-version")] {
             let mut command = Command::new(tool);
@@ -108,7 +108,7 @@ impl Drop for Screen {
     }
 }
 
-/// What a window manager says to a window, and hears from it.
+/// A minimal window manager.
 struct Manager {
     server: RustConnection,
     pings: Cell<u32>,
@@ -117,7 +117,7 @@ struct Manager {
 impl Manager {
     fn new(display: &str) -> Self {
         let (server, screen) = x11rb::connect(Some(display)).expect("the server answers");
-        // Answers go to the root window.
+        // Replies to pings go to the root window.
         let aux = ChangeWindowAttributesAux::new().event_mask(EventMask::SUBSTRUCTURE_NOTIFY);
         let root = server.setup().roots[screen].root;
         let asked = server.change_window_attributes(root, &aux).expect("it is sent");
@@ -137,7 +137,7 @@ impl Manager {
         sent.expect("it is sent").check().expect("the window is there");
     }
 
-    /// Asks whether the window still hears, and waits for the answer: then it has heard what was done before.
+    /// Pings the window and waits for the reply: by then it has received all earlier events.
     fn ping(&self, window: u32) {
         let (number, ping) = (self.pings.get() + 1, self.atom("_NET_WM_PING"));
         self.pings.set(number);
@@ -161,19 +161,19 @@ pub struct Viewer<'a> {
     program: Child,
     window: String,
     folder: tempfile::TempDir,
-    /// Events that the test has read.
+    /// Number of events that the test has consumed.
     read: usize,
     /// Whether the left mouse button is down.
     pulls: bool,
 }
 
 impl<'a> Viewer<'a> {
-    /// Starts `nephroid view` with arguments separated by spaces and waits for its window.
+    /// Starts `nephroid view` with arguments separated by spaces, and waits for its window.
     pub fn open(screen: &'a Screen, arguments: &str) -> Self {
         Self::open_with(screen, arguments, None)
     }
 
-    /// The same, with what another window kept in a folder; otherwise nothing was kept.
+    /// The same with a configuration folder; `None` starts with an empty one.
     pub fn open_with(screen: &'a Screen, arguments: &str, config: Option<&Path>) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let config = config.map_or_else(|| folder.path().join("config"), Path::to_path_buf);
@@ -216,31 +216,31 @@ impl<'a> Viewer<'a> {
         number.unwrap_or_else(|_| panic!("one window: {:?}", self.window))
     }
 
-    /// Hands that do several things in a row, in xdotool's words, and wait for nothing.
+    /// Sends input in xdotool's syntax without waiting.
     pub fn hasty_hands(&self, what: &str) {
         self.screen.xdotool(&what.split_whitespace().collect::<Vec<_>>());
     }
 
-    /// The same, until the window has drawn what comes of it: one that is late would take it all in at once, and meet a
-    /// click where the mouse is by then.
+    /// Sends input and waits until the window has drawn its effect. A slow window would otherwise receive several
+    /// inputs at once, and a click at the latest position of the mouse.
     pub fn hands(&self, what: &str) {
         self.hasty_hands(what);
-        // Each is answered before a frame: the second after the one that saw the deed, the third after the one that
-        // this asked for.
+        // The window answers each ping before it draws a frame. The second answer comes after the frame that handled
+        // the input, the third after the frame which that one requested.
         for _ in 0..3 {
             std::thread::sleep(Duration::from_millis(20));
             self.manager.ping(self.number());
         }
     }
 
-    /// Holds a key for some seconds.
+    /// Holds a key for a time [s].
     pub fn hold(&self, key: &str, seconds: f64) {
         self.hands(&format!("keydown {key}"));
         std::thread::sleep(Duration::from_secs_f64(seconds));
         self.hands(&format!("keyup {key}"));
     }
 
-    /// The display that its window is on, and the window's number.
+    /// Display and number of the window.
     pub fn place(&self) -> (&str, &str) {
         (&self.screen.display, &self.window)
     }
@@ -249,7 +249,7 @@ impl<'a> Viewer<'a> {
         self.screen.xdotool(&["getwindowname", &self.window])
     }
 
-    /// Where the program was started.
+    /// Working folder of the program.
     pub fn working_folder(&self) -> PathBuf {
         self.folder.path().join("working")
     }
@@ -258,7 +258,7 @@ impl<'a> Viewer<'a> {
         fs::read_to_string(self.folder.path().join("stderr")).expect("it is text")
     }
 
-    /// The whole lines of its log; the last one may be half-written.
+    /// Complete lines of the event log; the last line may still be in writing.
     fn log(&self) -> String {
         let mut text = fs::read_to_string(self.folder.path().join("events")).unwrap_or_default();
         text.truncate(text.rfind('\n').map_or(0, |end| end + 1));
@@ -275,12 +275,12 @@ impl<'a> Viewer<'a> {
             .collect()
     }
 
-    /// Forgets the events so far.
+    /// Skips the events so far.
     pub fn forget(&mut self) {
         self.read = self.log().lines().count();
     }
 
-    /// The number and text of the next event that fits.
+    /// Index and content of the next event that fits.
     fn next(&mut self, what: &str, fits: impl Fn(&Value) -> bool) -> (usize, Value) {
         let (path, read) = (self.folder.path().join("events"), self.read);
         let told = || format!("no {what}: {}", fs::read_to_string(&path).unwrap_or_default());
@@ -299,26 +299,26 @@ impl<'a> Viewer<'a> {
         })
     }
 
-    /// The next event of that name that fits, after those that were waited for before.
+    /// The next event of that name that fits, after the last one waited for.
     pub fn wait_for(&mut self, name: &str, fits: impl Fn(&Value) -> bool) -> Value {
         let (index, event) = self.next(name, |event| event["event"] == name && fits(event));
         self.read = index + 1;
         event
     }
 
-    /// The end of the bake, and the rest that follows it.
+    /// Waits for the end of the bake and the idle window that follows.
     pub fn wait_for_bake(&mut self) -> (Value, Value) {
         (self.wait_for("done", |_| true), self.wait_for("rest", |_| true))
     }
 
-    /// The next maps that are shown, of a first level or, where that came too soon after it to be shown by itself, of the
-    /// whole bake. They may be waited for again.
+    /// Waits for the next maps that are shown: of the first level, or of the whole bake if it ended too soon for the
+    /// first level to be shown. Does not consume the event.
     pub fn wait_for_maps(&mut self) -> Value {
         let is_shown = |event: &Value| event["event"] == "done" || event["shown"] == true;
         self.next("maps", is_shown).1
     }
 
-    /// Flies by a key for half a second, and tells where the camera rests then.
+    /// Moves the camera by a key for half a second; returns the position where it comes to rest.
     pub fn fly(&mut self, key: &str, from: DVec3) -> DVec3 {
         self.hands("mousemove 900 300");
         self.forget();
@@ -326,12 +326,12 @@ impl<'a> Viewer<'a> {
         self.wait_for_move(from)
     }
 
-    /// The next rest with the camera elsewhere than there.
+    /// Waits until the camera rests at another position; returns it.
     pub fn wait_for_move(&mut self, from: DVec3) -> DVec3 {
         position(&self.wait_for("rest", |rest| position(rest).distance(from) > 1e-6))
     }
 
-    /// The controls that the panel has now: role, name and left, top, right and bottom [pixels].
+    /// Present controls: role, name, and left, top, right and bottom [pixels].
     fn controls(&self) -> Vec<(String, String, [f64; 4])> {
         let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
         let known = self.all("controls").pop();
@@ -344,8 +344,8 @@ impl<'a> Viewer<'a> {
             .collect()
     }
 
-    /// Left, top, right and bottom of the first control of the panel with that name and, where one is given, that role
-    /// [pixels]; waits until it is there and rests.
+    /// Left, top, right and bottom of the first control with that name, and with that role if one is given [pixels].
+    /// Waits until it exists and does not move.
     fn control(&self, role: Option<&str>, name: &str) -> [f64; 4] {
         let mut last = None;
         poll(&|| format!("no {name} in {:?}", self.controls()), || {
@@ -356,24 +356,24 @@ impl<'a> Viewer<'a> {
                 return last;
             }
             last = rect;
-            // A panel that glides moves with every picture, and pictures may take half a second.
+            // A scrolling panel moves with every picture, and pictures may take half a second.
             self.hands("sleep 0.1");
             None
         })
     }
 
-    /// The middle of a control of the panel [pixels], scrolled into the window where it is not.
+    /// Centre of a control [pixels], after scrolling it into the window.
     pub fn centre(&self, role: &str, name: &str) -> (i32, i32) {
         let mut last_top = None;
         let mut unmoved = 0;
         for _ in 0..60 {
             let [left, top, right, bottom] = self.control(Some(role), name);
             let [.., bake] = self.control(None, "Re-bake");
-            // What stands above the sections, or over the picture, does not scroll.
+            // The header and controls over the picture do not scroll.
             let is_fixed = ABOVE.iter().any(|above| name.starts_with(above)) || left >= f64::from(WIDTH);
             let highest = if is_fixed { 0.0 } else { bake + BELOW_BAKE };
             unmoved = if last_top == Some(top) { unmoved + 1 } else { 0 };
-            // What stands at the very top cannot be scrolled any lower, however often one tries.
+            // A control at the very top cannot be scrolled down any further.
             let is_at_top = unmoved >= 3 && top > 0.0;
             if bottom < f64::from(SIZE.1) && (top > highest || is_at_top) {
                 return ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
@@ -386,30 +386,30 @@ impl<'a> Viewer<'a> {
         panic!("{role} {name} cannot be scrolled to");
     }
 
-    /// Places on a slider of the panel, by the share of the way along it [pixels].
+    /// Positions on a slider, by fractions of its length [pixels].
     pub fn on_slider<const N: usize>(&self, name: &str, shares: [f64; N]) -> [(i32, i32); N] {
         let [left, top, _, bottom] = self.control(Some("Slider"), name);
         shares.map(|share| ((left + 4.0 + share * 104.0) as i32, (0.5 * (top + bottom)) as i32))
     }
 
-    /// Clicks at a place [pixels].
+    /// Clicks at a position [pixels].
     pub fn click_at(&self, (x, y): (i32, i32)) {
         self.hands(&format!("mousemove {x} {y}"));
         self.hands("mousedown 1");
         self.hands("mouseup 1");
     }
 
-    /// Clicks a control of the panel as a person would.
+    /// Clicks a control of the panel.
     pub fn click(&self, role: &str, name: &str) {
         self.click_at(self.centre(role, name));
     }
 
-    /// Opens sections of the panel that are closed: the program opens some by itself.
+    /// Opens sections of the panel that are closed.
     pub fn open_sections(&self, names: &[&str]) {
         names.iter().for_each(|name| self.set_section(name, true));
     }
 
-    /// Closes sections of the panel that are open: what stands below comes into sight.
+    /// Closes sections of the panel that are open, which moves the sections below into view.
     pub fn close_sections(&self, names: &[&str]) {
         names.iter().for_each(|name| self.set_section(name, false));
     }
@@ -423,7 +423,7 @@ impl<'a> Viewer<'a> {
         });
     }
 
-    /// Whether a control of its own stands below a section's title, not the next title.
+    /// Whether the control below a section's title belongs to the section instead of being the next title.
     fn is_open(&self, section: &str) -> bool {
         let [_, top, ..] = self.control(Some("DisclosureTriangle"), section);
         let controls = self.controls();
@@ -432,9 +432,9 @@ impl<'a> Viewer<'a> {
         below.next().is_some_and(|(role, ..)| role != "DisclosureTriangle")
     }
 
-    /// Chooses what the picture shows, and waits until the log tells so.
+    /// Chooses the quantity shown and waits until the log confirms it.
     pub fn choose_view(&mut self, view: &str) {
-        // A list that a late window has closed again is opened once more.
+        // A slow window may close the list again at once; it is then reopened.
         poll(&|| format!("no {view} in {:?}", self.controls()), || {
             self.click("ComboBox", "View");
             let is_listed = || {
@@ -448,7 +448,7 @@ impl<'a> Viewer<'a> {
         self.wait_for("shows", |shows| shows["what"] == view);
     }
 
-    /// Types over what a field of the panel holds, and confirms.
+    /// Replaces the content of a text field and confirms.
     pub fn type_into(&self, role: &str, name: &str, text: &str) {
         self.click_at(self.centre(role, name));
         self.hands("key ctrl+a");
@@ -456,7 +456,7 @@ impl<'a> Viewer<'a> {
         self.hands("key Return");
     }
 
-    /// Presses the mouse at the first place and pulls to the others [pixels]; it stays down.
+    /// Presses the mouse at the first position and drags to the others [pixels]; it stays pressed.
     pub fn pull(&mut self, places: &[(i32, i32)]) {
         self.forget();
         self.pulls = true;
@@ -468,13 +468,13 @@ impl<'a> Viewer<'a> {
         }
     }
 
-    /// Lets the mouse go.
+    /// Releases the mouse.
     pub fn let_go(&mut self) {
         self.hands("mouseup 1");
         self.pulls = false;
     }
 
-    /// What is on the screen, without what is said of a control that the mouse is over.
+    /// A screenshot. Unless the mouse is pressed, it is first moved away from the panel, to hide tooltips.
     pub fn screenshot(&self) -> RgbImage {
         if !self.pulls {
             self.hands("mousemove 900 300");
@@ -488,7 +488,7 @@ impl<'a> Viewer<'a> {
         image::open(path).expect("it is a picture").to_rgb8()
     }
 
-    /// The first screenshot that fits: what the log tells takes a moment to reach the screen.
+    /// The first screenshot that fits; what the log reports takes a moment to reach the screen.
     #[track_caller]
     pub fn screenshot_that(&self, what: &str, fits: impl Fn(&RgbImage) -> bool) -> RgbImage {
         let keep = || {
@@ -498,10 +498,10 @@ impl<'a> Viewer<'a> {
         poll(&keep, || Some(self.screenshot()).filter(&fits))
     }
 
-    /// Processor time of all its threads so far [s].
+    /// CPU time of all threads so far [s].
     pub fn cpu_s(&self) -> f64 {
         let stat = fs::read_to_string(format!("/proc/{}/stat", self.program.id())).expect("it runs");
-        // Fields 14 and 15, counted after the name in parentheses, in ticks of 1/100 s.
+        // Fields 14 and 15, counted from the end of the name in parentheses, in ticks of 1/100 s.
         let after_name = stat.rsplit(')').next().expect("a name");
         let ticks = after_name.split_whitespace().skip(11).take(2);
         ticks
@@ -509,13 +509,13 @@ impl<'a> Viewer<'a> {
             .sum()
     }
 
-    /// Whether the program has not ended.
+    /// Whether the program is still running.
     pub fn runs(&mut self) -> bool {
         self.program.try_wait().expect("it can be asked").is_none()
     }
 
-    /// Asks the window to close as a window manager does. The program ends with success and without a panic; its stderr
-    /// and all events.
+    /// Closes the window as a window manager does. Asserts that the program ends with success and without a panic;
+    /// returns its stderr and all events.
     #[track_caller]
     pub fn close(self) -> (String, Vec<Value>) {
         let close = self.manager.atom("WM_DELETE_WINDOW");
@@ -523,7 +523,7 @@ impl<'a> Viewer<'a> {
         self.ended()
     }
 
-    /// Destroys the window as another program can, and tells the same.
+    /// Destroys the window as another program can; otherwise as [`close`](Self::close).
     pub fn destroy(self) -> (String, Vec<Value>) {
         self.hasty_hands(&format!("windowclose {}", self.window));
         self.ended()
@@ -538,7 +538,7 @@ impl<'a> Viewer<'a> {
         (stderr, self.log().lines().map(event).collect())
     }
 
-    /// Sends a signal by name and waits for the program's end.
+    /// Sends a signal by name and waits for the program to end.
     pub fn signal(mut self, name: &str) -> ExitStatus {
         let id = self.program.id().to_string();
         let sent = Command::new("kill").args(["-s", name, &id]).status();
@@ -560,18 +560,18 @@ impl Drop for Viewer<'_> {
     }
 }
 
-/// A line of the log.
+/// Parses a line of the event log.
 fn event(line: &str) -> Value {
     serde_json::from_str(line).expect("a line is JSON")
 }
 
-/// A camera's place from the log [m].
+/// Position of the camera in an event [m].
 pub fn position(rest: &Value) -> DVec3 {
     let coordinate = |axis: usize| rest["position_m"][axis].as_f64().expect("a number");
     DVec3::new(coordinate(0), coordinate(1), coordinate(2))
 }
 
-/// Where a point of a built-in scene is seen at the start [pixels of the window].
+/// Window position of a point in the initial view of a built-in scene [pixels].
 pub fn pixel_of(scene: &str, point: DVec3) -> (i32, i32) {
     let (left, height) = (f64::from(WIDTH), f64::from(SIZE.1));
     let width = f64::from(SIZE.0) - left;
@@ -583,13 +583,13 @@ pub fn pixel_of(scene: &str, point: DVec3) -> (i32, i32) {
     (x as i32, y as i32)
 }
 
-/// The picture's pixels with their places, the panel left out.
+/// Pixels of the picture with their positions, without the panel.
 pub fn picture(shot: &RgbImage) -> impl Iterator<Item = (u32, u32, [u8; 3])> {
     let pixels = shot.enumerate_pixels().map(|(x, y, pixel)| (x, y, pixel.0));
     pixels.filter(|(x, ..)| *x >= WIDTH as u32)
 }
 
-/// Share of the picture's pixels that differ visibly.
+/// Fraction of the picture's pixels that differ visibly.
 pub fn difference(a: &RgbImage, b: &RgbImage) -> f64 {
     let differs = |p: [u8; 3], q: [u8; 3]| p.iter().zip(q).any(|(p, q)| p.abs_diff(q) > 8);
     let pairs = picture(a).zip(picture(b));

@@ -1,4 +1,4 @@
-//! A dozen small scenes, each calling for other effects; and the pool as one quad whose normals come from an image.
+//! Small scenes that need different effects; and the pool as one quad with a normal map.
 
 use std::sync::Arc;
 
@@ -13,18 +13,17 @@ use nephroid::scene::{
 use nephroid::settings::LayerKind;
 use nephroid::units::Flux;
 
-/// A scene and the effects of its light pass.
+/// A scene and the effects that its light pass needs.
 pub struct EffectScene {
     pub name: &'static str,
     pub scene: Scene,
     pub layers: Vec<LayerKind>,
-    /// What the scene calls for; nothing else.
+    /// Exactly the effects that the scene needs.
     pub calls_for: Vec<Effect>,
-    /// Whether something specular is in view of the scene's first camera, hidden or not.
+    /// Whether something specular is in the view of the scene's first camera, occluded or not.
     pub shows_specular: bool,
 }
 
-/// All of them.
 pub fn all() -> Vec<EffectScene> {
     let mirrored = |material: Material| {
         let mut scene = room();
@@ -135,7 +134,7 @@ fn camera(from: DVec3, to: DVec3) -> Camera {
     Camera::look_at("camera", from, to, 0.9)
 }
 
-/// Upright, so that it lights the floor.
+/// Upright, so that it reflects light to the floor.
 fn add_mirror(scene: &mut Scene, material: Material) {
     let mut mesh: Mesh = shapes::rectangle(DVec3::new(-0.6, 0.4, 0.0), DVec3::Y * 0.3, DVec3::Z * 0.3);
     mesh.uv0.get_or_insert_with(|| {
@@ -202,14 +201,14 @@ fn stripes() -> Texture {
     }
 }
 
-/// Texels across and down.
+/// Width and height of the normal map [texels].
 const SIDE: u32 = 256;
-/// Normals are stored so many times steeper, for more of their digits.
+/// Factor by which stored normals are steeper, for better use of 8 bits.
 const STEEPER: f64 = 4.0;
 /// Width of the water [m].
 const WIDTH_M: f64 = 3.0;
 
-/// Waves that fit the water, so that an image of them tiles.
+/// Waves that fit the width of the water, so that a normal map of them tiles.
 pub fn fitting_waves() -> Waves {
     let wave = |direction: DVec3, wavelength_m, phase_rad| Wave {
         amplitude_m: 0.015,
@@ -225,7 +224,7 @@ pub fn fitting_waves() -> Waves {
     .expect("gentle waves")
 }
 
-/// The pool with those waves as waves.
+/// The pool with these waves as analytic waves.
 pub fn by_waves() -> Scene {
     let mut scene = pool::bumped(0.0);
     scene.materials[1].waves = Some(fitting_waves());
@@ -233,7 +232,7 @@ pub fn by_waves() -> Scene {
     scene
 }
 
-/// The same waves as an image of normals; `mirrored` has it, and its coordinates, the other way around.
+/// The pool with these waves as a normal map; `mirrored` flips the map and its texture coordinates.
 pub fn by_image(mirrored: bool) -> Scene {
     let mut scene = by_waves();
     let waves = scene.materials[1].waves.take().expect("they are there");

@@ -1,4 +1,4 @@
-//! A file manager that drops a file on a window: the X drag-and-drop protocol (XDND, version 5), from its source's side.
+//! A file manager that drops a file on a window: the source side of the X drag-and-drop protocol (XDND, version 5).
 
 use std::path::Path;
 use std::time::{Duration, Instant};
@@ -21,7 +21,7 @@ struct Source {
     text: String,
 }
 
-/// Drags a file over the middle of a window, given by its display and number, and lets it go there.
+/// Drags a file to the middle of a window, given by its display and number, and drops it there.
 pub fn drop_file((display, target): (&str, &str), path: &Path) {
     let (server, screen) = x11rb::connect(Some(display)).expect("the server answers");
     let own = server.generate_id().expect("a number");
@@ -70,13 +70,13 @@ impl Source {
         self.tell("XdndEnter", [5 << 24, list, 0, 0]);
         let copy = self.atom("XdndActionCopy");
         self.tell("XdndPosition", [0, (800 << 16) | 400, x11rb::CURRENT_TIME, copy]);
-        // The window asks for the path, and says that it takes it.
+        // The window asks for the path and accepts it.
         self.answer_until("XdndStatus", true);
         self.tell("XdndDrop", [0, x11rb::CURRENT_TIME, 0, 0]);
         self.answer_until("XdndFinished", false);
     }
 
-    /// Hands the path out until the window has sent that message and, where that is awaited, has asked for the path.
+    /// Serves the path until the window has sent that message and, with `must_ask`, has asked for the path.
     fn answer_until(&self, message: &str, mut must_ask: bool) {
         let awaited = self.atom(message);
         let mut must_tell = true;

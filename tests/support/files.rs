@@ -1,16 +1,16 @@
-//! Scenes as files, written here.
+//! Scene files made in memory.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
 use base64::encode;
 use serde_json::{Value, json};
 
-/// One triangle of 1 m legs, lying flat; without lights.
+/// A horizontal triangle with legs of 1 m, without lights.
 pub fn dark_triangle() -> String {
     triangle().to_string()
 }
 
-/// The same under a sun of 683 lx = 1 W/m²: nothing specular in it.
+/// The same triangle under a sun of 683 lx = 1 W/m²; nothing is specular.
 pub fn lit_matte_triangle() -> String {
     let mut scene = triangle();
     scene["extensionsUsed"] = json!(["KHR_lights_punctual"]);
@@ -18,7 +18,7 @@ pub fn lit_matte_triangle() -> String {
         json!({"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 683.0}]}});
     scene["nodes"] = json!([
         {"mesh": 0, "name": "floor"},
-        // Turned so that its −z points down.
+        // Rotated so that its −z axis points down.
         {"rotation": [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2],
          "extensions": {"KHR_lights_punctual": {"light": 0}}},
     ]);
@@ -26,7 +26,8 @@ pub fn lit_matte_triangle() -> String {
     scene.to_string()
 }
 
-/// A lamp of 5 cm, a sun of 0.53°, a panel of 0.5 m² and the glowing floor, of 1 W/(m² sr) the latter two.
+/// A point light of 5 cm radius, a sun of 0.53°, a panel of 0.5 m², and the floor as an emitter; the last two emit 1
+/// W/(m² sr).
 pub fn lamps_with_extent() -> String {
     let mut scene = triangle();
     scene["materials"] = json!([{"emissiveFactor": [1.0, 1.0, 1.0],
@@ -56,7 +57,8 @@ pub fn lamps_with_extent() -> String {
     scene.to_string()
 }
 
-/// A mirror on the ground under a matte ceiling, with three lamps between them: white, green, and one of 5 cm.
+/// A mirror on the ground below a matte ceiling, with three lamps between them: a white one, a green one, and one of
+/// 5 cm radius.
 pub fn mirror_under_lamps() -> String {
     let mut scene = triangle();
     scene["materials"] = json!([
@@ -84,7 +86,7 @@ pub fn mirror_under_lamps() -> String {
     scene.to_string()
 }
 
-/// Two triangles, one of N-SF11 and one of gold, under a lamp with the spectrum of illuminant A and one without.
+/// A triangle of N-SF11 and one of gold, under a lamp with the spectrum of illuminant A and one without a spectrum.
 pub fn glasses() -> String {
     let mut scene = triangle();
     scene["materials"] = json!([
@@ -141,7 +143,7 @@ fn triangle() -> Value {
     })
 }
 
-/// RFC 4648 base64, for whole triples of bytes.
+/// Base64 (RFC 4648) of whole triples of bytes.
 mod base64 {
     const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 

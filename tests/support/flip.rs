@@ -1,24 +1,23 @@
-//! How differently two pictures look, pixel by pixel: FLIP for display light (Andersson et al., "FLIP: A Difference
-//! Evaluator for Alternating Images", HPG 2020), filters split into rows and columns as in
-//! <https://github.com/NVlabs/flip>.
+//! FLIP, the perceived difference of two pictures, for low dynamic range (Andersson et al., "FLIP: A Difference
+//! Evaluator for Alternating Images", HPG 2020), with separable filters as in <https://github.com/NVlabs/flip>.
 
 use std::f64::consts::PI;
 
 use nephroid::optics::LinearSrgb;
 
-/// Pixels per degree of a 0.7 m wide display of 3840 pixels, seen from 0.7 m: the authors' usual one.
+/// Pixels per degree of a display 0.7 m wide with 3840 pixels, seen from 0.7 m: the authors' default.
 const PIXELS_PER_DEGREE: f64 = 0.7 * 3840.0 / 0.7 * PI / 180.0;
 
-/// Colour differences are raised to this power …
+/// Exponent of colour differences.
 const COLOUR_POWER: f64 = 0.7;
-/// … and from this share of the largest one on they are squeezed into what is left above the next.
+/// Colour differences above this fraction of the largest one are compressed into the range from `KNEE_AT` to 1.
 const KNEE: f64 = 0.4;
 const KNEE_AT: f64 = 0.95;
-/// Edges and points are looked for at this scale [degrees].
+/// Width of the feature detector [degrees].
 const FEATURE_WIDTH: f64 = 0.082;
 const FEATURE_POWER: f64 = 0.5;
 
-/// CIE XYZ of D65.
+/// XYZ of D65.
 const WHITE: [f64; 3] = [0.950_428_545, 1.0, 1.088_900_371];
 
 const XYZ_FROM_RGB: [[f64; 3]; 3] = [
@@ -32,7 +31,7 @@ const RGB_FROM_XYZ: [[f64; 3]; 3] = [
     [0.055_639_423, -0.204_011_202, 1.057_148_933],
 ];
 
-/// Mean FLIP of two pictures as they are shown, RGBA with sRGB encoding: 0 where they look alike, at most 1.
+/// Mean FLIP of two RGBA pictures in sRGB encoding: 0 if they look alike, at most 1.
 pub fn mean_flip(reference: &[u8], test: &[u8], width: usize) -> f64 {
     let errors = flip(reference, test, width);
     errors.iter().sum::<f64>() / errors.len() as f64
@@ -60,13 +59,13 @@ pub fn flip(reference: &[u8], test: &[u8], width: usize) -> Vec<f64> {
         .collect()
 }
 
-/// A picture as an eye has it.
+/// A picture after the filters of the visual system.
 struct Seen {
-    /// Blurred, L*a*b* with colours weighed by lightness.
+    /// Filtered L*a*b* with Hunt-adjusted colours.
     colours: Vec<[f64; 3]>,
-    /// How strong edges are.
+    /// Strength of edges.
     edges: Vec<f64>,
-    /// How strong points are.
+    /// Strength of points.
     points: Vec<f64>,
 }
 
@@ -79,7 +78,7 @@ impl Seen {
         };
         let opponent: Vec<[f64; 3]> = bytes.chunks_exact(4).map(opponent).collect();
         let plane = |channel: usize| -> Vec<f64> { opponent.iter().map(|pixel| pixel[channel]).collect() };
-        // Blue and yellow are blurred by the sum of two bells.
+        // The blue-yellow channel is filtered by the sum of two Gaussians.
         let [y, cx, cz] = [0, 1, 2].map(plane);
         let [for_y, for_cx] = [(1.0, 0.0047), (1.0, 0.0053)].map(|(a, b)| normalised(&bell(a, b)));
         let [near, far] = [(34.1, 0.04), (13.5, 0.025)].map(|(a, b)| bell(a, b));
@@ -116,13 +115,13 @@ fn transform(rows: &[[f64; 3]; 3], v: [f64; 3]) -> [f64; 3] {
     rows.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// XYZ over that of white.
+/// XYZ relative to white.
 fn relative_xyz(linear: [f64; 3]) -> [f64; 3] {
     let xyz = transform(&XYZ_FROM_RGB, linear);
     [0, 1, 2].map(|axis| xyz[axis] / WHITE[axis])
 }
 
-/// L*a*b* of linear sRGB, colours weighed by lightness after Hunt.
+/// Hunt-adjusted L*a*b* of linear sRGB.
 fn hunt(linear: [f64; 3]) -> [f64; 3] {
     const DELTA: f64 = 6.0 / 29.0;
     let [x, y, z] = relative_xyz(linear).map(|value| {
@@ -140,14 +139,15 @@ fn hunt(linear: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Distance in lightness plus that in colour.
+/// HyAB distance: absolute difference of lightness plus Euclidean distance of the colours.
 fn hyab(a: [f64; 3], b: [f64; 3]) -> f64 {
     (a[0] - b[0]).abs() + (a[1] - b[1]).hypot(a[2] - b[2])
 }
 
-/// Square root of a bell of the contrast sensitivity: applied along rows and columns it is the whole.
+/// Square root of a Gaussian of the contrast sensitivity function: applied along rows and columns it gives the
+/// Gaussian.
 fn bell(a: f64, b: f64) -> Vec<f64> {
-    // Three deviations of the widest bell.
+    // Three standard deviations of the widest Gaussian.
     let radius = (3.0 * (0.04 / (2.0 * PI * PI)).sqrt() * PIXELS_PER_DEGREE).ceil() as i32;
     (-radius..=radius)
         .map(|offset| {
@@ -165,7 +165,8 @@ fn normalised(filter: &[f64]) -> Vec<f64> {
     scaled(filter, filter.iter().sum())
 }
 
-/// A gaussian and its derivatives: their positive and negative weights each add up to one.
+/// A Gaussian and its first two derivatives. The positive and the negative weights of each are normalised to a sum of
+/// one.
 fn derivatives() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     let deviation = 0.5 * FEATURE_WIDTH * PIXELS_PER_DEGREE;
     let radius = (3.0 * deviation).ceil() as i32;
@@ -183,7 +184,7 @@ fn derivatives() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
     (normalised(&smooth), balanced(first), balanced(offsets().map(second).collect()))
 }
 
-/// One filter along rows, then one along columns; the outermost pixels go on beyond the picture.
+/// Filters along rows, then along columns; pixels at the border are repeated outside.
 fn filtered(values: &[f64], width: usize, across: &[f64], down: &[f64]) -> Vec<f64> {
     let height = values.len() / width;
     let along = |values: &[f64], filter: &[f64], steps: (usize, usize)| -> Vec<f64> {

@@ -1,4 +1,4 @@
-//! Scenes small enough to know every pixel of.
+//! Scenes simple enough that every pixel is known.
 
 use std::f64::consts::PI;
 use glam::{DMat3, DVec2, DVec3};
@@ -10,7 +10,7 @@ use nephroid::scene::{Camera, Material, Mesh, Object, Scene, Texture, TextureRef
 
 use crate::scenes::{map_of, view_of};
 
-/// Corners of the unit floor by (x, z), and at the same time by (u, v).
+/// Corners of the unit floor, both as (x, z) and as (u, v).
 const CORNERS: [DVec2; 4] = [
     DVec2::new(0.0, 0.0),
     DVec2::new(1.0, 0.0),
@@ -60,8 +60,8 @@ pub fn floor_map(object: usize, width: usize, height: usize, irradiance: Vec<[f3
     map_of(chart, irradiance)
 }
 
-/// The unit floor from straight above, filling a square picture exactly: pixel (i, j) sees x = (i + ½)/size and
-/// z = (j + ½)/size.
+/// The unit floor seen from above, filling a square picture exactly: pixel (i, j) sees x = (i + ½)/size and z = (j +
+/// ½)/size.
 pub fn from_above(size: u32) -> View {
     let camera = Camera {
         name: "above".into(),
@@ -74,7 +74,7 @@ pub fn from_above(size: u32) -> View {
     view_of(camera, [size; 2])
 }
 
-/// Lambert of a given albedo.
+/// A Lambertian surface with an albedo.
 pub fn diffuse(albedo: LinearSrgb) -> Material {
     Material {
         base_colour: albedo,
@@ -82,7 +82,7 @@ pub fn diffuse(albedo: LinearSrgb) -> Material {
     }
 }
 
-/// Four texels of different colours, 2×2, u to the right and v down.
+/// A texture of 2×2 texels of different colours, u to the right and v down.
 pub fn four_colours() -> Texture {
     Texture {
         name: "four".into(),
@@ -99,7 +99,7 @@ pub fn four_colours() -> Texture {
     }
 }
 
-/// A reference to texture 0 by TEXCOORD_0.
+/// Texture 0 with TEXCOORD_0.
 pub fn texture_reference() -> TextureRef {
     TextureRef {
         texture: 0,
@@ -108,7 +108,7 @@ pub fn texture_reference() -> TextureRef {
     }
 }
 
-/// Radiance of a diffuse surface.
+/// Radiance of a Lambertian surface [W/(m² sr)].
 pub fn lambert(albedo: f64, irradiance_w_m2: f64) -> f64 {
     albedo * irradiance_w_m2 / PI
 }

@@ -6,7 +6,7 @@ use nephroid::error::Result;
 use nephroid::scene::{LoadOptions, Scene};
 use serde_json::{Value, json};
 
-/// JSON and binary data of a file to be.
+/// JSON and binary data of a file.
 #[derive(Clone)]
 pub struct Glb {
     pub json: Value,
@@ -14,7 +14,7 @@ pub struct Glb {
 }
 
 impl Glb {
-    /// A file without nodes.
+    /// A file with an empty scene.
     pub fn empty() -> Self {
         let json = json!({
             "asset": { "version": "2.0" },
@@ -28,7 +28,7 @@ impl Glb {
         }
     }
 
-    /// Appends to a list of the JSON and returns the index.
+    /// Appends to a list in the JSON; returns the index.
     pub fn push(&mut self, list: &str, item: Value) -> usize {
         let fields = self.json.as_object_mut().expect("a file is an object");
         let items = fields.entry(list).or_insert_with(|| json!([]));
@@ -37,7 +37,7 @@ impl Glb {
         items.len() - 1
     }
 
-    /// Adds a node and lists it in the scene.
+    /// Adds a node to the scene; returns its index.
     pub fn push_root(&mut self, node: Value) -> usize {
         let index = self.push("nodes", node);
         let nodes = self.json["scenes"][0]["nodes"]
@@ -47,7 +47,7 @@ impl Glb {
         index
     }
 
-    /// Adds bytes as a buffer view of their own.
+    /// Adds bytes as a new buffer view.
     pub fn push_view(&mut self, bytes: &[u8]) -> usize {
         let offset = self.binary.len();
         self.binary.extend(bytes);
@@ -58,7 +58,7 @@ impl Glb {
         )
     }
 
-    /// Adds an accessor of floats with `width` numbers an element.
+    /// Adds an accessor of floats with `width` components per element.
     pub fn push_floats(&mut self, values: &[f32], width: usize) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();
         let view = self.push_view(&bytes);
@@ -79,12 +79,12 @@ impl Glb {
         )
     }
 
-    /// Adds a mesh of one primitive.
+    /// Adds a mesh with one primitive.
     pub fn push_mesh(&mut self, primitive: Value) -> usize {
         self.push("meshes", json!({ "primitives": [primitive] }))
     }
 
-    /// A file with one triangle (0 0 0), (1 0 0), (0 1 0) without normals on the node `tri`.
+    /// The triangle (0 0 0), (1 0 0), (0 1 0) without normals, on the node `tri`.
     pub fn triangle() -> Self {
         let mut file = Self::empty();
         let positions = file.push_floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0], 3);
@@ -93,7 +93,7 @@ impl Glb {
         file
     }
 
-    /// A file with a closed tetrahedron with its vertices' directions as normals, on the node `solid`.
+    /// A closed tetrahedron with smooth normals, on the node `solid`.
     pub fn tetrahedron() -> Self {
         let mut file = Self::empty();
         let corners = [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0, 1.0, -1.0, -1.0, -1.0, 1.0];
@@ -106,7 +106,7 @@ impl Glb {
         file
     }
 
-    /// Gives the first mesh a material.
+    /// Adds a material and assigns it to the first mesh.
     pub fn with_material(mut self, material: Value) -> Self {
         let material = self.push("materials", material);
         self.json["meshes"][0]["primitives"][0]["material"] = json!(material);
@@ -135,7 +135,7 @@ impl Glb {
         file.bytes_as_stated()
     }
 
-    /// The same with the buffers that the JSON states.
+    /// The same with `buffers` as in the JSON.
     pub fn bytes_as_stated(&self) -> Vec<u8> {
         let mut text = self.json.to_string().into_bytes();
         text.resize(text.len().next_multiple_of(4), b' ');
@@ -151,37 +151,37 @@ impl Glb {
         bytes
     }
 
-    /// Loads it as a file.
+    /// Loads the file.
     pub fn load(&self) -> Result<Scene> {
         self.load_with(&LoadOptions::default())
     }
 
-    /// Loads it as a file, with options.
+    /// Loads the file with options.
     pub fn load_with(&self, options: &LoadOptions) -> Result<Scene> {
         load_bytes(&self.bytes(), options)
     }
 
-    /// Loads it; fails where that fails.
+    /// Loads the file; panics if that fails.
     #[track_caller]
     pub fn scene(&self) -> Scene {
         self.load().unwrap_or_else(|error| panic!("{error}"))
     }
 
-    /// Fails unless it is refused in a sentence with these words.
+    /// Asserts that the file is refused with a message that contains these words.
     #[track_caller]
     pub fn assert_refused(&self, words: &str) {
         let refusal = self.refusal();
         assert!(refusal.contains(words), "{refusal}");
     }
 
-    /// The sentence with which it is refused.
+    /// The message with which the file is refused.
     #[track_caller]
     pub fn refusal(&self) -> String {
         self.load().expect_err("has to be refused").to_string()
     }
 }
 
-/// Loads the bytes as a file of their own.
+/// Loads bytes as a `.glb` file.
 pub fn load_bytes(bytes: &[u8], options: &LoadOptions) -> Result<Scene> {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join("test.glb");
@@ -194,7 +194,7 @@ pub fn load_path(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Scene::load(path.to_str().expect("path is UTF-8"), options)
 }
 
-/// Fails unless one of the scene's warnings has all the parts.
+/// Asserts that one of the scene's warnings contains all parts.
 #[track_caller]
 pub fn assert_warned(scene: &Scene, parts: &[&str]) {
     let all: Vec<String> = scene.warnings.iter().map(ToString::to_string).collect();

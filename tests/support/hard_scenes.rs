@@ -1,4 +1,4 @@
-//! Scenes that estimators find hard: coarse and faceted meshes, blockers, silhouettes within one surface, grazing
+//! Scenes that are hard for estimators: coarse and faceted meshes, occluders, silhouettes within one surface, grazing
 //! light, small casters, several receivers. Metres, watts, y up; each has one light, and receivers named `floor`,
 //! `wall`, `blocker`, …
 
@@ -12,16 +12,16 @@ use nephroid::units::{Flux, Irradiance, Radiance};
 
 use crate::tools::builtin_scene;
 
-/// How normals run over a mesh.
+/// Normals of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Shading {
-    /// The exact surface's.
+    /// Normals of the exact surface.
     Smooth,
-    /// Each triangle's own.
+    /// Normals of the triangles.
     Flat,
 }
 
-/// Built-in `ring` (oracle S1) with another number of segments.
+/// Built-in `ring` (oracle S1) with a given number of segments.
 pub fn ring(segments: u32, shading: Shading) -> Scene {
     let name = format!("ring_{segments}_{shading:?}").to_lowercase();
     let mut scene = named(&name, parts::reference_scene(1.0));
@@ -39,7 +39,7 @@ pub fn ring(segments: u32, shading: Shading) -> Scene {
     scene
 }
 
-/// The ring with a box in the light's way to its far wall.
+/// The ring with a box that occludes its far wall.
 pub fn ring_with_blocker() -> Scene {
     let mut scene = ring(256, Shading::Smooth);
     blocker(
@@ -51,7 +51,7 @@ pub fn ring_with_blocker() -> Scene {
     scene
 }
 
-/// Built-in `ball` (oracle S2) of 20,480 triangles.
+/// Built-in `ball` (oracle S2) with 20,480 triangles.
 pub fn ball() -> Scene {
     let mut scene = named("ball", parts::reference_scene(0.6));
     glass_ball(&mut scene, DVec3::new(0.0, 0.8, 0.0), 0.5, 5);
@@ -71,7 +71,7 @@ pub fn ball_with_blocker() -> Scene {
     scene
 }
 
-/// A tilted torus that hides a part of itself from the lamp.
+/// A tilted torus that occludes part of itself.
 pub fn torus(material: Material) -> Scene {
     let name = format!("{}_torus", material.name);
     let mut scene = named(&name, parts::reference_scene(1.0));
@@ -90,10 +90,10 @@ pub fn torus(material: Material) -> Scene {
     scene
 }
 
-/// Waves under a sun 10 degrees above the horizon, which hide parts of one another.
+/// Waves that occlude one another under a sun 10° above the horizon.
 pub fn grazing_pool() -> Scene {
     let mut scene = named("grazing_pool", parts::reference_scene(1.0));
-    // (kx, kz, phase) of waves of 2 cm.
+    // (kx, kz, phase) of waves of 2 cm amplitude.
     let waves = [(9.0, 0.0, 1.0), (0.0, 7.0, 2.0), (6.0, 5.0, 0.0)];
     let water = shapes::sheet(320, 192, |u, v| {
         let (x, z) = (-3.0 + 5.0 * u, -1.5 + 3.0 * v);
@@ -115,7 +115,7 @@ pub fn grazing_pool() -> Scene {
     scene
 }
 
-/// A mirror bowl on its side with the lamp within: light leaves it after one reflection or several.
+/// A mirror bowl on its side with the lamp inside: light leaves it after one or several reflections.
 pub fn mirror_bowl() -> Scene {
     let mut scene = named("mirror_bowl", parts::reference_scene(1.0));
     let tilt = DMat3::from_rotation_z(2.2);
@@ -128,7 +128,7 @@ pub fn mirror_bowl() -> Scene {
     scene
 }
 
-/// A glass bowl, open above, with the lamp over its rim.
+/// A glass bowl, open at the top, with the lamp above its rim.
 pub fn glass_bowl() -> Scene {
     let mut scene = named("glass_bowl", parts::reference_scene(1.0));
     let (centre, outer_m, inner_m) = (DVec3::new(0.0, 0.65, 0.0), 0.5, 0.44);
@@ -148,7 +148,7 @@ pub fn glass_bowl() -> Scene {
     scene
 }
 
-/// A glass ball ground to 320 flat facets.
+/// A glass ball cut into 320 flat facets.
 pub fn cut_glass() -> Scene {
     let mut scene = named("cut_glass", parts::reference_scene(1.0));
     let facets = flat(&shapes::sphere(DVec3::new(0.0, 0.7, 0.0), 0.4, 2));
@@ -157,19 +157,16 @@ pub fn cut_glass() -> Scene {
     scene
 }
 
-/// Parts of [`tiny_ball`]; neither's light meets the other.
+/// Parts of [`tiny_ball`]. Light of one part does not reach the other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TinyBall {
-    /// A ball and a mirror.
     Both,
-    /// The ball alone.
     Ball,
-    /// The mirror alone.
     Mirror,
 }
 
-/// A glass ball 0.45 mm wide, a hundredth of a lattice cell at 10³ rays per steradian, beside a mirror of 0.4 m under
-/// one sun.
+/// A glass ball of 0.45 mm diameter, a hundredth of a lattice cell at 10³ rays/sr, beside a mirror of 0.4 m under one
+/// sun.
 pub fn tiny_ball(parts_of: TinyBall) -> Scene {
     let name = match parts_of {
         TinyBall::Both => "tiny_ball_and_mirror",
@@ -192,7 +189,7 @@ pub fn tiny_ball(parts_of: TinyBall) -> Scene {
     scene
 }
 
-/// A ball that lights another.
+/// A ball that is lit through another.
 pub fn balls_in_series() -> Scene {
     let mut scene = named("balls_in_series", parts::reference_scene(0.6));
     glass_ball(&mut scene, DVec3::new(0.02, 1.4, 0.0), 0.3, 4);
@@ -201,7 +198,7 @@ pub fn balls_in_series() -> Scene {
     scene
 }
 
-/// The ball over a floor, before a wall and over a table of two colours.
+/// The ball above a floor, in front of a wall, with a table below part of it.
 pub fn ball_in_a_room() -> Scene {
     let mut scene = ball();
     let wall = shapes::rectangle(DVec3::new(-0.6, 0.6, 0.0), DVec3::Z * -0.6, DVec3::Y * 0.6);
@@ -213,7 +210,7 @@ pub fn ball_in_a_room() -> Scene {
     scene
 }
 
-/// The scene with its floor turned by 30 degrees about an axis through its middle.
+/// The scene with its floor rotated by 30° about a horizontal axis through its centre.
 pub fn with_tilted_floor(mut scene: Scene) -> Scene {
     let tilt = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), PI / 6.0);
     for object in scene.objects.iter_mut().filter(|object| object.name == "floor") {
@@ -225,7 +222,7 @@ pub fn with_tilted_floor(mut scene: Scene) -> Scene {
     scene
 }
 
-/// The scene with its floor cut in two objects along x = 7 % of its half width.
+/// The scene with its floor cut into two objects at x = 7 % of its half width.
 pub fn with_cut_floor(mut scene: Scene) -> Scene {
     let floor = scene
         .objects
@@ -246,7 +243,7 @@ pub fn with_cut_floor(mut scene: Scene) -> Scene {
     scene
 }
 
-/// The mesh with corners of its own for each triangle, and the triangle's normal at each.
+/// The mesh with separate triangles and their face normals.
 pub fn flat(mesh: &Mesh) -> Mesh {
     let mut facets = Mesh::default();
     for triangle in 0..mesh.triangles.len() {
@@ -287,7 +284,7 @@ fn blocker(scene: &mut Scene, low: DVec3, high: DVec3) {
     parts::add(scene, "blocker", shapes::cuboid(low, high), material);
 }
 
-/// The lower half of a sphere: `surface` gives position and normal of a direction.
+/// The lower half of a sphere; `surface` maps a direction to position and normal.
 fn cap(columns: u32, rows: u32, surface: impl Fn(DVec3) -> (DVec3, DVec3)) -> Mesh {
     shapes::sheet(columns, rows, |u, v| {
         let (sine_u, cosine_u) = (TAU * u.fract()).sin_cos();
@@ -296,8 +293,8 @@ fn cap(columns: u32, rows: u32, surface: impl Fn(DVec3) -> (DVec3, DVec3)) -> Me
     })
 }
 
-/// A built-in scene under a square lamp of a side [m] instead of its point: it shines downwards, with the same intensity
-/// on its axis whatever its side.
+/// A built-in scene with a square panel of a given side [m] in place of its point light. The panel faces down; its
+/// intensity on the axis does not depend on the side.
 pub fn under_square_lamp(name: &str, side_m: f64) -> Scene {
     let mut scene = builtin_scene(name);
     scene.lights[0].kind = LightKind::Panel {
@@ -310,7 +307,7 @@ pub fn under_square_lamp(name: &str, side_m: f64) -> Scene {
     scene
 }
 
-/// Built-in `nephroid` under a sun as wide as ours.
+/// Built-in `nephroid` under a sun of 0.53° diameter.
 pub fn under_the_suns_disc() -> Scene {
     let mut scene = builtin_scene("nephroid");
     let diameter_rad = 0.53_f64.to_radians();
@@ -318,7 +315,7 @@ pub fn under_the_suns_disc() -> Scene {
     scene
 }
 
-/// A built-in scene whose specular materials have a roughness.
+/// A built-in scene with a given roughness of its specular materials.
 pub fn roughened(name: &str, roughness: f64) -> Scene {
     let mut scene = builtin_scene(name);
     let specular = |material: &&mut Material| material.surface.is_specular();

@@ -1,4 +1,4 @@
-//! Shared by the test binaries: scenes, meshes, files made in memory, the program in a sandbox, skips that are counted.
+//! Support for the test binaries: scenes, meshes, files in memory, a sandbox for the program, and counted skips.
 #![allow(missing_docs, clippy::missing_panics_doc)]
 
 pub mod chain_laws;
@@ -24,19 +24,18 @@ pub mod tools;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
-/// The project's folder.
 fn root() -> &'static Path {
     let support = Path::new(env!("CARGO_MANIFEST_DIR"));
     support.ancestors().nth(2).expect("tests/support lies in the project")
 }
 
-/// The folder of this build's programs; test binaries lie in its `deps`.
+/// Folder of this build's programs; test binaries are in its `deps`.
 fn build_folder() -> PathBuf {
     let test = std::env::current_exe().expect("the path of this test binary");
     test.ancestors().nth(2).expect("it lies in the build folder").to_owned()
 }
 
-/// Writes a file into the build folder's `evidence`, and says where it is.
+/// Writes a file to the folder `evidence` in the build folder; returns a message with its path.
 pub fn keep_bytes(name: &str, bytes: &[u8]) -> String {
     let folder = build_folder().join("evidence");
     std::fs::create_dir_all(&folder).expect("the build folder can be written");
@@ -45,15 +44,15 @@ pub fn keep_bytes(name: &str, bytes: &[u8]) -> String {
     format!("see {}", path.display())
 }
 
-/// A file or folder of the project; fails where it is missing.
+/// Path of a file or folder of the project, which must exist.
 pub fn project_file(path: &str) -> PathBuf {
     let full = root().join(path);
     assert!(full.exists(), "{path} is missing from the project");
     full
 }
 
-/// A file or folder of the optional collection beside the project (`oracle/`, `scenes/`, `validator/`). `None`, after
-/// a counted skip, where it is not there.
+/// Path of a file or folder in the optional collection beside the project (`oracle/`, `scenes/`, `validator/`). If it
+/// does not exist, counts a skip and returns `None`.
 pub fn shared_or_skip(path: &str) -> Option<PathBuf> {
     let full = root().join("../shared").join(path);
     if full.exists() {
@@ -64,10 +63,11 @@ pub fn shared_or_skip(path: &str) -> Option<PathBuf> {
     None
 }
 
-/// Says that a test was skipped and why, past the test harness's capture, so that `tests/run` counts it.
+/// Reports a skipped test and the reason. Bypasses the output capture of the test harness, so that `tests/run` counts
+/// the skip.
 ///
 /// # Panics
-/// With CI=true.
+/// If CI=true, which allows no skips.
 pub fn skip(test: &str, reason: &str) {
     assert!(
         std::env::var("CI").as_deref() != Ok("true"),
@@ -76,7 +76,7 @@ pub fn skip(test: &str, reason: &str) {
     let _ = writeln!(std::io::stderr(), "skipped: {test}: {reason}");
 }
 
-/// What it holds, or the end of a test whose skip was counted.
+/// The value of an option, or return from a test whose skip is counted.
 #[macro_export]
 macro_rules! or_skip {
     ($option:expr) => {
@@ -87,7 +87,8 @@ macro_rules! or_skip {
     };
 }
 
-/// How a law is tried: many cases, the same ones in every run, so that a failure can be looked at.
+/// Configuration of a property test: a fixed seed, so that every run tries the same cases and failures are
+/// reproducible.
 pub fn law(cases: u32) -> proptest::test_runner::Config {
     proptest::test_runner::Config {
         cases,
@@ -97,7 +98,7 @@ pub fn law(cases: u32) -> proptest::test_runner::Config {
     }
 }
 
-/// Fails unless two values agree to a relative tolerance (absolute where the expected one is zero).
+/// Asserts that two values agree to a relative tolerance, or an absolute one if `expected` is 0.
 #[track_caller]
 pub fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
     let scale = if expected == 0.0 { 1.0 } else { expected.abs() };
@@ -107,8 +108,8 @@ pub fn assert_close(actual: f64, expected: f64, tolerance: f64, what: &str) {
     );
 }
 
-/// A reference map of `assets/reference` by its scene's name: 256×256 values [W/m²], row 0 first. PFM as the solver
-/// writes it: little-endian, one channel, rows in the map's own order.
+/// Reference map of a scene in `assets/reference`: 256×256 values [W/m²], row 0 first. The files are PFM as the
+/// solver writes it: little-endian, one channel, rows in the map's own order.
 pub fn reference_map(name: &str) -> Vec<f64> {
     let path = project_file(&format!("assets/reference/{name}.pfm"));
     let bytes = std::fs::read(path).expect("a readable reference");

@@ -1,10 +1,10 @@
-//! Meshes and small scenes that the tests share.
+//! Meshes shared by the tests.
 
 use glam::{DMat3, DVec2, DVec3};
 use nephroid::scene::Mesh;
 
-/// Parallelogram with a corner and two sides; faces side_u × side_v turned over, so that u × v = −normal as on the
-/// floors of the reference scenes. TEXCOORD_0 runs 0..1 along the sides.
+/// A parallelogram with a corner and two sides. It faces −(side_u × side_v), so that u × v = −normal as on the floors
+/// of the reference scenes. TEXCOORD_0 runs from 0 to 1 along the sides.
 pub fn quad(corner: DVec3, side_u: DVec3, side_v: DVec3) -> Mesh {
     let normal = side_v.cross(side_u).normalize();
     Mesh {
@@ -17,7 +17,7 @@ pub fn quad(corner: DVec3, side_u: DVec3, side_v: DVec3) -> Mesh {
     }
 }
 
-/// The square |x|, |z| ≤ half of the plane y = height, facing up.
+/// The square |x|, |z| ≤ half in the plane y = height, facing up.
 pub fn floor(half: f64, height: f64) -> Mesh {
     quad(
         DVec3::new(-half, height, -half),
@@ -26,7 +26,7 @@ pub fn floor(half: f64, height: f64) -> Mesh {
     )
 }
 
-/// A surface r(s, t) over a grid of the unit square, s and t included, facing ∂r/∂s × ∂r/∂t.
+/// A grid over the surface r(s, t), s and t in [0, 1], facing ∂r/∂s × ∂r/∂t.
 pub fn grid(columns: usize, rows: usize, place: impl Fn(f64, f64) -> DVec3) -> Mesh {
     let mut mesh = Mesh::default();
     for row in 0..=rows {
@@ -58,13 +58,13 @@ pub fn grid(columns: usize, rows: usize, place: impl Fn(f64, f64) -> DVec3) -> M
     mesh
 }
 
-/// A ball, facing outwards; its normals are the exact ones.
+/// A sphere, facing outwards, with exact normals.
 pub fn sphere(centre: DVec3, radius: f64, columns: usize, rows: usize) -> Mesh {
     let mut mesh = grid(columns, rows, |s, t| {
         let (phi, theta) = (s * std::f64::consts::TAU, (1.0 - t) * std::f64::consts::PI);
         centre + radius * DVec3::new(theta.sin() * phi.cos(), -theta.cos(), theta.sin() * phi.sin())
     });
-    // Exactly closed: the seam and the poles meet bit for bit.
+    // Watertight: vertices at the seam and at the poles are equal bit for bit.
     let stride = columns + 1;
     for row in 0..=rows {
         mesh.positions[row * stride + columns] = mesh.positions[row * stride];
@@ -81,7 +81,7 @@ pub fn sphere(centre: DVec3, radius: f64, columns: usize, rows: usize) -> Mesh {
     mesh
 }
 
-/// A box of six split faces, facing outwards.
+/// A box with separate faces, facing outwards.
 pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
     let size = high - low;
     let (x, y, z) = (DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
@@ -98,7 +98,7 @@ pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
     mesh
 }
 
-/// Both meshes as one; coordinates only where both have them.
+/// Both meshes as one; texture coordinates are kept only if both have them.
 pub fn joined(mut a: Mesh, b: Mesh) -> Mesh {
     let offset = a.positions.len() as u32;
     a.positions.extend(b.positions);
@@ -114,7 +114,7 @@ pub fn joined(mut a: Mesh, b: Mesh) -> Mesh {
     a
 }
 
-/// Rotated about the origin, then moved.
+/// The mesh rotated about the origin, then translated.
 pub fn moved(mut mesh: Mesh, rotation: DMat3, offset: DVec3) -> Mesh {
     for position in &mut mesh.positions {
         *position = rotation * *position + offset;

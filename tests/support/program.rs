@@ -1,4 +1,4 @@
-//! Runs the program in a folder of its own.
+//! Runs the program in a sandbox.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -6,18 +6,18 @@ use std::process::{Command, Output, Stdio};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// An empty folder in which the program runs, and one for what it and its drivers keep; both removed at the end.
+/// An empty working folder for the program, and a cache folder for it and its drivers. Both are removed at the end.
 pub struct Sandbox {
     folder: TempDir,
     cache: TempDir,
 }
 
-/// The program of this build.
+/// Path of this build's program.
 pub fn program() -> PathBuf {
     crate::build_folder().join(format!("nephroid{}", std::env::consts::EXE_SUFFIX))
 }
 
-/// How a run ended.
+/// Result of a run.
 #[derive(Debug)]
 pub struct Run {
     pub code: i32,
@@ -41,7 +41,7 @@ impl Sandbox {
         path
     }
 
-    /// A one-channel PFM; the values are stored in their order.
+    /// Writes a one-channel PFM, row by row.
     pub fn write_pfm(&self, name: &str, width: usize, height: usize, value: impl Fn(usize, usize) -> f32) {
         let mut bytes = format!("Pf\n{width} {height}\n-1.0\n").into_bytes();
         for row in 0..height {
@@ -52,13 +52,13 @@ impl Sandbox {
         self.write(name, bytes);
     }
 
-    /// The program, ready to start here, without a display.
+    /// A command that starts the program in the sandbox, without a display.
     pub fn command(&self, arguments: &[&str]) -> Command {
         let mut command = Command::new(program());
         command
             .args(arguments)
             .current_dir(self.folder.path())
-            // Without it, libraries of the window system complain on stderr.
+            // Without this variable, libraries of the window system print warnings to stderr.
             .env("XDG_RUNTIME_DIR", self.folder.path())
             .env("XDG_CACHE_HOME", self.cache.path())
             .stdin(Stdio::null());
@@ -68,13 +68,13 @@ impl Sandbox {
         command
     }
 
-    /// Runs it, arguments separated by spaces.
+    /// Runs the program with arguments separated by spaces.
     pub fn run(&self, line: &str) -> Run {
         let arguments: Vec<&str> = line.split_whitespace().collect();
         Run::from(self.command(&arguments).output().expect("the program starts"))
     }
 
-    /// Runs it and expects success.
+    /// Runs the program and asserts success.
     #[track_caller]
     pub fn succeed(&self, line: &str) -> Run {
         let run = self.run(line);
@@ -82,12 +82,12 @@ impl Sandbox {
         run
     }
 
-    /// Where the program keeps what took long to make.
+    /// The program's cache folder.
     pub fn cache(&self) -> PathBuf {
         self.cache.path().join("nephroid")
     }
 
-    /// Names of the files in a folder, sorted; none where there is no such folder.
+    /// Sorted names of the files in a folder; empty if it does not exist.
     pub fn files(&self, folder: impl AsRef<Path>) -> Vec<String> {
         names(&self.folder.path().join(folder))
     }
@@ -108,13 +108,13 @@ impl From<Output> for Run {
 }
 
 impl Run {
-    /// The one JSON document that stdout is.
+    /// Parses stdout as one JSON document.
     #[track_caller]
     pub fn json(&self) -> Value {
         serde_json::from_str(&self.stdout).unwrap_or_else(|error| panic!("{error}: {}", self.stdout))
     }
 
-    /// Expects that exit code, nothing on stdout, and one sentence on stderr with every one of these words.
+    /// Asserts the exit code, empty stdout, and one sentence on stderr that contains all these words.
     #[track_caller]
     pub fn failed_in_one_sentence(&self, code: i32, words: &[&str]) {
         assert_eq!(self.code, code, "{}", self.stderr);
@@ -141,7 +141,7 @@ pub fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or_else(|| panic!("{value} is no number"))
 }
 
-/// Names in a folder, sorted; none where there is no such folder.
+/// Sorted names in a folder; empty if it does not exist.
 pub fn names(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten();
     let name = |entry: std::io::Result<std::fs::DirEntry>| entry.expect("it can be listed").file_name();

@@ -1,4 +1,4 @@
-//! Random scenes: a floor, up to three casters, some of them sealed, up to three walls, up to three lamps.
+//! Random scenes: a floor, one to three casters, some of them enclosed, up to three walls, one to three lamps.
 
 use glam::{DQuat, DVec3};
 use nephroid::optics::LinearSrgb;
@@ -8,10 +8,10 @@ use nephroid::units::{Flux, Irradiance, RadiantIntensity};
 
 use crate::laws::scenes::{Build, floor, light, random};
 
-/// Lamps of a scene, at most.
+/// Largest number of lamps in a scene.
 pub const MAX_LAMPS: u32 = 3;
 
-/// One of many scenes.
+/// The random scene of a seed.
 pub fn scene(seed: u64) -> Scene {
     let mut dice = Dice(random(0xeffec7 ^ seed << 20));
     let mut scene = floor(1.0);
@@ -81,7 +81,7 @@ impl<F: FnMut() -> f64> Dice<F> {
             _ => (shapes::cuboid(centre - size, centre + size), self.glass()),
         };
         let scene = scene.with("caster", mesh, material);
-        // Sealed, now and then.
+        // One caster in four is enclosed in a diffuse box.
         if self.below(4) > 0 {
             return scene;
         }

@@ -1,4 +1,4 @@
-//! The built-in scenes with maps of an independent solver (`assets/reference`), and how near bakes come to them.
+//! Built-in scenes with maps of an independent solver (`assets/reference`), and the required agreement of bakes.
 
 use nephroid::illumination::compare::{average_relative_difference, relative_rmse};
 use nephroid::scene::Scene;
@@ -7,21 +7,21 @@ use nephroid::bake::Bake;
 use crate::tools::{caustic, energy_fault, map_of};
 use crate::{assert_close, reference_map};
 
-/// A density [1/sr] and the largest relative RMSE with it, on maps of 256×256.
+/// Ray density [rays/sr] and the largest relative RMSE at that density, for maps of 256×256.
 pub type Agreement = (f64, f64);
 
 pub struct Reference {
     pub builtin: &'static str,
     pub file: &'static str,
     pub by_wavefronts: Agreement,
-    /// Largest mean relative difference of wavefronts.
+    /// Limit of the mean relative difference of wavefronts.
     pub mean_difference: f64,
     pub by_splats: Option<Agreement>,
-    /// Watts on the floor.
+    /// Flux on the floor [W].
     pub floor_w: f64,
-    /// Watts that left the scene, where the solver says so.
+    /// Flux that leaves the scene [W], if the solver reports it.
     pub escaped_w: Option<f64>,
-    /// Whether a sun shines, whose irradiance does not fall with the scene's size.
+    /// Whether the light is a sun, whose irradiance does not depend on the size of the scene.
     pub has_sun: bool,
 }
 
@@ -90,8 +90,8 @@ pub fn references() -> [Reference; 7] {
 }
 
 impl Reference {
-    /// Fails unless a bake of the scene, `size` times as large, has the solver's map within an error, and its watts within a
-    /// share.
+    /// Asserts that a bake of the scene, scaled by `size`, agrees with the solver: the map to a relative RMSE, the
+    /// flux to a relative error.
     pub fn check(&self, result: &Bake, scene: &Scene, size: f64, (most, share): (f64, f64)) {
         let name = self.builtin;
         let irradiance = if self.has_sun { 1.0 } else { 1.0 / (size * size) };
@@ -115,7 +115,7 @@ impl Reference {
         }
     }
 
-    /// Fails unless few rays of wavefronts are enough, here and everywhere on the map.
+    /// Asserts that wavefronts agree with the solver, also on average over the texels, with few rays.
     pub fn check_wavefronts(&self, result: &Bake, scene: &Scene) {
         let name = self.builtin;
         self.check(result, scene, 1.0, (self.by_wavefronts.1, 0.001));

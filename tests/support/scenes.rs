@@ -1,4 +1,4 @@
-//! Small scenes that the tests share.
+//! Small scenes and pictures shared by the tests.
 
 use std::sync::Arc;
 
@@ -44,7 +44,7 @@ pub fn surface(surface: SurfaceKind, ior: f64) -> Material {
     }
 }
 
-/// Lambert of an albedo.
+/// A Lambertian surface with an albedo.
 pub fn diffuse(albedo: f64) -> Material {
     Material {
         base_colour: LinearSrgb::grey(albedo),
@@ -76,7 +76,7 @@ pub fn sun(direction: DVec3, normal_irradiance: f64) -> Light {
     })
 }
 
-/// The chart of an object of a tracer's scene.
+/// The chart of an object in a tracer's scene.
 pub fn chart(tracer: &Tracer, object: usize, width: usize, height: usize) -> Chart {
     parametrise(object, tracer.scene().objects[object].mesh_in_scene(), DEFAULT_NOMINAL_SIDE)
         .expect("the object has area")
@@ -93,7 +93,7 @@ pub fn direct(tracer: &Tracer, chart: &Chart) -> DirectLayer {
     layer
 }
 
-/// Flux on a whole surface [W], by the first channel.
+/// Flux on the whole surface in the first channel [W].
 pub fn flux_w(chart: &Chart, layer: &DirectLayer) -> f64 {
     layer
         .irradiance
@@ -103,7 +103,7 @@ pub fn flux_w(chart: &Chart, layer: &DirectLayer) -> f64 {
         .sum()
 }
 
-/// A map of one layer.
+/// A map with one layer.
 pub fn map_of(chart: impl Into<Arc<Chart>>, irradiance: Vec<[f32; 3]>) -> IlluminationMap {
     IlluminationMap {
         chart: chart.into(),
@@ -117,12 +117,12 @@ pub fn map_of(chart: impl Into<Arc<Chart>>, irradiance: Vec<[f32; 3]>) -> Illumi
     }
 }
 
-/// A view before a black background, without a tone map.
+/// A view with a black background and without tone mapping.
 pub fn view(eye: DVec3, target: DVec3, fov_rad: f64, size: [u32; 2]) -> View {
     view_of(Camera::look_at("eye", eye, target, fov_rad), size)
 }
 
-/// The view of a camera before a black background, without a tone map.
+/// A camera's view with a black background and without tone mapping.
 pub fn view_of(camera: Camera, size: [u32; 2]) -> View {
     View {
         tone_map: ToneMap::None,
@@ -130,7 +130,7 @@ pub fn view_of(camera: Camera, size: [u32; 2]) -> View {
     }
 }
 
-/// The CPU's picture and the rays that it took.
+/// The picture of the CPU eye pass and the rays traced for it.
 pub fn seen(
     tracer: &Tracer,
     maps: &[IlluminationMap],
@@ -140,13 +140,13 @@ pub fn seen(
     render_counted(tracer, maps, view, settings, &(), &Control::default()).expect("nobody cancels")
 }
 
-/// The bits of a picture: pictures are the same only where these are.
+/// The bits of a picture, for exact comparison.
 pub fn bits(picture: &Picture) -> Vec<u32> {
     let channels = picture.radiance.iter().flatten();
     channels.map(|channel| channel.to_bits()).collect()
 }
 
-/// The middles of a square picture's pixels or of a square map's texels, in the unit square, row by row.
+/// Centres of the pixels of a square picture, or of the texels of a square map, in the unit square, row by row.
 pub fn middles(side: usize) -> impl Iterator<Item = DVec2> {
     let at = move |index: usize| (index as f64 + 0.5) / side as f64;
     (0..side * side).map(move |index| DVec2::new(at(index % side), at(index / side)))

@@ -1,12 +1,12 @@
-//! What a loaded scene promises.
+//! Validity of loaded scenes.
 
 use nephroid::scene::{Camera, Light, LightKind, Material, Object, Scene, Texture};
 
-/// Whether something is kept, and what is wrong where it is not.
+/// Whether a condition holds, and what is wrong if not.
 type Promise = (bool, &'static str);
 
-/// The first promise of [`Scene`] that one breaks, if there is one: every number finite, every index valid, normals and
-/// directions unit.
+/// The first condition that a scene violates: every number is finite, every index valid, every normal and direction
+/// unit.
 pub fn scene_fault(scene: &Scene) -> Option<String> {
     let fault = |name: &str, promises: &[Promise]| {
         let broken = promises.iter().find(|(is_kept, _)| !is_kept);

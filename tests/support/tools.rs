@@ -1,4 +1,4 @@
-//! Bakes with little ceremony, and checks that are themselves tested with wrong input.
+//! Short forms for bakes, and checks that are themselves tested with wrong input.
 
 use std::sync::Arc;
 
@@ -11,18 +11,18 @@ use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, MapRes
 use nephroid::study::brute_force::brute_force;
 use nephroid::transport::Tracer;
 
-/// A built-in scene that must exist.
+/// A built-in scene, which must exist.
 pub fn builtin_scene(name: &str) -> Scene {
     builtin::build(name).unwrap_or_else(|| panic!("there is no built-in scene {name}"))
 }
 
-/// Settings with one of them changed.
+/// Settings with one change.
 pub fn set(mut settings: BakeSettings, change: impl FnOnce(&mut BakeSettings)) -> BakeSettings {
     change(&mut settings);
     settings
 }
 
-/// An estimator at a density [1/sr], for targets in relative RMSE, with maps of `side` texels each way.
+/// Settings of an estimator at a density [rays/sr], with relative RMSE as the metric and maps of side² texels.
 fn by(estimator: Estimator, density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {
         density_per_sr,
@@ -35,17 +35,17 @@ fn by(estimator: Estimator, density_per_sr: f64, side: usize) -> BakeSettings {
     }
 }
 
-/// Default settings of splats at a density [rays/sr] and a map side.
+/// Splats at a density [rays/sr], with maps of side² texels.
 pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
     by(Estimator::Splat, density_per_sr, side)
 }
 
-/// The same of wavefronts.
+/// Wavefronts at a density [rays/sr], with maps of side² texels.
 pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
     by(Estimator::Wavefront, density_per_sr, side)
 }
 
-/// The same of photons, unfiltered.
+/// Photons at a density [rays/sr] without filtering, with maps of side² texels.
 pub fn photons(density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {
         filter: Some(false),
@@ -53,13 +53,12 @@ pub fn photons(density_per_sr: f64, side: usize) -> BakeSettings {
     }
 }
 
-/// Bakes a scene to the end.
 pub fn bake(scene: Scene, settings: &BakeSettings) -> Bake {
     let mut session = Baker::new(Arc::new(scene)).expect("a session");
     session.bake(settings, &(), &Control::default()).expect("a bake")
 }
 
-/// The map of the object of that name.
+/// The map of the named object, which must exist.
 pub fn map_of<'a>(result: &'a Bake, scene: &Scene, name: &str) -> &'a IlluminationMap {
     result
         .maps
@@ -68,7 +67,7 @@ pub fn map_of<'a>(result: &'a Bake, scene: &Scene, name: &str) -> &'a Illuminati
         .unwrap_or_else(|| panic!("{name} received no light"))
 }
 
-/// Luminance of the caustic layer [W/m²].
+/// Luminance of the caustic layer for each texel [W/m²].
 pub fn caustic(map: &IlluminationMap) -> Vec<f64> {
     let layer = map.layer(LayerKind::Caustic).expect("a caustic layer");
     layer
@@ -80,8 +79,8 @@ pub fn caustic(map: &IlluminationMap) -> Vec<f64> {
         .collect()
 }
 
-/// The first fault of a bake's energy, if there is one: a ledger that does not close to 1e-6, or maps that do not hold
-/// what the ledgers say was deposited (to 1e-6; maps are single precision).
+/// The first fault in the energy balance of a bake: a ledger that does not close, or maps whose flux differs from the
+/// flux deposited according to the ledgers. Both tolerances are 1e-6, as maps are in single precision.
 pub fn energy_fault(result: &Bake) -> Option<String> {
     for ledger in &result.ledgers {
         let imbalance = ledger.energy_w.relative_imbalance();
@@ -107,7 +106,8 @@ pub fn energy_fault(result: &Bake) -> Option<String> {
         .then(|| format!("the maps hold {held} W, the ledgers say {deposited} W"))
 }
 
-/// The scene turned or mirrored, scaled about the origin, then moved. Lights keep their strength, and skies their place.
+/// The scene rotated or mirrored, scaled about the origin, then translated. Lights keep their strength, skies their
+/// orientation.
 pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3) -> Scene {
     let place = |p: DVec3| rotation * p * scale + offset;
     let turned = |direction: DVec3| (rotation * direction).normalize();
@@ -117,7 +117,7 @@ pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3)
         mesh.positions.iter_mut().for_each(|p| *p = place(*p));
         mesh.normals.iter_mut().for_each(|n| *n = turned(*n));
         if is_mirrored {
-            // Outsides stay outside.
+            // Keeps the outsides of surfaces outside.
             mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
         }
     }
@@ -153,7 +153,7 @@ pub fn transformed(mut scene: Scene, rotation: DMat3, scale: f64, offset: DVec3)
     scene
 }
 
-/// The bits of all layers of a map: maps are the same only where these are.
+/// The bits of all layers of a map, for exact comparison.
 pub fn bits(map: &IlluminationMap) -> Vec<u32> {
     map.layers
         .iter()
@@ -163,7 +163,7 @@ pub fn bits(map: &IlluminationMap) -> Vec<u32> {
         .collect()
 }
 
-/// A scene's maps by brute force.
+/// A brute-force reference bake of a scene.
 pub fn brute(scene: &Scene, settings: &BakeSettings, rays: u64) -> Bake {
     let tracer = Tracer::new(Arc::new(scene.clone()));
     brute_force(&tracer, settings, rays, &(), &Control::default()).expect("a reference")

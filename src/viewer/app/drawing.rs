@@ -21,7 +21,7 @@ use crate::viewer::panel::{Display, Quantity};
 use crate::viewer::timing::FrameStats;
 
 impl App {
-    /// Draws what changed of the picture: maps, exposure, view.
+    /// Uploads what has changed and draws the picture if its view, maps or quality changed.
     pub(super) fn draw_picture(&mut self) -> Result<()> {
         let Some(mut view) = self.view() else {
             return Ok(());
@@ -32,7 +32,7 @@ impl App {
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
-        // Played by the processor, shadow rays take longer than the next bake.
+        // On a software rasterizer, shadow rays take longer than the next bake.
         let traces_lights = self.model.traces_lights() && !graphics.gpu().is_software();
         let wanted_maps = MapsOnDevice {
             shown: self.shown,
@@ -87,7 +87,7 @@ impl App {
             dispersion: self.model.choices.settings.effects.get(Effect::Dispersion),
             white_balance,
         })?;
-        // Measuring the exposure and drawing would take them in without a word.
+        // Must come before `expose` and drawing, which would collect the times without reporting them.
         if let Some(ms) = graphics.take_times() {
             if let Some(quality) = graphics.counts().timed_quality {
                 self.pace.learn(ms, quality);
@@ -114,7 +114,7 @@ impl App {
         Ok(())
     }
 
-    /// Makes the picture of a view at rest better, as long as nothing else is to be done.
+    /// Refines the picture while the camera rests and no bake runs.
     pub(super) fn refine_picture(&mut self, view: &View) -> Result<()> {
         let is_busy = self.model.state.is_working() || self.model.navigator.is_moving();
         let Some(graphics) = self.graphics.as_mut().filter(|_| !is_busy) else {
@@ -135,7 +135,7 @@ impl App {
         Ok(())
     }
 
-    /// Chooses the exposure. The maps of the first bake may change it, until the user does.
+    /// Measures and adjusts the exposure. The maps of the first bake may change it until the user does.
     fn expose(&mut self, view: &mut View, has_new_maps: bool) -> Result<()> {
         let (model, mut shown) = (&mut self.model, view.exposure_stops);
         let since = std::mem::replace(&mut self.exposed, Instant::now()).elapsed();
@@ -158,12 +158,11 @@ impl App {
         Ok(())
     }
 
-    /// Whether the exposure is on its way.
     pub(super) fn is_exposing(&self) -> bool {
         self.exposure.is_moving(self.model.choices.display.exposure_stops)
     }
 
-    /// What the picture is to show; `None` while it has no area.
+    /// The view that the picture is to show; `None` while the picture has no area.
     pub(super) fn view(&self) -> Option<View> {
         let graphics = self.graphics.as_ref()?;
         let scale = graphics.window().scale_factor() as f32;
@@ -172,7 +171,7 @@ impl App {
         let (width, height) = (pixels(size.x), pixels(size.y));
         let display = match self.model.quantity() {
             Quantity::Light => self.model.choices.display,
-            // Colours of a legend are shown as they are.
+            // False colours must be shown unchanged to match their legend.
             _ => Display {
                 exposure_stops: 0.0,
                 tone_map: ToneMap::None,
@@ -189,7 +188,7 @@ impl App {
         })
     }
 
-    /// Looks what the picture that is shown takes.
+    /// Reports whether chains are drawn, and collects GPU times.
     pub(super) fn report_chains(&mut self) {
         let (Some(view), switch) = (self.view(), self.chains_switch()) else {
             return;
@@ -212,7 +211,7 @@ impl App {
         };
     }
 
-    /// Tells the panel how the picture was made, and the user once where chains cannot be had.
+    /// Reports how the picture was rendered, and tells the user once if chains are not available.
     pub(super) fn report_making(&mut self) {
         let Some(graphics) = &self.graphics else { return };
         let (counts, quality) = (graphics.counts(), graphics.quality());
@@ -235,7 +234,7 @@ impl App {
         }
     }
 
-    /// What radiance is multiplied by before tone mapping; colours of a legend are shown as they are.
+    /// White balance of the picture; false colours must be shown unchanged to match their legend.
     pub(super) fn white_balance(&self) -> Matrix3 {
         let chosen = match self.model.quantity() {
             Quantity::Light => self.model.choices.display.white_balance,
@@ -249,12 +248,12 @@ impl App {
     }
 }
 
-/// Pixels across of the picture that shaders are compiled for.
+/// Width of the picture that shaders are compiled with [pixels].
 const WARM_UP_WIDTH: u32 = 64;
 
-/// Whether mirrors and glass may be drawn: what they take is compiled beside the window, seconds where the driver has it in
-/// no cache. A device of its own draws the view once, small. Drivers compile at the latest then, and keep what they compiled
-/// for every device.
+/// Compiles the shaders for chains on a thread, because that can take seconds if the driver has not cached them. A
+/// device of its own draws the view once at a small size, which forces compilation; drivers share their cache between
+/// devices. Until then the window draws no chains.
 #[derive(Debug)]
 pub struct WarmUp {
     work: Background<(), Result<()>>,
@@ -263,7 +262,7 @@ pub struct WarmUp {
 }
 
 impl WarmUp {
-    /// Nothing is compiled; the window is woken when it is.
+    /// Nothing is compiled yet. `wake` is called when it is.
     pub fn new(wake: &Wake) -> Self {
         Self {
             work: Background::new("shaders", wake),
@@ -272,7 +271,7 @@ impl WarmUp {
         }
     }
 
-    /// Begins with the second picture of light, so that the first one waits for nothing.
+    /// Starts with the second lit picture, so that the first one does not wait.
     pub fn begin(&mut self, scene: &Arc<Scene>, view: &View, quality: EyeQuality) {
         let was_lit = std::mem::replace(&mut self.is_lit, true);
         if !was_lit || self.is_done || self.is_coming() {
@@ -288,12 +287,11 @@ impl WarmUp {
         self.is_done = started.is_err();
     }
 
-    /// Whether it is under way.
     pub fn is_coming(&self) -> bool {
         self.work.of().is_some()
     }
 
-    /// How chains are switched in the window, where `wanted` is asked for.
+    /// The switch for chains to use now if `wanted` is set: off until the shaders are compiled.
     pub fn switch(&mut self, wanted: EffectSwitch) -> EffectSwitch {
         if let Some((_, outcome)) = self.work.take() {
             self.is_done = true;

@@ -13,7 +13,7 @@ use crate::viewer::files::{Choice, LoadPurpose, NO_DIALOG, free_names, working_f
 use crate::viewer::model::Model;
 use crate::viewer::panel::Quantity;
 
-/// Shown first for a file without light.
+/// Notice for a file without light.
 pub(super) fn dark_notice(model: &Model) -> Option<String> {
     let loaded = model.edits().loaded();
     was_dark(loaded).then(|| {
@@ -28,13 +28,13 @@ pub(super) fn dark_notice(model: &Model) -> Option<String> {
 }
 
 impl App {
-    /// Shows what was chosen, read or written since the last frame.
+    /// Handles chosen, loaded and saved files since the last frame.
     pub(super) fn poll_files(&mut self) {
         match self.dialog.take() {
             Some((Choice::Open, Some(path))) => self.model.open(&path.display().to_string()),
             Some((Choice::SaveScene, Some(path))) => self.save_scene_as(path),
             Some((Choice::Open, None)) => self.model.files.refusal = Some(NO_DIALOG.to_owned()),
-            // Beside the original it is found again, and the notice says where.
+            // Saved next to the original, where it is easily found; the notice names the path.
             Some((Choice::SaveScene, None)) => {
                 let original = self.original();
                 let stem = original.file_stem().unwrap_or_default().to_string_lossy();
@@ -54,7 +54,7 @@ impl App {
         }
     }
 
-    /// Asks for a file in the system's own dialog.
+    /// Opens the system's file dialog.
     pub(super) fn ask_for_file(&mut self, choice: Choice) {
         let original = self.original();
         if let Some(graphics) = &self.graphics {
@@ -62,14 +62,13 @@ impl App {
         }
     }
 
-    /// A file was dropped on the window.
     pub(super) fn drop_file(&mut self, path: &Path) {
         self.notice = None;
         self.model.open(&path.display().to_string());
         self.request_redraw();
     }
 
-    /// The file that the scene in the window was read from.
+    /// Path of the present scene.
     fn original(&self) -> PathBuf {
         PathBuf::from(&self.model.edits().loaded().source)
     }
@@ -98,7 +97,7 @@ impl App {
         self.notice = Some(sentence.to_owned());
     }
 
-    /// The window shows another scene than before, or the same read again.
+    /// Updates the window after another scene was loaded or the same one reloaded.
     fn begin_scene(&mut self, purpose: LoadPurpose) {
         if purpose == LoadPurpose::Open {
             self.notice = dark_notice(&self.model);
@@ -110,7 +109,7 @@ impl App {
         }
     }
 
-    /// Writes the picture to files in the working folder, and tells where over the picture.
+    /// Writes the picture to files in the working folder, and shows their paths.
     pub(super) fn save_picture(&mut self) {
         let saved = self.written_picture();
         self.tell_saved(saved);
@@ -128,7 +127,7 @@ impl App {
         };
         let picture = graphics.radiance(&view)?;
         let folder = working_folder();
-        // False colours are no radiance.
+        // False colours are not radiance.
         let has_radiance = self.model.quantity() == Quantity::Light;
         let scene = &self.model.scene().name;
         exporting::save_picture(&folder, scene, &picture, &view, &white_balance, has_radiance)

@@ -14,10 +14,10 @@ use crate::viewer::gizmo::{self, GizmoTarget};
 use crate::viewer::lens::Viewport;
 use crate::viewer::navigation::{BOOKMARKS, HeldKeys, NavigationMode};
 
-/// A press that moves farther than this before it is let go is no click [pixels].
+/// A press that moves farther than this is a drag, not a click [pixels].
 const CLICK_PIXELS: f64 = 4.0;
 
-/// What a way to get about means, when it was chosen.
+/// Explains a navigation mode when it was chosen.
 fn travel_notice(travel: NavigationMode) -> String {
     match travel {
         NavigationMode::Fly => "Flying: W A S D E Q, through walls too.",
@@ -41,7 +41,7 @@ impl App {
         self.fly();
         let is_chord = self.modifiers.control_key() || self.modifiers.super_key();
         if is_chord && event.state.is_pressed() {
-            // Nothing flies or bakes by a chord.
+            // Shortcuts with Ctrl do not also move the camera or start a bake.
             return self.on_chord(&event.logical_key);
         }
         if let PhysicalKey::Code(code) = event.physical_key
@@ -60,10 +60,10 @@ impl App {
         }
     }
 
-    /// Does what a key stands for while Ctrl is held.
+    /// Handles a key pressed together with Ctrl.
     fn on_chord(&mut self, key: &Key) {
         match key {
-            // What was held before goes on, more slowly.
+            // Ctrl alone slows the motion of the keys held before.
             Key::Named(NamedKey::Control) => self.model.navigator.keys.creep = true,
             Key::Character(letter) => match letter.to_lowercase().as_str() {
                 "z" if !self.modifiers.shift_key() => self.pressed.push(Command::Undo),
@@ -80,7 +80,7 @@ impl App {
         }
     }
 
-    /// Does what the letter on a key stands for.
+    /// Handles a letter key.
     fn on_letter(&mut self, letter: &str) {
         match letter {
             "c" => drop(self.model.navigator.next_camera().map(str::to_owned)),
@@ -117,7 +117,7 @@ impl App {
         }
     }
 
-    /// Lets go of the gaze, or of what has handles, or of the bake.
+    /// Stops mouse look, else deselects, else cancels the bake.
     fn let_go(&mut self) {
         if self.looking_from.is_some() {
             self.stop_looking();
@@ -145,7 +145,7 @@ impl App {
     }
 
     fn on_left_press(&mut self) {
-        // What egui has under the pointer, handles included, is not for what is behind it.
+        // egui widgets and handles under the pointer take the click.
         if !self.is_over_picture() || self.gizmo.is_hot() {
             return;
         }
@@ -170,7 +170,7 @@ impl App {
         let Some((lens, place)) = self.pointed(&camera) else {
             return;
         };
-        // Lights are marked only beside handles.
+        // Lights are drawn, and can be clicked, only while there are handles.
         let marks = self.model.choices.selection.held().is_some();
         let light = gizmo::light_at(&lens, self.model.scene(), place).filter(|_| marks);
         let gaze = lens.gaze(place);
@@ -193,7 +193,7 @@ impl App {
         }
     }
 
-    /// As the picture shows the scene.
+    /// The camera of the picture.
     fn camera(&self) -> Camera {
         let aspect = f64::from(self.picture_rect.aspect_ratio());
         self.model.navigator.camera_for(aspect)
@@ -205,13 +205,13 @@ impl App {
         Some(egui::pos2(points(self.pointer.x), points(self.pointer.y)))
     }
 
-    /// The picture, and where the pointer is in it.
+    /// The viewport, and the pointer's position in the window [points].
     fn pointed<'a>(&self, camera: &'a Camera) -> Option<(Viewport<'a>, egui::Pos2)> {
         let picture = self.picture_rect;
         Some((Viewport { camera, picture }, self.pointer_points()?))
     }
 
-    /// The ray from the eye through the pointer.
+    /// The view ray under the pointer.
     fn gaze(&self) -> Option<Ray> {
         let camera = self.camera();
         self.pointed(&camera).map(|(lens, place)| lens.gaze(place))
@@ -226,7 +226,7 @@ impl App {
         }
     }
 
-    /// Whether the pointer is on the picture and not on a list or text that lies over it.
+    /// Whether the pointer is over the picture and not over a widget in front of it.
     pub(super) fn is_over_picture(&mut self) -> bool {
         let (Some(place), Some(graphics)) = (self.pointer_points(), &mut self.graphics) else {
             return false;
@@ -240,7 +240,7 @@ impl App {
         self.looking_from = Some(self.pointer);
         if let Some(graphics) = &self.graphics {
             let window = graphics.window();
-            // Where neither is to be had, the movements still come; the pointer just leaves the window.
+            // If the system supports neither mode, mouse movements still arrive; only the pointer leaves the window.
             let _ = window
                 .set_cursor_grab(CursorGrabMode::Locked)
                 .or_else(|_| window.set_cursor_grab(CursorGrabMode::Confined));
@@ -253,7 +253,7 @@ impl App {
             && let Some(graphics) = &self.graphics
         {
             let window = graphics.window();
-            // A convenience, which not every system offers: the pointer comes back to where it was.
+            // Puts the pointer back where it was. Not every system supports that.
             let _ = window.set_cursor_position(from);
             let _ = window.set_cursor_grab(CursorGrabMode::None);
             window.set_cursor_visible(true);
@@ -261,8 +261,8 @@ impl App {
     }
 }
 
-/// Holds or releases a movement key, by its place on the keyboard, so that any layout flies with the same fingers;
-/// tells whether it is one.
+/// Updates a movement key; returns whether the key is one. Keys are identified by physical position, so that every
+/// keyboard layout works with the same fingers.
 fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
     let held = match key {
         KeyCode::KeyW => &mut keys.forward,
@@ -279,7 +279,7 @@ fn hold(keys: &mut HeldKeys, key: KeyCode, state: ElementState) -> bool {
     true
 }
 
-/// Which kept view a key with a digit means, from 0 on.
+/// Index of the bookmark that a digit key stands for, from 0.
 fn bookmark(digit: &str) -> Option<usize> {
     let number: usize = digit.parse().ok()?;
     (1..=BOOKMARKS).contains(&number).then(|| number - 1)

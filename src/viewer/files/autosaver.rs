@@ -11,21 +11,21 @@ use crate::scene::Scene;
 use crate::scene::changes::Change;
 use crate::viewer::background::{Background, Task, Wake};
 
-/// Longest that a change waits: a program that is killed loses no more than this.
+/// Longest time that a change stays unsaved: the most that a killed process loses.
 pub const SOON: Duration = Duration::from_secs(1);
 
-/// What is to be written of a scene.
+/// State of a scene to be saved.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// All but the edits; of those, what was kept before and not taken over.
+    /// Everything but the edits; of these, the ones that were saved before and not restored.
     pub kept: SavedState,
-    /// As it was loaded.
+    /// The scene as loaded.
     pub loaded: Arc<Scene>,
     pub edited: Arc<Scene>,
 }
 
 impl Snapshot {
-    /// Whether both would be written alike.
+    /// Whether both would be saved alike.
     pub fn is_same(&self, other: &Self) -> bool {
         self.kept == other.kept
             && Arc::ptr_eq(&self.loaded, &other.loaded)
@@ -33,19 +33,18 @@ impl Snapshot {
     }
 }
 
-/// Keeps scenes in a folder; dropping it writes what is still to be written.
+/// Saves the state of scenes in a folder. Dropping it writes pending changes.
 #[derive(Debug)]
 pub struct Autosaver {
     folder: ConfigFolder,
-    /// As it was handed over last, or read back.
+    /// Last state that was saved or restored.
     known: Option<Snapshot>,
-    /// What is another one since some time.
+    /// Pending state, and the time of its first change.
     waiting: Option<(Instant, Snapshot)>,
     writing: Background<(), ()>,
 }
 
 impl Autosaver {
-    /// Keeps nothing yet.
     pub fn new(folder: ConfigFolder) -> Self {
         Self {
             folder,
@@ -55,12 +54,12 @@ impl Autosaver {
         }
     }
 
-    /// What is in the window from now on, as it was read back: only what comes to differ from it is written.
+    /// Sets the restored state: only a state that differs from it is saved.
     pub fn begin(&mut self, snapshot: Snapshot) {
         self.known = Some(snapshot);
     }
 
-    /// Looks what is in the window, and hands it over once it has been another one for [`SOON`].
+    /// Takes the present state, and saves it [`SOON`] after the first change.
     pub fn look(&mut self, snapshot: Snapshot, now: Instant) {
         match &mut self.waiting {
             Some((_, waiting)) => *waiting = snapshot,
@@ -72,12 +71,12 @@ impl Autosaver {
         }
     }
 
-    /// When [`look`](Self::look) is to be called though nothing happens.
+    /// When [`look`](Self::look) has to be called without any event.
     pub fn due(&self) -> Option<Instant> {
         self.waiting.as_ref().map(|(since, _)| *since + SOON)
     }
 
-    /// Keeps the list of files that were opened.
+    /// Saves the list of recent files.
     pub fn keep_recent(&mut self, recent: &Recent) {
         let (folder, recent) = (self.folder.clone(), recent.clone());
         self.write(move || {
@@ -87,13 +86,13 @@ impl Autosaver {
         });
     }
 
-    /// Writes what waits, and comes back when it is on the disk: for who reads it back at once.
+    /// Saves pending changes and waits until they are on disk, for a caller that reads them back at once.
     pub fn settle(&mut self) {
         self.flush();
         self.writing.wait();
     }
 
-    /// Begins to write what waits.
+    /// Starts to save pending changes.
     fn flush(&mut self) {
         if let Some((_, snapshot)) = self.waiting.take() {
             self.known = Some(snapshot.clone());
@@ -102,7 +101,7 @@ impl Autosaver {
         }
     }
 
-    /// Writes on a thread, after what is being written.
+    /// Writes on a thread, after earlier writes.
     fn write(&mut self, work: impl FnOnce() + Send + 'static) {
         self.writing.wait();
         if let Err(error) = self.writing.start((), |_| work()) {
@@ -123,7 +122,7 @@ fn write(folder: &ConfigFolder, snapshot: Snapshot) {
         loaded,
         edited,
     } = snapshot;
-    // Without an edit, what was kept of edits before is kept on.
+    // Without edits, saved edits that were not restored are kept.
     if !Arc::ptr_eq(&loaded, &edited) {
         kept.changes = Change::between(&loaded, &edited);
     }
@@ -132,15 +131,15 @@ fn write(folder: &ConfigFolder, snapshot: Snapshot) {
     }
 }
 
-/// Time between two looks. A change counts once it is the same at two of them: who writes has come to rest.
+/// Polling interval. A change counts once two polls see the same state, so that unfinished writes are not read.
 pub const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
 
-/// When files were written last, and how long they are; `None` for one that is not there.
+/// Modification times and sizes [bytes] of files; `None` for a missing file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Stamps(Vec<(PathBuf, Option<(SystemTime, u64)>)>);
 
 impl Stamps {
-    /// As the files are now.
+    /// Present state of files.
     pub fn of(paths: Vec<PathBuf>) -> Self {
         let stamp = |path: PathBuf| {
             let data = std::fs::metadata(&path).ok();
@@ -150,13 +149,14 @@ impl Stamps {
         Self(paths.into_iter().map(stamp).collect())
     }
 
-    /// Of the same files now.
+    /// Present state of the same files.
     fn again(&self) -> Self {
         Self::of(self.0.iter().map(|(path, _)| path.clone()).collect())
     }
 }
 
-/// Waits until files that were as `known` says have changed; as they are then.
+/// Blocks until the files differ from `known` and have come to rest; returns their new state, or `known` if
+/// cancelled.
 pub(super) fn changed(known: Stamps, task: &Task) -> Stamps {
     let mut before = known.clone();
     while !task.control.is_cancelled() {

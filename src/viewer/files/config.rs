@@ -17,28 +17,28 @@ use crate::viewer::filming::Film;
 use crate::viewer::navigation::{BOOKMARKS, NavigationMode};
 use crate::viewer::panel::Display;
 
-/// Most that is read of one file [bytes]: far more than anything here takes.
+/// Limit of the size of a file [bytes], far above that of any valid one.
 const MAX_BYTES: u64 = 16 << 20;
-/// Names that are tried for a file that is set aside.
+/// Numbers tried when a broken file is renamed.
 const NUMBERS: std::ops::RangeInclusive<u32> = 1..=99;
 
-/// A folder of the user's settings.
+/// The user's configuration folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ConfigFolder {
     path: PathBuf,
 }
 
-/// What was read, and a sentence where a broken file was set aside for it.
+/// The value, if there is one, and a warning if a broken file was renamed.
 pub type ReadBack<T> = (Option<T>, Option<String>);
 
 impl ConfigFolder {
-    /// This folder; it is made when something is written.
+    /// The folder is created on first write.
     pub fn new(path: PathBuf) -> Self {
         Self { path }
     }
 
-    /// The user's: `$NEPHROID_CONFIG_DIR`, or else `nephroid` in `$XDG_CONFIG_HOME`, in `%APPDATA%` or in `~/.config`; `None`
-    /// where the system names none of them.
+    /// The user's folder: `$NEPHROID_CONFIG_DIR`, else `nephroid` in `$XDG_CONFIG_HOME`, `%APPDATA%` or `~/.config`;
+    /// `None` if none of these variables is set.
     pub fn of_user() -> Option<Self> {
         let variable = |name: &str| {
             let value = std::env::var_os(name).filter(|value| !value.is_empty())?;
@@ -51,7 +51,7 @@ impl ConfigFolder {
         Some(Self::new(path))
     }
 
-    /// Where a scene's file is.
+    /// Path of a scene's saved state.
     pub fn scene_file(&self, source: &str) -> PathBuf {
         let full = full_source(source);
         let mut hash = ContentHash::default();
@@ -62,15 +62,15 @@ impl ConfigFolder {
         self.path.join("scenes").join(name)
     }
 
-    /// What was kept of a scene.
+    /// Reads the saved state of a scene.
     pub fn read_scene(&self, source: &str) -> ReadBack<SavedState> {
         read(&self.scene_file(source))
     }
 
-    /// Keeps a scene.
+    /// Writes the saved state of a scene.
     ///
     /// # Errors
-    /// A place that cannot be written.
+    /// The file cannot be written.
     pub fn write_scene(&self, kept: &SavedState) -> Result<PathBuf> {
         let path = self.scene_file(&kept.source);
         write(&path, kept)?;
@@ -81,22 +81,23 @@ impl ConfigFolder {
         self.path.join("recent.json")
     }
 
-    /// Files that were opened before.
+    /// Reads the list of recent files.
     pub fn read_recent(&self) -> ReadBack<Recent> {
         let (paths, warning) = read::<Vec<PathBuf>>(&self.recent_file());
         (paths.map(Recent::of), warning)
     }
 
-    /// Keeps the list.
+    /// Writes the list of recent files.
     ///
     /// # Errors
-    /// A place that cannot be written.
+    /// The file cannot be written.
     pub fn write_recent(&self, recent: &Recent) -> Result<()> {
         write(&self.recent_file(), &recent.paths())
     }
 }
 
-/// A scene by its full path, so that it is the same one from whatever folder it is opened.
+/// Canonical path of a scene, so that its saved state is found from any working folder; the source itself if it is
+/// built in or does not exist.
 pub fn full_source(source: &str) -> String {
     if source.starts_with("builtin:") {
         return source.to_owned();
@@ -105,7 +106,7 @@ pub fn full_source(source: &str) -> String {
     full.map_or_else(|_| source.to_owned(), |path| path.display().to_string())
 }
 
-/// What a file holds; nothing where there is none. One that cannot be understood gets another name, and is kept.
+/// Reads a file; nothing if it does not exist. An unreadable file is renamed and kept.
 fn read<T: DeserializeOwned>(path: &Path) -> ReadBack<T> {
     if !path.exists() {
         return (None, None);
@@ -118,7 +119,7 @@ fn read<T: DeserializeOwned>(path: &Path) -> ReadBack<T> {
     }
 }
 
-/// Gives a broken file another name, and says so.
+/// Renames a broken file and returns a message about it.
 fn set_aside(path: &Path, why: &str) -> String {
     let named = |number: u32| path.with_extension(format!("broken-{number}.json"));
     let free = NUMBERS.map(named).find(|name| !name.exists());
@@ -148,37 +149,32 @@ fn write<T: Serialize>(path: &Path, value: &T) -> Result<()> {
     write_atomically(path, |writer| writer.write_all(&text))
 }
 
-/// From where a scene is seen, and how the camera gets about.
+/// Camera, mode and bookmarks.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct KeptViews {
-    /// `None` for the file's first.
+    /// `None` takes the scene's first camera.
     pub camera: Option<Camera>,
-    /// How it gets about.
     pub travel: NavigationMode,
-    /// Views under the numbers from 1 on.
     pub bookmarks: [Option<Camera>; BOOKMARKS],
 }
 
-/// All that is kept of a scene.
+/// Saved state of a scene.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SavedState {
-    /// The file by its full path, or `builtin:NAME`: for who reads the folder.
+    /// Canonical path, or `builtin:NAME`; for people who read the folder.
     pub source: String,
-    /// Camera and bookmarks.
     pub views: KeptViews,
-    /// Of the bake, by their names: a later version may have more of them, and others.
+    /// Bake settings by name, as JSON: another version may have more or other settings.
     pub settings: Value,
-    /// Of the picture.
     pub display: Display,
-    /// The camera's path.
     pub film: Film,
-    /// Whether a change is baked by itself.
+    /// Whether changes are baked automatically.
     pub automatic: Option<bool>,
-    /// Whether the scene is read again when its files change.
+    /// Whether the scene is reloaded when its files change.
     pub watch: bool,
-    /// Edits of what was loaded; those that this version does not know are left out.
+    /// Edits of the loaded scene; edits that this version does not know are dropped.
     #[serde(deserialize_with = "known")]
     pub changes: Vec<Change>,
 }
@@ -192,8 +188,8 @@ fn known<'a, D: Deserializer<'a>>(source: D) -> std::result::Result<Vec<Change>,
 }
 
 impl SavedState {
-    /// Settings as they were kept; those that this version does not know, or that are outside their ranges, are left as
-    /// `otherwise` has them.
+    /// The saved settings. Settings that this version does not know or cannot parse are taken from `otherwise`; if
+    /// the result is out of range, all are.
     pub fn settings_or(&self, otherwise: &BakeSettings) -> BakeSettings {
         let (Value::Object(kept), Ok(mut known)) = (&self.settings, serde_json::to_value(otherwise)) else {
             return otherwise.clone();

@@ -16,52 +16,50 @@ use crate::viewer::background::{Background, Task, Wake};
 pub mod autosaver;
 pub mod config;
 
-/// What a scene is read for.
+/// Why a scene is loaded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LoadPurpose {
-    /// To take the place of the one in the window.
+    /// To replace the present scene.
     Open,
-    /// Its files have changed.
+    /// To update the present scene, whose files have changed.
     Reload,
 }
 
-/// How scenes are opened in the window.
+/// Options for opening scenes in the window.
 #[derive(Clone, Debug, Default)]
 pub struct FilesOptions {
-    /// How they are read, the first and every other.
+    /// How scenes are loaded.
     pub load: LoadOptions,
-    /// Whether the scene is read again when its files change.
+    /// Whether scenes are reloaded when their files change.
     pub watch: bool,
-    /// Where the user's settings are kept; `None` keeps nothing.
+    /// The user's configuration folder; `None` saves nothing.
     pub config: Option<ConfigFolder>,
-    /// Whether what was kept of the first scene is left alone until something changes.
+    /// Whether the saved state of the first scene is ignored until something changes.
     pub fresh: bool,
-    /// Whether the bake's settings are those that the user asked for, and kept ones give way.
+    /// Whether bake settings were given on the command line; they override saved ones.
     pub settings_given: bool,
 }
 
-/// What the window knows of files.
+/// Loads, saves and watches scene files, and keeps their saved state.
 #[derive(Debug)]
 pub struct Files {
-    /// How scenes are read.
     pub load: LoadOptions,
     loader: Background<(String, LoadPurpose), Result<Scene>>,
     saver: Background<PathBuf, Result<()>>,
-    /// What was opened before.
+    /// Files opened before.
     pub recent: Recent,
-    /// Why the last scene could not be opened.
     pub refusal: Option<String>,
-    /// What was found of what was kept, and could not be taken over.
+    /// What could not be restored of the saved state.
     pub warning: Option<String>,
-    /// Watches the files of the scene in the window.
+    /// Watches the files of the present scene.
     watch: Background<(), Stamps>,
-    /// Keeps what the user does.
+    /// `None` without a configuration folder.
     pub autosaver: Option<Autosaver>,
     config: Option<ConfigFolder>,
 }
 
 impl Files {
-    /// Nothing was opened yet; the window is woken when there is news.
+    /// Reads the list of recent files. `wake` is called when there is news.
     pub fn new(options: &FilesOptions, wake: &Wake) -> Self {
         let recent = options.config.as_ref().map(ConfigFolder::read_recent);
         let (recent, warning) = recent.unwrap_or_default();
@@ -78,7 +76,7 @@ impl Files {
         }
     }
 
-    /// A scene was opened.
+    /// Records that a scene was opened.
     pub fn opened(&mut self, source: &str) {
         self.recent.opened(source);
         if let Some(autosaver) = &mut self.autosaver {
@@ -86,10 +84,10 @@ impl Files {
         }
     }
 
-    /// Reads a scene; one that is still being read is forgotten.
+    /// Starts to load a scene; cancels a load in progress.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot create a thread.
     pub fn read(&mut self, source: &str, purpose: LoadPurpose) -> Result<()> {
         let (named, options) = (source.to_owned(), self.load.clone());
         self.loader.start((source.to_owned(), purpose), move |_| {
@@ -97,7 +95,7 @@ impl Files {
         })
     }
 
-    /// The scene that was read, once, with where it comes from and what it was read for.
+    /// Takes the loaded scene or the error, with its source and purpose.
     pub fn take_read(&mut self) -> Option<((String, LoadPurpose), Result<Scene>)> {
         let (of, outcome) = self.loader.take()?;
         let broken = || {
@@ -111,10 +109,10 @@ impl Files {
         Some((of, outcome))
     }
 
-    /// Writes an edited scene, unless one is being written.
+    /// Starts to write an edited scene, unless one is being written.
     ///
     /// # Errors
-    /// The system gives no thread.
+    /// The system cannot create a thread.
     pub fn save(&mut self, target: PathBuf, loaded: Arc<Scene>, edited: Arc<Scene>) -> Result<()> {
         if self.saver.of().is_some() {
             return Ok(());
@@ -124,7 +122,7 @@ impl Files {
             .start(target, move |_| load::save(&path, &loaded, &edited, &options))
     }
 
-    /// Where the scene was written, once, or why it was not.
+    /// Takes the path of the saved scene, or the error.
     pub fn take_saved(&mut self) -> Option<Result<PathBuf>> {
         let (target, outcome) = self.saver.take()?;
         let location = target.display().to_string();
@@ -138,30 +136,28 @@ impl Files {
         Some(outcome.unwrap_or_else(|| Err(broken())).map(|()| target))
     }
 
-    /// What was kept of a scene by its full path, and a sentence where that cannot be understood.
+    /// Saved state of a scene, by its full path, and a warning if it cannot be read.
     pub fn read_back(&self, full_source: &str) -> ReadBack<SavedState> {
         let config = self.config.as_ref();
         config.map_or((None, None), |config| config.read_scene(full_source))
     }
 
-    /// Whether files are watched.
     pub fn is_watching(&self) -> bool {
         self.watch.of().is_some()
     }
 
-    /// Watches files that were as `stamps` say.
+    /// Watches files for changes from the state in `stamps`.
     pub fn start_watch(&mut self, stamps: Stamps) {
         if let Err(error) = self.watch.start((), |task| changed(stamps, task)) {
             self.refusal = Some(error.to_string());
         }
     }
 
-    /// Watches them no longer.
     pub fn stop_watch(&mut self) {
         self.watch.stop();
     }
 
-    /// Whether they changed since this was called last.
+    /// Whether the watched files have changed since the last call.
     pub fn have_changed(&mut self) -> bool {
         let stamps = self.watch.take().and_then(|(_, stamps)| stamps);
         let has_changed = stamps.is_some();
@@ -169,13 +165,13 @@ impl Files {
         has_changed
     }
 
-    /// The scene that is being read.
+    /// Source of the scene that is being loaded.
     pub fn loading(&self) -> Option<&str> {
         self.loader.of().map(|(source, _)| source.as_str())
     }
 }
 
-/// A typed or pasted path, without surrounding space or quotation marks, `~/` expanded.
+/// Cleans up a typed or pasted path: trims white space, removes quotation marks and expands `~/`.
 pub fn typed(text: &str) -> String {
     let bare = text.trim();
     let quoted = ['"', '\''].iter().find_map(|mark| {
@@ -190,18 +186,18 @@ pub fn typed(text: &str) -> String {
     }
 }
 
-/// Where pictures, maps, paths and frames go. Said in full where the system knows it: the window does not show where it was
-/// started.
+/// Folder for pictures, maps, paths and frames, as an absolute path if known, because the window does not show where
+/// it was started.
 pub fn working_folder() -> PathBuf {
     std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."))
 }
 
 const NUMBERS: std::ops::RangeInclusive<u32> = 1..=9999;
 
-/// Names for files of one number, none of which there is yet.
+/// Paths of `N` files with a common number for which no file exists yet.
 ///
 /// # Errors
-/// All numbers are taken.
+/// No number is free.
 pub fn free_names<const N: usize>(
     folder: &Path,
     named: impl Fn(&str) -> [String; N],
@@ -220,29 +216,29 @@ pub fn free_names<const N: usize>(
 /// A dialog that closes sooner than this was never shown.
 const NO_DIALOG_WITHIN: Duration = Duration::from_millis(400);
 
-/// Told where no dialog can be had.
+/// Message if the system has no file dialog.
 pub const NO_DIALOG: &str =
     "This system offers no dialog to choose a file in: type its path, or drop the file on the window.";
 
-/// What a file is chosen for.
+/// Purpose of a file dialog.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Choice {
-    /// A scene to be opened.
+    /// Open a scene.
     Open,
-    /// The edited scene to be saved.
+    /// Save the edited scene.
     SaveScene,
 }
 
-/// A dialog, open or not.
+/// A file dialog, open or not.
 #[derive(Debug)]
 pub struct Dialog {
     open: Background<(Choice, Instant), Option<PathBuf>>,
-    /// Asked for where the system gives no thread.
+    /// Purpose of the last request if the system could not create a thread.
     refused: Option<Choice>,
 }
 
 impl Dialog {
-    /// None is open; the window is woken when a file was chosen.
+    /// No dialog is open. `wake` is called when the user has chosen.
     pub fn new(wake: &Wake) -> Self {
         Self {
             open: Background::new("dialog", wake),
@@ -250,7 +246,7 @@ impl Dialog {
         }
     }
 
-    /// Asks for a file, unless a dialog is open already. It begins in the folder of the file that is in the window.
+    /// Opens the dialog in the folder of the present scene, unless one is open already.
     pub fn ask(&mut self, choice: Choice, window: &Window, present: &Path) {
         if self.open.of().is_some() {
             return;
@@ -273,30 +269,30 @@ impl Dialog {
         self.refused = is_refused.then_some(choice);
     }
 
-    /// What was chosen, once, and for what; `None` for the file where there is no dialog to choose it in.
+    /// Takes the user's choice; the path is `None` if the system has no dialog. Cancelled dialogs return nothing.
     pub fn take(&mut self) -> Option<(Choice, Option<PathBuf>)> {
         if let Some(choice) = self.refused.take() {
             return Some((choice, None));
         }
         let ((choice, since), answer) = self.open.take()?;
         let file = answer.flatten();
-        // The user thought better of it.
+        // The user cancelled.
         let is_closed = file.is_none() && since.elapsed() >= NO_DIALOG_WITHIN;
         (!is_closed).then_some((choice, file))
     }
 }
 
-/// Most that are remembered.
+/// Maximum length of the list.
 pub const MAX_RECENT: usize = 10;
 
-/// Files that were opened, the newest first.
+/// Files opened before, newest first.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Recent {
     paths: Vec<PathBuf>,
 }
 
 impl Recent {
-    /// Those of a list that are still there; each once, at most [`MAX_RECENT`].
+    /// The existing files of a list, without duplicates, at most [`MAX_RECENT`].
     pub fn of(paths: impl IntoIterator<Item = PathBuf>) -> Self {
         let mut recent = Self::default();
         for path in paths {
@@ -307,17 +303,16 @@ impl Recent {
         recent
     }
 
-    /// The newest first.
     pub fn paths(&self) -> &[PathBuf] {
         &self.paths
     }
 
-    /// A file was opened: it comes first, and what is gone is left out. Built-in scenes are no files.
+    /// Puts a file first and removes files that no longer exist. Ignores built-in scenes.
     pub fn opened(&mut self, source: &str) {
         if source.starts_with("builtin:") {
             return;
         }
-        // Found again from whatever folder the program is started in.
+        // An absolute path is valid from any working folder.
         let Ok(path) = Path::new(source).canonicalize() else {
             return;
         };

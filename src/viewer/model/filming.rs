@@ -10,20 +10,20 @@ use crate::viewer::filming::{FilmJob, Player};
 use serde_json::{Value, json};
 
 impl Model {
-    /// Whether the camera moves by itself or by keys.
+    /// Whether the camera moves, by its path or by keys.
     pub fn is_moving(&self) -> bool {
         self.player.is_some() || self.navigator.is_moving()
     }
 
-    /// Whether the camera's path is being played.
+    /// Whether the camera path is being played.
     pub fn is_playing(&self) -> bool {
         self.player.is_some()
     }
 
-    /// Moves the camera along its path by some time [s]; tells whether it is played.
+    /// Advances the camera along its path by a time [s]; returns whether the path is being played.
     pub(super) fn play_on(&mut self, seconds: f64) -> bool {
         if self.navigator.is_moving() {
-            // Whoever presses a key takes over.
+            // A movement key ends the playback.
             self.end_play();
         }
         let Some(player) = &mut self.player else {
@@ -55,7 +55,7 @@ impl Model {
         Ok(())
     }
 
-    /// Does what was asked for in section *Camera path*.
+    /// Carries out a command of the section *Camera path*.
     pub(super) fn film(&mut self, command: &FilmCommand) {
         let before = self.choices.film.clone();
         let outcome = self.filmed(command);
@@ -70,7 +70,7 @@ impl Model {
         }
     }
 
-    /// A message, if any.
+    /// Returns a message for the panel, if any.
     fn filmed(&mut self, command: &FilmCommand) -> Result<Option<String>> {
         let origin_world = self.scene().origin_world;
         match command {
@@ -113,7 +113,7 @@ impl Model {
         Ok(None)
     }
 
-    /// Has frames drawn and written by the exporting thread.
+    /// Starts to draw and write frames on the exporting thread.
     fn shoot(&mut self, turns: bool) -> Result<()> {
         let scene = self.scene().clone();
         let display = self.choices.display;

@@ -23,7 +23,7 @@ use crate::viewer::worker::BakedLevel;
 use serde_json::json;
 
 impl Model {
-    /// Takes over what was kept of the first scene; what the command line says goes first.
+    /// Restores the saved state of the first scene; the command line takes precedence.
     pub(super) fn begin(&mut self, options: &ViewerOptions) {
         self.choices.watches |= options.files.watch;
         let what = RestoredParts {
@@ -37,8 +37,8 @@ impl Model {
         self.exposure_is_kept = self.find_again((!options.files.fresh).then_some(what));
     }
 
-    /// Reads a scene, which takes the place of the present one when it is there: a path as it was typed, or
-    /// `builtin:NAME`. Whatever was being read is given up.
+    /// Loads a scene (a path as typed, or `builtin:NAME`), which replaces the present one when it is ready. Cancels a
+    /// load in progress.
     pub fn open(&mut self, source: &str) {
         let source = files::typed(source);
         if !source.is_empty() {
@@ -46,7 +46,7 @@ impl Model {
         }
     }
 
-    /// Writes the edited scene to a `.glb` file, on a thread: [`Files::take_saved`] tells what came of it.
+    /// Writes the edited scene to a `.glb` file on a thread. [`Files::take_saved`] returns the outcome.
     ///
     /// # Errors
     /// As [`Files::save`].
@@ -58,7 +58,7 @@ impl Model {
         self.files.save(target, loaded, edited)
     }
 
-    /// Whether these maps are of the first bake of the scene in the window.
+    /// Whether these maps are of the first bake of the present scene.
     pub fn is_first(&self, level: &BakedLevel) -> bool {
         level.serial == self.first_request
     }
@@ -77,8 +77,8 @@ impl Model {
         self.files.refusal = Some(sentence.to_owned());
     }
 
-    /// Shows the scene that was being read once it is there; tells whether another scene is shown. One that cannot be
-    /// read leaves everything as it was.
+    /// Shows the scene being loaded once it is ready; returns the purpose of the load if the scene has changed. A
+    /// scene that cannot be read leaves everything as it was.
     pub fn poll_files(&mut self) -> Option<LoadPurpose> {
         if self.files.have_changed() {
             let source = self.edits.loaded().source.clone();
@@ -102,7 +102,7 @@ impl Model {
         Some(purpose)
     }
 
-    /// Puts a scene in the place of the present one: of its maps, edits and views nothing is left.
+    /// Replaces the present scene, with its maps, edits and views.
     fn show(&mut self, scene: Scene) {
         let scene = Arc::new(scene);
         if let Some(autosaver) = &mut self.files.autosaver {
@@ -125,7 +125,7 @@ impl Model {
         self.bake_first();
     }
 
-    /// Puts a scene that was read again in its own place: camera, settings and edits stay.
+    /// Shows the reloaded scene; camera, settings and edits stay.
     fn show_again(&mut self, mut scene: Scene) {
         let loaded = Arc::clone(self.edits.loaded());
         let changes = Change::between(&loaded, self.edits.scene());
@@ -141,7 +141,7 @@ impl Model {
         self.bake_first();
     }
 
-    /// Nothing that was baked is shown any more.
+    /// Discards all maps, the reference and the probe.
     fn forget_maps(&mut self) {
         self.last = None;
         self.given.clear();
@@ -149,7 +149,7 @@ impl Model {
         self.probe(None);
     }
 
-    /// Bakes a scene of which there are no maps that would do.
+    /// Bakes a scene that has no usable maps.
     fn bake_first(&mut self) {
         self.maps_revision += 1;
         self.refusal = None;
@@ -157,7 +157,7 @@ impl Model {
         self.settle();
         self.asked = None;
         self.rebake();
-        // Where a setting is out of its range nothing was asked for, and nothing of before is to come.
+        // If a setting is out of range there is no request, and results of earlier requests must not arrive.
         self.first_request = match &self.asked {
             Some((serial, _)) => *serial,
             None => {
@@ -167,7 +167,7 @@ impl Model {
         };
     }
 
-    /// Watches the scene's files, or no longer, as the panel says.
+    /// Starts or stops watching the scene's files, as the panel says.
     pub(super) fn watch(&mut self) {
         let source = &self.edits.loaded().source;
         let wanted = self.choices.watches && !source.starts_with("builtin:");

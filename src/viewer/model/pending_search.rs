@@ -13,18 +13,18 @@ use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::new_light::{NewLight, ViewTarget};
 use crate::viewer::probe;
 
-/// From how far the brightest spot is looked at, in scene radii.
+/// Distance from which the brightest spot is viewed, in scene radii.
 const DISTANCE: f64 = 0.6;
-/// A spot is seen where a gaze ends as near to it as this, in scene radii.
+/// A spot is visible if the view ray ends within this distance of it, in scene radii.
 const SEEN: f64 = 1e-3;
-/// A gaze flatter than this sine shows little of a surface.
+/// Smallest cosine between view direction and normal at which a surface is well visible.
 const FLATTEST: f64 = 0.25;
-/// Leaves the surface by this much, in scene radii.
+/// Offset of the probe ray's origin from the surface, in scene radii.
 const OFF: f64 = 1e-6;
-/// How often the way to a hidden spot is halved.
+/// How often the distance is halved while the spot is hidden.
 const HALVINGS: i32 = 6;
 
-/// What is to be done once surfaces are known.
+/// Tasks for when the collision surfaces are built.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PendingSearch {
     pub light: Option<NewLight>,
@@ -32,13 +32,13 @@ pub(super) struct PendingSearch {
 }
 
 impl Model {
-    /// Does something as soon as the surfaces of the scene are known.
+    /// Adds a task and runs it as soon as the collision surfaces are built.
     pub(super) fn seek(&mut self, what: impl FnOnce(&mut PendingSearch)) {
         what(&mut self.pending_search);
         self.poll_sought();
     }
 
-    /// Does what waited, as soon as the surfaces of the scene are known.
+    /// Runs the pending tasks if the collision surfaces are built.
     pub(super) fn poll_sought(&mut self) {
         if self.pending_search.light.is_none() && !self.pending_search.brightest {
             return;
@@ -53,7 +53,7 @@ impl Model {
         }
     }
 
-    /// Adds a light before what the camera looks at, and gives it handles.
+    /// Adds a light near what the camera looks at, and gives it handles.
     fn add_light(&mut self, light: NewLight, surfaces: &Arc<Tracer>) {
         let (camera, radius_m) = (self.navigator.camera(), self.navigator.radius_m());
         let gaze = Ray {
@@ -72,7 +72,7 @@ impl Model {
         }
     }
 
-    /// Probes the texel with the most of the light that is shown, and goes where it is seen.
+    /// Moves the camera to a view of the brightest texel and probes it.
     fn show_brightest(&mut self, surfaces: &Arc<Tracer>) {
         let Some(spot) = brightest::find(self.edits.scene(), &self.lit_maps()) else {
             self.refusal = Some("There is no light in the maps, and so no brightest spot.".into());
@@ -87,7 +87,7 @@ impl Model {
         }));
     }
 
-    /// From where a spot is seen: the way the camera looks now if it can be, else as near as it must be.
+    /// Position from which a spot is visible: along the present view direction if possible, and as near as needed.
     fn view_of(&self, spot: &BrightSpot, surfaces: &Tracer) -> DVec3 {
         let radius_m = self.navigator.radius_m();
         let back = -self.navigator.camera().forward;

@@ -12,44 +12,43 @@ use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::panel::PlaceTool;
 use serde_json::json;
 
-/// A light at a surface has no place before it: it is put there as far off as this, in scene radii.
+/// Distance from surfaces at which a light without a useful distance of its own is placed, in scene radii.
 const OFF: f64 = 0.3;
-/// What of a light's surroundings is framed, in scene radii.
+/// Radius around a light that is framed, in scene radii.
 const AROUND_LIGHT: f64 = 0.25;
-/// Nearer to a surface than this, in scene radii, it counts as at it.
+/// A light nearer to a surface than this counts as on it, in scene radii.
 const AT: f64 = 0.01;
 
-/// A light that the mouse drags over surfaces.
 #[derive(Debug, Default)]
 pub(super) struct DraggedLight {
-    /// Whether the button is down.
+    /// Whether the mouse button is down.
     is_down: bool,
-    /// Where the mouse pointed last, until the light is there.
+    /// Last ray under the mouse that has not been applied yet.
     gaze: Option<Ray>,
-    /// Until the button is up.
+    /// `None` when the button is up.
     hand: Option<DragTool>,
 }
 
 #[derive(Debug)]
 struct DragTool {
-    /// As they were when the drag began: lights are no surfaces.
+    /// The surfaces at the start of the drag. They stay valid because lights are no surfaces.
     surfaces: Arc<Tracer>,
     does: DragAction,
 }
 
-/// What becomes of a light.
+/// Effect of the drag on a light, by its index.
 #[derive(Clone, Copy, Debug)]
 enum DragAction {
-    /// It is put so far before surfaces [m].
+    /// Places it at this distance from surfaces [m].
     Put(usize, f64),
-    /// It is turned to them from there [m].
+    /// Turns it towards the surface; it stays at this position [m].
     Turn(usize, DVec3),
-    /// A sun: it goes where it is seen.
+    /// Turns a sun so that it appears, or is mirrored, under the mouse.
     TurnSun(usize),
 }
 
 impl DragTool {
-    /// What a gaze asks for; `None` where it meets nothing that it could be put before.
+    /// The edit for a ray under the mouse; `None` if it meets no surface and the action needs one.
     fn edit(&self, gaze: &Ray) -> Option<Edit> {
         let met = met(&self.surfaces, gaze);
         match (self.does, met) {
@@ -71,7 +70,7 @@ impl DragTool {
     }
 }
 
-/// Where a gaze ends, and the surface's unit normal towards the eye.
+/// First surface point along a ray, and the unit normal that faces the ray's origin.
 fn met(surfaces: &Tracer, gaze: &Ray) -> Option<(DVec3, DVec3)> {
     let place = surfaces.intersect(gaze)?;
     let normal = surfaces.surface_at(&place).geometric_normal;
@@ -80,13 +79,13 @@ fn met(surfaces: &Tracer, gaze: &Ray) -> Option<(DVec3, DVec3)> {
 }
 
 impl Model {
-    /// Picks what a gaze meets, as soon as the surfaces of the scene are known.
+    /// Picks the object along a ray, as soon as the collision surfaces are built.
     pub fn pick(&mut self, gaze: Ray) {
         self.picking = Some(gaze);
         self.poll_pick();
     }
 
-    /// Gives handles to a light or an object.
+    /// Selects a light or an object and gives it handles.
     pub fn hold(&mut self, held: GizmoTarget) {
         self.picking = None;
         self.choices.selection.hold(Some(held));
@@ -98,7 +97,8 @@ impl Model {
         self.log.write("picked", json!({"name": name}));
     }
 
-    /// Steps back or forth until what has handles fills a picture of that aspect (width/height), or else the scene.
+    /// Moves along the view axis until the selected light or object, else the scene, fills a picture of that aspect
+    /// ratio (width/height).
     pub fn frame(&mut self, aspect: f64) {
         let whole_m = self.navigator.radius_m();
         let ball = match self.choices.selection.held() {
@@ -140,19 +140,19 @@ impl Model {
         self.placing.gaze = Some(gaze);
     }
 
-    /// The mouse points elsewhere.
+    /// The mouse points along another ray.
     pub fn go_on_placing(&mut self, gaze: Ray) {
         if self.placing.is_down {
             self.placing.gaze = Some(gaze);
         }
     }
 
-    /// Lets the light go, once it is where the mouse pointed last.
+    /// Ends the drag; the last ray is still applied.
     pub fn end_placing(&mut self) {
         self.placing.is_down = false;
     }
 
-    /// The edit that puts the light before what the mouse points at, as soon as the surfaces of the scene are known.
+    /// The edit for the last ray of the drag, as soon as the collision surfaces are built.
     pub fn placed(&mut self) -> Option<Edit> {
         let gaze = self.placing.gaze?;
         if self.placing.hand.is_none() {
@@ -167,7 +167,7 @@ impl Model {
         edit
     }
 
-    /// Takes the panel's light in the hand: as far before surfaces as it is now before that at which a gaze ends.
+    /// Begins a drag. A placed light keeps its present distance from the surface under the mouse.
     fn take_light(&mut self, gaze: &Ray) -> Option<DragTool> {
         let placed = self.choices.selection.placed()?;
         let (PlaceTool::At(light) | PlaceTool::Towards(light)) = placed;

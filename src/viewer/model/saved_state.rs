@@ -13,27 +13,26 @@ use crate::viewer::files::config::SavedState;
 use crate::viewer::files::config::full_source;
 use serde_json::json;
 
-/// What of a kept scene is taken over.
+/// Which parts of a saved state are restored.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct RestoredParts {
-    /// Settings of the bake.
     pub settings: bool,
-    /// The camera; bookmarks always are.
+    /// Bookmarks are always restored.
     pub camera: bool,
     pub exposure: bool,
     pub edits: bool,
 }
 
-/// What was kept and not taken over, to be kept on until it is changed: a look at other maps takes no edits away.
+/// Saved state that was not restored. It is saved again until the user changes it, so that a look at other maps loses
+/// no edits.
 #[derive(Debug, Default)]
 pub(super) struct IgnoredState {
     changes: Vec<Change>,
-    /// What stood against them, and the settings.
+    /// The settings given on the command line, and the saved settings that they override.
     settings: Option<(BakeSettings, Value)>,
 }
 
 impl RestoredParts {
-    /// Everything.
     pub(super) const ALL: Self = Self {
         settings: true,
         camera: true,
@@ -43,7 +42,7 @@ impl RestoredParts {
 }
 
 impl Model {
-    /// What there is to be kept.
+    /// The state to save.
     fn snapshot(&self) -> Snapshot {
         Snapshot {
             kept: SavedState {
@@ -61,7 +60,8 @@ impl Model {
         }
     }
 
-    /// The panel's settings; where the command line overrode a saved one and it has not changed since, the saved one.
+    /// The panel's settings. If the command line overrode saved settings and they have not been changed since, the
+    /// saved ones.
     fn settings_to_keep(&self) -> Value {
         match &self.left_alone.settings {
             Some((given, kept)) if *given == self.choices.settings => kept.clone(),
@@ -69,7 +69,7 @@ impl Model {
         }
     }
 
-    /// Keeps what changed.
+    /// Hands the present state to the autosaver.
     pub(super) fn keep(&mut self, now: Instant) {
         if self.files.autosaver.is_some() {
             let snapshot = self.snapshot();
@@ -79,7 +79,7 @@ impl Model {
         }
     }
 
-    /// Makes the scene in the window what it was last time, as far as that is wanted; tells whether there was such a time.
+    /// Restores the saved state of the scene, as far as wanted; returns whether there was one.
     pub(super) fn find_again(&mut self, what: Option<RestoredParts>) -> bool {
         self.full_source = full_source(&self.edits.loaded().source);
         let (kept, warning) = match what {
@@ -126,7 +126,8 @@ impl Model {
         }
     }
 
-    /// Does edits of an earlier time again, each to be taken back by itself; says which of them the file has no place for.
+    /// Applies saved edits again, each as an undo step of its own; warns about edits whose target the file no longer
+    /// has.
     pub(super) fn edit_again(&mut self, changes: &[Change]) {
         let mut lost = Vec::new();
         let loaded = Arc::clone(self.edits.loaded());

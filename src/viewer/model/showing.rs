@@ -20,17 +20,16 @@ use crate::viewer::panel::{LayerShown, Quantity};
 use crate::viewer::views::MapSurvey;
 use crate::viewer::worker::{BakedLevel, EffectDifference};
 
-/// Which maps the picture shows, and how.
+/// Identifies the maps in the picture: two equal values show the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MapsShown {
     revision: u64,
     layer: LayerShown,
-    /// What of them.
     pub quantity: Quantity,
 }
 
 impl Model {
-    /// Layers of the present maps.
+    /// Layers of the maps shown, sorted, without duplicates.
     pub fn layers(&self) -> Vec<LayerKind> {
         let mut kinds: Vec<_> = self
             .maps()
@@ -43,7 +42,7 @@ impl Model {
         kinds
     }
 
-    /// What the picture shows: the light where the panel asks for what there is not.
+    /// The quantity in the picture; light if the quantity chosen in the panel is not available.
     pub fn quantity(&self) -> Quantity {
         match self.choices.display.quantity {
             Quantity::Error if false_colours::has_errors(self.maps()) => Quantity::Error,
@@ -53,8 +52,8 @@ impl Model {
         }
     }
 
-    /// Whether direct light is to be traced and not looked up: it is shown, and its layer is not baked yet, or a light or
-    /// an object was moved since.
+    /// Whether direct light is to be traced per pixel instead of looked up in the maps: it is shown, and either its
+    /// layer is not baked yet, or a light or an object has moved since.
     pub fn traces_lights(&self) -> bool {
         let shown = matches!(
             self.choices.display.layer,
@@ -75,7 +74,6 @@ impl Model {
         }
     }
 
-    /// The maps without their direct light.
     pub fn maps_without_direct(&self) -> Vec<IlluminationMap> {
         let mut maps = self.shown_maps().into_owned();
         for map in &mut maps {
@@ -85,23 +83,23 @@ impl Model {
         maps
     }
 
-    /// The maps as the panel asks them to be shown: some layers, the errors, or what an effect is worth.
+    /// The maps in the layer and quantity chosen in the panel.
     pub fn shown_maps(&self) -> Cow<'_, [IlluminationMap]> {
         self.as_shown(self.maps())
     }
 
-    /// Some maps of the scene as the panel asks them to be shown.
+    /// `maps` in the layer and quantity chosen in the panel.
     fn as_shown<'a>(&self, maps: &'a [IlluminationMap]) -> Cow<'a, [IlluminationMap]> {
         self.with_quantity(maps, self.quantity())
     }
 
-    /// Some maps of the scene, of the layer that the panel asks for, with a quantity in them.
+    /// `maps` in the layer chosen in the panel and in a given quantity.
     fn with_quantity<'a>(
         &self,
         maps: &'a [IlluminationMap],
         quantity: Quantity,
     ) -> Cow<'a, [IlluminationMap]> {
-        // Until the next maps come, an edit may have made a receiver clear, or a mirror.
+        // Until the next maps arrive, an edit may have turned a receiver into glass or a mirror.
         let receives = |map: &&IlluminationMap| {
             let scene = self.scene();
             let object = scene.objects.get(map.chart.object());
@@ -133,12 +131,12 @@ impl Model {
         Cow::Owned(with_kind.collect())
     }
 
-    /// The maps' light, whatever the picture shows in its place.
+    /// The light in the maps shown, even if the picture shows another quantity.
     pub(super) fn lit_maps(&self) -> Cow<'_, [IlluminationMap]> {
         self.with_quantity(self.maps(), Quantity::Light)
     }
 
-    /// Maps as they are to be shown next, looked at as a whole, with what their values stand for.
+    /// The maps to show next and how to display them; updates the survey of these maps.
     pub fn maps_to_show(&mut self, without_direct: bool) -> (Vec<IlluminationMap>, MapStyle) {
         let maps = if without_direct {
             self.maps_without_direct()
@@ -149,14 +147,13 @@ impl Model {
         (maps, self.map_style())
     }
 
-    /// What the values of the maps that are shown stand for.
+    /// How the values of the maps shown are displayed.
     pub fn map_style(&self) -> MapStyle {
         let quantity = self.quantity();
         let choice = &self.choices.display.scale;
         quantity.map_style(self.survey.scale(quantity, choice))
     }
 
-    /// Which maps the picture is to show, and how.
     pub fn maps_shown(&self) -> MapsShown {
         MapsShown {
             revision: self.maps_revision,
@@ -165,18 +162,18 @@ impl Model {
         }
     }
 
-    /// What an effect adds to the maps that are shown or takes from them, where that was found.
+    /// Contribution of an effect to the maps shown, if it was found.
     pub(super) fn difference(&self) -> Option<&Difference> {
         self.worth.as_ref()?.difference.as_ref().ok()
     }
 
-    /// The reference's maps as they are to be shown.
+    /// The reference maps in the layer and quantity chosen in the panel.
     pub fn reference_to_show(&self) -> Option<(&Arc<Scene>, Vec<IlluminationMap>)> {
         let reference = self.reference.as_ref()?;
         Some((&reference.scene, self.as_shown(&reference.maps).into_owned()))
     }
 
-    /// Begins or ends a comparison.
+    /// Begins or ends a comparison with other maps.
     pub(super) fn compare_with(&mut self, command: &CompareCommand) {
         let scene = self.edits.scene();
         let reference = match command {
@@ -194,7 +191,7 @@ impl Model {
         }
     }
 
-    /// Holds the maps that are shown now against the reference.
+    /// Compares the maps shown with the reference.
     pub(super) fn compare_again(&mut self) {
         let present = self.last.as_ref().map_or(&self.given, |last| &last.result.maps);
         if let Some(reference) = &mut self.reference {
@@ -205,7 +202,7 @@ impl Model {
         }
     }
 
-    /// Shows what an effect is worth; tells whether there is anything new to be shown.
+    /// Shows the contribution of an effect; returns whether it belongs to the maps shown.
     pub(super) fn take_worth(&mut self, worth: EffectDifference) -> bool {
         let is_of_shown = |last: &Arc<BakedLevel>| Arc::ptr_eq(last, &worth.with);
         if !self.last.as_ref().is_some_and(is_of_shown) {
@@ -219,7 +216,7 @@ impl Model {
         true
     }
 
-    /// Finds what an effect is worth to the maps that are shown, once these are done.
+    /// Starts to compute the contribution of an effect to the maps shown, if their bake is done.
     pub(super) fn compare(&mut self, effect: Effect) {
         let Some(last) = self.last.as_ref().filter(|last| last.is_final) else {
             return;
@@ -230,7 +227,7 @@ impl Model {
     }
 }
 
-/// Whether a scene is lit otherwise than before: a lamp is another one, or an object elsewhere.
+/// Whether the direct light differs: a light has changed, or an object has moved.
 fn is_other_light(before: &Arc<Scene>, now: &Arc<Scene>) -> bool {
     let (was, is) = (&before.objects, &now.objects);
     let stand_alike = || was.len() == is.len() && was.iter().zip(is).all(|(was, is)| was.stands_as(is));

@@ -9,7 +9,7 @@ use super::control::{choice, listed, rows, setting, significant};
 use super::light_pass;
 use crate::settings::{BakeSettings, Estimator, MapResolution};
 
-/// Shows the section; `settings` holds what the user chose.
+/// Shows the section.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = light_pass::no_caustic(settings);
     rows(ui, "accuracy", |ui| {
@@ -42,13 +42,13 @@ fn map_resolution(ui: &mut Ui, resolution: &mut MapResolution) -> Response {
     choice(ui, "map size", resolution, &custom, &choices)
 }
 
-/// Ends of the slider; every share that settings may have can be typed.
+/// Range of the slider; every valid value can be typed.
 const SHARES: std::ops::RangeInclusive<f64> = 1e-6..=0.5;
 const DEPTHS: std::ops::RangeInclusive<u32> = 1..=1000;
 
 const NO_TARGET: &str = "No error is aimed at.";
 
-/// Shows the rows.
+/// Shows the subsection *Limits*.
 pub fn show_limits(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = light_pass::no_caustic(settings);
     let default = BakeSettings::default();
@@ -74,7 +74,7 @@ pub fn show_limits(ui: &mut Ui, settings: &mut BakeSettings) {
     });
 }
 
-/// The value that counts; automatic until it is touched.
+/// A slider that shows the automatic value until the user changes it.
 fn automatic<T: Copy>(
     ui: &mut Ui,
     value: &mut Option<T>,

@@ -13,12 +13,12 @@ use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
 use crate::viewer::time_left::{in_words, time_left_s};
 use crate::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
-/// Text of what went wrong.
+/// Text colour of errors.
 pub const FAILED: Color32 = Color32::from_rgb(255, 120, 110);
-/// Text of what needs attention.
+/// Text colour of warnings.
 pub const ATTENTION: Color32 = Color32::from_rgb(250, 190, 90);
 
-/// Shows the controls and the state.
+/// Shows the controls and the state of the bake.
 fn show(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
     let refused = choices.settings.validate().err();
     ui.horizontal(|ui| {
@@ -98,12 +98,12 @@ fn state_line(ui: &mut Ui, choices: &Choices, model: &Model) {
     }
 }
 
-/// A bake that takes longer shows how to end it sooner [s].
+/// A bake with more time left than this shows how to shorten it [s].
 const LONG_S: f64 = 600.0;
 const SOONER: &str =
     "Section Accuracy: map size, max error, or bake until a max time. Cancel keeps the maps that are shown.";
 
-/// Whether a bake ended because its maps are as exact as they were to be.
+/// Whether the bake reached its target error.
 fn has_converged(last: Option<&BakedLevel>) -> bool {
     last.is_some_and(|last| last.result.stop_reason == StopReason::MaxError)
 }
@@ -140,7 +140,7 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
     .on_hover_text(hover);
 }
 
-/// Shows where the light of the last bake went.
+/// Shows the energy ledger of the last bake, summed over all lights.
 pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
     let ledgers = last.map_or(&[][..], |last| &last.result.ledgers);
     let total: EnergyLedger = ledgers.iter().map(|light| &light.energy_w).sum();
@@ -158,7 +158,7 @@ const CARRIERS: &str = "What brought the deposited light to the maps. Patches of
     together, photons where it scatters. Bundles are laid down whole before photons, which carry the difference: less than \
     nothing where bundles brought too much.";
 
-/// "estimated error 2.1 %, 0.42 s: level 2, goes on": one line of the choices.
+/// One line about the last level: "estimated error 2.1 %, 0.42 s: level 2, goes on".
 fn level_line(last: &BakedLevel) -> String {
     let error = match last.result.estimated_error(last.request.settings.error_metric) {
         Some(error) => format!("estimated error {} %", two_digits(100.0 * error)),
@@ -259,7 +259,7 @@ pub fn header(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut 
     }
 }
 
-/// A button that takes a change back or does one again; tells whether it was pressed.
+/// An undo or redo button; returns whether it was clicked.
 fn step(ui: &mut Ui, (sign, name): (&str, &str), (does, what): (&str, Option<&str>)) -> bool {
     let button = ui.add_enabled(
         what.is_some(),

@@ -12,29 +12,27 @@ use strum::{EnumMessage, VariantArray};
 use super::Command;
 use crate::settings::options::{OPTIONS, OptionInfo};
 
-/// Width of the control beside its label [points].
+/// Width of a control [points].
 pub const CONTROL_WIDTH: f32 = 186.0;
-/// Width of the label in front of it [points].
+/// Width of the label in front of a control [points].
 const LABEL_WIDTH: f32 = 124.0;
-/// Size of what sets a value back to its default [points].
+/// Size of the reset button [points].
 const RESET: egui::Vec2 = vec2(16.0, 18.0);
-/// Most height of an open list [points].
+/// Largest height of an open drop-down list [points].
 const LIST_HEIGHT: f32 = 320.0;
 /// Width of a slider without its value [points].
 const SLIDER_WIDTH: f32 = 112.0;
 
-/// What a control is for, in the user's terms.
+/// Help of a control.
 #[derive(Clone, Copy, Debug, Deserialize)]
 pub struct ControlHelp {
-    /// What it sets.
+    /// What the control sets.
     pub what: &'static str,
-    /// Its values.
     pub range: &'static str,
-    /// What it is set back to.
     pub default: &'static str,
-    /// What it does to accuracy.
+    /// Effect on accuracy.
     accuracy: &'static str,
-    /// What it does to time and memory.
+    /// Effect on time and memory.
     cost: &'static str,
 }
 
@@ -51,7 +49,7 @@ impl From<&OptionInfo> for ControlHelp {
     fn from(option: &OptionInfo) -> Self {
         Self {
             what: option.what,
-            // Once for the whole run.
+            // Leaked once, for the life of the process.
             range: option.range().leak(),
             default: option.default,
             accuracy: option.accuracy,
@@ -60,8 +58,7 @@ impl From<&OptionInfo> for ControlHelp {
     }
 }
 
-/// All that is told, by the labels of rows and by the names of buttons; rows of a bake's options stand beside its
-/// settings.
+/// All help texts: of rows by their labels, of buttons by their names. Texts of bake settings come from [`OPTIONS`].
 #[derive(Deserialize)]
 struct Texts {
     #[serde(borrow)]
@@ -81,7 +78,7 @@ static TEXTS: LazyLock<Texts> = LazyLock::new(|| {
     texts
 });
 
-/// The help of a label's control.
+/// Help of the control with this label.
 pub fn about(label: &str) -> &'static ControlHelp {
     TEXTS
         .rows
@@ -89,7 +86,7 @@ pub fn about(label: &str) -> &'static ControlHelp {
         .expect("about.json or OPTIONS tells about every row")
 }
 
-/// The help of a button.
+/// Help of the button with this name.
 pub fn about_button(name: &str) -> &'static str {
     TEXTS
         .buttons
@@ -97,7 +94,7 @@ pub fn about_button(name: &str) -> &'static str {
         .expect("about.json tells about every button")
 }
 
-/// A button, greyed where there is a reason why not; whether it was clicked.
+/// A button, disabled if there is a reason `why_not`; returns whether it was clicked.
 pub fn button(ui: &mut Ui, name: &str, why_not: Option<&str>) -> bool {
     ui.add_enabled(why_not.is_none(), Button::new(name))
         .on_hover_text(about_button(name))
@@ -105,14 +102,14 @@ pub fn button(ui: &mut Ui, name: &str, why_not: Option<&str>) -> bool {
         .clicked()
 }
 
-/// A button that asks for something, greyed where there is a reason why not.
+/// A button that pushes a command, disabled if there is a reason `why_not`.
 pub fn ask(ui: &mut Ui, name: &str, why_not: Option<&str>, commands: &mut Vec<Command>, command: Command) {
     if button(ui, name, why_not) {
         commands.push(command);
     }
 }
 
-/// A grid of label, control and what sets it back.
+/// A grid of labels, controls and reset buttons.
 pub fn rows(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui)) {
     Grid::new(name)
         .num_columns(3)
@@ -124,7 +121,7 @@ pub fn rows(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui)) {
         });
 }
 
-/// A row of what has no default; greyed, with the reason on hover, where the control is `unavailable`.
+/// A row without a default; disabled, with the reason as tooltip, if the control is `unavailable`.
 pub fn row(
     ui: &mut Ui,
     label: &str,
@@ -136,7 +133,7 @@ pub fn row(
     response
 }
 
-/// A row of a value, with what sets it back where it is not its default.
+/// A row with a reset button, which is shown while the value differs from its default.
 pub fn setting<T: PartialEq + Clone>(
     ui: &mut Ui,
     label: &str,
@@ -151,7 +148,7 @@ pub fn setting<T: PartialEq + Clone>(
     ui.end_row();
 }
 
-/// A button that sets a value back; tells whether it was pressed.
+/// A reset button; returns whether it was clicked.
 pub fn reset_to(ui: &mut Ui, label: &str, default: &str) -> bool {
     let name = format!("Reset {label}");
     ui.add(
@@ -187,7 +184,7 @@ fn labelled(
         .on_disabled_hover_text(unavailable.unwrap_or_default())
 }
 
-/// Steps that the arrow keys ask for while a closed list has the keyboard: down is 1.
+/// Steps by the arrow keys while a closed list has the keyboard focus; down is positive.
 fn arrow_steps(ui: &Ui, list: &Response) -> isize {
     if !list.has_focus() {
         return 0;
@@ -201,11 +198,11 @@ fn arrow_steps(ui: &Ui, list: &Response) -> isize {
     presses(Key::ArrowDown) - presses(Key::ArrowUp)
 }
 
-/// An entry of a drop-down list: its name, a text for hovering, and why it cannot be picked if it cannot.
+/// An entry of a drop-down list: name, tooltip, and the reason if it cannot be picked.
 pub type Entry<'a> = (&'a str, Cow<'a, str>, Option<&'a str>);
 
-/// A drop-down list: what is shown, and at which place of the list that is, if at any. The place that was picked, by
-/// mouse or arrow keys.
+/// A drop-down list that shows a text and the index of the present entry, if it is in the list. Returns the index
+/// picked by mouse or arrow keys.
 pub fn pick(
     ui: &mut Ui,
     (id, width): (&str, f32),
@@ -251,8 +248,7 @@ pub fn pick(
     (list.response, picked)
 }
 
-/// A drop-down list of values, each with a name and a text for hovering; `custom` is shown for one that is not among
-/// them.
+/// A drop-down list of values, each with a name and a tooltip; shows `custom` for a value that is not in the list.
 pub fn choice<T: PartialEq + Copy>(
     ui: &mut Ui,
     name: &str,
@@ -273,7 +269,7 @@ pub fn choice<T: PartialEq + Copy>(
     response
 }
 
-/// A drop-down list of all values of a setting, by the names and texts that they have on the command line.
+/// A drop-down list of all values of a setting, with the names and texts of the command line.
 pub fn listed<T>(ui: &mut Ui, value: &mut T) -> Response
 where
     T: VariantArray + EnumMessage + Into<&'static str> + PartialEq + Copy,
@@ -295,7 +291,7 @@ where
     )
 }
 
-/// A number in four significant digits; very large and very small ones in powers of ten.
+/// Four significant digits; scientific notation for very large and very small values.
 pub fn significant(value: f64) -> String {
     let magnitude = value.abs().log10().floor();
     if value == 0.0 || !value.is_finite() {
@@ -308,7 +304,7 @@ pub fn significant(value: f64) -> String {
     format!("{value:.3e}")
 }
 
-/// Three digits that tell something, more only before the point: 0.005, 25, 1366, 2.5e-7.
+/// Three significant digits, more only before the decimal point, without trailing zeros: 0.005, 25, 1366, 2.5e-7.
 pub fn short(value: f64) -> String {
     let magnitude = value.abs().log10().floor();
     if value == 0.0 || !value.is_finite() {
@@ -323,7 +319,7 @@ pub fn short(value: f64) -> String {
     without_zeros(&format!("{value:.decimals$}")).to_owned()
 }
 
-/// A number without zeros behind its point that say nothing.
+/// Removes trailing zeros behind the decimal point.
 fn without_zeros(number: &str) -> &str {
     if number.contains('.') {
         number.trim_end_matches('0').trim_end_matches('.')
@@ -332,7 +328,7 @@ fn without_zeros(number: &str) -> &str {
     }
 }
 
-/// A count with separators for thousands: 1,234,567.
+/// With thousands separators: 1,234,567.
 pub fn grouped(count: u64) -> String {
     let digits = count.to_string();
     let mut text = String::new();
@@ -345,7 +341,7 @@ pub fn grouped(count: u64) -> String {
     text
 }
 
-/// A size with its unit, in powers of 1000.
+/// With a unit, in powers of 1000.
 pub fn bytes(count: u64) -> String {
     match count {
         0..1000 => format!("{count} B"),
@@ -354,7 +350,7 @@ pub fn bytes(count: u64) -> String {
     }
 }
 
-/// A count with its noun: "1 light", "2 lights".
+/// A count and its noun: "1 light", "2 lights".
 pub fn counted(count: usize, noun: &str) -> String {
     let plural = if count == 1 { "" } else { "s" };
     format!("{} {noun}{plural}", grouped(count as u64))

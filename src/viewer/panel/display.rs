@@ -40,22 +40,21 @@ const TONE_MAPS: [(ToneMap, &str, &str); 5] = [
     (ToneMap::None, "none", "cut at the display's white"),
 ];
 
-/// Ends of what can be typed as an end of the scale [W/m²].
+/// Range of values that can be typed for the ends of the scale [W/m²].
 const MIN_W_M2: f64 = 1e-9;
 const MAX_W_M2: f64 = 1e9;
-/// Of the upper end over the lower one.
+/// Smallest ratio of the upper to the lower end.
 const MIN_RATIO: f64 = 1.01;
 
-/// What the slider of the white balance begins at: D65.
+/// Initial value of the white balance slider [K]: D65.
 const DAYLIGHT_KELVIN: f64 = 6504.0;
 
-/// Shows the section.
 pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Vec<Command>) {
     let baked = &model.layers()[..];
     rows(ui, "display", |ui| {
         row(ui, "Exposure [stops]", None, |ui| {
             ui.horizontal(|ui| {
-                // A button stands beside it.
+                // Leaves room for the button.
                 ui.spacing_mut().slider_width = 74.0;
                 let slider = exposure(ui, &mut display.exposure_stops);
                 let auto = ui.button("Auto").on_hover_text(AUTO_EXPOSURE);
@@ -206,7 +205,7 @@ fn range(ui: &mut Ui, choice: &mut ScaleChoice, model: &Model) -> Response {
 
 fn layer(ui: &mut Ui, shown: &mut LayerShown, baked: &[LayerKind]) -> Response {
     ui.horizontal(|ui| {
-        // Four words in a narrow row.
+        // Four words have to fit into a narrow row.
         let spacing = ui.spacing_mut();
         (spacing.item_spacing.x, spacing.icon_spacing) = (2.0, 1.0);
         (spacing.icon_width, spacing.icon_width_inner) = (11.0, 6.0);

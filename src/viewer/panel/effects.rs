@@ -15,12 +15,12 @@ use crate::viewer::worker::{BakeState, EffectDifference};
 
 /// Width of the three switches of an effect [points].
 const SWITCHES_WIDTH: f32 = 128.0;
-/// Of the button that sets it back, with what is before it.
+/// Width of the reset button, with its spacing [points].
 const RESET_WIDTH: f32 = 24.0;
 /// Size of a switch [points].
 const SWITCH: egui::Vec2 = vec2(40.0, 18.0);
 
-/// Size of the counters' text [points].
+/// Font size of the counters [points].
 pub const COUNTER: f32 = 11.5;
 
 const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
@@ -57,7 +57,7 @@ pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, model: &Model, commands:
     }
 }
 
-/// The plan of the last level, the eye's chains as the picture has them. Dispersion is of both passes.
+/// The plan of an effect: of the picture for chains, of both passes for dispersion, of the last level for all others.
 fn known(effect: Effect, model: &Model) -> Option<Cow<'_, EffectLine>> {
     let plan = model.last.as_ref().map(|last| &last.result.plan);
     let planned = || plan?.effects.iter().find(|line| line.effect == effect);
@@ -72,7 +72,7 @@ fn known(effect: Effect, model: &Model) -> Option<Cow<'_, EffectLine>> {
     }
 }
 
-/// Shows one effect; tells whether it was asked what it is worth.
+/// Shows one effect; returns whether its contribution was requested.
 fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, model: &Model) -> bool {
     let known = known(effect, model);
     let is_on = known.as_ref().map(|line| line.on);
@@ -109,7 +109,7 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, model: &Model) 
     is_asked
 }
 
-/// "refraction: on", strong where it is on.
+/// "refraction: on", emphasized if it is on.
 fn title(ui: &mut Ui, name: &str, is_on: Option<bool>) -> egui::Response {
     let text = match is_on {
         Some(true) => RichText::new(format!("{name}: on")).strong(),
@@ -136,7 +136,7 @@ fn segments(ui: &mut Ui, name: &str, switch: &mut EffectSwitch) {
             let response = ui
                 .add(Button::selectable(is_chosen, label).min_size(SWITCH))
                 .on_hover_text(hover);
-            // Three of each kind stand in the panel: told apart by the effect.
+            // The labels repeat in every row, so the accessible name includes the effect.
             let is_enabled = ui.is_enabled();
             response.widget_info(|| {
                 let text = format!("{name}: {label}");
@@ -149,7 +149,7 @@ fn segments(ui: &mut Ui, name: &str, switch: &mut EffectSwitch) {
     });
 }
 
-/// Rays that a bake counts for an effect by themselves; `None` where it traced none.
+/// Rays that a bake counted for an effect alone; `None` if there are none.
 fn rays(effect: Effect, counts: &BakeCounts) -> Option<String> {
     let (rays, name) = match effect {
         Effect::LightPass => (counts.rays, "light rays"),
@@ -165,7 +165,8 @@ const BUTTON: &str = "Bakes once more without this effect, beside the maps that 
 const LINE: &str = "Light on all maps and layers with the effect minus without it, in luminous-equivalent watts; the \
                     root mean square of the difference over the mean with it.";
 
-/// A button that asks what an effect is worth, unless that is known or being found; tells whether it was pressed.
+/// A button that requests the contribution of an effect, unless it is known or being computed; returns whether it was
+/// clicked.
 fn button(ui: &mut Ui, effect: Effect, model: &Model) -> bool {
     if found(effect, model).is_some_and(|worth| worth.difference.is_ok()) || progress(effect, model).is_some()
     {
@@ -181,7 +182,7 @@ fn button(ui: &mut Ui, effect: Effect, model: &Model) -> bool {
     button.clicked()
 }
 
-/// What was found, or how far that is.
+/// The contribution of an effect, or the progress of its computation.
 fn line(ui: &mut Ui, effect: Effect, model: &Model) {
     if let Some(text) = progress(effect, model) {
         ui.label(RichText::new(text).size(COUNTER));

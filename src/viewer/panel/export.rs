@@ -6,7 +6,6 @@ use super::control::{CONTROL_WIDTH, ask, row, rows};
 use super::{Command, Model, bake};
 use crate::viewer::exporting::{Export, ExportState, folder_name};
 
-/// Shows the section.
 pub fn show(ui: &mut Ui, maps_folder: &mut String, model: &Model, commands: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         ask(ui, "Save picture", None, commands, Command::SavePicture);
@@ -26,7 +25,7 @@ pub fn show(ui: &mut Ui, maps_folder: &mut String, model: &Model, commands: &mut
     outcome(ui, model);
 }
 
-/// A button that exports all maps.
+/// A button that exports all maps to a folder; an empty name means the default.
 pub fn all(ui: &mut Ui, name: &str, folder: &str, model: &Model, commands: &mut Vec<Command>) {
     let folder = match folder.trim() {
         "" => folder_name(&model.scene().name),
@@ -36,7 +35,7 @@ pub fn all(ui: &mut Ui, name: &str, folder: &str, model: &Model, commands: &mut 
     ask(ui, name, unavailable(model), commands, export);
 }
 
-/// Why no map can be exported now.
+/// Why maps cannot be exported at present.
 pub fn unavailable(model: &Model) -> Option<&'static str> {
     match model.last {
         _ if model.exporter.state.is_running() => Some("Something is being written."),
@@ -46,7 +45,7 @@ pub fn unavailable(model: &Model) -> Option<&'static str> {
     }
 }
 
-/// How the last export got on, in one line.
+/// State of the last export, in one line.
 pub fn outcome(ui: &mut Ui, model: &Model) {
     match &model.exporter.state {
         ExportState::Idle => {}

@@ -11,15 +11,15 @@ use crate::scene::builtin;
 const WATCH: &str = "Reads the scene again whenever its file, or a buffer or an image that the file refers to, is written. \
                      Camera, settings and edits stay, as far as the new file has a place for them. Default: off.";
 
-/// What is typed into the row.
+/// Typed text of the row.
 #[derive(Clone, Debug, Default)]
 pub struct FileRow {
     text: String,
-    /// What was in the window when it was typed.
+    /// Source of the scene when the text was typed.
     of: String,
 }
 
-/// Says what is being read, and what could not be.
+/// Shows what is being loaded, and what could not be.
 pub fn show_state(ui: &mut Ui, model: &Model) {
     if let Some(source) = model.files.loading() {
         let name = Path::new(source).file_name().map(|name| name.to_string_lossy());
@@ -34,7 +34,7 @@ pub fn show_state(ui: &mut Ui, model: &Model) {
     }
 }
 
-/// Shows the row; what is to be opened goes to `commands`.
+/// Shows the row and its buttons; pushes commands.
 pub fn show(
     ui: &mut Ui,
     (file, watches): (&mut FileRow, &mut bool),

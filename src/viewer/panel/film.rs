@@ -11,10 +11,10 @@ const TOO_FEW: &str = "A path has at least two keys.";
 const FEW_CAMERAS: &str = "The scene has fewer than two cameras.";
 const FIELD: &str = "Path file";
 
-/// Sides of a frame that can be set [pixels].
+/// Range of a frame's sides [pixels].
 const SIDES: std::ops::RangeInclusive<u32> = 16..=8192;
 
-/// Shows the section; `file` is what is typed as the path's file.
+/// Shows the section; `file` is the typed path of the file.
 pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, commands: &mut Vec<Command>) {
     let too_few = (film.keys.len() < 2).then_some(TOO_FEW);
     ui.horizontal(|ui| {
@@ -95,7 +95,6 @@ fn length(film: &Film) -> String {
     format!("{keys}, {seconds:.1} s")
 }
 
-/// A row for each key.
 fn keys(ui: &mut Ui, film: &mut Film, commands: &mut Vec<Command>) {
     let mut gone = None;
     for (index, key) in film.keys.iter().enumerate() {

@@ -10,7 +10,7 @@ use crate::viewer::timing::{FrameStats, FrameTimes, Latencies, PICTURES, Percent
 const HEIGHT: f32 = 64.0;
 const MARKS: Color32 = Color32::from_gray(170);
 
-/// Passes from the bottom up: name, colour, what it draws.
+/// Passes from bottom to top: name, colour and tooltip.
 const PASSES: [(&str, Color32, &str); 3] = [
     (
         "opaque",
@@ -35,7 +35,7 @@ const HOW: &str = "While the camera moves and pictures are late, what is seen in
                    more coarsely; at rest, pictures of one view are averaged until their edges are smooth.";
 const NOT_YET: &str = "Known with the first picture.";
 
-/// The section's title, with the newest time.
+/// Title of the section, with the latest time.
 pub fn title(times: Option<&FrameTimes>) -> String {
     match times.and_then(FrameTimes::newest) {
         Some(newest) => {
@@ -48,7 +48,7 @@ pub fn title(times: Option<&FrameTimes>) -> String {
     }
 }
 
-/// Shows the section; `None` where the device cannot tell.
+/// Shows the section; `None` if the device cannot measure times.
 pub fn show(ui: &mut Ui, times: Option<&FrameTimes>) {
     let Some(times) = times else {
         ui.label(RichText::new(CANNOT_TELL).weak());
@@ -79,7 +79,7 @@ const WAITS: &str = "From a key, click or movement of the mouse until the frame 
                      system; of the last 10,000. Events that came while the window was busy count from the earliest \
                      moment at which they can have come.";
 
-/// Shows how long events waited for their frames.
+/// Shows the latencies from events to frames.
 pub fn waits(ui: &mut Ui, latencies: &Latencies) {
     for (when, waits) in [
         ("Baking", latencies.while_baking()),
@@ -103,7 +103,7 @@ fn told_waits(when: &str, waits: &Percentiles) -> String {
     format!("{when}: event to frame {p50_ms:.0} ms, 95 % {p95_ms:.0}, 99 % {p99_ms:.0} (of {count})")
 }
 
-/// What is said beside the time where the traced picture is not as fine as the picture.
+/// Note for the title if reflections and refractions are traced below the frame's resolution.
 fn coarseness(times: &FrameTimes) -> Option<String> {
     let scale = times.made()?.traced_scale?;
     (scale < 1.0).then(|| format!("mirrors and glass at 1/{:.0}", 1.0 / scale))
@@ -142,17 +142,16 @@ fn graph(ui: &mut Ui, times: &FrameTimes) {
     response.on_hover_text(GRAPH);
 }
 
-/// Milliseconds from the graph's bottom to its top: the least of 1, 2 and 5 times a power of ten that is not below the
-/// longest time.
+/// Range of the graph [ms]: the smallest of 1, 2 and 5 times a power of ten that covers the longest time.
 pub fn scale_ms(longest_ms: f64) -> f64 {
-    // From a tenth of a millisecond to a hundred seconds.
+    // 0.1 ms to 100 s.
     let powers = (-1..=4).map(|power| 10_f64.powi(power));
     let mut steps = powers.flat_map(|power| [1.0, 2.0, 5.0].map(|digit| digit * power));
     steps.find(|step| *step >= longest_ms).unwrap_or(1e5)
 }
 
-/// The bars of each picture within `rect`, by pass from the bottom up; the newest picture at the right edge, each with
-/// one of as many columns as pictures are remembered. Times beyond the scale end at the top.
+/// Stacked bars of each picture within `rect`, by pass from bottom to top. There is one column per picture kept, with
+/// the latest at the right edge. Bars are clipped at the top.
 pub fn columns(times: &FrameTimes, scale_ms: f64, rect: Rect) -> Vec<[Rect; 3]> {
     let width = rect.width() / PICTURES as f32;
     let first = PICTURES - times.iter().len();

@@ -11,10 +11,10 @@ use crate::optics::glass::{Dispersion, catalogue};
 use crate::scene::{Edit, Material, MaterialEdit};
 
 const ONE_INDEX: &str = "one index";
-/// Said where only figures make it up.
+/// Shown for a glass that is not in the catalogue.
 const BY_NUMBERS: &str = "by numbers";
 
-/// Shows the rows of a clear material with that of the file; what is changed goes to `commands`.
+/// Shows the rows of a transparent material; their defaults are those of the file. Pushes edits to `commands`.
 pub fn show(
     ui: &mut Ui,
     material: usize,
@@ -33,7 +33,7 @@ pub fn show(
         ui.add(slider.fixed_decimals(3))
     });
     if dispersion != before {
-        // Back to the file's number is back to its glass.
+        // The file's dispersion restores the file's glass.
         glass = if dispersion == default && shown.ior == of_file.ior {
             of_file.glass.clone()
         } else {
@@ -56,23 +56,23 @@ pub fn show(
     }
 }
 
-/// 20 over the Abbe number; 0 for none.
+/// 20 over the Abbe number; 0 without dispersion.
 fn dispersion_of(material: &Material) -> f64 {
     let glass = material.glass.as_ref();
     let parting = glass.filter(|glass| glass.dispersion.is_dispersive());
     let abbe_number = parting.map(|glass| match glass.dispersion {
-        // As it was typed: the formula comes near it.
+        // The exact number: the fitted formula reproduces it only approximately.
         Dispersion::Abbe { v_d, .. } => v_d,
         other => other.abbe_number(),
     });
-    // To the digits that are shown: a look at the number changes nothing.
+    // Rounded to the digits shown, so that displaying the number does not change it.
     abbe_number.map_or(0.0, |v_d| (20.0 / v_d * 1e3).round() / 1e3)
 }
 
 fn by_name(ui: &mut Ui, glass: &mut Option<Arc<Glass>>) -> Response {
     let all: Vec<&Glass> = catalogue::all().collect();
     let known = |glass: &Glass| all.iter().position(|known| known.name == glass.name);
-    // The list begins with none of them.
+    // The first entry stands for no glass.
     let (shown, at) = match glass.as_deref() {
         None => (ONE_INDEX, Some(0)),
         Some(glass) => match known(glass) {

@@ -11,7 +11,7 @@ use crate::optics::spectrum::{Spectrum, illuminants};
 use crate::scene::{Edit, Light, LightEdit};
 
 const COLOUR_ALONE: &str = "a colour alone";
-/// Of those that are called by a number.
+/// Spectra that are named by a number.
 const BY_NUMBER: [&str; 7] = [
     "blackbody:2700",
     "blackbody:3200",
@@ -22,7 +22,7 @@ const BY_NUMBER: [&str; 7] = [
     "line:633",
 ];
 
-/// Shows the rows of a light with that of the file; what is changed goes to `commands`.
+/// Shows the rows of a light; their defaults are those of the file. Pushes edits to `commands`.
 pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), commands: &mut Vec<Command>) {
     let mut colour = light.colour;
     setting(ui, "Colour", None, (&mut colour, &of_file.colour), button);
@@ -48,13 +48,13 @@ pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), comma
     )));
 }
 
-/// The nearest colour without a negative channel.
+/// Clamps negative channels to zero.
 fn within_reach(colour: LinearSrgb) -> LinearSrgb {
     LinearSrgb::from(colour.to_array().map(|channel| channel.max(0.0)))
 }
 
 fn button(ui: &mut Ui, colour: &mut LinearSrgb) -> Response {
-    // What is outside of what the button shows is changed only with it.
+    // The button clamps colours outside the gamut; the colour changes only when the user edits it.
     let mut rgb = colour.to_array().map(|channel| channel.clamp(0.0, 1.0) as f32);
     let response = ui.color_edit_button_rgb(&mut rgb);
     if response.changed() && rgb.iter().any(|channel| *channel > 0.0) {
@@ -76,7 +76,7 @@ fn by_name(ui: &mut Ui, spectrum: &mut Option<Arc<Spectrum>>) -> Response {
     let entries: Vec<Entry> = names.iter().map(|name| (*name, "".into(), None)).collect();
     let (response, picked) = pick(ui, ("spectrum", CONTROL_WIDTH), (shown, at), &entries);
     if let Some(index) = picked {
-        // Every name of the list is one of a lamp.
+        // All names in the list are valid.
         *spectrum = match index {
             0 => None,
             _ => illuminants::illuminant(names[index]).ok().map(Arc::new),

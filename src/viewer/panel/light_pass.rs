@@ -6,11 +6,11 @@ use super::accuracy::target;
 use super::control::{about, grouped, listed, rows, setting};
 use crate::settings::{BakeSettings, Estimator, Kernel, LayerKind, Sigma};
 
-/// Density at the slider's zero [rays/sr]. Each step is [`NESTING`] times the one before: the lattice's sides double,
-/// and what was traced of one is kept for the next.
+/// Density at step 0 of the slider [rays/sr]. Each step multiplies it by [`NESTING`]: the sides of the lattice
+/// double, and rays already traced are kept.
 const BASE_DENSITY_PER_SR: f64 = 100_000.0;
 const NESTING: f64 = 4.0;
-/// The slider's ends: 391 to 102,400,000 rays/sr.
+/// Range of the slider: 391 to 102,400,000 rays/sr.
 const DENSITY_STEPS: std::ops::RangeInclusive<f64> = -4.0..=5.0;
 const SIGMA_RANGE: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 
@@ -18,7 +18,7 @@ const NO_CAUSTIC: &str = "The caustic layer is off: nothing here applies to the 
 const NO_SPLATS: &str = "Only the splat estimator has it.";
 const NOT_GAUSSIAN: &str = "Sigma is the spread of the gaussian kernel; the chosen kernel has none.";
 
-/// What the settings are set back to: what the program begins with for an estimator.
+/// Defaults in the panel for an estimator.
 pub fn defaults(estimator: Estimator) -> BakeSettings {
     BakeSettings {
         layers: vec![LayerKind::Caustic, LayerKind::Direct],
@@ -26,7 +26,7 @@ pub fn defaults(estimator: Estimator) -> BakeSettings {
     }
 }
 
-/// The density that a bake begins from unless another is set [rays/sr].
+/// Default density [rays/sr]: the start of refinement, or a preview density without refinement.
 fn default_density_per_sr(settings: &BakeSettings) -> f64 {
     settings.max_error.map_or_else(
         || settings.estimator.preview_density_per_sr(),
@@ -34,7 +34,7 @@ fn default_density_per_sr(settings: &BakeSettings) -> f64 {
     )
 }
 
-/// Shows the section; `settings` holds what the user chose.
+/// Shows the section.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = no_caustic(settings);
     let refines = settings.estimator.refines();
@@ -54,7 +54,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
         let before = *density_per_sr.0;
         setting(ui, "Ray density [rays/sr]", no_caustic, density_per_sr, density);
         if settings.density_per_sr != before {
-            // What is asked for is seen: refinement would go on to the same picture from any density.
+            // The density has to determine the result: refinement would lead to the same picture from any density.
             target::aim_at_density(settings);
         }
         let value = (&mut settings.sigma, &default.sigma);
@@ -64,7 +64,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings) {
     });
 }
 
-/// Shows what is seldom changed.
+/// Shows the subsection *Rays and kernels*.
 pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
     let no_caustic = no_caustic(settings);
     let no_splats = no_caustic.or(settings.estimator.refines().then_some(NO_SPLATS));
@@ -83,14 +83,14 @@ pub fn show_details(ui: &mut Ui, settings: &mut BakeSettings) {
     });
 }
 
-/// Takes over what suits another estimator.
+/// Adapts density, sigma and target to a new estimator.
 fn change_estimator(settings: &mut BakeSettings, before: Estimator) {
     settings.density_per_sr *= settings.estimator.preview_density_per_sr() / before.preview_density_per_sr();
     settings.sigma = settings.estimator.default_sigma();
     target::after_change_of_estimator(settings);
 }
 
-/// Why nothing that shapes the caustic layer can be set, where that is so.
+/// Reason why settings of the caustic layer have no effect, if the layer is off.
 pub fn no_caustic(settings: &BakeSettings) -> Option<&'static str> {
     (!settings.layers.contains(&LayerKind::Caustic)).then_some(NO_CAUSTIC)
 }
@@ -102,7 +102,7 @@ fn no_sigma(settings: &BakeSettings) -> Option<&'static str> {
 
 fn layers(ui: &mut Ui, layers: &mut Vec<LayerKind>) -> Response {
     ui.horizontal(|ui| {
-        // Three words in a narrow row.
+        // Three words have to fit into a narrow row.
         ui.spacing_mut().item_spacing.x = 5.0;
         for kind in LayerKind::ALL {
             let mut on = layers.contains(&kind);
@@ -132,7 +132,7 @@ fn density(ui: &mut Ui, density_per_sr: &mut f64) -> Response {
         }
         step_of(*density_per_sr)
     };
-    // Beside it stand up to nine digits.
+    // Leaves room for nine digits.
     ui.spacing_mut().slider_width = 86.0;
     ui.add(
         Slider::from_get_set(DENSITY_STEPS, get_set)

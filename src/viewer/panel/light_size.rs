@@ -6,12 +6,12 @@ use super::Command;
 use super::control::setting;
 use crate::scene::{Edit, Light, LightEdit, LightKind, LightSize};
 
-/// Drag of one point, as a share of the radius, or [m] where that is 0.
+/// Change per point of a drag, as a fraction of the radius; [m] if the radius is 0.
 const RADIUS_SPEED: f64 = 0.01;
-/// Drag of one point [°].
+/// Change per point of a drag [°].
 const ANGLE_SPEED_DEG: f64 = 0.01;
 
-/// Shows the size of a light that can have one, with that of the file; what is changed goes to `commands`.
+/// Shows the size of a light, if its kind has one; its default is that of the file. Pushes edits to `commands`.
 pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), commands: &mut Vec<Command>) {
     let mut size = light.size;
     let value = (&mut size, &of_file.size);

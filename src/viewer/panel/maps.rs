@@ -20,19 +20,19 @@ use crate::viewer::flat_map::{self, ShownPixels};
 
 /// Side of a thumbnail [points].
 const THUMBNAIL: f32 = 40.0;
-/// Height of the list at most: six maps [points].
+/// Largest height of the list [points]: six maps.
 const MAX_HEIGHT: f32 = 6.0 * (THUMBNAIL + 4.0);
-/// Thumbnails that are made in one frame: a millisecond each.
+/// Limit of the thumbnails made per frame; each takes about a millisecond.
 const MAX_AT_ONCE: usize = 4;
 
 const LOOK: &str = "Shows the map large, with the irradiance under the pointer.";
 const ONE: &str = "Writes this map to an .exr file of its own in the working folder: each layer, their sum and the error \
                    [W/m²].";
 
-/// Which maps thumbnails were made of: number of the bake, and its level.
+/// Identifies the maps of the thumbnails: request number and level.
 type ThumbnailKey = Option<(u64, u32)>;
 
-/// What the section keeps between frames.
+/// State of the section between frames.
 #[derive(Clone, Default)]
 pub struct Browser {
     thumbnails: HashMap<usize, TextureHandle>,
@@ -59,7 +59,7 @@ pub fn show(
         export::all(ui, "Export all", maps_folder, model, commands);
     });
     let mut still_to_make = MAX_AT_ONCE;
-    // What stands below is not to be far away.
+    // Limits the height, to keep the sections below within reach.
     let list = ScrollArea::vertical()
         .id_salt("maps")
         .max_height(MAX_HEIGHT)
@@ -76,7 +76,7 @@ pub fn show(
     }
 }
 
-/// Shows the map that was chosen, in a window over the picture.
+/// Shows the selected map in a window over the picture.
 pub fn show_large(ui: &Ui, browser: &mut Browser, model: &Model) {
     browser.keep_up(model);
     let Some(large) = &mut browser.large else {
@@ -89,7 +89,7 @@ pub fn show_large(ui: &Ui, browser: &mut Browser, model: &Model) {
 }
 
 impl Browser {
-    /// Forgets pictures of other maps than those that are shown.
+    /// Drops images of maps that are no longer shown.
     fn keep_up(&mut self, model: &Model) {
         let made_of = model.last.as_ref().map(|last| (last.serial, last.level));
         if made_of != self.made_of {
@@ -151,7 +151,7 @@ fn figures(map: &IlluminationMap) -> String {
     format!("{} × {} texels, {memory}{error}", map.width(), map.height())
 }
 
-/// The object's name, and which of its sides where that is the back.
+/// Name of the object, marked if the map is of its back.
 fn name(map: &IlluminationMap, model: &Model) -> String {
     let object = model.scene().objects.get(map.chart.object());
     let name = object.map_or("surface", |object| object.name.as_str());
@@ -161,7 +161,7 @@ fn name(map: &IlluminationMap, model: &Model) -> String {
     }
 }
 
-/// The thumbnail of a map that is in view, once it is its turn.
+/// Thumbnail of a visible map; `None` if it is not made yet.
 fn thumbnail(
     ui: &Ui,
     browser: &mut Browser,
@@ -178,7 +178,7 @@ fn thumbnail(
     browser.thumbnails.get(&index).cloned()
 }
 
-/// Takes pixels to the device, in place of those of an older texture.
+/// Uploads pixels, reusing an older texture.
 fn texture(ui: &Ui, name: &str, shown: &ShownPixels, old: Option<TextureHandle>) -> TextureHandle {
     let image = ColorImage::from_rgba_unmultiplied(shown.size, &shown.rgba);
     match old {
@@ -190,10 +190,10 @@ fn texture(ui: &Ui, name: &str, shown: &ShownPixels, old: Option<TextureHandle>)
     }
 }
 
-/// What the field is called by assistive technology.
+/// Name of the field for assistive technology.
 const FOLDER: &str = "Folder to compare with";
 
-/// Shows the controls.
+/// Shows the section *Compare*.
 pub fn compare(ui: &mut Ui, folder: &mut String, model: &Model, commands: &mut Vec<Command>) {
     ui.horizontal(|ui| {
         let none = model.layers().is_empty().then_some("There are no maps yet.");

@@ -33,18 +33,17 @@ use crate::error::Warning;
 use crate::eye_pass::{ToneMap, WhiteBalance};
 use crate::settings::LayerKind;
 
-/// Width of the panel [points].
+/// [points].
 pub const WIDTH: f32 = 360.0;
-/// Titles of what is seldom opened.
+/// Colour of subsection titles.
 const PART: Color32 = Color32::from_gray(160);
 
-/// Which layer the picture shows.
+/// The layers that the picture shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LayerShown {
-    /// The sum of what was baked.
+    /// The sum of all baked layers.
     #[default]
     All,
-    /// One layer alone.
     Only(LayerKind),
 }
 
@@ -54,20 +53,18 @@ pub enum LayerShown {
 pub struct Display {
     /// Radiance is multiplied by 2^stops.
     pub exposure_stops: f64,
-    /// After the exposure.
+    /// Applied after the exposure.
     pub tone_map: ToneMap,
-    /// Before it.
+    /// Applied before the exposure.
     pub white_balance: WhiteBalance,
-    /// Which light.
     pub layer: LayerShown,
-    /// The light, or something else about surfaces.
     pub quantity: Quantity,
-    /// How irradiance is shown in false colours.
+    /// Scale of irradiance in false colours.
     pub scale: ScaleChoice,
 }
 
 impl Display {
-    /// Sets what differs between two to what it is in the second; the rest stays.
+    /// Sets the fields that differ between `from` and `to` to their value in `to`.
     pub fn restore(&mut self, from: &Self, to: &Self) {
         fn set<T: PartialEq + Copy>(value: &mut T, from: T, to: T) {
             if from != to {
@@ -83,46 +80,46 @@ impl Display {
     }
 }
 
-/// What the panel keeps between frames: what is typed, and what is open.
+/// State of the panel between frames.
 #[derive(Clone, Default)]
 pub struct Panel {
-    /// As the last frame had it.
+    /// Whether probing was on in the last frame.
     probed: bool,
-    /// What the section has scrolled to: the point, and whether its paths were there.
+    /// The probe result that the section has scrolled to: its point, and whether paths were found.
     probe_told: Option<(DVec3, bool)>,
-    /// Folder of the maps to compare with.
+    /// Typed folder of the maps to compare with.
     compare_folder: String,
-    /// File of a path.
+    /// Typed file of a camera path.
     film_file: String,
-    /// Which scene is in the window.
     file: file::FileRow,
-    /// Picks in the picture that opened the section of the scene.
+    /// Number of picks in the picture that have opened the section *Scene*.
     picks: u32,
-    /// What is kept of section *Maps*.
+    /// State of section *Maps*.
     maps: maps::Browser,
-    /// Where all maps are exported to; empty for the folder of the scene's name.
+    /// Typed export folder for all maps; empty for the default.
     maps_folder: String,
-    /// Whether the list of keys is open.
+    /// Whether section *Help* is open.
     pub help_open: bool,
     help_was_open: bool,
 }
 
-/// Dark, since the picture beside it is what is to be judged; without animations, so that an idle window rests.
+/// Dark, because the picture beside the panel is what the user judges; without animations, so that an idle window
+/// draws nothing.
 pub fn set_style(context: &egui::Context) {
     context.set_theme(egui::Theme::Dark);
-    // A press is a click however long the frame takes that first sees it.
+    // Slow frames must not turn clicks into long presses.
     context.options_mut(|options| options.input_options.max_click_duration = f64::INFINITY);
     context.all_styles_mut(|style| {
         style.animation_time = 0.0;
         style.interaction.tooltip_delay = 0.3;
-        // Labels carry units here: they are to be read, not to recede.
+        // Labels carry units and must stay readable.
         style.visuals.widgets.noninteractive.fg_stroke.color = Color32::from_gray(205);
         style.visuals.weak_text_color = Some(Color32::from_gray(150));
     });
 }
 
 impl Panel {
-    /// Shows the panel at the left; what the user asks for.
+    /// Shows the panel at the left of the window; returns the user's commands.
     pub fn show(&mut self, ui: &mut Ui, model: &Model) -> Vec<Command> {
         let is_dragging = ui.input(|input| input.pointer.any_down()) || ui.text_edit_focused();
         let mut commands = Vec::new();
@@ -196,7 +193,7 @@ impl Panel {
         self.help(ui, &model.navigator);
     }
 
-    /// Opens where something is picked in the picture.
+    /// Opens when something is picked in the picture.
     fn scene(&mut self, ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
         let is_picked = model.choices.selection.picks > self.picks;
         self.picks = model.choices.selection.picks;
@@ -210,7 +207,7 @@ impl Panel {
             });
     }
 
-    /// Opens with the mode and closes with it.
+    /// Opens and closes with the probe mode.
     fn probe(&mut self, ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
         let is_switched = choices.probes != self.probed;
         self.probed = choices.probes;
@@ -264,13 +261,13 @@ fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {
     titled(ui, name, RichText::new(name).strong(), open, add);
 }
 
-/// A section within another, closed at first.
+/// A subsection, initially closed.
 fn part(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui)) {
     titled(ui, name, RichText::new(name).color(PART), false, add);
 }
 
 fn titled(ui: &mut Ui, name: &str, title: RichText, open: bool, add: impl FnOnce(&mut Ui)) {
-    // The text may carry a count; the section stays the same one.
+    // The title may contain a count, which must not change the id.
     let id = name.split(" (").next().unwrap_or(name);
     CollapsingHeader::new(title)
         .id_salt(id)
@@ -278,7 +275,7 @@ fn titled(ui: &mut Ui, name: &str, title: RichText, open: bool, add: impl FnOnce
         .show_unindented(ui, add);
 }
 
-/// Shows the keys for a way to get about at a speed [m/s].
+/// Lists the keys for a navigation mode and its speed [m/s].
 fn keys(ui: &mut Ui, travel: NavigationMode, speed_m_per_s: f64) {
     let (way, wheel) = match travel {
         NavigationMode::Fly | NavigationMode::Walk => (

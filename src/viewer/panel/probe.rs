@@ -19,10 +19,9 @@ const HITS: &str = "Draws a dot wherever one of some thousand light rays lands t
 const PATCHES: &str = "Outlines what lies between four neighbouring light rays that met the same objects: small patches are \
                        bright, folded ones are where the wavefront overlaps. Far thinner than the bake's patches; changes \
                        nothing in a bake.";
-/// Paths that are listed: the strongest.
+/// Limit of the paths that are listed; the strongest come first.
 const MAX_LISTED: usize = 8;
 
-/// Shows the section.
 pub fn show(
     ui: &mut Ui,
     (is_on, sketched): (&mut bool, &mut PreviewFlags),
@@ -56,7 +55,7 @@ pub fn show(
     }
 }
 
-/// What is drawn of the way that all light takes.
+/// Switches of the path preview.
 fn sketch(ui: &mut Ui, sketched: &mut PreviewFlags, model: &Model) {
     ui.horizontal(|ui| {
         ui.label("Draw");
@@ -130,7 +129,7 @@ fn paths(ui: &mut Ui, probed: &Probed, model: &Model) {
     }
 }
 
-/// A share as text; a tiny one is not shown as none.
+/// A share as text; small shares are not rounded to zero.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     if percent > 0.0 && percent < 0.05 {
@@ -139,7 +138,7 @@ fn percent(share: f64) -> String {
     format!("{percent:.1} %")
 }
 
-/// A path in words: lamp, through ball, through ball.
+/// A path in words: "lamp, through ball, off mirror".
 fn chain(path: &LightPath, model: &Model) -> String {
     let scene = model.scene();
     let light = scene.lights.get(path.light).map_or("light", |light| &light.name);

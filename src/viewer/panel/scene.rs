@@ -10,38 +10,38 @@ use crate::scene::{Edit, LightEdit, LightKind, MaterialEdit, Motion, Scene, Surf
 use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::new_light::NewLight;
 
-/// The slider's ends, as factors of the strength in the file.
+/// Range of the slider, as factors of the strength in the file.
 const POWER_FACTORS: (f64, f64) = (1e-2, 1e2);
-/// The steepest elevation that can be set [°]: straight up and down have no azimuth.
+/// Largest elevation that can be set [°]: the vertical has no azimuth.
 const STEEPEST_DEG: f64 = 89.99;
-/// Unit vectors nearer than this are the same direction.
+/// Unit vectors nearer than this count as equal.
 const SAME_DIRECTION: f64 = 1e-9;
-/// Least distance that one point of a drag moves, as a share of the scene's extent.
+/// Distance per point of a drag, as a fraction of the scene's diagonal.
 const DRAG_SHARE: f64 = 1e-3;
 
-/// What the list of lights leaves for the button beside it [points].
+/// Width of the button beside the list of lights [points].
 const REMOVE_WIDTH: f32 = 66.0;
 const AIM: &str = "A click or drag in the picture turns the light: a spot to the surface there; a sun goes where it is seen there \
                    in the sky, or would be seen if the surface there were a mirror.";
 const NO_HAND: &str = "Not for this light.";
 const NO_PLACE: &str = "This light has neither a place nor a direction that could be changed.";
 const NO_TURN: &str = "It is tilted.";
-/// What the section has in hand.
+/// What is edited in the section, and by mouse in the picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Selection {
     light: usize,
     object: usize,
     hand: MouseTool,
-    /// How often something was picked in the picture: each time the section opens.
+    /// Counts picks in the picture; each opens the section.
     pub picks: u32,
 }
 
-/// What clicks in the picture do to a light.
+/// What clicks and drags in the picture do to a light, by its index.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlaceTool {
-    /// Put it before the surface.
+    /// Place it in front of the surface.
     At(usize),
-    /// Turn it to the surface; a sun goes where it is seen, or would be in a mirror there.
+    /// Aim it at the surface; a sun moves to where it appears, or is mirrored, at that point.
     Towards(usize),
 }
 
@@ -50,13 +50,13 @@ pub enum PlaceTool {
 enum MouseTool {
     #[default]
     Nothing,
-    /// Pulls the light by handles.
+    /// Moves the light by handles.
     Light,
-    /// Puts the light before surfaces.
+    /// Places the light in front of surfaces.
     Place,
-    /// Turns the light to what is pointed at.
+    /// Aims the light at surfaces.
     Aim,
-    /// Pulls the object by handles.
+    /// Moves the object by handles.
     Object,
 }
 
@@ -70,7 +70,7 @@ impl Selection {
         }
     }
 
-    /// The light that clicks in the picture put elsewhere, or turn.
+    /// The light that clicks in the picture place or aim.
     pub fn placed(&self) -> Option<PlaceTool> {
         match self.hand {
             MouseTool::Place => Some(PlaceTool::At(self.light)),
@@ -79,7 +79,7 @@ impl Selection {
         }
     }
 
-    /// Something was picked in the picture, or let go.
+    /// Selects what was picked in the picture; `None` deselects.
     pub fn hold(&mut self, held: Option<GizmoTarget>) {
         self.hand = match held {
             None => MouseTool::Nothing,
@@ -96,7 +96,7 @@ impl Selection {
     }
 }
 
-/// Shows the section; what is changed goes to `commands`.
+/// Shows the section; pushes edits to `commands`.
 pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mut Vec<Command>) {
     let scene = model.scene();
     let inventory = format!(
@@ -155,7 +155,7 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mu
     });
 }
 
-/// Buttons for lights that are to be added.
+/// Buttons that add lights.
 fn add_light(ui: &mut Ui, commands: &mut Vec<Command>) {
     row(ui, "Add light", None, |ui| {
         ui.horizontal(|ui| {
@@ -197,7 +197,7 @@ fn remove_light(ui: &mut Ui, selection: &mut Selection, scene: &Scene, commands:
     }
 }
 
-/// A list of names, of which one is chosen by its index.
+/// A drop-down list of names; the index of the present one is `chosen`.
 fn one_of<'a>(
     ui: &mut Ui,
     (name, width): (&str, f32),
@@ -263,12 +263,12 @@ fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), c
     }
 }
 
-/// Three lengths [m].
+/// A row of three coordinates [m].
 fn place(ui: &mut Ui, name: &str, place: &mut DVec3, scene: &Scene) -> Response {
     let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
     let speed = DRAG_SHARE * (high - low).length().max(1e-6);
     ui.horizontal(|ui| {
-        // Three numbers in a narrow row.
+        // Three numbers have to fit into a narrow row.
         let spacing = ui.spacing_mut();
         (spacing.item_spacing.x, spacing.button_padding.x) = (3.0, 2.0);
         spacing.interact_size.x = 58.0;
@@ -286,7 +286,7 @@ fn place(ui: &mut Ui, name: &str, place: &mut DVec3, scene: &Scene) -> Response 
     .expect("there are three axes")
 }
 
-/// Azimuth and elevation of a direction.
+/// A row with the azimuth and elevation of a direction.
 fn angles(ui: &mut Ui, direction: &mut DVec3) -> Response {
     let mut azimuth_deg = direction.x.atan2(-direction.z).to_degrees();
     let mut elevation_deg = direction.y.clamp(-1.0, 1.0).asin().to_degrees();
@@ -306,7 +306,7 @@ fn angles(ui: &mut Ui, direction: &mut DVec3) -> Response {
             .to_radians()
             .sin_cos();
         let turned = DVec3::new(azimuth.sin() * cosine, sine, -azimuth.cos() * cosine);
-        // Rounding to angles and back is no turn.
+        // Ignores the rounding error of the conversion to angles and back.
         if turned.distance(*direction) > SAME_DIRECTION {
             *direction = turned;
         }
@@ -370,7 +370,7 @@ fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Comman
     }
 }
 
-/// A switch for what the mouse does in the picture.
+/// A toggle for what the mouse does in the picture.
 fn hand(ui: &mut Ui, present: &mut MouseTool, own: MouseTool, (text, name): (&str, &str), what: &str) {
     let mut is_on = *present == own;
     let switch = ui.toggle_value(&mut is_on, text).accessible_name(name);
@@ -414,7 +414,7 @@ fn light_hand(ui: &mut Ui, selection: &mut Selection, model: &Model) {
     });
 }
 
-/// Offset and turn of an object's node.
+/// Rows with the offset and rotation of an object's node.
 fn place_of_object(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Command>) {
     let motion = model.scene().objects[object].motion();
     let why_not = motion.yaw_rad().is_none().then_some(NO_TURN);
@@ -427,7 +427,7 @@ fn place_of_object(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec
         (&mut moved, &DVec3::ZERO),
         |ui, moved| place(ui, "Offset [m]", moved, model.scene()),
     );
-    // To the digits that are shown: a look at the number changes nothing.
+    // Rounded to the digits shown, so that displaying the number does not change it.
     let present_deg = (yaw_rad.to_degrees() * 1e2).round() / 1e2;
     let mut turn_deg = present_deg;
     setting(ui, "Turn [°]", why_not, (&mut turn_deg, &0.0), |ui, turn_deg| {

@@ -9,12 +9,12 @@ use super::control::setting;
 use crate::scene::waves::STEEPEST_SLOPE;
 use crate::scene::{Edit, MaterialEdit, Wave, Waves};
 
-/// Least height that a drag starts from [m].
+/// Smallest amplitude that scaling starts from [m].
 const MIN_HEIGHT_M: f64 = 1e-6;
-/// Slopes nearer than this are the same.
+/// Slopes nearer than this count as equal.
 const SAME_SLOPE: f64 = 1e-9;
 
-/// Shows the waves of a material, with those of the file; what is changed goes to `commands`.
+/// Shows the waves of a material; their defaults are those of the file. Pushes edits to `commands`.
 pub fn show(
     ui: &mut Ui,
     material: usize,
@@ -45,11 +45,11 @@ pub fn show(
     }
 }
 
-/// The slope of all; their heights follow it.
+/// A row with the sum of all slopes, which scales all amplitudes.
 fn slope(ui: &mut Ui, list: &mut [Wave], in_file: &[Wave]) {
     let of = |list: &[Wave]| list.iter().map(Wave::slope).sum::<f64>();
     let (present, in_file) = (of(list), of(in_file));
-    // What rounding leaves is no difference.
+    // Ignores rounding errors.
     let is_as_in_file = (present - in_file).abs() < SAME_SLOPE;
     let default = if is_as_in_file { present } else { in_file };
     let mut wanted = present;
@@ -61,7 +61,7 @@ fn slope(ui: &mut Ui, list: &mut [Wave], in_file: &[Wave]) {
         return;
     }
     for wave in list.iter_mut() {
-        // Flat waves rise too, all alike.
+        // Flat waves get equal amplitudes, so that scaling can raise them.
         wave.amplitude_m = wave.amplitude_m.max(MIN_HEIGHT_M);
     }
     let present = of(list);
@@ -107,7 +107,7 @@ fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
     response
 }
 
-/// A value shown with so many decimals. What rounding leaves of it is no change.
+/// A number shown with this many decimals. Rounding for display does not change the value.
 fn number(
     ui: &mut Ui,
     value: &mut f64,

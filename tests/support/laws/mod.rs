@@ -1,4 +1,4 @@
-//! Hard cases as a table: scenes that are baked, and the laws that their bakes must keep.
+//! A table of hard cases: scenes to bake, and the laws that their bakes have to satisfy.
 
 pub mod law;
 pub mod scenes;
@@ -14,49 +14,48 @@ use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
 
 use crate::tools::{at, bake, photons, settings};
 
-/// Most that ledgers and maps may leave open, of what was emitted or deposited.
+/// Largest relative error of the energy balance of ledgers and maps.
 const BOOKS_BOUND: f64 = 1e-6;
 
-/// Photons that tell watts to a percent.
+/// Number of photons that determines a flux to about one per cent.
 const MIN_PHOTONS: f64 = 2e4;
 
-/// Whether the long variants of cases are asked for.
+/// Whether the long variants of the cases are requested.
 pub fn is_long() -> bool {
     std::env::var_os("NEPHROID_LONG").is_some_and(|value| value != "0")
 }
 
-/// A scene and what a bake made of it.
+/// A scene and its bake.
 pub struct Baked {
     pub scene: Scene,
     pub result: Bake,
 }
 
-/// How far a law is off, after all bakes before it.
+/// Deviation from a law, given all bakes so far.
 type Measure = Box<dyn Fn(&[Baked]) -> f64 + Send>;
 
-/// What is done with bakes before they are forgotten.
+/// Use of bakes before they are dropped.
 type Look = Box<dyn Fn(&[Baked]) + Send>;
 
 enum Step {
     Bake {
         what: Box<(Scene, BakeSettings)>,
-        /// Whether the scene is baked by photons and by what is chosen, too.
+        /// Whether the scene is also baked by photons and by the automatic estimator.
         is_carried: bool,
     },
     Law(String, f64, Measure),
-    /// Of the last bake's scene by photons and by what is chosen.
+    /// A law about the last bake's scene, baked by photons and by the automatic estimator.
     Carried(String, Box<dyn Fn(&Baked) -> f64 + Send>),
     Forget(Look),
 }
 
-/// Hard cases.
 #[derive(Default)]
 pub struct Table {
     cases: Vec<Case>,
 }
 
 impl Table {
-    /// One case more.
+    /// Adds a case.
     pub fn case(&mut self, name: impl Into<String>) -> &mut Case {
         self.cases.push(Case {
             name: name.into(),
@@ -67,7 +66,7 @@ impl Table {
     }
 }
 
-/// Bakes and laws, in the order in which they are made and looked at. A law sees all bakes before it.
+/// Bakes and laws, in order. A law sees all bakes before it.
 pub struct Case {
     name: String,
     steps: Vec<Step>,
@@ -75,17 +74,17 @@ pub struct Case {
 }
 
 impl Case {
-    /// A bake by wavefronts at a density [rays/sr], with maps of so many texels each way.
+    /// Bakes by wavefronts at a density [rays/sr], with maps of side² texels.
     pub fn bake(&mut self, scene: Scene, density_per_sr: f64, side: usize) -> &mut Self {
         self.bake_with(scene, at(density_per_sr, side))
     }
 
-    /// The same by splats.
+    /// Bakes by splats at a density [rays/sr], with maps of side² texels.
     pub fn splat(&mut self, scene: Scene, density_per_sr: f64, side: usize) -> &mut Self {
         self.bake_with(scene, settings(density_per_sr, side))
     }
 
-    /// A bake with settings of its own.
+    /// Bakes with these settings.
     pub fn bake_with(&mut self, scene: Scene, settings: BakeSettings) -> &mut Self {
         self.steps.push(Step::Bake {
             what: Box::new((scene, settings)),
@@ -94,7 +93,8 @@ impl Case {
         self
     }
 
-    /// A law, how far it may be off, and how far it is. The worst of several of one wording counts.
+    /// Adds a law with the bound and the measure of its deviation. Laws of the same wording are reported once, with
+    /// the largest deviation.
     pub fn law(
         &mut self,
         says: impl Into<String>,
@@ -105,8 +105,8 @@ impl Case {
         self
     }
 
-    /// A law of the last bake's scene by photons and by what is chosen of photons and patches: how far they are off, over what
-    /// chance allows.
+    /// Adds a law about the last bake's scene, baked by photons and by the automatic estimator. The measure is
+    /// relative to what chance allows, so that its bound is 1.
     pub fn carried(&mut self, says: &str, of: impl Fn(&Baked) -> f64 + Send + 'static) -> &mut Self {
         let mut steps = self.steps.iter_mut().rev();
         if let Some(Step::Bake { is_carried, .. }) = steps.find(|step| matches!(step, Step::Bake { .. })) {
@@ -116,13 +116,14 @@ impl Case {
         self
     }
 
-    /// Looks at all bakes so far and forgets them.
+    /// Passes all bakes so far to `after` and drops them.
     pub fn forget(&mut self, after: impl Fn(&[Baked]) + Send + 'static) -> &mut Self {
         self.steps.push(Step::Forget(Box::new(after)));
         self
     }
 
-    /// Ledgers and maps are not compared: of light beyond what maps can hold, of other layers than caustics.
+    /// Skips the check of the energy balance: for layers other than caustics, and for values beyond the range of
+    /// maps.
     pub fn without_books(&mut self) -> &mut Self {
         self.is_without_books = true;
         self
@@ -136,7 +137,7 @@ impl Case {
                 case: self.name.clone(),
                 scene: scene.into(),
                 law,
-                // What is no number is worse than anything.
+                // NaN counts as the largest deviation.
                 measured: if measured.is_nan() { f64::INFINITY } else { measured },
                 bound,
             });
@@ -145,7 +146,7 @@ impl Case {
             let is_done = catch_unwind(AssertUnwindSafe(|| match step {
                 Step::Bake { what, is_carried } => {
                     let (scene, mut settings) = *what;
-                    // Cases run side by side.
+                    // Cases run in parallel, so each uses one thread unless it asks for more.
                     settings.threads = settings.threads.max(1);
                     let result = bake(scene.clone(), &settings);
                     if open.is_none() {
@@ -180,7 +181,7 @@ impl Case {
     }
 }
 
-/// A scene's name, or what is in it.
+/// Name of a scene, or else a list of its contents.
 fn described(scene: &Scene) -> String {
     if !scene.name.is_empty() {
         return scene.name.clone();
@@ -200,8 +201,8 @@ fn described(scene: &Scene) -> String {
     words.collect::<Vec<_>>().join(", ")
 }
 
-/// What ledgers leave open at worst, of what was emitted, or maps of what was deposited; infinite where a value is not
-/// finite, or below zero though no light is traced by wavelength, which knows colours beyond sRGB.
+/// Largest relative error in the energy balance of the ledgers, or between ledgers and maps. Infinite if a value is
+/// not finite or is negative; negative values are valid for spectral lights, whose colours may lie outside sRGB.
 pub fn energy_residual(result: &Bake) -> f64 {
     let is_spectral = result.ledgers.iter().any(|ledger| ledger.emitted_radiant_w.is_some());
     let is_value = |e: f32| e.is_finite() && (e >= 0.0 || is_spectral);
@@ -220,9 +221,9 @@ pub fn energy_residual(result: &Bake) -> f64 {
         let held = |map: &IlluminationMap| map.flux_w(LayerKind::Caustic).luminance();
         let held_w: f64 = result.maps.iter().map(held).sum();
         is_sound &= held_w.is_finite();
-        // Of a sliver of light, roundings are as large as the light itself.
+        // If only a sliver of light is deposited, rounding errors are as large as the light itself.
         let whole_w = deposited_w.max(1e-9 * emitted_w);
-        // Nor do maps hold what single precision does not.
+        // Maps cannot hold values below the range of single precision.
         let area_m2: f64 = result.maps.iter().map(|map| map.chart.area_m2()).sum();
         let lost_w = (held_w - deposited_w).abs() - area_m2 * f64::from(f32::MIN_POSITIVE);
         if whole_w > 0.0 {
@@ -232,7 +233,7 @@ pub fn energy_residual(result: &Bake) -> f64 {
     if is_sound { worst } else { f64::INFINITY }
 }
 
-/// The same scene by photons, and by what is chosen of photons and patches.
+/// The scene baked by photons and by the automatic estimator.
 fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<(&'static str, Baked)> {
     let plain = photons(settings.density_per_sr, 16);
     let photons = BakeSettings {
@@ -264,13 +265,13 @@ fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<(&'static str, Bak
     vec![("photons", baked(&many)), ("auto", baked(&chosen))]
 }
 
-/// All values of a map, its errors included.
+/// All values of a map, including its errors.
 pub fn values(map: &IlluminationMap) -> impl Iterator<Item = f32> {
     let layers = map.layers.iter().flat_map(|layer| layer.irradiance.iter().flatten());
     layers.chain(map.error.iter().flatten()).copied()
 }
 
-/// One law of one case.
+/// Result of one law of one case.
 struct Row {
     case: String,
     scene: String,
@@ -292,7 +293,7 @@ impl Row {
     }
 }
 
-/// Rows of one case and one law are one: the worst.
+/// Merges rows of the same case and law; the largest deviation is kept.
 fn worst(mut rows: Vec<Row>, row: Row) -> Vec<Row> {
     match rows.iter_mut().find(|known| known.case == row.case && known.law == row.law) {
         Some(known) if known.measured < row.measured => *known = row,
@@ -302,10 +303,10 @@ fn worst(mut rows: Vec<Row>, row: Row) -> Vec<Row> {
     rows
 }
 
-/// Tables of the groups that are done, by name.
+/// Tables of finished groups, by name.
 static DONE: Mutex<Vec<(&str, String)>> = Mutex::new(Vec::new());
 
-/// Runs all cases of a group and writes the table of all groups so far; fails unless all laws hold.
+/// Runs all cases of a group and writes the tables of all groups so far; asserts that all laws hold.
 #[track_caller]
 pub fn hold(group: &'static str, fill: fn(&mut Table)) {
     let mut table = Table::default();
@@ -315,7 +316,7 @@ pub fn hold(group: &'static str, fill: fn(&mut Table)) {
     check(&rows);
 }
 
-/// Runs the cases of those names; fails unless all laws hold, and there are such cases.
+/// Runs the named cases, which must exist; asserts that all laws hold.
 #[track_caller]
 pub fn hold_some(fill: fn(&mut Table), names: &[&str]) {
     let mut table = Table::default();
@@ -332,7 +333,7 @@ fn check(rows: &[Row]) {
     assert!(!rows.is_empty() && faults.is_empty(), "laws that do not hold:\n{faults}");
 }
 
-/// Runs cases side by side.
+/// Runs cases in parallel.
 fn run(table: Table) -> Vec<Row> {
     let cases: Vec<Mutex<Option<Case>>> = table.cases.into_iter().map(Some).map(Mutex::new).collect();
     let next = AtomicUsize::new(0);
@@ -368,7 +369,7 @@ fn publish(group: &'static str, rows: &[Row]) {
     std::fs::write(folder.join("laws.md"), text).expect("the build folder can be written");
 }
 
-/// Two digits: as they are from a thousandth to a thousand, else with a power of ten.
+/// Two digits; scientific notation outside 1e-3 to 1e3.
 fn number(value: f64) -> String {
     let magnitude = value.abs();
     if value == 0.0 {

@@ -1,4 +1,4 @@
-//! Scenes in one expression. Metres, watts, y up; the receiver whose E is known is the object `floor`.
+//! A builder for scenes. Metres, watts, y up; the receiver whose irradiance E is known is the object `floor`.
 
 use std::f64::consts::PI;
 use glam::DVec3;
@@ -8,25 +8,25 @@ use nephroid::scene::{Light, LightKind, LightSize, Material, Mesh, Scene};
 use nephroid::settings::BakeSettings;
 use nephroid::units::{Flux, Irradiance};
 
-/// Parts of a scene, one after the other.
+/// Adds parts to a scene.
 pub trait Build: Sized {
-    /// With an object of a material of its own.
+    /// Adds an object with a material of its own.
     #[must_use]
     fn with(self, name: &str, mesh: Mesh, material: Material) -> Self;
-    /// With one light more.
+    /// Adds a light.
     #[must_use]
     fn lit(self, light: Light) -> Self;
-    /// With another mesh for an object.
+    /// Replaces or changes the mesh of an object.
     #[must_use]
     fn reshaped(self, object: usize, change: impl FnOnce(&mut Mesh)) -> Self;
 
-    /// With a lamp of 1 W/sr.
+    /// Adds a point light of 1 W/sr.
     #[must_use]
     fn lamp(self, place: DVec3) -> Self {
         self.lit(parts::point_light("lamp", place, Flux(4.0 * PI)))
     }
 
-    /// With a sun of 1 W/m² across its beam.
+    /// Adds a sun of 1 W/m² on a surface perpendicular to it.
     #[must_use]
     fn sun(self, direction: DVec3) -> Self {
         self.lit(parts::sun("sun", direction, Irradiance(1.0)))
@@ -37,13 +37,13 @@ pub trait Build: Sized {
         self.with("mirror", mesh, parts::mirror())
     }
 
-    /// With clear glass of a refractive index.
+    /// Adds clear glass.
     #[must_use]
     fn glass(self, ior: f64, mesh: Mesh) -> Self {
         self.with("glass", mesh, parts::dielectric("glass", ior))
     }
 
-    /// With a diffuse surface of that name.
+    /// Adds a diffuse object.
     #[must_use]
     fn diffuse(self, name: &str, mesh: Mesh) -> Self {
         self.with(name, mesh, parts::matte(name, LinearSrgb::grey(0.5)))
@@ -67,7 +67,7 @@ impl Build for Scene {
     }
 }
 
-/// A white light of that kind, without a size.
+/// A white light without size.
 pub fn light(kind: LightKind) -> Light {
     Light {
         name: "lamp".into(),
@@ -78,22 +78,22 @@ pub fn light(kind: LightKind) -> Light {
     }
 }
 
-/// A diffuse floor of |x|, |z| ≤ half.
+/// A horizontal diffuse floor of |x|, |z| ≤ half.
 pub fn floor(half_m: f64) -> Scene {
     parts::reference_scene(half_m)
 }
 
-/// A box of diffuse walls around the origin, called the floor.
+/// A box of diffuse walls around the origin; the box is the object `floor`.
 pub fn room(half_m: f64) -> Scene {
     floor(half_m).reshaped(0, |mesh| *mesh = shapes::cuboid(DVec3::splat(-half_m), DVec3::splat(half_m)))
 }
 
-/// A horizontal slab that reaches 3 m to all sides.
+/// A horizontal slab of |x|, |z| ≤ 3 m.
 pub fn slab(low_m: f64, high_m: f64) -> Mesh {
     shapes::cuboid(DVec3::new(-3.0, low_m, -3.0), DVec3::new(3.0, high_m, 3.0))
 }
 
-/// A floor of 1 × 1 m below a slab of glass that covers it.
+/// A floor of 1 × 1 m below a glass slab that covers it.
 pub fn under_slab(ior: f64) -> Scene {
     floor(0.5).glass(ior, slab(0.5, 0.7))
 }
@@ -103,21 +103,21 @@ pub fn upright() -> Mesh {
     shapes::rectangle(DVec3::new(0.6, 0.75, 0.0), DVec3::Z, DVec3::Y * 0.75)
 }
 
-/// A floor of 1 × 1 m before an upright mirror, or what stands for it, with a lamp between.
+/// A floor of 1 × 1 m in front of an upright mirror, or a substitute for it, with a lamp between them.
 pub fn before(mirror: Mesh) -> Scene {
     floor(0.5).mirror(mirror).lamp(DVec3::new(-0.1, 1.0, 0.05))
 }
 
-/// Where that lamp is seen in the mirror.
+/// Mirror image of that lamp.
 pub const MIRRORED_LAMP: DVec3 = DVec3::new(1.3, 1.0, 0.05);
 
-/// A glass ball over a floor, under a lamp.
+/// A glass ball above a floor, below a lamp.
 pub fn glass_ball(levels: u32) -> Scene {
     let ball = shapes::sphere(DVec3::new(0.0, 0.5, 0.0), 0.3, levels);
     floor(0.4).glass(1.5, ball).lamp(DVec3::new(0.1, 2.0, 0.05))
 }
 
-/// Settings that follow every branch which carries a 1e-9th.
+/// Settings that follow every branch down to a share of 1e-9.
 pub fn thoroughly(settings: BakeSettings) -> BakeSettings {
     BakeSettings {
         branch_threshold: Some(1e-9),
@@ -126,7 +126,7 @@ pub fn thoroughly(settings: BakeSettings) -> BakeSettings {
     }
 }
 
-/// Numbers in [0, 1), the same at every run.
+/// Reproducible random numbers in [0, 1).
 pub fn random(seed: u64) -> impl FnMut() -> f64 {
     use rand_pcg::rand_core::{Rng, SeedableRng};
     let mut generator = rand_pcg::Pcg64Mcg::seed_from_u64(seed);

@@ -15,7 +15,7 @@ use crate::viewer::worker::BakedLevel;
 
 /// Height of the plot [points].
 const HEIGHT: f32 = 132.0;
-/// Text in the plot and below it [points].
+/// Font size in and below the plot [points].
 const SMALL: f32 = 10.5;
 
 const PAST: Color32 = Color32::from_rgb(105, 150, 205);
@@ -25,13 +25,13 @@ const MARK: Color32 = Color32::from_gray(105);
 const TEXT: Color32 = Color32::from_gray(170);
 const TARGET: Color32 = Color32::from_rgb(120, 200, 130);
 
-/// Points of the expected curve.
+/// Segments of the expected curve.
 const STEPS: usize = 24;
-/// The best error that is shown, unless the target or the maps are better [1].
+/// Smallest error on the axis, unless the target or the maps are better [1].
 const BEST_SHOWN: f64 = 0.002;
-/// The worst one [1].
+/// Largest error on the axis, unless the maps are worse [1].
 const WORST_SHOWN: f64 = 0.12;
-/// Room beyond what is shown, as a ratio.
+/// Margin of the axes, as a factor.
 const ROOM: f64 = 1.4;
 
 const NAME: &str = "Error against time";
@@ -40,13 +40,13 @@ const HOVER: &str = "Estimated error (up) against time of the light pass (right)
                      the target; drag it along the curve, by error or, where a time is the target, by time.";
 const NOTHING: &str = "Known once the error of a level is.";
 
-/// The part's title, with what the target takes.
+/// Title of the subsection, with the cost of the target.
 pub fn title(settings: &BakeSettings, last: Option<&BakedLevel>) -> String {
     let line = last.and_then(|last| Curve::new(settings, last)?.headline());
     line.map_or(NAME.into(), |line| format!("{NAME} ({line})"))
 }
 
-/// Shows the plot and what it says; picks a target where it is dragged.
+/// Shows the plot and a summary; dragging in the plot sets the target.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings, last: Option<&BakedLevel>) {
     let curve = last.and_then(|last| Curve::new(settings, last));
     let Some(curve) = curve else {
@@ -77,21 +77,21 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, last: Option<&BakedLevel>)
     }
 }
 
-/// What the plot shows.
+/// Content of the plot.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Curve {
-    /// The levels so far.
+    /// Levels so far.
     pub past: Vec<CostPoint>,
-    /// From the last level on, to better and better targets.
+    /// Forecasts for decreasing errors, from the last level on.
     pub future: Vec<Forecast>,
-    /// Of each preset.
+    /// Forecasts for the presets.
     pub presets: Vec<(Preset, Forecast)>,
-    /// Where the target is on the curve; `None` where a density is.
+    /// The target on the curve; `None` if the target is a density.
     pub target: Option<Forecast>,
 }
 
 impl Curve {
-    /// Of a bake; `None` where no error is known.
+    /// `None` if no error is known yet.
     pub fn new(settings: &BakeSettings, last: &BakedLevel) -> Option<Self> {
         let estimator = last.request.settings.estimator;
         let is_shown = |point: &&CostPoint| point.wall_s > 0.0 && point.error > 0.0;
@@ -120,7 +120,7 @@ impl Curve {
         })
     }
 
-    /// What the target takes; of a bake by density the last level.
+    /// Cost of the target; `None` if the target is a density.
     fn headline(&self) -> Option<String> {
         let target = self.target?;
         let sure = if target.factor > 1.0 { "about " } else { "" };
@@ -140,7 +140,7 @@ impl Curve {
     }
 }
 
-/// The curve at a time: the level that was there by then, or what is expected by it.
+/// The curve at a given time: a level that was reached by then, or a forecast.
 fn at_seconds(past: &[CostPoint], future: &[Forecast], seconds: f64) -> Option<Forecast> {
     let reached = past.iter().rev().find(|point| point.wall_s <= seconds);
     let expected = future.iter().rev().find(|point| point.wall_s <= seconds);
@@ -158,18 +158,18 @@ fn at_seconds(past: &[CostPoint], future: &[Forecast], seconds: f64) -> Option<F
     })
 }
 
-/// Logarithmic axes in a rectangle: seconds to the right, errors up.
+/// Logarithmic axes in a rectangle: time to the right, error upwards.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     rect: Rect,
-    /// Ends [s].
+    /// Range [s].
     pub seconds: RangeInclusive<f64>,
-    /// Ends [1].
+    /// Range [1].
     pub errors: RangeInclusive<f64>,
 }
 
 impl Frame {
-    /// Around all that a curve shows.
+    /// Axes that enclose the whole curve.
     pub fn around(curve: &Curve, rect: Rect) -> Self {
         let past = curve.past.iter().map(|point| (point.wall_s, point.error));
         let future = curve.future.iter().map(|point| (point.wall_s, point.target));
@@ -192,7 +192,7 @@ impl Frame {
         }
     }
 
-    /// Where a point of the plot is.
+    /// Position of a point of the plot.
     pub fn place(&self, seconds: f64, error: f64) -> Pos2 {
         let x = share(&self.seconds, seconds);
         let y = share(&self.errors, error);
@@ -202,7 +202,7 @@ impl Frame {
         )
     }
 
-    /// Seconds and error at a place.
+    /// Time [s] and error at a position.
     pub fn at(&self, place: Pos2) -> (f64, f64) {
         let x = f64::from((place.x - self.rect.left()) / self.rect.width()).clamp(0.0, 1.0);
         let y = f64::from((self.rect.bottom() - place.y) / self.rect.height()).clamp(0.0, 1.0);

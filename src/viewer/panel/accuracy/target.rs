@@ -6,26 +6,26 @@ use strum::EnumMessage;
 use crate::settings::{BakeSettings, Estimator, MIN_MAX_ERROR, MapResolution, Preset};
 use crate::viewer::panel::control::{self, CONTROL_WIDTH, choice, setting};
 
-/// The first time that is offered [s].
+/// Initial time limit [s].
 const FIRST_TIME_S: f64 = 10.0;
-/// Ends of the sliders.
+/// Ranges of the sliders.
 const PERCENTS: std::ops::RangeInclusive<f64> = 0.01..=100.0;
 const TIMES_S: std::ops::RangeInclusive<f64> = 1e-3..=1e4;
 const NO_ERRORS: &str = "Splats do not refine until an error is reached.";
 
-/// What a bake aims at.
+/// When a bake ends.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
-    /// Of rays, without refinement.
+    /// A ray density, without refinement.
     Density,
-    /// Of all maps [1].
+    /// An error of all maps [1].
     Error(f64),
-    /// On the wall clock [s].
+    /// A wall-clock time [s].
     Time(f64),
 }
 
 impl Target {
-    /// An error that is no target stands beside a time: as far as that goes.
+    /// A time target is stored with the smallest possible error, so that refinement never ends before the time is up.
     pub fn of(settings: &BakeSettings) -> Self {
         match (settings.max_error, settings.max_time_s) {
             (Some(error), Some(time_s)) if error <= MIN_MAX_ERROR => Self::Time(time_s),
@@ -35,7 +35,7 @@ impl Target {
         }
     }
 
-    /// Refinement begins from a density of its own; without it the density is all that counts.
+    /// Refinement starts at a density of its own; without refinement, the density is the only target.
     fn set(self, settings: &mut BakeSettings) {
         let was_refined = settings.max_error.is_some();
         (settings.max_error, settings.max_time_s) = match self {
@@ -59,7 +59,7 @@ impl Target {
         }
     }
 
-    /// What a bake by an estimator ends with unless something else is set.
+    /// The default target for an estimator.
     fn default_of(estimator: Estimator) -> Self {
         if estimator.refines() {
             Self::Error(Preset::default().max_error())
@@ -69,7 +69,8 @@ impl Target {
     }
 }
 
-/// Aims at a point of the curve: by time where a time is the target, else by error, two digits of it. Splats refine to no error.
+/// Sets the target to a point of the curve, rounded to two digits: its time if a time is the target, else its error.
+/// Ignored for splats, which cannot refine to an error.
 pub fn pick(settings: &mut BakeSettings, seconds: f64, error: f64) {
     let rounded = |value: f64| {
         let unit = 10_f64.powf(value.log10().floor() - 1.0);
@@ -87,19 +88,19 @@ pub fn pick(settings: &mut BakeSettings, seconds: f64, error: f64) {
     }
 }
 
-/// In per cent, without what rounding leaves.
+/// In per cent, rounded to hide floating-point noise.
 fn percent(share: f64) -> f64 {
     (share * 1e6).round() / 1e4
 }
 
-/// The density as it is set ends a bake that was to refine.
+/// After the user sets a density, a bake ends with it instead of refining.
 pub fn aim_at_density(settings: &mut BakeSettings) {
     if settings.max_error.take().is_some() {
         settings.max_time_s = None;
     }
 }
 
-/// Keeps what ends a bake where another estimator can: splats do not refine.
+/// Keeps the target where the new estimator supports it; splats cannot refine to an error.
 pub fn after_change_of_estimator(settings: &mut BakeSettings) {
     match (Target::of(settings), settings.estimator) {
         (Target::Error(_), Estimator::Splat) => Target::Density,
@@ -108,13 +109,13 @@ pub fn after_change_of_estimator(settings: &mut BakeSettings) {
     .set(settings);
 }
 
-/// Rows with the list of targets and the value of the chosen one. Settings that ask for both an error and a time keep both
-/// until one of them is touched here.
+/// Rows with the list of targets and the value of the present one. Settings with both an error and a time keep both
+/// until the user changes one of them here.
 pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>) {
     let before = Target::of(settings);
     let mut target = before;
     let default = Target::default_of(settings.estimator);
-    // Another error is no other target: its own row sets it back.
+    // A different error is not a different kind of target; its own row resets it.
     let mut kind = match (target, default) {
         (Target::Error(_), Target::Error(_)) => default,
         _ => target,
@@ -182,7 +183,7 @@ fn percent_slider(ui: &mut Ui, error: &mut f64) -> Response {
     response
 }
 
-/// Sets all that a preset stands for; the estimator stays.
+/// Applies all settings of a preset; keeps the estimator.
 fn apply(preset: Preset, settings: &mut BakeSettings) {
     (settings.max_error, settings.density_per_sr) = if settings.estimator.refines() {
         let target = preset.max_error();
@@ -198,7 +199,7 @@ fn apply(preset: Preset, settings: &mut BakeSettings) {
     settings.branch_threshold = default.branch_threshold;
 }
 
-/// The preset that settings are those of; `None` where one of its values differs.
+/// The preset that matches the settings; `None` if any of its values differs.
 pub fn preset_of(settings: &BakeSettings) -> Option<Preset> {
     Preset::ALL.into_iter().find(|preset| {
         let mut set = settings.clone();

@@ -9,34 +9,34 @@ use crate::viewer::panel::WIDTH;
 use crate::viewer::panel::control::significant;
 use crate::viewer::panel::effects::COUNTER;
 
-/// First side of the picture [points]; with the panel and the window's frame it fits into 1280 × 720.
+/// Initial side of the picture [points]; fits into a window of 1280 × 720 with the panel.
 const SIDE: f32 = 440.0;
-/// Most and least points across a texel.
+/// Range of the zoom [points per texel].
 const ZOOM: (f64, f64) = (1e-3, 256.0);
-/// What one press of a button zooms by.
+/// Zoom factor of a button press.
 const STEP: f64 = 1.5;
-/// Zoom per point that the wheel scrolls.
+/// Logarithmic zoom per point scrolled.
 const WHEEL: f64 = 0.004;
-/// What one press of an arrow key moves by [points].
+/// Movement per press of an arrow key [points].
 const ARROW: f32 = 24.0;
 
 const HOW: &str = "Drag to move, wheel to zoom; with the keyboard arrows, + and −. As white paper would look under this \
                    light, in an exposure that suits this map alone.";
 
-/// A map that is looked at.
+/// The map in the window.
 #[derive(Clone)]
 pub struct Large {
     map: usize,
-    /// The texel in the middle and points across a texel; `None` fits the whole map in.
+    /// Texel at the centre and zoom [points per texel]; `None` fits the whole map into the window.
     place: Option<([f64; 2], f64)>,
     texture: Option<TextureHandle>,
-    /// What the texture shows.
+    /// The crop in the texture, and its size.
     shown: Option<(MapCrop, [usize; 2])>,
     exposure_stops: Option<f64>,
 }
 
 impl Large {
-    /// The whole of a map, by its place in the list.
+    /// Shows a map by its index.
     pub fn new(map: usize) -> Self {
         Self {
             map,
@@ -47,17 +47,17 @@ impl Large {
         }
     }
 
-    /// Its place in the list.
+    /// Index of the map.
     pub fn map(&self) -> usize {
         self.map
     }
 
-    /// Other maps came: the picture is made anew.
+    /// The maps have changed: forces a new picture.
     pub fn forget_picture(&mut self) {
         (self.shown, self.exposure_stops) = (None, None);
     }
 
-    /// Shows the window; tells whether it stays open.
+    /// Shows the window; returns whether it stays open.
     pub fn show(&mut self, ui: &Ui, map: &IlluminationMap, name: &str) -> bool {
         let mut is_open = true;
         egui::Window::new(format!("Map of {name}"))
@@ -123,7 +123,7 @@ impl Large {
         ui.label(RichText::new(super::figures(map)).weak());
     }
 
-    /// Where the hands move it to.
+    /// Centre and zoom after input by mouse and keyboard.
     fn moved(
         &mut self,
         ui: &Ui,
@@ -157,7 +157,7 @@ impl Large {
             times *= (WHEEL * f64::from(scroll)).exp() * f64::from(pinch);
         }
         let zoomed = (zoom * times).clamp(ZOOM.0, ZOOM.1);
-        // What lies under the pointer stays there.
+        // Zooms about the pointer.
         let off = pointer.map_or(vec2(0.0, 0.0), |pointer| pointer - canvas.rect.center());
         middle[0] += f64::from(off.x) * (1.0 / zoom - 1.0 / zoomed);
         middle[1] += f64::from(off.y) * (1.0 / zoom - 1.0 / zoomed);
@@ -187,7 +187,7 @@ impl Large {
     }
 }
 
-/// The whole map within a rectangle.
+/// Centre and zoom that fit the whole map into a rectangle.
 fn fit(map: &IlluminationMap, rect: Rect) -> ([f64; 2], f64) {
     let (width, height) = (map.width() as f64, map.height() as f64);
     let zoom = (f64::from(rect.width()) / width).min(f64::from(rect.height()) / height);
