@@ -6,7 +6,7 @@ use glam::{DAffine3, DQuat, DVec3, DVec4};
 
 use super::{Mesh, Scene, Waves};
 
-/// What a track changes of its node's transform.
+/// Animated part of a node's transform.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Animated {
     /// [m]

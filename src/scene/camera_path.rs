@@ -1,8 +1,8 @@
 //! A camera path from a file: straight lines between keys at equal intervals of time.
 //!
 //! The file is JSON: `{"frames": N, "vertical_fov_deg": F, "keys": [{"position_m": [x, y, z], "target_m": [x, y, z],
-//! "roll_deg": R}, ...]}`, positions in the coordinates of the scene's file; `roll_deg` may be left out. Nothing else may
-//! stand in it.
+//! "roll_deg": R}, ...]}`, positions in the coordinates of the scene's file; `roll_deg` is optional. Other fields are
+//! refused.
 
 use std::path::Path;
 
@@ -86,7 +86,7 @@ impl PathPlan {
     /// Reads a file without checking the ranges of its values.
     ///
     /// # Errors
-    /// A file that cannot be read; no JSON of this form.
+    /// A file that cannot be read, or that is not JSON of this form.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = files::read_file(path, MAX_BYTES)?;
         Self::parse(&bytes, &path.display().to_string())
@@ -102,7 +102,7 @@ impl PathPlan {
         })
     }
 
-    /// Writes a file that [`read`](Self::read) reads.
+    /// Writes the plan to a file for [`read`](Self::read).
     ///
     /// # Errors
     /// The file cannot be written.
@@ -115,7 +115,7 @@ impl PathPlan {
     /// Checks the plan and interpolates its frames; `location` is named in errors.
     ///
     /// # Errors
-    /// Fewer than 2 keys; frames, angle or coordinates out of range; an eye at its target.
+    /// Fewer than 2 keys; frames, field of view or coordinates out of range; an eye at its target.
     pub fn path(&self, location: &str) -> Result<CameraPath> {
         let Self {
             frames,
@@ -178,7 +178,7 @@ impl CameraPath {
     /// Reads the contents of a file; `location` is named in errors.
     ///
     /// # Errors
-    /// No JSON of this form; those of [`PathPlan::path`].
+    /// Text that is not JSON of this form; errors of [`PathPlan::path`].
     pub fn parse(json: &[u8], location: &str) -> Result<Self> {
         PathPlan::parse(json, location)?.path(location)
     }

@@ -42,7 +42,7 @@ pub enum EmitterKind {
         /// Unit, on the side that shines.
         normal: DVec3,
     },
-    /// Parallel light.
+    /// Parallel light from infinity.
     Parallel {
         /// Unit, direction of travel.
         direction: DVec3,

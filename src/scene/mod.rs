@@ -59,9 +59,9 @@ pub use waves::{Wave, Waves};
 /// A whole scene, sanitised: every number in it is finite and every index valid.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// A short name for titles and files: the file's stem or the built-in's name.
+    /// Short name for titles and files: the stem of the file's name, or the name of the built-in.
     pub name: String,
-    /// What the user named: a path as given or `builtin:NAME`.
+    /// Source as the user named it: a path or `builtin:NAME`.
     pub source: String,
     /// World position of the scene's origin [m].
     pub origin_world: DVec3,

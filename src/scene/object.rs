@@ -12,7 +12,7 @@ use super::{Mesh, Scene, instances};
 /// One mesh primitive of one node: the unit that has a material and, if light reaches it, an illumination map.
 #[derive(Clone, Debug)]
 pub struct Object {
-    /// The node's name in the file; `nodeN` when it has none.
+    /// Name of the node in the file; `nodeN` without one.
     pub name: String,
     /// glTF index of the node.
     pub node: usize,

@@ -2,8 +2,8 @@
 //! that height would. The surface itself stays where it is, unless the scene [displaces](super::Scene::swells) its
 //! vertices too.
 //!
-//! Waves are a solid texture in the scene's coordinates: K is a vector in space, and each surface takes the part of
-//! ∇h along itself. They are smooth over any mesh, need no texture coordinates, and go on across its triangles. An
+//! Waves are a solid texture in the scene's coordinates: K is a vector in space, and each surface takes the component
+//! of ∇h along itself. They are smooth on any mesh, need no texture coordinates, and continue across triangles. An
 //! object that is moved moves through them.
 
 use std::f64::consts::TAU;

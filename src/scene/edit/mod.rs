@@ -33,7 +33,7 @@ impl Edit {
     /// The edited scene, which shares all untouched meshes and images.
     ///
     /// # Errors
-    /// An index that the scene lacks, a property that the light does not have, a value outside its range.
+    /// An index that does not exist, a property that the light does not have, a value out of range.
     pub fn apply(&self, scene: &Scene) -> Result<Scene> {
         let mut edited = scene.clone();
         match self {

@@ -1,4 +1,4 @@
-//! A clear sky with its sun and the ground below, for scenes without light.
+//! A clear sky and the ground below it, for scenes without light. Their sun is a light of its own.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
@@ -14,7 +14,7 @@ const SIZE: [usize; 2] = [128, 64];
 const ABOVE: LinearSrgb = LinearSrgb::new(0.35, 0.6, 1.0);
 const HORIZON: LinearSrgb = LinearSrgb::new(0.85, 0.95, 1.0);
 
-/// Of the ground.
+/// Albedo of the ground.
 const ALBEDO: f64 = 0.2;
 
 /// A clear sky that gives level ground an irradiance of `sky_w_per_m2`, above ground that is also lit by a sun of

@@ -98,7 +98,7 @@ impl Reader<'_> {
     /// Vertex indices.
     ///
     /// # Errors
-    /// As [`vectors`](Self::vectors).
+    /// Those of [`vectors`](Self::vectors).
     pub fn indices(&self, index: Index<Accessor>, owner: &str, budget: &mut Budget) -> Result<Vec<u32>> {
         let accessor = self.get(index, owner)?;
         let component = match (&accessor.type_, &accessor.component_type) {
@@ -137,7 +137,7 @@ impl Reader<'_> {
     ) -> Result<Vec<u8>> {
         let bytes = accessor.count.0.saturating_mul(element as u64);
         let mut packed = match accessor.buffer_view {
-            // Bounded by the buffer.
+            // The buffer limits the number of elements.
             Some(view) => {
                 let offset = accessor.byte_offset.unwrap_or_default().0;
                 self.elements(view, offset, accessor.count.0, element, owner)?

@@ -51,7 +51,6 @@ struct Sampler {
 }
 
 impl Animations {
-    /// Those of a file.
     pub fn of(file: &Map<String, Value>) -> Self {
         Self::deserialize(file).unwrap_or_default()
     }

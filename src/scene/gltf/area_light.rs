@@ -1,7 +1,7 @@
 //! Area lights of EXT_lights_area, by its draft of 2025 (KhronosGroup/glTF, pull request 2525).
 //!
-//! A lamp lies in the node's xy plane around its origin and shines along −z. Its size is scaled by the largest scale of
-//! the node, the same way in all directions.
+//! A light lies in the node's xy plane around its origin and shines along −z. Its size is scaled uniformly, by the
+//! largest scale of the node.
 
 use std::path::Path;
 
@@ -67,7 +67,7 @@ impl Default for Rect {
 /// warning.
 ///
 /// # Errors
-/// As [`spectrum::apply`].
+/// Those of [`spectrum::apply`].
 pub fn add_all(
     lights: &mut Vec<(Light, Origin)>,
     document: &Document,

@@ -115,7 +115,7 @@ pub(super) fn linear([r, g, b, _]: [u8; 4]) -> LinearSrgb {
 pub struct MaterialReader<'a, 'b> {
     pub owner: String,
     pub source: &'a Source,
-    /// As its extras state them.
+    /// From the extras.
     pub waves: Option<&'a Value>,
     pub glass: Option<&'a Value>,
     pub metal: Option<&'a Value>,

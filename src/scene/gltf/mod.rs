@@ -60,7 +60,7 @@ pub(super) use save::save;
 /// Reads a `.glb` or `.gltf` file with the buffers and images beside it.
 ///
 /// # Errors
-/// As [`super::load`].
+/// Those of [`super::load`].
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = files::read_file(path, options.memory_limit_bytes)?;
     let in_file = |error: Error| Error {

@@ -1,5 +1,5 @@
-//! Spectra of lamps: `spectrum` in the `extras` of the node or else of the light, or of a material that glows; by name or
-//! as a CSV file beside the scene.
+//! Spectra of lights: `spectrum` in the `extras` of a node, of its light, or of an emissive material; by name or as a
+//! CSV file beside the scene.
 
 use std::path::Path;
 use std::sync::Arc;

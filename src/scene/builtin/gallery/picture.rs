@@ -1,8 +1,9 @@
 //! A block of clear plastic whose front is ground so that the light of a lamp behind it draws a butterfly.
 //!
-//! The light has to be moved within the block's square so that it is as dense as the picture wants it: with x + ∇φ for
-//! where light of x goes, det(1 + D²φ)·target(x + ∇φ) = 1, a Monge–Ampère equation. It is solved by Poisson equations
-//! alone (Benamou, Froese and Oberman, 2010), whose solutions are sums of cosines. The height of the glass goes with φ.
+//! Light must be moved within the block's square so that its density becomes that of the picture: if light of x goes to
+//! x + ∇φ, then det(1 + D²φ)·target(x + ∇φ) = 1, a Monge–Ampère equation. It is solved by a sequence of Poisson
+//! equations (Benamou, Froese and Oberman, 2010), whose solutions are sums of cosines. The height of the glass is
+//! proportional to φ.
 
 use std::f64::consts::{PI, TAU};
 
