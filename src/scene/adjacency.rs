@@ -7,23 +7,23 @@ use rayon::slice::ParallelSliceMut;
 
 use super::InScene;
 
-/// Beyond this edge is nothing, or more than one thing.
+/// No neighbour across this edge, or no unique one.
 const BORDER: u32 = u32::MAX;
 
 /// Neighbours across the edges of each triangle.
 #[derive(Clone, Debug)]
 pub struct Adjacency {
-    /// Four times the neighbour and which of its edges it is.
+    /// Per edge, four times the neighbour's index plus the number of its edge.
     across: Vec<[u32; 3]>,
 }
 
-/// One direction of an edge: its welded ends in ascending order, whether it runs that way, triangle, corner it starts at.
+/// Directed edge: welded ends in ascending order, whether it runs that way, triangle, first corner.
 type HalfEdge = (u32, u32, bool, u32, u8);
 
 impl Adjacency {
-    /// Of a mesh. Vertices at the same position are one, since normals and texture coordinates split them. An edge of
-    /// more than two triangles, or of two that are wound against each other, is a border: there is no telling which side
-    /// goes on into which.
+    /// Vertices at the same position are welded, since normals and texture coordinates split them. An edge of more than
+    /// two triangles, or of two with opposite winding, is a border, because the surface has no unique continuation
+    /// there.
     pub fn of<'a>(mesh: impl Into<InScene<'a>>) -> Self {
         let mesh = mesh.into();
         let vertices = weld(mesh.positions());
@@ -48,8 +48,8 @@ impl Adjacency {
         Self { across }
     }
 
-    /// The triangle beyond the edge of a triangle from corner `edge` to the next one, and its corner at the end of that
-    /// edge, from which the same edge runs back.
+    /// The triangle across the edge that runs from corner `edge` to the next, and its corner where the same edge starts
+    /// in its own winding; `None` at a border.
     pub fn beyond(&self, triangle: usize, edge: usize) -> Option<(usize, usize)> {
         let next = self.across[triangle][edge];
         (next != BORDER).then_some(((next >> 2) as usize, (next & 3) as usize))
@@ -61,13 +61,14 @@ impl Adjacency {
     }
 }
 
-/// For every vertex the first one at the same position.
+/// For every vertex, the first one at the same position.
 fn weld(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
     let mut first_at: HashMap<[u32; 3], u32> = HashMap::new();
     positions
         .enumerate()
         .map(|(index, position)| {
-            // Computed positions may differ by rounding; files hold single precision. Adding zero makes −0 and +0 alike.
+            // Single precision, as in files, since computed positions may differ by rounding. Adding zero turns −0 into
+            // +0.
             let key = (position + DVec3::ZERO).as_vec3().to_array().map(f32::to_bits);
             *first_at.entry(key).or_insert(index as u32)
         })

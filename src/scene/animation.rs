@@ -6,7 +6,7 @@ use glam::{DAffine3, DQuat, DVec3, DVec4};
 
 use super::{Mesh, Scene, Waves};
 
-/// What a track changes of its node's transform.
+/// Animated part of a node's transform.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Animated {
     /// [m]
@@ -17,14 +17,14 @@ pub enum Animated {
     Scale,
 }
 
-/// What is between keyframes: glTF 2.0, appendix C.
+/// Interpolation between keyframes (glTF 2.0, appendix C).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
-    /// The keyframe before.
+    /// Holds the previous keyframe.
     Step,
-    /// Straight, along the shortest arc for rotations.
+    /// Linear; along the shortest arc for rotations.
     Linear,
-    /// A cubic; each keyframe has an in-tangent, a value and an out-tangent [per s].
+    /// Cubic; each keyframe has an in-tangent, a value and an out-tangent [per s].
     CubicSpline,
 }
 
@@ -35,14 +35,14 @@ pub struct Track {
     pub animated: Animated,
     /// Ascending [s], at least one.
     pub times_s: Vec<f64>,
-    /// One for each time, or three of a cubic.
+    /// One for each time, or three for a cubic.
     pub values: Vec<DVec4>,
-    /// What is between them.
+    /// Interpolation between the keyframes.
     pub interpolation: Interpolation,
 }
 
 impl Track {
-    /// At a moment; before the first keyframe and behind the last one as there.
+    /// Value at a time; the first and the last keyframe hold outside the range.
     pub fn at(&self, time_s: f64) -> DVec4 {
         let next = self.times_s.partition_point(|time| *time <= time_s);
         let last = self.times_s.len() - 1;
@@ -81,20 +81,20 @@ impl Track {
     }
 }
 
-/// A node that moves, or below which something does.
+/// A node that moves, or that has a descendant that does.
 #[derive(Clone, Debug)]
 pub struct ClipNode {
     /// glTF index.
     pub node: usize,
-    /// Its parent's place among the nodes of the clip.
+    /// Index of its parent among the nodes of the clip.
     pub parent: Option<usize>,
-    /// From the node to its parent at rest.
+    /// From node to parent coordinates, at rest.
     pub at_rest: DAffine3,
-    /// The same as scale, rotation and translation [m], of nodes that have tracks.
+    /// `at_rest` as scale, rotation and translation [m], for nodes with tracks.
     pub pose: (DVec3, DQuat, DVec3),
-    /// Whether what hangs on it goes with it: not a mesh that a skin bends.
+    /// Whether what is attached to it moves along; false for a skinned mesh.
     pub is_carried: bool,
-    /// What moves it.
+    /// Keyframes of its transform.
     pub tracks: Vec<Track>,
 }
 
@@ -121,19 +121,19 @@ impl ClipNode {
 pub struct Clip {
     /// Parents before their children.
     pub nodes: Vec<ClipNode>,
-    /// The last keyframe [s]; the clip begins again behind it.
+    /// Time of the last keyframe [s], after which the clip starts over.
     pub duration_s: f64,
-    /// glTF index of the node of each of the first lights of the scene; the others have none.
+    /// glTF index of the node of each of the first lights of the scene; further lights have none.
     pub light_nodes: Vec<usize>,
     /// glTF index of the node of each camera of the scene.
     pub camera_nodes: Vec<usize>,
 }
 
-/// What brings a node of this glTF index from where it is at rest to where it is at a moment, in the world.
+/// glTF index of a node, and the world transform from its place at rest to that at some time.
 type Carrying = (usize, DAffine3);
 
 impl Clip {
-    /// The nodes that are elsewhere at a moment, ascending. One that is scaled to nothing stays at rest.
+    /// Nodes that are not at rest at a time, in ascending order. One that is scaled to zero stays at rest.
     fn moved(&self, time_s: f64) -> Vec<Carrying> {
         let time_s = match self.duration_s > 0.0 && time_s > self.duration_s {
             true => time_s % self.duration_s,
@@ -160,12 +160,12 @@ impl Clip {
 }
 
 impl Scene {
-    /// Whether anything in it moves by itself.
+    /// Whether anything moves by itself.
     pub fn is_animated(&self) -> bool {
         self.why_animated().is_some()
     }
 
-    /// What moves by itself, in words; `None` where nothing does.
+    /// Describes what moves by itself; `None` if nothing does.
     pub fn why_animated(&self) -> Option<String> {
         let runs = |object: &usize| {
             let waves = self.material_of(*object).bending_waves();
@@ -185,8 +185,8 @@ impl Scene {
         (!ways.is_empty()).then(|| ways.join(", "))
     }
 
-    /// The scene at a moment [s] of which this one is the beginning: with waves that ran on, and nodes where their
-    /// keyframes have them. What does not move is shared.
+    /// The scene at a time [s] after this one: waves advanced, nodes posed by their keyframes. Whatever does not move
+    /// is shared.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Self {
         let mut scene = self.clone();
@@ -200,7 +200,7 @@ impl Scene {
         scene
     }
 
-    /// The scene with waves whose periods fit so much time [s] a whole number of times.
+    /// The scene with wave periods adjusted so that a whole number of each fits a duration [s].
     #[must_use]
     pub fn looped(&self, duration_s: f64) -> Self {
         let mut scene = self.clone();
@@ -236,7 +236,7 @@ impl Scene {
         }
     }
 
-    /// Puts the vertices of swells where their waves lift them.
+    /// Displaces the vertices of `swells` by their waves.
     pub fn lift(&mut self) {
         for (object, flat) in &self.swells {
             let Some(object) = self.objects.get_mut(*object) else {
@@ -251,7 +251,7 @@ impl Scene {
     }
 }
 
-/// A still surface with its vertices lifted along their normals.
+/// Surface at rest with its vertices displaced along their normals.
 fn lifted(flat: &Mesh, waves: Option<&Waves>, scene_from_mesh: &DAffine3) -> Mesh {
     let mut mesh = flat.clone();
     let Some(waves) = waves else { return mesh };
@@ -261,7 +261,7 @@ fn lifted(flat: &Mesh, waves: Option<&Waves>, scene_from_mesh: &DAffine3) -> Mes
     mesh
 }
 
-/// A unit vector turned by a transform; as it is where that makes nothing of it.
+/// A unit vector, transformed and normalised; unchanged if the transform collapses it.
 pub(super) fn turned(direction: DVec3, transform: &DAffine3) -> DVec3 {
     transform.transform_vector3(direction).normalize_or(direction)
 }
@@ -318,7 +318,7 @@ mod tests {
     #[test]
     fn rotations_take_the_shortest_arc() {
         let quarter = DQuat::from_rotation_y(FRAC_PI_2);
-        // The same turn by the other quaternion.
+        // The same rotation as the opposite quaternion.
         let values = vec![DVec4::W, -DVec4::from(quarter)];
         let track = track(Animated::Rotation, Interpolation::Linear, values);
         let half = DQuat::from_vec4(track.at(2.0));

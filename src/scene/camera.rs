@@ -6,28 +6,28 @@ use serde::{Deserialize, Serialize};
 use super::animation::turned;
 use crate::geometry::Frustum;
 
-/// Full vertical angle of view of a camera that frames a scene [rad].
+/// Full vertical field of view of a camera that frames a scene [rad].
 const FRAMING_FOV_RAD: f64 = 0.8;
 
 /// A perspective camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
-    /// The node's name in the file; `cameraN` when it has none.
+    /// Name of the node in the file; `cameraN` without one.
     pub name: String,
     /// Scene coordinates [m].
     pub position: DVec3,
-    /// Unit, where it looks.
+    /// Viewing direction, unit.
     pub forward: DVec3,
     /// Unit, perpendicular to `forward`.
     pub up: DVec3,
-    /// Full vertical angle of view [rad], (0, π).
+    /// Full vertical field of view [rad], (0, π).
     pub vertical_fov_rad: f64,
-    /// Nearest visible distance [m], > 0.
+    /// Distance of the near plane [m], > 0.
     pub near_m: f64,
 }
 
 impl Camera {
-    /// Whether its numbers are those of a camera: finite, its axes unit and perpendicular, its angle in range.
+    /// Whether its values are valid: finite, with orthonormal axes, field of view and near plane in range.
     pub fn is_sound(&self) -> bool {
         let is_unit = |axis: DVec3| (axis.length() - 1.0).abs() < 1e-6;
         let is_angle = self.vertical_fov_rad > 0.0 && self.vertical_fov_rad < std::f64::consts::PI;
@@ -41,7 +41,7 @@ impl Camera {
             && is_near
     }
 
-    /// A camera at `position` that looks at `target`, y up (z where it looks straight up or down).
+    /// A camera at `position` that looks at `target`, y up (z if it looks straight up or down).
     pub fn look_at(name: impl Into<String>, position: DVec3, target: DVec3, vertical_fov_rad: f64) -> Self {
         let forward = (target - position).normalize_or(DVec3::NEG_Z);
         let right = forward.cross(DVec3::Y).try_normalize().unwrap_or(DVec3::X);
@@ -56,7 +56,7 @@ impl Camera {
         }
     }
 
-    /// A camera that sees the whole box from above and aside, whatever the `aspect` = width/height of the picture.
+    /// A camera that sees a whole box obliquely from above, for any `aspect` = width/height of the picture.
     pub fn framing(name: impl Into<String>, (low, high): (DVec3, DVec3), aspect: f64) -> Self {
         let centre = 0.5 * (low + high);
         let radius_m = (0.5 * (high - low).length()).max(1e-6);
@@ -67,7 +67,7 @@ impl Camera {
         Self::look_at(name, centre + backward * distance_m, centre, FRAMING_FOV_RAD)
     }
 
-    /// Moves and turns it; its axes stay perpendicular.
+    /// Applies a transform and keeps the axes orthonormal.
     pub(super) fn carry(&mut self, carrying: &DAffine3) {
         self.position = carrying.transform_point3(self.position);
         let [forward, up] = [self.forward, self.up].map(|axis| turned(axis, carrying));
@@ -76,7 +76,7 @@ impl Camera {
         }
     }
 
-    /// Unit, to the right of the picture.
+    /// Unit vector to the right of the picture.
     pub fn right(&self) -> DVec3 {
         self.forward.cross(self.up)
     }
@@ -88,7 +88,7 @@ impl Camera {
         (self.forward + self.right() * (x * half_height * aspect) + self.up * (y * half_height)).normalize()
     }
 
-    /// What it sees in a picture of `aspect` = width/height.
+    /// View frustum of a picture of `aspect` = width/height.
     pub fn frustum(&self, aspect: f64) -> Frustum {
         let half_height = (0.5 * self.vertical_fov_rad).tan();
         Frustum::new(

@@ -1,8 +1,8 @@
 //! A camera path from a file: straight lines between keys at equal intervals of time.
 //!
 //! The file is JSON: `{"frames": N, "vertical_fov_deg": F, "keys": [{"position_m": [x, y, z], "target_m": [x, y, z],
-//! "roll_deg": R}, ...]}`, positions in the coordinates of the scene's file; `roll_deg` may be left out. Nothing else may
-//! stand in it.
+//! "roll_deg": R}, ...]}`, positions in the coordinates of the scene's file; `roll_deg` is optional. Other fields are
+//! refused.
 
 use std::path::Path;
 
@@ -13,36 +13,36 @@ use super::Camera;
 use crate::error::{Error, Result};
 use crate::files;
 
-/// Most frames of a path, and most keys.
+/// Largest number of frames, and of keys.
 pub const MAX_FRAMES: usize = 10_000;
-/// Largest file that is read: far beyond what so many keys take [bytes].
+/// Size limit of a file: far beyond what the largest number of keys takes [bytes].
 const MAX_BYTES: u64 = 8_000_000;
-/// Farthest from the origin that a coordinate may lie [m].
+/// Limit of the coordinates [m].
 const MAX_COORDINATE_M: f64 = 1e9;
-/// Angles of view that make a picture [degrees].
+/// Allowed fields of view [degrees].
 const FOV_DEG: std::ops::RangeInclusive<f64> = 0.1..=170.0;
 
-/// What a file holds.
+/// Contents of a file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PathPlan {
-    /// From the first key to the last, 1 to [`MAX_FRAMES`].
+    /// Number of frames from the first key to the last, 1 to [`MAX_FRAMES`].
     pub frames: usize,
-    /// 0.1 to 170.
+    /// Field of view, 0.1 to 170 [degrees].
     pub vertical_fov_deg: f64,
-    /// 2 to [`MAX_FRAMES`].
+    /// 2 to [`MAX_FRAMES`] keys.
     pub keys: Vec<Key>,
 }
 
-/// Where the eye is at some time, and what it looks at.
+/// Position and target of the eye at some time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Key {
     /// In the coordinates of the scene's file [m].
     pub position_m: DVec3,
-    /// In the same [m]; another point.
+    /// In the same coordinates [m]; differs from the position.
     pub target_m: DVec3,
-    /// How far the camera leans to its right, −180 to 180 [degrees].
+    /// Roll to the right, −360 to 360 [degrees].
     #[serde(default, skip_serializing_if = "is_level")]
     pub roll_deg: f64,
 }
@@ -56,7 +56,7 @@ impl Key {
         }
     }
 
-    /// From there to the target, in scene coordinates.
+    /// Camera at the key, in scene coordinates.
     pub fn camera(&self, name: String, origin_world: DVec3, vertical_fov_rad: f64) -> Camera {
         let (position, target) = (self.position_m - origin_world, self.target_m - origin_world);
         let mut camera = Camera::look_at(name, position, target, vertical_fov_rad);
@@ -67,7 +67,7 @@ impl Key {
 
     fn is_in_range(self) -> bool {
         let coordinates = [self.position_m, self.target_m].map(|point| point.to_array());
-        // Not a number is in no range.
+        // False for NaN.
         let is_in_range = |coordinate: &f64| coordinate.abs() <= MAX_COORDINATE_M;
         coordinates.as_flattened().iter().all(is_in_range) && self.roll_deg.abs() <= 360.0
     }
@@ -77,16 +77,16 @@ fn is_level(roll_deg: &f64) -> bool {
     *roll_deg == 0.0
 }
 
-/// A turn by the same angle, at most half a turn.
+/// The equivalent rotation by at most half a turn.
 fn shorter_way_deg(turn_deg: f64) -> f64 {
     turn_deg - 360.0 * (turn_deg / 360.0).round()
 }
 
 impl PathPlan {
-    /// Reads a file; what its numbers mean together is not looked at yet.
+    /// Reads a file without checking the ranges of its values.
     ///
     /// # Errors
-    /// A file that cannot be read; no JSON of this form.
+    /// A file that cannot be read, or that is not JSON of this form.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = files::read_file(path, MAX_BYTES)?;
         Self::parse(&bytes, &path.display().to_string())
@@ -102,7 +102,7 @@ impl PathPlan {
         })
     }
 
-    /// Writes a file that [`read`](Self::read) reads.
+    /// Writes the plan to a file for [`read`](Self::read).
     ///
     /// # Errors
     /// The file cannot be written.
@@ -112,10 +112,10 @@ impl PathPlan {
         files::write_atomically(path, |writer| writeln!(writer, "{text}"))
     }
 
-    /// The way itself; `location` is named in errors.
+    /// Checks the plan and interpolates its frames; `location` is named in errors.
     ///
     /// # Errors
-    /// Fewer than 2 keys; frames, angle or coordinates out of range; an eye at its target.
+    /// Fewer than 2 keys; frames, field of view or coordinates out of range; an eye at its target.
     pub fn path(&self, location: &str) -> Result<CameraPath> {
         let Self {
             frames,
@@ -159,7 +159,7 @@ fn refused(location: &str, what: &str, remedy: &str) -> Error {
     Error::failure(location, format!("is no camera path ({what})"), remedy)
 }
 
-/// A camera for each frame.
+/// Interpolated keys, one per frame.
 #[derive(Clone, Debug)]
 pub struct CameraPath {
     frames: Vec<Key>,
@@ -178,12 +178,12 @@ impl CameraPath {
     /// Reads the contents of a file; `location` is named in errors.
     ///
     /// # Errors
-    /// No JSON of this form; those of [`PathPlan::path`].
+    /// Text that is not JSON of this form; errors of [`PathPlan::path`].
     pub fn parse(json: &[u8], location: &str) -> Result<Self> {
         PathPlan::parse(json, location)?.path(location)
     }
 
-    /// A camera for each frame, at least one; `origin_world` is that of the scene: see [`super::Scene::origin_world`].
+    /// One camera per frame, at least one; `origin_world` is [`super::Scene::origin_world`].
     pub fn cameras(&self, origin_world: DVec3) -> Vec<Camera> {
         let frames = self.frames.iter().enumerate();
         let camera = |(frame, key): (usize, &Key)| {
@@ -197,7 +197,7 @@ impl CameraPath {
     }
 }
 
-/// The eye in one of some frames: the first frame at the first key, the last at the last.
+/// Key of a frame, interpolated: the first frame is at the first key, the last one at the last.
 fn at(keys: &[Key], frame: usize, frames: usize) -> Key {
     let spans = keys.len() - 1;
     let time = frame as f64 / (frames - 1).max(1) as f64 * spans as f64;

@@ -6,18 +6,18 @@ use serde::{Deserialize, Serialize};
 
 use super::{Edit, LightEdit, MaterialEdit, Scene};
 
-/// One edit, with the name of what it edits: a file that is exported again may hold it at another place.
+/// One edit, with the name of its target: the index may differ once the file is exported again.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Change {
     /// Name of the light, material or object.
     pub of: String,
-    /// What sets it as it is.
+    /// The edit itself.
     pub edit: Edit,
 }
 
 impl Change {
-    /// What was done to a scene since it was loaded: in the order of lights, lights that were taken out, materials and
-    /// objects. Lights are taken out last and from behind, so that the places of the others hold until then.
+    /// Edits since loading, in the order of lights, removals of lights, materials and objects. Removals come after the
+    /// other edits of lights and from the last index down, so that all indices stay valid.
     pub fn between(loaded: &Scene, edited: &Scene) -> Vec<Self> {
         let mut changes = Vec::new();
         let mut push = |of: &str, edit| changes.push(Self { of: of.into(), edit });
@@ -41,7 +41,7 @@ impl Change {
         }
         let mut done = None;
         for (index, (was, now)) in loaded.objects.iter().zip(&edited.objects).enumerate() {
-            // Parts of a node move together, and follow each other.
+            // Parts of a node move together and are adjacent.
             if was.motion() != now.motion() && done.replace(now.node) != Some(now.node) {
                 push(&now.name, Edit::Place(index, *now.motion()));
             }
@@ -49,8 +49,8 @@ impl Change {
         changes
     }
 
-    /// Whether a scene that was loaded has it already: the light that is to be added or removed is there or is not, since
-    /// the edited scene was saved in the place of the file.
+    /// Whether a loaded scene contains the change already, because the edited scene was saved over its file: the light
+    /// to add is there, or the light to remove is not.
     pub fn is_done_in(&self, scene: &Scene) -> bool {
         let has_light = || scene.lights.iter().any(|light| light.name == self.of);
         match self.edit {
@@ -60,8 +60,8 @@ impl Change {
         }
     }
 
-    /// The same edit for a scene: of what has this name there, at its own place if it can be; `None` where nothing has it,
-    /// or several do.
+    /// The edit with its index adapted to `scene`: unchanged if the name at that index matches, else the only item of
+    /// that name; `None` if none or several have it.
     pub fn for_scene(&self, scene: &Scene) -> Option<Edit> {
         let mut edit = self.edit.clone();
         let lights = || scene.lights.iter().map(|light| light.name.as_str());
@@ -85,7 +85,7 @@ impl Change {
             return Some(index);
         }
         let found = names.position(|name| name == self.of)?;
-        // `position` has gone past it: another of the name makes it unclear which is meant.
+        // `position` has consumed the first match; a second one makes the name ambiguous.
         (!names.any(|name| name == self.of)).then_some(found)
     }
 }

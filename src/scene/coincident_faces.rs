@@ -7,36 +7,36 @@ use glam::DVec3;
 use super::Scene;
 use crate::error::Warning;
 
-/// How finely planes are told apart: parts of a unit normal, and of the largest coordinate.
+/// Quantisation of planes: steps per unit of a normal's component, and per largest coordinate.
 const STEPS: f64 = 1e9;
 
-/// Pairs that a scene is told of.
+/// Largest number of warnings.
 const MAX_WARNINGS: usize = 8;
 
-/// Comparisons of triangles that are worth making; what is beyond is not looked at.
+/// Largest number of triangle comparisons; the search ends there.
 const MAX_TESTS: usize = 1 << 22;
 
-/// A plane in steps, the same from both sides.
+/// Quantised plane, the same from both sides.
 type Plane = [i64; 4];
 
-/// A triangle of a body: whose it is, and the box around it [m].
+/// Triangle of a body, by its object and bounding box [m].
 #[derive(Clone, Copy, Debug)]
 struct Face {
     object: usize,
-    /// Whether it faces to the side that its plane counts as the front.
+    /// Whether its normal is on the front of its plane.
     is_front: bool,
     low: DVec3,
     high: DVec3,
 }
 
-/// Pairs of solid dielectrics, by their indices, that have parts of faces in common, with how many triangles of the
-/// first lie on the second.
+/// Pairs of solid dielectrics, by object index, that share parts of faces, with the number of triangles of the first
+/// that lie on the second.
 pub fn touching(scene: &Scene) -> BTreeMap<(usize, usize), usize> {
     let mut pairs = BTreeMap::new();
     let mut tests = 0;
     for faces in planes(scene).values() {
         for (index, face) in faces.iter().enumerate() {
-            // Bodies come one after another.
+            // Faces are grouped by object.
             let next = faces[index..].partition_point(|other| other.object == face.object);
             let others = &faces[index + next..];
             tests += others.len() + 1;
@@ -74,7 +74,7 @@ pub fn warnings(scene: &Scene) -> Vec<Warning> {
         .collect()
 }
 
-/// Triangles of all solid dielectrics by their planes; nothing where there is only one such body.
+/// Triangles of all solid dielectrics that are near another one, by plane; empty with fewer than two such bodies.
 fn planes(scene: &Scene) -> BTreeMap<Plane, Vec<Face>> {
     let is_solid = |object: &usize| scene.material_of(*object).is_solid();
     let bodies: Vec<usize> = (0..scene.objects.len()).filter(is_solid).collect();
@@ -85,7 +85,7 @@ fn planes(scene: &Scene) -> BTreeMap<Plane, Vec<Face>> {
     let size_m = low.abs().max(high.abs()).max_element();
     let bounds = |object: usize| scene.objects[object].bounds();
     for &object in &bodies {
-        // Wider than what counts as touching.
+        // Wider than the tolerance of `touch`.
         let margin = DVec3::splat(1e-6 * size_m);
         let others = bodies.iter().filter(|other| **other != object);
         let boxes =
@@ -119,11 +119,11 @@ fn planes(scene: &Scene) -> BTreeMap<Plane, Vec<Face>> {
     planes
 }
 
-/// The plane of a triangle, and whether its normal is on the front of it; `point` in units of the scene.
+/// Quantised plane of a triangle, and whether the normal is on its front; `point` in units of the scene's size.
 fn plane(normal: DVec3, point: DVec3) -> (Plane, bool) {
     let numbers = [normal.x, normal.y, normal.z, normal.dot(point)];
     let numbers = numbers.map(|number| (number * STEPS).round() as i64);
-    // On the front, the first number that is not 0 is above it.
+    // On the front, the first non-zero number is positive.
     let is_front = numbers
         .iter()
         .find(|number| **number != 0)
@@ -136,7 +136,7 @@ fn plane(normal: DVec3, point: DVec3) -> (Plane, bool) {
     (plane, is_front)
 }
 
-/// Whether two faces of one plane face each other, and their boxes have more than an edge in common.
+/// Whether two faces of one plane face each other and their bounding boxes overlap in more than an edge.
 fn touch(a: &Face, b: &Face) -> bool {
     if a.is_front == b.is_front {
         return false;

@@ -6,20 +6,20 @@ use super::{Glow, InScene, Light, LightKind, LightSize, PanelShape, Scene};
 use crate::geometry::ray;
 use crate::optics::LinearSrgb;
 
-/// The source of the rays of one wavefront.
+/// Source of the rays of one wavefront.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Emitter {
-    /// What leaves in each direction from where.
+    /// Position and angular distribution.
     pub kind: EmitterKind,
-    /// Intensity on the axis [W/sr] or, where light is parallel, normal irradiance [W/m²], per channel: of the whole
-    /// light, as if all of it came from here. The mean over all places of the light is the light.
+    /// Intensity on the axis [W/sr] or, for parallel light, normal irradiance [W/m²], per channel: of the whole light,
+    /// as if it all came from here. The mean over all samples of the light is the light.
     pub strength: LinearSrgb,
 }
 
-/// How a source sends light.
+/// Position and angular distribution of a source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum EmitterKind {
-    /// The same in every direction.
+    /// Uniform in all directions.
     Point {
         /// [m].
         position: DVec3,
@@ -30,27 +30,27 @@ pub enum EmitterKind {
         position: DVec3,
         /// Unit, away from the lamp.
         direction: DVec3,
-        /// Half-angle of full strength [rad].
+        /// Half-angle of the cone of full strength [rad].
         inner_cone_rad: f64,
-        /// Half-angle at which it ends [rad], at most π/2.
+        /// Half-angle at which the light ends [rad], at most π/2.
         outer_cone_rad: f64,
     },
-    /// A point of a surface that glows: by the cosine, on one side.
+    /// A point of an emissive surface: cosine distribution, one-sided.
     Facet {
         /// [m].
         position: DVec3,
-        /// Unit, to the side that it shines to.
+        /// Unit, on the side that shines.
         normal: DVec3,
     },
-    /// Parallel light.
+    /// Parallel light from infinity.
     Parallel {
-        /// Unit, the way the light travels.
+        /// Unit, direction of travel.
         direction: DVec3,
     },
 }
 
 impl EmitterKind {
-    /// Share of the strength that leaves in a unit direction, [0, 1].
+    /// Relative strength in a unit direction, [0, 1].
     pub fn falloff(&self, direction: DVec3) -> f64 {
         match *self {
             Self::Spot {
@@ -64,7 +64,7 @@ impl EmitterKind {
         }
     }
 
-    /// Axis and half-angle [rad] of the cone that it shines into, where that is not everywhere.
+    /// Axis and half-angle [rad] of the cone that contains all its light; `None` without such a cone.
     pub fn cone(&self) -> Option<(DVec3, f64)> {
         match *self {
             Self::Spot {
@@ -77,7 +77,7 @@ impl EmitterKind {
         }
     }
 
-    /// Where it is [m]; `None` for parallel light.
+    /// Position [m]; `None` for parallel light.
     pub fn position(&self) -> Option<DVec3> {
         match *self {
             Self::Point { position } | Self::Spot { position, .. } | Self::Facet { position, .. } => {
@@ -88,7 +88,7 @@ impl EmitterKind {
     }
 }
 
-/// Fall-off of a spot, [0, 1]: the square of a linear ramp in the cosine to its axis (KHR_lights_punctual).
+/// Angular falloff of a spot, [0, 1]: square of a linear ramp in the cosine to the axis (KHR_lights_punctual).
 pub fn spot_falloff(cosine: f64, inner_cone_rad: f64, outer_cone_rad: f64) -> f64 {
     let (cos_outer, cos_inner) = (outer_cone_rad.cos(), inner_cone_rad.cos());
     let ramp = if cos_inner > cos_outer {
@@ -100,7 +100,7 @@ pub fn spot_falloff(cosine: f64, inner_cone_rad: f64, outer_cone_rad: f64) -> f6
 }
 
 impl Emitter {
-    /// The middle of a light: what it is without its size. `None` for what has no middle, or sends nothing.
+    /// Centre of a light, without its extent. `None` if it has no centre or emits nothing.
     pub fn middle(light: &Light, scene: &Scene) -> Option<Self> {
         match light.kind {
             LightKind::Environment { .. } => None,
@@ -108,28 +108,28 @@ impl Emitter {
         }
     }
 
-    /// The place of a light at a point of the unit square; `None` where it sends nothing.
+    /// Samples a light at a point of the unit square; `None` if it emits nothing.
     pub fn sample(light: &Light, scene: &Scene, square: DVec2) -> Option<Self> {
         EmitterSampler::new(light, scene).sample(square)
     }
 }
 
-/// A light whose places are asked for many times.
+/// A light prepared for many samples.
 #[derive(Debug)]
 pub struct EmitterSampler<'a> {
     light: &'a Light,
     scene: &'a Scene,
-    /// Of an object that glows.
+    /// Of an emissive object.
     surface: Option<Glowing<'a>>,
 }
 
 impl<'a> EmitterSampler<'a> {
-    /// Of a light of a scene.
+    /// Prepares a light of a scene.
     pub fn new(light: &'a Light, scene: &'a Scene) -> Self {
         Self::chosen_by(light, scene, weight)
     }
 
-    /// The same, where parts of a surface that an image leaves dark are chosen as often as bright ones.
+    /// Like [`new`](Self::new), but samples the dark triangles of a textured surface as often as bright ones.
     pub fn spread_evenly(light: &'a Light, scene: &'a Scene) -> Self {
         Self::chosen_by(light, scene, |_, _| 1.0)
     }
@@ -146,12 +146,13 @@ impl<'a> EmitterSampler<'a> {
         }
     }
 
-    /// The place at a point of the unit square; `None` where the light sends nothing.
+    /// Samples the light at a point of the unit square; `None` if it emits nothing.
     pub fn sample(&self, square: DVec2) -> Option<Emitter> {
         self.at(Some(square))
     }
 
-    /// Where a point of the unit square lies on a lamp that faces one way: [−1, 1]², in half-axes from its middle.
+    /// Maps the unit square to a light that faces one way: [−1, 1]², in half-axes from its centre. `None` for other
+    /// lights.
     pub fn offsets(&self) -> Option<fn(DVec2) -> DVec2> {
         match self.light.kind {
             LightKind::Sun { .. } | LightKind::Spot { .. } => Some(on_disc),
@@ -163,7 +164,7 @@ impl<'a> EmitterSampler<'a> {
         }
     }
 
-    /// Area of all sides of an object that glow, or of a panel [m²]; 0 of other lights.
+    /// Emitting area of an object, over all its emitting sides, or of a panel [m²]; 0 for other lights.
     pub fn area_m2(&self) -> f64 {
         match self.light.kind {
             LightKind::Panel {
@@ -189,7 +190,7 @@ impl<'a> EmitterSampler<'a> {
         match (light.kind, light.size, square) {
             (LightKind::Point { position, .. }, LightSize::Radius { radius_m }, Some(square)) => {
                 let normal = on_sphere(square);
-                // The ball's radiance is I/(πr²): each point of its surface stands for 4πr² of it.
+                // The sphere's radiance is I/(πr²); each sample stands for its whole area 4πr².
                 let position = position + normal * radius_m;
                 Some(whole(EmitterKind::Facet { position, normal }, 4.0))
             }
@@ -273,12 +274,12 @@ impl<'a> EmitterSampler<'a> {
     }
 }
 
-/// Points of the square around the origin whose sides are 2, evenly.
+/// Uniform over the square [−1, 1]².
 fn in_rectangle(square: DVec2) -> DVec2 {
     square * 2.0 - 1.0
 }
 
-/// Unit vectors, evenly.
+/// Uniform unit vectors.
 fn on_sphere(square: DVec2) -> DVec3 {
     let z = 1.0 - 2.0 * square.x;
     let radius = (1.0 - z * z).max(0.0).sqrt();
@@ -286,7 +287,7 @@ fn on_sphere(square: DVec2) -> DVec3 {
     DVec3::new(radius * cosine, radius * sine, z)
 }
 
-/// Points of the unit disc, evenly (the concentric map of Shirley and Chiu, 1997: neighbours stay neighbours).
+/// Uniform over the unit disc; concentric map of Shirley and Chiu (1997), under which neighbours stay neighbours.
 pub fn on_disc(square: DVec2) -> DVec2 {
     let [x, y] = (square * 2.0 - 1.0).to_array();
     if x == 0.0 && y == 0.0 {
@@ -301,38 +302,39 @@ pub fn on_disc(square: DVec2) -> DVec2 {
     DVec2::from_angle(angle) * radius
 }
 
-/// Unit directions within a half-angle [rad] of an axis, evenly by solid angle.
+/// Unit directions within a half-angle [rad] of an axis, uniform in solid angle.
 pub fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
     let (x, y) = axis.any_orthonormal_pair();
     let place = on_disc(square);
-    // 1 − cos of the angle, without a difference of nearly equal numbers.
+    // 1 − cos θ, without cancellation.
     let height = 2.0 * (0.5 * half_angle_rad).sin().powi(2) * place.length_squared();
     let sine = (height * (2.0 - height)).sqrt();
     let sideways = place.normalize_or_zero() * sine;
     (x * sideways.x + y * sideways.y + axis * (1.0 - height)).normalize()
 }
 
-/// An object that glows.
+/// An emissive object.
 #[derive(Debug)]
 struct Glowing<'a> {
     mesh: InScene<'a>,
     both_sides: bool,
-    /// Area of all triangles up to each, itself included, by how bright they are [m²].
+    /// Cumulative area of the triangles, weighted by brightness, each inclusive [m²].
     upto_m2: Vec<f64>,
-    /// Of an image: the scene with its object, and the area of the object [m²].
+    /// With an emission texture: the scene, the object, and the object's area [m²].
     image: Option<(&'a Scene, usize, f64)>,
-    /// How often a triangle is chosen for its area.
+    /// Sampling weight of a triangle relative to its area.
     weight: fn(&Glow, usize) -> f64,
 }
 
-/// How often a triangle is chosen for its area: dark ones too, whose image may have been overlooked.
+/// Sampling weight of a triangle relative to its area; bounded from below, since the estimate of a dark triangle may
+/// have missed bright texels.
 fn weight(glow: &Glow, triangle: usize) -> f64 {
     const LEAST: f64 = 0.05;
     glow.by_triangle[triangle].max(LEAST)
 }
 
 impl<'a> Glowing<'a> {
-    /// `None` where it has no area.
+    /// `None` if it has no area.
     fn new(scene: &'a Scene, object: usize, weight: fn(&Glow, usize) -> f64) -> Option<Self> {
         let mesh = scene.objects.get(object)?.in_scene();
         let glow = scene.glows.get(&object);
@@ -357,13 +359,14 @@ impl<'a> Glowing<'a> {
         self.upto_m2.last().copied().unwrap_or(0.0)
     }
 
-    /// Of all glowing sides [m²].
+    /// Over all emitting sides [m²].
     fn area_m2(&self) -> f64 {
         let area_m2 = self.image.map_or(self.total_m2(), |(.., area_m2)| area_m2);
         area_m2 * if self.both_sides { 2.0 } else { 1.0 }
     }
 
-    /// A point of it, as often by area as its triangle is bright; and how bright it is there for that, where an image tells.
+    /// Samples a point of the surface, with triangles in proportion to their brightness. With an emission texture, also
+    /// the relative radiance there divided by the relative sampling density.
     fn facet(&self, mut square: DVec2) -> Option<(EmitterKind, Option<LinearSrgb>)> {
         let mut side = 1.0;
         if self.both_sides {
@@ -373,7 +376,7 @@ impl<'a> Glowing<'a> {
             }
         }
         let wanted_m2 = square.x * self.total_m2();
-        // Triangles without area are never chosen, the last ones neither.
+        // Triangles of zero area are never chosen, trailing ones included.
         let end = self.upto_m2.partition_point(|upto| *upto < self.total_m2());
         let triangle = self.upto_m2.partition_point(|upto| *upto <= wanted_m2).min(end);
         let before_m2 = if triangle == 0 {
@@ -382,7 +385,7 @@ impl<'a> Glowing<'a> {
             self.upto_m2[triangle - 1]
         };
         let share = ((wanted_m2 - before_m2) / (self.upto_m2.get(triangle)? - before_m2)).clamp(0.0, 1.0);
-        // Evenly over the triangle: the root of one coordinate, times the other.
+        // Uniform over the triangle.
         let root = share.sqrt();
         let barycentric = [1.0 - root, root * (1.0 - square.y), root * square.y];
         let (point, error) = ray::point_with_error(&self.mesh.corners(triangle), barycentric);
@@ -396,12 +399,12 @@ impl<'a> Glowing<'a> {
     }
 }
 
-/// Directions along a side of the square over which an environment is summed up.
+/// Directions per side of the square over which an environment is integrated.
 const ENVIRONMENT_SIDE: u32 = 16;
 
 impl Scene {
-    /// What all lamps send to the middle of the scene from all around [W/m²], without shadows: for its colour. A lamp
-    /// close to the middle counts as if it stood at the scene's border.
+    /// Unoccluded light of all sources that arrives at the middle of the scene from all directions [W/m²]; meant for
+    /// its colour. A source near the middle counts as if it stood at the border of the scene.
     pub fn light_at_middle(&self) -> LinearSrgb {
         let (low, high) = self.bounds().unwrap_or_default();
         let (middle, radius_m) = (0.5 * (low + high), 0.5 * (high - low).length());
@@ -413,7 +416,7 @@ impl Scene {
         lamps.fold(LinearSrgb::BLACK, |sum, light| sum + light)
     }
 
-    /// The same of its environment.
+    /// The same for the environment.
     fn light_from_around(&self) -> LinearSrgb {
         let Some((environment, strength)) = self.sky() else {
             return LinearSrgb::BLACK;
@@ -429,7 +432,7 @@ impl Scene {
     }
 }
 
-/// The unit direction of a place of the unit square, of which equal areas are equal solid angles.
+/// Unit direction for a point of the unit square, uniform in solid angle.
 fn direction_of(square: DVec2) -> DVec3 {
     let (sine, cosine) = (std::f64::consts::TAU * square.x).sin_cos();
     let height = 1.0 - 2.0 * square.y;
@@ -437,7 +440,7 @@ fn direction_of(square: DVec2) -> DVec3 {
     DVec3::new(around * cosine, height, around * sine)
 }
 
-/// What a lamp of unit strength sends to a place [1/m²], or 1 of parallel light; where it shines, whichever way that is.
+/// Normal irradiance from a source of unit strength at a place [1/m²], or 1 for parallel light; ignores falloff.
 fn received_per_m2(kind: &EmitterKind, middle: DVec3, radius_m: f64) -> f64 {
     match *kind {
         EmitterKind::Parallel { .. } => 1.0,

@@ -12,35 +12,34 @@ use crate::optics::LinearSrgb;
 pub use clear_sky::clear_sky;
 pub use file::read;
 
-/// Radiance from infinitely far, over all directions. Column 0 begins at −z and columns go on over +x (the middle of the
-/// image looks at +z); row 0 is up, y.
+/// Radiance from infinity as an equirectangular image. Column 0 begins at −z and columns advance towards +x, so that
+/// the image centre is +z; row 0 is at +y, up.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Environment {
     width: usize,
     height: usize,
-    /// W/(m² sr), row by row, not negative and finite.
+    /// [W/(m² sr)], row by row; finite and non-negative.
     radiance: Vec<[f32; 3]>,
-    /// Over all rows: share of the luminous radiance × solid angle in the rows above and in this one.
+    /// Normalised cumulative distribution over rows of luminance × solid angle.
     rows: Vec<f64>,
-    /// The same within each row.
+    /// Normalised cumulative distribution of luminance within each row.
     columns: Vec<f64>,
     /// ∫ L dω of the luminance [W/m²].
     total: f64,
 }
 
-/// A direction to look for light in.
+/// A direction sampled from an environment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EnvironmentSample {
-    /// Unit, towards the light.
+    /// Unit vector towards the light.
     pub to_light: DVec3,
-    /// Radiance over the density of directions [W/m² across the beam]: what the whole environment sends if all of it
-    /// came from there.
+    /// Radiance divided by the pdf [W/m²]: normal irradiance as if the whole environment shone from this direction.
     pub irradiance: LinearSrgb,
 }
 
 impl Environment {
-    /// An image of `width` × `height` pixels of radiance [W/(m² sr)]; `None` where their number is not that, or a number
-    /// is negative or not finite, or there is none.
+    /// An image of `width` × `height` pixels of radiance [W/(m² sr)]; `None` if there are no pixels, their number does
+    /// not match, or a value is negative or not finite.
     pub fn new(width: usize, height: usize, radiance: Vec<[f32; 3]>) -> Option<Self> {
         let is_light = |pixel: &[f32; 3]| pixel.iter().all(|channel| channel.is_finite() && *channel >= 0.0);
         if width == 0 || height == 0 || radiance.len() != width * height || !radiance.iter().all(is_light) {
@@ -77,7 +76,7 @@ impl Environment {
         Some(environment)
     }
 
-    /// Pixels across and down.
+    /// Width and height in pixels.
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
@@ -101,15 +100,15 @@ impl Environment {
         TAU / self.width as f64 * (polar(row).cos() - polar(row + 1).cos())
     }
 
-    /// Radiance that comes from a unit direction [W/(m² sr)]: that of the pixel there.
+    /// Radiance from a unit direction [W/(m² sr)], of the pixel that contains it.
     pub fn radiance(&self, to_light: DVec3) -> LinearSrgb {
         let [u, v] = coordinates(to_light).to_array();
         let index = |share: f64, count: usize| ((share * count as f64).max(0.0) as usize).min(count - 1);
         self.pixel(index(u, self.width), index(v, self.height))
     }
 
-    /// Radiance that is seen in a unit direction [W/(m² sr)]: bilinear between the middles of pixels, around the image,
-    /// not over its poles. `sky.wgsl` does the same.
+    /// Radiance seen in a unit direction [W/(m² sr)], interpolated bilinearly between pixel centres: around the image,
+    /// but not across the poles. `sky.wgsl` does the same.
     pub fn smooth_radiance(&self, direction: DVec3) -> LinearSrgb {
         let size = DVec2::new(self.width as f64, self.height as f64);
         let place = coordinates(direction) * size - 0.5;
@@ -124,7 +123,7 @@ impl Environment {
         along(row(low.y)) * (1.0 - share.y) + along(row(low.y + 1.0)) * share.y
     }
 
-    /// Density of the directions that [`sample`](Self::sample) gives, near one of them [1/sr]; 0 where all is black.
+    /// pdf of [`sample`](Self::sample) for a direction [1/sr]; 0 if the environment is black.
     pub fn density_per_sr(&self, to_light: DVec3) -> f64 {
         if self.total > 0.0 {
             self.radiance(to_light).luminance() / self.total
@@ -133,14 +132,15 @@ impl Environment {
         }
     }
 
-    /// The direction of a point of the unit square: as many in any region as it sends light. `None` where all is black.
+    /// Samples a direction in proportion to luminance from a point of the unit square. `None` if the environment is
+    /// black.
     pub fn sample(&self, square: DVec2) -> Option<EnvironmentSample> {
         if self.total <= 0.0 {
             return None;
         }
         let (row, v) = inverted(&self.rows, square.y);
         let (column, u) = inverted(&self.columns[row * self.width..][..self.width], square.x);
-        // Within a pixel evenly by solid angle.
+        // Uniform in solid angle within the pixel.
         let polar = |edge: usize| (edge as f64 / self.height as f64 * PI).cos();
         let cosine = polar(row) + (polar(row + 1) - polar(row)) * v;
         let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
@@ -153,15 +153,15 @@ impl Environment {
     }
 }
 
-/// Place of a unit direction in the image, [0, 1]² from its top left.
+/// Image coordinates of a unit direction, [0, 1]² from the top left.
 pub fn coordinates(direction: DVec3) -> DVec2 {
     let azimuth = direction.x.atan2(-direction.z).rem_euclid(TAU);
     DVec2::new(azimuth / TAU, direction.y.clamp(-1.0, 1.0).acos() / PI)
 }
 
-/// The step of a cumulated distribution that a share falls into, and how far into it, [0, 1).
+/// Inverts a cumulative distribution: the step that contains a share and the relative position in it, [0, 1).
 fn inverted(shares: &[f64], share: f64) -> (usize, f64) {
-    // Steps without weight are never chosen, the last ones neither.
+    // Steps of zero weight are never chosen, trailing ones included.
     let last = shares.len() - 1;
     let end = shares.partition_point(|&upto| upto < shares[last]);
     let step = shares.partition_point(|&upto| upto <= share).min(end);
@@ -192,7 +192,7 @@ mod tests {
         let Some(sky) = Environment::new(width, height, pixels) else {
             panic!("a sound image");
         };
-        // ∫ L cos⁺ dω towards a slanted axis, by samples and by pixels.
+        // ∫ L cos⁺ dω about a slanted axis, from samples and from pixels.
         let axis = DVec3::new(0.3, 0.8, -0.5).normalize();
         let count = 1 << 16;
         let mut sum = LinearSrgb::BLACK;

@@ -7,23 +7,23 @@ use super::texture::{Texture, TextureRef};
 use super::{InScene, Scene};
 use crate::optics::LinearSrgb;
 
-/// Steps along an edge of a triangle in which its image is looked at.
+/// Fewest and most samples along an edge of a triangle.
 const STEPS: (f64, f64) = (4.0, 64.0);
 
-/// Looks that a mesh of many triangles takes, about: they say which triangle is bright, not how a place of it looks.
+/// Approximate number of texture samples for a mesh of many triangles: enough to tell which triangles are bright.
 const LOOKS: f64 = 1e6;
 
-/// Brightness of an object over the mean of its image.
+/// Mean of an emission texture over an object, and its distribution over the triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Glow {
-    /// Mean of the image over the surface.
+    /// Area-weighted mean over the surface.
     pub mean: LinearSrgb,
-    /// Luminance of each triangle's mean over that of all.
+    /// Luminance of each triangle's mean relative to that of `mean`.
     pub by_triangle: Vec<f64>,
 }
 
 impl Glow {
-    /// Of a mesh with an image; `None` where it is black or has no coordinates.
+    /// `None` if the image is black or the mesh lacks its texture coordinates.
     pub fn new(mesh: InScene, image: &TextureRef, texture: &Texture) -> Option<Self> {
         let most_steps = (LOOKS / mesh.triangle_count() as f64)
             .sqrt()
@@ -45,13 +45,13 @@ impl Glow {
         })
     }
 
-    /// Radiance over that of the whole for a white texel of the image.
+    /// Factor from a texture's colour to radiance relative to the mean.
     pub fn per_colour(&self) -> LinearSrgb {
         self.mean.map(|mean| if mean > 0.0 { mean.recip() } else { 0.0 })
     }
 }
 
-/// Mean of an image over a triangle, at places as close as its texels or in so many steps.
+/// Mean of an image over a triangle, sampled once per texel, within the limits of [`STEPS`] and `most_steps`.
 fn triangle_mean(
     mesh: InScene,
     (image, texture): (&TextureRef, &Texture),
@@ -66,7 +66,7 @@ fn triangle_mean(
     let mut sum = LinearSrgb::BLACK;
     for row in 0..steps {
         for column in 0..steps {
-            // Middles of the small triangles that the steps divide it into, those that are turned over mirrored back.
+            // Centroids of the sub-triangles; beyond the diagonal, mirroring yields those of the inverted ones.
             let [x, y] = [column, row].map(|step| (f64::from(step) + 1.0 / 3.0) / f64::from(steps));
             let (x, y) = if x + y > 1.0 { (1.0 - x, 1.0 - y) } else { (x, y) };
             sum += texture.sample(at([1.0 - x - y, x, y])?);
@@ -76,7 +76,7 @@ fn triangle_mean(
 }
 
 impl Scene {
-    /// What the radiance of an object that glows is multiplied by at a place: white where it is the same everywhere.
+    /// Radiance of an emissive object at a point relative to its mean; white without an emission texture.
     pub fn glow_at(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> LinearSrgb {
         let Some(glow) = self.glows.get(&object) else {
             return LinearSrgb::WHITE;

@@ -7,23 +7,24 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::{Mesh, Object};
 
-/// Triangles that copies of one mesh may have in all; of a mesh with more, each of its objects is an instance.
+/// Largest total of triangles in the copies of one mesh; beyond it, the objects of the mesh are instances.
 pub const MAX_COPIED: usize = 1 << 18;
 
-/// Copies of meshes with fewer triangles take no more than what an instance takes.
+/// Meshes with fewer triangles are copied, since a copy takes no more memory than an instance.
 const MIN_SHARED: usize = 64;
 
-/// Rounding of places on their way into the coordinates of an instance, in radii of its mesh: far below the margins of the
-/// hierarchy.
+/// Largest rounding error of a point in the coordinates of an instance, in radii of its mesh: far below the margins of
+/// the hierarchy.
 const ROUNDING: f64 = 1e-9;
 
-/// Instances are not flattened more than this, as a share of their extents.
+/// Largest condition number of an instance's transform (Frobenius norm).
 const MAX_SKEW: f64 = 1e3;
 
-/// Meshes do not lie farther from the origin of their coordinates, which are single on devices [diagonals of their boxes].
+/// Farthest reach of a mesh from the origin of its coordinates, which are single precision on the device, in diagonals
+/// of its bounding box.
 const MAX_OFF_CENTRE: f64 = 64.0;
 
-/// Which objects are instances: those of meshes whose copies would have many triangles.
+/// Whether each object is an instance: copies of its mesh would exceed `max_copied` triangles in total.
 pub fn find(objects: &[Object], max_copied: usize) -> Vec<bool> {
     let mut uses: HashMap<*const Mesh, usize> = HashMap::new();
     for object in objects {
@@ -38,8 +39,8 @@ pub fn find(objects: &[Object], max_copied: usize) -> Vec<bool> {
     objects.iter().map(is_instance).collect()
 }
 
-/// Whether a mesh can be met and drawn in its own coordinates without loss. Normals of others come from all the triangles
-/// around a vertex.
+/// Whether a mesh can be traced and drawn in its own coordinates without loss. All its normals must have a moderate
+/// length: others are computed from the triangles around the vertex.
 pub(super) fn is_sound(mesh: &Mesh, transform: &DAffine3) -> bool {
     let Some((low, high)) = mesh.bounds().filter(|_| !mesh.triangles.is_empty()) else {
         return false;
@@ -57,7 +58,7 @@ pub(super) fn is_sound(mesh: &Mesh, transform: &DAffine3) -> bool {
     let (stretch, shrink) = (size(linear), size(linear.inverse()));
     let (reach, diagonal) = (low.abs().max(high.abs()).length(), (high - low).length());
     let farthest = stretch * reach + transform.translation.length();
-    // Also false where a number is not one.
+    // Also false for NaN.
     shrink * farthest * f64::EPSILON < ROUNDING * 0.5 * diagonal
         && stretch * shrink < MAX_SKEW
         && reach <= MAX_OFF_CENTRE * diagonal

@@ -10,10 +10,10 @@ use crate::optics::LinearSrgb;
 use crate::optics::spectrum::Spectrum;
 use crate::units::{Irradiance, Radiance, RadiantIntensity};
 
-/// Where a light is and how strong: KHR_lights_punctual, EXT_lights_area, what glows, and what lies around.
+/// Geometry and strength of a light: KHR_lights_punctual, EXT_lights_area, emissive surfaces, the environment.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum LightKind {
-    /// The same in every direction.
+    /// Uniform in all directions.
     Point {
         /// Scene coordinates [m].
         position: DVec3,
@@ -28,100 +28,99 @@ pub enum LightKind {
         direction: DVec3,
         /// On the axis: glTF's candela divided by 683 lm/W.
         intensity: RadiantIntensity,
-        /// Half-angle of full strength [rad], 0 ≤ inner < outer.
+        /// Half-angle of the cone of full strength [rad], 0 ≤ inner < outer.
         inner_cone_rad: f64,
-        /// Half-angle at which it ends [rad], at most π/2.
+        /// Half-angle at which the light ends [rad], at most π/2.
         outer_cone_rad: f64,
     },
-    /// Parallel light from infinitely far.
+    /// Parallel light from infinity.
     Sun {
-        /// Unit, the way the light travels.
+        /// Unit, direction of travel.
         direction: DVec3,
-        /// Measured across the beam: glTF's lux divided by 683 lm/W.
+        /// On a plane normal to the beam: glTF's lux divided by 683 lm/W.
         normal_irradiance: Irradiance,
     },
-    /// A flat lamp that sends the same radiance into all directions of one side.
+    /// A flat light with the same radiance in all directions of one side.
     Panel {
-        /// Of its middle, scene coordinates [m].
+        /// Centre in scene coordinates [m].
         centre: DVec3,
-        /// From the middle to the middle of one side [m].
+        /// From the centre to the middle of one side [m].
         across: DVec3,
-        /// From the middle to the middle of the next side [m]; it shines to the side of `across` × `down`.
+        /// From the centre to the middle of the next side [m]; the light shines towards `across` × `down`.
         down: DVec3,
         /// Its outline.
         shape: PanelShape,
         /// glTF's cd/m² divided by 683 lm/W.
         radiance: Radiance,
     },
-    /// The triangles of an object that glow.
+    /// The emissive triangles of an object.
     Surface {
         /// Index into `Scene::objects`.
         object: usize,
         /// glTF's cd/m² divided by 683 lm/W.
         radiance: Radiance,
     },
-    /// `Scene::environment`, so many times as bright.
+    /// `Scene::environment`, scaled.
     Environment {
         /// Factor [1], > 0.
         scale: f64,
     },
 }
 
-/// Outline of a flat lamp.
+/// Outline of a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum PanelShape {
-    /// The parallelogram of its half-axes.
+    /// Parallelogram spanned by the half-axes.
     Rectangle,
-    /// The ellipse of its half-axes.
+    /// Ellipse with these half-axes.
     Disc,
 }
 
-/// How large a lamp is that would else be a point, or a sun that would else be one direction.
+/// Extent of a light that would otherwise be a point or, for a sun, a single direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum LightSize {
-    /// Not at all.
+    /// No extent.
     #[default]
     None,
-    /// Of a point light: a ball that sends the same radiance everywhere. Of a spot: a disc across its axis.
+    /// Point light: a sphere of uniform radiance. Spot: a disc normal to its axis.
     Radius {
         /// [m], > 0.
         radius_m: f64,
     },
-    /// Of a sun.
+    /// Sun.
     Angle {
-        /// Full angle across its disc [rad], > 0 and at most π.
+        /// Angular diameter [rad], > 0 and at most π.
         diameter_rad: f64,
     },
 }
 
-/// A light with its colour.
+/// A light source.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Light {
-    /// The node's name in the file; `lightN` when it has none.
+    /// Name of the node in the file; `lightN` without one.
     pub name: String,
-    /// Multiplies the intensity per channel; a light's luminous-equivalent strength is intensity × its luminance. That
-    /// of a spectrum has the luminance 1, and a channel below 0 where the spectrum lies outside of sRGB.
+    /// Multiplies the intensity per channel; the luminous-equivalent strength is the intensity times its luminance. The
+    /// colour of a spectrum has luminance 1, and a negative channel if it lies outside the gamut of sRGB.
     pub colour: LinearSrgb,
-    /// Its light by wavelength, scaled to one luminous-equivalent watt, of which `colour` is the colour; `None` where
-    /// that is all that is known.
+    /// Spectrum, scaled to one luminous-equivalent watt, whose colour is `colour`; `None` if only the colour is known.
     pub spectrum: Option<Arc<Spectrum>>,
-    /// Where and how strong.
+    /// Geometry and strength.
     pub kind: LightKind,
-    /// How large, where the kind does not say it.
+    /// Extent, unless the kind defines it.
     pub size: LightSize,
 }
 
-/// What edits did to the list of lights: those of the file come first, in its order, and then those that were added.
+/// Edits of the list of lights. Lights of the file come first, in file order, then added ones.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightList {
-    /// Places of lights that were taken out, among those of the scene as it was loaded, ascending.
+    /// Indices of removed lights in the scene as loaded, ascending.
     pub removed: Vec<usize>,
-    /// Lights that were added, as they were then.
+    /// Added lights, as they were when added.
     pub added: Vec<Arc<Light>>,
 }
 
 impl Light {
-    /// A white light without a size or a spectrum.
+    /// A white light without extent and spectrum.
     pub fn new(name: impl Into<String>, kind: LightKind) -> Self {
         Self {
             name: name.into(),
@@ -132,19 +131,19 @@ impl Light {
         }
     }
 
-    /// What its maps are multiplied by per channel: [`LightKind::strength`] times the colour.
+    /// Factor on its maps per channel: [`LightKind::strength`] times the colour.
     pub fn strength(&self) -> LinearSrgb {
         self.colour * self.kind.strength()
     }
 
-    /// Gives it a spectrum, scaled to one luminous-equivalent watt, and the spectrum's colour; as bright as it was
-    /// if its colour had the luminance 1.
+    /// Sets the spectrum, scaled to one luminous-equivalent watt, and its colour. The luminous strength stays the same
+    /// if the old colour had luminance 1.
     pub fn set_spectrum(&mut self, spectrum: Arc<Spectrum>) {
         self.colour = spectrum.xyz().to_linear_srgb();
         self.spectrum = Some(spectrum);
     }
 
-    /// The same light, white and of strength 1; its spectrum stays.
+    /// The light, white and of unit strength; keeps its spectrum.
     #[must_use]
     pub fn of_unit_strength(&self) -> Self {
         let mut kind = self.kind;
@@ -168,8 +167,8 @@ impl Light {
 }
 
 impl LightKind {
-    /// Its strength alone: intensity [W/sr], normal irradiance [W/m²] of a sun, radiance [W/(m² sr)] of what glows,
-    /// the scale [1] of an environment.
+    /// Strength without colour: intensity [W/sr], normal irradiance [W/m²] of a sun, radiance [W/(m² sr)] of a panel or
+    /// surface, scale [1] of an environment.
     pub fn strength(&self) -> f64 {
         match *self {
             Self::Point { intensity, .. } | Self::Spot { intensity, .. } => intensity.0,
@@ -195,7 +194,7 @@ impl LightKind {
         }
     }
 
-    /// The way a spot's or a sun's light travels.
+    /// Direction of travel of the light of a spot or sun.
     pub fn direction(&self) -> Option<DVec3> {
         match *self {
             Self::Spot { direction, .. } | Self::Sun { direction, .. } => Some(direction),
@@ -203,7 +202,7 @@ impl LightKind {
         }
     }
 
-    /// Where it is [m], or its middle; `None` for what has no single place.
+    /// Position or centre [m]; `None` for lights without a single place.
     pub fn position(&self) -> Option<DVec3> {
         match *self {
             Self::Point { position, .. } | Self::Spot { position, .. } => Some(position),
@@ -212,12 +211,12 @@ impl LightKind {
         }
     }
 
-    /// The same light moved by `offset` [m].
+    /// The light translated by `offset` [m].
     pub fn moved(self, offset: DVec3) -> Self {
         self.carried(&DAffine3::from_translation(offset))
     }
 
-    /// The same light, moved and turned; panels are scaled too.
+    /// The light moved and turned by a transform; panels are scaled too.
     pub fn carried(mut self, carrying: &DAffine3) -> Self {
         match &mut self {
             Self::Point { position, .. } => *position = carrying.transform_point3(*position),

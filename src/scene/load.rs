@@ -9,17 +9,16 @@ use super::{Light, LightKind, Opened, Scene, builtin, coincident_faces, environm
 use crate::error::{Error, Result, Warning};
 use crate::units::Irradiance;
 
-/// How a scene is read.
+/// Options for loading a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LoadOptions {
-    /// Reads transmitting surfaces without a volume as solid glass where their mesh encloses space.
+    /// Reads transmissive surfaces without a volume as solid glass if their mesh encloses space.
     pub solid_glass: bool,
-    /// Adds a sun and a clear sky to a scene that has no light, with a warning.
+    /// Adds a sun and a clear sky to a scene without light, with a warning.
     pub default_light: bool,
-    /// An equirectangular image of radiance, .hdr or .exr, that lies around the scene and lights it.
+    /// Equirectangular image of radiance, .hdr or .exr, that surrounds and lights the scene.
     pub environment: Option<PathBuf>,
-    /// The most memory that the file, its geometry and its images may take together, and the environment by itself
-    /// [bytes].
+    /// Memory limit of the file, its geometry and its images together, and of the environment by itself [bytes].
     pub memory_limit_bytes: u64,
 }
 
@@ -35,12 +34,12 @@ impl Default for LoadOptions {
 }
 
 impl Scene {
-    /// Reads `builtin:NAME` or a `.glb` or `.gltf` file. What was repaired or left out stands in `warnings`.
+    /// Reads `builtin:NAME` or a `.glb` or `.gltf` file. Repairs and omissions are listed in `warnings`.
     ///
     /// # Errors
-    /// An unknown built-in; a file that cannot be read, is no glTF 2.0, breaks its rules where no repair is plain,
-    /// requires an extension that is not supported, or does not fit the memory limit. An environment as
-    /// [`environment::read`].
+    /// An unknown built-in; a file that cannot be read, is not glTF 2.0, breaks its rules beyond obvious repair,
+    /// requires an unsupported extension, or exceeds the memory limit; an environment that [`environment::read`]
+    /// refuses.
     pub fn load(source: &str, options: &LoadOptions) -> Result<Self> {
         let mut scene = match source.strip_prefix("builtin:") {
             Some(name) => builtin::build(name).ok_or_else(|| unknown_builtin(source))?,
@@ -58,12 +57,12 @@ impl Scene {
     }
 }
 
-/// Writes an edited scene as a `.glb`: the file that it was loaded from, in which only what was edited is changed, so that
-/// whatever the program does not know survives.
+/// Writes an edited scene as a `.glb`: its source file with only the edits applied, so that content unknown to the
+/// program survives.
 ///
 /// # Errors
-/// A built-in scene, which has no file; a file that changed since; an edit that no file can hold, such as another shape, the
-/// brightness of an environment, or a glass without a name; a place that cannot be written.
+/// A built-in scene, which has no file; a file that changed since it was loaded; an edit that no file can hold, such as
+/// another shape, the brightness of an environment, or a glass without a name; a target that cannot be written.
 pub fn save(target: &Path, loaded: &Scene, edited: &Scene, options: &LoadOptions) -> Result<()> {
     if loaded.source.starts_with("builtin:") {
         return Err(Error::failure(
@@ -75,17 +74,17 @@ pub fn save(target: &Path, loaded: &Scene, edited: &Scene, options: &LoadOptions
     gltf::save(Path::new(&loaded.source), target, loaded, edited, options)
 }
 
-/// A scene's document, to be changed and written elsewhere: its file as it is, with all that lies beside it, or for a
-/// built-in one a document made for it, whose node `i` is object `i`.
+/// Document of a scene, to be modified and written elsewhere: its file with everything stored beside it or, for a
+/// built-in, a document made for it, in which node `i` is object `i`.
 ///
 /// # Errors
-/// A file that cannot be read any more, or one to which nothing can be added.
+/// A file that can no longer be read, or to which nothing can be added.
 pub fn open_document(scene: &Scene, options: &LoadOptions) -> Result<Opened> {
     gltf::open(scene, options.memory_limit_bytes)
 }
 
-/// The files that a scene is read from: the file itself and what it refers to beside it, as far as that can be told; none
-/// for a built-in.
+/// Files that a scene is read from: the file itself and those it refers to, as far as these can be determined; none for
+/// a built-in.
 pub fn files_of(source: &str, options: &LoadOptions) -> Vec<PathBuf> {
     if source.starts_with("builtin:") {
         return Vec::new();
@@ -95,8 +94,8 @@ pub fn files_of(source: &str, options: &LoadOptions) -> Vec<PathBuf> {
     files
 }
 
-/// Gives a scene that was read again the meshes and images of the time before where they are the same, so that who knows
-/// those does nothing anew; tells whether all of its objects have the shape that they had.
+/// Replaces meshes and images of a reloaded scene by equal ones of the previous scene, so that data derived from those
+/// stay valid. Returns whether all objects have kept their shape.
 pub fn share(before: &Scene, now: &mut Scene) -> bool {
     let mut is_same = before.objects.len() == now.objects.len();
     for (was, is) in before.objects.iter().zip(&mut now.objects) {
@@ -140,23 +139,23 @@ fn add_environment(scene: &mut Scene, path: &Path, memory_limit_bytes: u64) -> R
     Ok(())
 }
 
-/// Under both a grey floor sends a radiance of about 0.5 W/(m² sr): neither dark nor overexposed at exposure 0.
+/// Under both, a grey floor has a radiance of about 0.5 W/(m² sr): neither dark nor overexposed at exposure 0.
 const DEFAULT_SUN: Irradiance = Irradiance(4.0);
-/// From the sky on level ground: a sixth of the sun's, as on a clear day.
+/// Irradiance of level ground from the sky: a sixth of the sun's, as on a clear day.
 const DEFAULT_SKY: Irradiance = Irradiance(DEFAULT_SUN.0 / 6.0);
 
-/// Name of the sun of scenes without light.
+/// Name of the sun that is added to scenes without light.
 const DEFAULT_SUN_NAME: &str = "default sun";
 
-/// Images beside a scene that are named to light it.
+/// Largest number of images that a warning suggests.
 const MAX_BESIDE: usize = 3;
 
-/// Whether a scene, as it was loaded, had no light of its own and was given a sun.
+/// Whether a scene, as loaded, had no light of its own and was given a sun.
 pub fn was_dark(loaded: &Scene) -> bool {
     loaded.lights.iter().any(|light| light.name == DEFAULT_SUN_NAME)
 }
 
-/// A sun and, unless something lies around the scene already, a clear sky.
+/// Adds a sun and, without an environment, a clear sky.
 fn add_default_light(scene: &mut Scene) {
     let direction = DVec3::new(0.4, -0.8, -0.45).normalize();
     let normal_irradiance = DEFAULT_SUN;
@@ -186,7 +185,7 @@ fn add_default_light(scene: &mut Scene) {
     ));
 }
 
-/// How to surround a scene by the images that lie beside its file.
+/// Command-line options that surround a scene with the images beside its file.
 pub fn skies_beside(source: &str) -> Vec<String> {
     let folder = Path::new(source)
         .parent()

@@ -4,17 +4,17 @@ use glam::{DAffine3, DMat3, DVec2, DVec3};
 
 use crate::optics::LinearSrgb;
 
-/// A normal of a length that differs from 1 by no more is unit, squared [1].
+/// Largest deviation of a unit normal's squared length from 1.
 const UNIT: f64 = 4.0 * f64::EPSILON;
 
-/// Indexed triangles. Counter-clockwise corners face outwards; vertex normals are kept as the file has them, since
+/// Indexed triangles, counter-clockwise as seen from outside. Vertex normals are kept as the file has them, since
 /// smooth normals carry the shape between the vertices.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mesh {
     /// Vertex positions [m].
     pub positions: Vec<DVec3>,
-    /// Vertex normals, one per position: unit in scene coordinates. In those of a file's mesh they have any length, or 0
-    /// where the triangles around the vertex give them. Flat-shaded meshes have their corners split.
+    /// Vertex normals, one per position: unit length in scene coordinates. In a file's mesh they have any length, or 0
+    /// where they are to be computed from the adjacent triangles. Flat-shaded meshes have split vertices.
     pub normals: Vec<DVec3>,
     /// TEXCOORD_0, one per position (v downwards, as glTF has it).
     pub uv0: Option<Vec<DVec2>>,
@@ -47,18 +47,18 @@ impl Mesh {
         ]
     }
 
-    /// What the base colour is multiplied by at a place of a triangle: white without colours.
+    /// Interpolated vertex colour, which multiplies the base colour; white without colours.
     pub fn colour(&self, triangle: usize, barycentric: [f64; 3]) -> LinearSrgb {
         InScene::from(self).colour(triangle, barycentric)
     }
 
-    /// Unit normal of a triangle by its winding; zero for a degenerate one.
+    /// Unit normal of a triangle from its winding; zero for a degenerate triangle.
     pub fn face_normal(&self, triangle: usize) -> DVec3 {
         let [a, b, c] = self.corners(triangle);
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Smallest box, as minimum and maximum corner [m]; `None` without vertices.
+    /// Bounding box, as minimum and maximum corner [m]; `None` without vertices.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         InScene::from(self).bounds()
     }
@@ -74,16 +74,16 @@ impl Mesh {
         InScene::from(self).area_m2()
     }
 
-    /// The same mesh where a transform puts it, with unit normals. A mirroring transform turns the triangles, so that
-    /// they stay wound counter-clockwise about the outside.
+    /// The mesh transformed, with unit normals. A mirroring transform also swaps corners, so that triangles stay
+    /// counter-clockwise as seen from outside.
     #[must_use]
     pub fn placed(&self, world_from_object: &DAffine3) -> Self {
         Placement::new(*world_from_object).of_mesh(self)
     }
 
-    /// Normals of the triangles around each vertex, weighted by area; every vertex is part of a triangle with an area.
+    /// Area-weighted normals of the vertices; every vertex belongs to a triangle of non-zero area.
     fn normals_around(&self) -> Vec<DVec3> {
-        // Added to anything, −0 leaves its sign.
+        // −0 is the neutral element of addition: it preserves the sign of zero.
         let mut sums = vec![DVec3::splat(-0.0); self.positions.len()];
         let mut any = sums.clone();
         for triangle in 0..self.triangles.len() {
@@ -93,7 +93,7 @@ impl Mesh {
                 any[vertex as usize] = self.face_normal(triangle);
             }
         }
-        // Triangles back to back cancel: then any one of them is as good.
+        // Back-to-back triangles cancel; then the normal of any of them will do.
         sums.iter()
             .zip(any)
             .map(|(sum, any)| sum.try_normalize().unwrap_or(any))
@@ -101,7 +101,7 @@ impl Mesh {
     }
 }
 
-/// Where a transform puts a mesh: all that is asked of a placed mesh goes through here, so that a copy of it and single
+/// A transform prepared for meshes. Everything about a placed mesh is computed here, so that a full copy and single
 /// triangles agree to the last bit.
 #[derive(Clone, Debug)]
 pub struct Placement {
@@ -112,7 +112,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// By a transform.
+    /// Prepares a transform.
     pub fn new(world_from_object: DAffine3) -> Self {
         let linear = world_from_object.matrix3;
         Self {
@@ -123,13 +123,13 @@ impl Placement {
         }
     }
 
-    /// From the coordinates of the mesh to those of the scene.
+    /// Transform from mesh to scene coordinates.
     pub fn world_from_object(&self) -> &DAffine3 {
         &self.world_from_object
     }
 
-    /// Corners of a triangle of the mesh, as the placed mesh has them [m].
-    // Out of the way of loops over meshes that nothing places.
+    /// Corners of a mesh triangle in scene coordinates, in the order of the placed mesh [m].
+    // Not inlined, to keep it out of loops over meshes without a placement.
     #[inline(never)]
     pub fn corners(&self, corners: &[DVec3; 3]) -> [DVec3; 3] {
         self.turned(corners.map(|corner| self.position(corner)))
@@ -143,7 +143,7 @@ impl Placement {
         if self.is_mirrored { [a, c, b] } else { [a, b, c] }
     }
 
-    /// `None` where the triangles around a vertex have to give it.
+    /// `None` if the normal must be computed from the adjacent triangles.
     fn normal(&self, normal: DVec3) -> Option<DVec3> {
         let normal = self.cofactors * normal * if self.is_mirrored { -1.0 } else { 1.0 };
         if self.is_shifted && (normal.length_squared() - 1.0).abs() <= UNIT {
@@ -152,7 +152,7 @@ impl Placement {
         normal.try_normalize()
     }
 
-    /// A copy of a mesh, placed.
+    /// Copy of a mesh in scene coordinates.
     pub(super) fn of_mesh(&self, mesh: &Mesh) -> Mesh {
         let mut placed = Mesh {
             positions: mesh
@@ -180,11 +180,11 @@ impl Placement {
     }
 }
 
-/// A mesh as it stands in the scene: a copy that is kept, or the mesh with what places it.
+/// A mesh in scene coordinates: stored in them, or transformed on access.
 #[derive(Clone, Copy, Debug)]
 pub struct InScene<'a> {
     mesh: &'a Mesh,
-    /// `None` where the mesh stands where its coordinates say.
+    /// `None` if the mesh is stored in scene coordinates.
     placement: Option<&'a Placement>,
 }
 
@@ -229,7 +229,7 @@ impl<'a> InScene<'a> {
         (0..self.mesh.positions.len()).map(move |vertex| self.position(vertex))
     }
 
-    /// Unit normal of a vertex. Where the triangles around it give it, all of the mesh is looked at.
+    /// Unit normal of a vertex. If it must be computed from adjacent triangles, this transforms the whole mesh.
     #[inline(never)]
     pub fn normal(&self, vertex: usize) -> DVec3 {
         let normal = self.mesh.normals[vertex];
@@ -248,7 +248,7 @@ impl<'a> InScene<'a> {
         }
     }
 
-    /// Unit normals of a triangle's vertices.
+    /// Unit vertex normals of a triangle.
     #[inline]
     pub fn corner_normals(&self, triangle: usize) -> [DVec3; 3] {
         match self.placement {
@@ -257,13 +257,13 @@ impl<'a> InScene<'a> {
         }
     }
 
-    /// Unit normal of a triangle by its winding; zero for a degenerate one.
+    /// Unit normal of a triangle from its winding; zero for a degenerate triangle.
     pub fn face_normal(&self, triangle: usize) -> DVec3 {
         let [a, b, c] = self.corners(triangle);
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Smallest box, as minimum and maximum corner [m]; `None` without vertices.
+    /// Bounding box, as minimum and maximum corner [m]; `None` without vertices.
     pub fn bounds(self) -> Option<(DVec3, DVec3)> {
         let mut positions = self.positions();
         let first = positions.next()?;
@@ -289,7 +289,7 @@ impl<'a> InScene<'a> {
         uvs.as_deref()
     }
 
-    /// What the base colour is multiplied by at a place of a triangle: white without colours.
+    /// Interpolated vertex colour, which multiplies the base colour; white without colours.
     pub fn colour(&self, triangle: usize, barycentric: [f64; 3]) -> LinearSrgb {
         let Some(colours) = &self.mesh.colours else {
             return LinearSrgb::WHITE;
@@ -302,8 +302,8 @@ impl<'a> InScene<'a> {
     }
 }
 
-/// What turns normals as a linear map turns the surface: its inverse transpose without the division, so that flattened
-/// objects have normals too.
+/// Matrix that transforms normals under a linear map: the inverse transpose without the division by the determinant, so
+/// that flattened objects have normals too.
 pub fn cofactors(linear: DMat3) -> DMat3 {
     let [x, y, z] = [linear.x_axis, linear.y_axis, linear.z_axis];
     DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))

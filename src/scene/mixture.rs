@@ -4,35 +4,35 @@ use super::material::{METAL_ROUGHNESS_LIMIT, Material, SPECULAR_ROUGHNESS_LIMIT,
 use super::texture::TextureRef;
 use crate::optics::LinearSrgb;
 
-/// How a material changes from place to place.
+/// Variation of a material over a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variation {
-    /// Its red, green and blue, in linear light, multiply transmission, roughness and metallic.
+    /// Red, green and blue, in linear light, multiply transmission, roughness and metallic.
     pub image: TextureRef,
-    /// The class of the surface: [`SurfaceKind::Varied`] unless all places are of one.
+    /// Class of the surface: [`SurfaceKind::Varied`] unless all points are of one class.
     pub surface: SurfaceKind,
 }
 
-/// What a place of a surface is made of: shares that add up to one.
+/// Composition of a surface at a point; `metal`, `clear`, `body` and `hole` are shares that sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mixture {
-    /// Of all of it.
+    /// Roughness, common to all parts.
     pub roughness: f64,
-    /// Smooth enough to reflect.
+    /// Specular metal.
     pub metal: f64,
-    /// Lets light through, as an interface or a pane.
+    /// Transmissive, as an interface or a pane.
     pub clear: f64,
-    /// Scatters light diffusely.
+    /// Diffuse.
     pub body: f64,
-    /// Is not there.
+    /// Absent (alpha).
     pub hole: f64,
-    /// Part of the body that is polished.
+    /// Share of the body that is coated.
     pub polish: f64,
 }
 
 impl Material {
-    /// What it is made of where its factors are multiplied by `factors`, in the order of [`Variation::image`], and where
-    /// the image of its base colour has an alpha.
+    /// Composition where a texture multiplies the factors by `factors`, in the order of [`Variation::image`], and the
+    /// base colour texture has this alpha.
     pub fn mixture(&self, factors: LinearSrgb, alpha: f64) -> Mixture {
         let there = self.coverage.map_or(1.0, |factor| factor * alpha);
         let roughness = self.roughness * factors.g;

@@ -59,50 +59,50 @@ pub use waves::{Wave, Waves};
 /// A whole scene, sanitised: every number in it is finite and every index valid.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
-    /// A short name for titles and files: the file's stem or the built-in's name.
+    /// Short name for titles and files: the stem of the file's name, or the name of the built-in.
     pub name: String,
-    /// What the user named: a path as given or `builtin:NAME`.
+    /// Source as the user named it: a path or `builtin:NAME`.
     pub source: String,
     /// World position of the scene's origin [m].
     pub origin_world: DVec3,
     /// Surfaces, in file order.
     pub objects: Vec<Object>,
-    /// Materials; never empty when there are objects.
+    /// Materials; never empty if there are objects.
     pub materials: Vec<Material>,
     /// Images that materials refer to; shared between a scene and its edited copies.
     pub textures: Vec<Arc<Texture>>,
-    /// Of objects whose emission has an image.
+    /// Per-triangle emission of objects with an emission texture, by object index.
     pub glows: BTreeMap<usize, Arc<Glow>>,
-    /// Of objects whose vertices the waves of their material lift: the mesh of the still surface.
+    /// Meshes at rest of objects whose vertices are displaced by waves, by object index.
     pub swells: BTreeMap<usize, Arc<Mesh>>,
-    /// What moves objects, lights and cameras.
+    /// Animation of objects, lights and cameras.
     pub clip: Option<Arc<Clip>>,
-    /// Lights with some power.
+    /// Lights of non-zero power.
     pub lights: Vec<Light>,
-    /// Which of them were there when the scene was loaded.
+    /// Additions and removals of lights since loading.
     pub light_list: LightList,
-    /// What lies infinitely far around everything; black where there is none.
+    /// Radiance from infinity; `None` is black.
     pub environment: Option<Arc<Environment>>,
     /// Cameras, in file order.
     pub cameras: Vec<Camera>,
-    /// What was repaired or ignored on loading.
+    /// Repairs made and content ignored on loading.
     pub warnings: Vec<Warning>,
 }
 
 impl Scene {
-    /// The material of an object.
+    /// Material of an object.
     pub fn material_of(&self, object: usize) -> &Material {
         &self.materials[self.objects[object].material]
     }
 
-    /// The place of a light among those of the scene as it was loaded; `None` for one that was added since.
+    /// Index of a light in the scene as loaded; `None` if it was added since.
     pub fn light_when_loaded(&self, light: usize) -> Option<usize> {
         let list = &self.light_list;
         let loaded = 0..self.lights.len() - list.added.len() + list.removed.len();
         loaded.filter(|place| !list.removed.contains(place)).nth(light)
     }
 
-    /// A light as it was when `loaded` was loaded, or when it was added.
+    /// A light as it was in `loaded` or, if it was added since, as it was added.
     pub fn light_at_first<'a>(&'a self, light: usize, loaded: &'a Self) -> &'a Light {
         match self.light_when_loaded(light) {
             Some(place) => &loaded.lights[place],
@@ -110,12 +110,12 @@ impl Scene {
         }
     }
 
-    /// Whether anything in it sends light of different wavelengths different ways.
+    /// Whether any object is dispersive.
     pub fn parts_wavelengths(&self) -> bool {
         (0..self.objects.len()).any(|object| self.material_of(object).is_dispersive())
     }
 
-    /// What an object's surface sends by itself, in the mean [W/(m² sr)]: that of its light, where it has one, as edited.
+    /// Mean radiance emitted by an object's surface [W/(m² sr)]: that of its light, as edited, if it has one.
     pub fn emitted_radiance(&self, object: usize) -> LinearSrgb {
         let is_of_it =
             |light: &&Light| matches!(light.kind, LightKind::Surface { object: of, .. } if of == object);
@@ -133,8 +133,8 @@ impl Scene {
         }
     }
 
-    /// What is seen where nothing stands in the way, and what its radiance is multiplied by: the environment as its
-    /// light is edited; `None` without one.
+    /// The environment and the factor on its radiance, which is that of the environment's light as edited; `None`
+    /// without one.
     pub fn sky(&self) -> Option<(&Arc<Environment>, LinearSrgb)> {
         let environment = self.environment.as_ref()?;
         let mut lights = self.lights.iter();
@@ -142,7 +142,7 @@ impl Scene {
         Some((environment, light.map_or(LinearSrgb::WHITE, Light::strength)))
     }
 
-    /// Smallest box around all surfaces, as minimum and maximum corner [m]; `None` without surfaces.
+    /// Bounding box of all surfaces, as minimum and maximum corner [m]; `None` without surfaces.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         self.objects
             .iter()
@@ -150,7 +150,7 @@ impl Scene {
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
-    /// Triangles over all objects.
+    /// Number of triangles of all objects.
     pub fn triangle_count(&self) -> usize {
         self.objects
             .iter()
@@ -159,7 +159,7 @@ impl Scene {
     }
 }
 
-/// Takes text, eight bytes a word.
+/// Hashes text in words of eight bytes.
 #[derive(Default)]
 struct Text {
     hash: ContentHash,
@@ -182,9 +182,8 @@ impl fmt::Write for Text {
 }
 
 impl Scene {
-    /// The same for scenes that are the same in everything that light meets, to the last bit: their numbers are written
-    /// out in full, so that no field of a material or a light can be forgotten. Names of files, cameras and warnings do
-    /// not count.
+    /// Equal for scenes that are equal, to the last bit, in everything that affects light. Hashes the debug output, so
+    /// that no field of a material or a light can be forgotten. Names of files, cameras and warnings do not count.
     pub fn content_hash(&self) -> u64 {
         let Self {
             name: _,
@@ -193,9 +192,9 @@ impl Scene {
             objects,
             materials,
             textures,
-            // As materials, images and meshes have it.
+            // Follow from materials, images and meshes.
             glows: _,
-            // As meshes and waves have it.
+            // Follow from meshes and waves.
             swells: _,
             clip: _,
             lights,
@@ -205,7 +204,7 @@ impl Scene {
             warnings: _,
         } = self;
         let mut text = Text::default();
-        // Text takes whatever it is given.
+        // Writing to `Text` never fails.
         for object in objects {
             let Object {
                 name,

@@ -4,33 +4,33 @@ use glam::DVec2;
 
 use super::texture::{Texture, TextureRef};
 
-/// Steepest slope that a texel is read as [1]: 83°. Normals along the surface, or into it, have none.
+/// Limit of the slope of a texel [1]: 83°. Normals in or below the tangent plane have no slope of their own.
 const STEEPEST_TEXEL: f64 = 8.0;
 
-/// A normal texture of a material (glTF's: +X along u, +Y against v, +Z away from the surface).
+/// Normal texture of a material (glTF's: +X along u, +Y against v, +Z away from the surface).
 #[derive(Clone, Debug, PartialEq)]
 pub struct NormalMap {
-    /// Its image holds (n + 1)/2, linear, and how it is looked up.
+    /// Image of (n + 1)/2, linear, and its coordinates.
     pub image: TextureRef,
-    /// Multiplies X and Y of the normals.
+    /// Factor on X and Y of the normals.
     pub scale: f64,
-    /// Length of its finest waves [texels]; infinite where it is flat.
+    /// Wavelength of the finest detail [texels]; infinite if the image is flat.
     pub detail_texels: f64,
 }
 
-/// The slope of a height at a place of a normal texture [1], along +X and +Y, and its change.
+/// Slope of the height field at a point of a normal texture [1], along +X and +Y, and its derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Slope {
     /// −X/Z and −Y/Z of the normal.
     pub value: DVec2,
-    /// Its derivative by u [1 per unit of u].
+    /// Derivative with respect to u [1 per unit of u].
     pub by_u: DVec2,
-    /// By v.
+    /// Derivative with respect to v [1 per unit of v].
     pub by_v: DVec2,
 }
 
 impl NormalMap {
-    /// With the detail that the image has.
+    /// Measures the detail of the image.
     pub fn new(image: TextureRef, scale: f64, texture: &Texture) -> Self {
         Self {
             image,
@@ -39,7 +39,8 @@ impl NormalMap {
         }
     }
 
-    /// The slope at a texture coordinate (KHR_texture_transform applied): bilinear between the slopes of texels.
+    /// Slope at a texture coordinate (after KHR_texture_transform), interpolated bilinearly between the slopes of
+    /// texels.
     pub fn slope(&self, texture: &Texture, uv: DVec2) -> Slope {
         let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
         let place = uv * size - 0.5;
@@ -64,8 +65,8 @@ fn texel_slope([red, green, blue, _]: [u8; 4], scale: f64) -> DVec2 {
     if up > 0.0 { -along / up } else { DVec2::ZERO }
 }
 
-/// The length [texels] of the wave whose slope changes as much from texel to texel, in the mean, as that of the image:
-/// a sine of λ texels changes by 2·sin(π/λ) of its own size.
+/// Wavelength [texels] of the sine whose slope changes as much from texel to texel, root mean square, as that of the
+/// image: a sine of λ texels changes by 2·sin(π/λ) of its own size.
 fn detail_texels(texture: &Texture, scale: f64) -> f64 {
     let slope = |x: u32, y: u32| texel_slope(texture.code(f64::from(x), f64::from(y)), scale);
     let (mut mean, mut squares, mut changes) = (DVec2::ZERO, 0.0, 0.0_f64);

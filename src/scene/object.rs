@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use super::mesh::{InScene, Placement};
 use super::{Mesh, Scene, instances};
 
-/// One mesh primitive of one node: the unit that has a material and, when light reaches it, an illumination map.
+/// One mesh primitive of one node: the unit that has a material and, if light reaches it, an illumination map.
 #[derive(Clone, Debug)]
 pub struct Object {
-    /// The node's name in the file; `nodeN` when it has none.
+    /// Name of the node in the file; `nodeN` without one.
     pub name: String,
     /// glTF index of the node.
     pub node: usize,
@@ -23,33 +23,33 @@ pub struct Object {
     shape: Shape,
 }
 
-/// A mesh where it stands.
+/// A mesh and its place in the scene.
 #[derive(Clone, Debug)]
 struct Shape {
     /// Shared between instances, and between a scene and its edited copies.
     mesh: Arc<Mesh>,
-    /// From the mesh to the scene, as it was loaded.
+    /// From mesh to scene coordinates, as loaded.
     at_rest: DAffine3,
     motion: Motion,
-    /// What the motion turns about [m].
+    /// Centre of the motion's rotation [m].
     pivot: DVec3,
     world_from_object: DAffine3,
-    /// `None` where that changes nothing.
+    /// `None` if the transform is the identity.
     placement: Option<Placement>,
     found: Arc<Found>,
 }
 
-/// What was found out about a mesh where it stands, when it was first asked for.
+/// Derived data, computed on first use.
 #[derive(Default)]
 struct Found {
-    /// A copy in scene coordinates.
+    /// The mesh in scene coordinates.
     mesh: OnceLock<Arc<Mesh>>,
     bounds: OnceLock<Option<(DVec3, DVec3)>>,
     can_share: OnceLock<bool>,
 }
 
 impl fmt::Debug for Found {
-    /// Objects are the same whether anybody has asked or not.
+    /// Omits the values, so that equal objects print the same whether or not these have been computed.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_struct("Found").finish_non_exhaustive()
     }
@@ -63,22 +63,22 @@ impl Shape {
     }
 }
 
-/// How a node was moved since it was loaded: turned about the middle of its box, and then moved.
+/// Motion of a node since loading: a rotation about the centre of its bounding box, then a translation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Motion {
-    /// Unit.
+    /// Unit quaternion.
     pub rotation: DQuat,
     /// [m]
     pub translation: DVec3,
 }
 
-/// A turn is about the vertical where its quaternion's other parts are smaller.
+/// Largest x and z part of a quaternion that still counts as a rotation about the vertical.
 const TILT: f64 = 1e-5;
-/// Angles are read off rotations in so many steps [1/rad]: what was typed, and not what rounding made of it.
+/// Steps to which angles are rounded [1/rad], so that an angle reads back as it was typed.
 const STEPS: f64 = 1e9;
 
 impl Motion {
-    /// A turn about the vertical, from z towards x [rad], and a way [m].
+    /// Rotation about the vertical, from z towards x [rad], and translation [m].
     pub fn turned(yaw_rad: f64, translation: DVec3) -> Self {
         let rotation = match yaw_rad {
             0.0 => DQuat::IDENTITY,
@@ -90,7 +90,7 @@ impl Motion {
         }
     }
 
-    /// The turn about the vertical, from z towards x [rad], (−π, π]; `None` where it tilts.
+    /// Rotation about the vertical, from z towards x [rad], (−π, π]; `None` if the axis is tilted.
     pub fn yaw_rad(&self) -> Option<f64> {
         let turn = self.rotation;
         let half_turns = (2.0 * turn.y.atan2(turn.w)) / std::f64::consts::TAU;
@@ -98,7 +98,7 @@ impl Motion {
         (turn.x.hypot(turn.z) <= TILT).then_some((yaw_rad * STEPS).round() / STEPS)
     }
 
-    /// As a transform that turns about `pivot` [m].
+    /// Transform that rotates about `pivot` [m], then translates.
     pub fn about(&self, pivot: DVec3) -> DAffine3 {
         if self.rotation == DQuat::IDENTITY {
             return DAffine3::from_translation(self.translation);
@@ -109,7 +109,7 @@ impl Motion {
 }
 
 impl Object {
-    /// A mesh that stands where its coordinates say, as a primitive of a node.
+    /// Object at the place that the mesh coordinates say.
     pub fn new(
         name: impl Into<String>,
         (node, primitive): (usize, usize),
@@ -133,22 +133,22 @@ impl Object {
         }
     }
 
-    /// The mesh in its own coordinates; instances share it.
+    /// The mesh in its own coordinates; shared by instances.
     pub fn mesh(&self) -> &Arc<Mesh> {
         &self.shape.mesh
     }
 
-    /// From the coordinates of the mesh to those of the scene.
+    /// Transform from mesh to scene coordinates.
     pub fn world_from_object(&self) -> &DAffine3 {
         &self.shape.world_from_object
     }
 
-    /// What places the mesh in the scene; `None` where it stands where its coordinates say.
+    /// Placement of the mesh in the scene; `None` if the transform is the identity.
     pub fn placement(&self) -> Option<&Placement> {
         self.shape.placement.as_ref()
     }
 
-    /// The mesh itself where nothing places it, or a copy that is kept.
+    /// The mesh in scene coordinates, unless that takes a copy that is not cached yet.
     #[inline]
     fn kept(&self) -> Option<&Arc<Mesh>> {
         match self.shape.placement {
@@ -157,20 +157,20 @@ impl Object {
         }
     }
 
-    /// The mesh in scene coordinates: [`mesh`](Self::mesh) itself where the transform is the identity, else a copy that is
-    /// kept. What goes over many objects asks [`in_scene`](Self::in_scene), which copies nothing.
+    /// The mesh in scene coordinates: [`mesh`](Self::mesh) itself if the transform is the identity, else a cached copy.
+    /// Loops over many objects use [`in_scene`](Self::in_scene), which copies nothing.
     pub fn mesh_in_scene(&self) -> &Arc<Mesh> {
         let copy = || self.shape.found.mesh.get_or_init(|| self.copy_in_scene());
         self.kept().unwrap_or_else(copy)
     }
 
-    /// The same, but a copy is not kept.
+    /// Like [`mesh_in_scene`](Self::mesh_in_scene), but does not cache the copy.
     pub fn copy_in_scene(&self) -> Arc<Mesh> {
         let copy = || Arc::new(self.shape.mesh.placed(&self.shape.world_from_object));
         self.kept().map_or_else(copy, Arc::clone)
     }
 
-    /// The same, triangle by triangle: by the copy where there is one.
+    /// Access to the mesh in scene coordinates, through the cached copy if there is one.
     #[inline]
     pub fn in_scene(&self) -> InScene<'_> {
         match self.kept() {
@@ -179,36 +179,37 @@ impl Object {
         }
     }
 
-    /// Smallest box around the mesh in the scene, as minimum and maximum corner [m]; `None` without vertices.
+    /// Bounding box in scene coordinates, as minimum and maximum corner [m]; `None` without vertices.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         *self.shape.found.bounds.get_or_init(|| self.in_scene().bounds())
     }
 
-    /// Whether its mesh can be met and drawn in its own coordinates, together with other objects that have it.
+    /// Whether the mesh can be traced and drawn in its own coordinates, shared with other objects.
     pub fn can_share(&self) -> bool {
         let is_sound = || instances::is_sound(&self.shape.mesh, &self.shape.world_from_object);
         *self.shape.found.can_share.get_or_init(is_sound)
     }
 
-    /// The mesh in scene coordinates, to be changed: from then on those are its own.
+    /// The mesh in scene coordinates, for modification. The object stops sharing it, and its transform becomes the
+    /// identity.
     pub fn mesh_in_scene_mut(&mut self) -> &mut Mesh {
         let mesh = Arc::clone(self.mesh_in_scene());
         self.shape = Self::new("", (0, 0), 0, mesh).shape;
         Arc::make_mut(&mut self.shape.mesh)
     }
 
-    /// How it was moved since it was loaded.
+    /// Motion since loading.
     pub fn motion(&self) -> &Motion {
         &self.shape.motion
     }
 
-    /// Puts it where it is loaded.
+    /// Sets the transform as loaded and resets the motion.
     pub fn place(&mut self, world_from_object: DAffine3) {
         self.shape.at_rest = world_from_object;
         self.set_motion(Motion::default(), DVec3::ZERO);
     }
 
-    /// Moves it from where it was loaded.
+    /// Sets the motion since loading.
     pub(super) fn set_motion(&mut self, motion: Motion, pivot: DVec3) {
         let shape = &mut self.shape;
         let is_at_rest = motion == Motion::default();
@@ -225,24 +226,24 @@ impl Object {
         shape.settle();
     }
 
-    /// Moves it on from where it is now.
+    /// Applies a further transform on top of the current one.
     pub(super) fn carry(&mut self, carrying: &DAffine3) {
         self.shape.world_from_object = *carrying * self.shape.world_from_object;
         self.shape.settle();
     }
 
-    /// Gives it another mesh at the same place.
+    /// Replaces the mesh, at the same place.
     pub(super) fn reshape(&mut self, mesh: Arc<Mesh>) {
         self.shape.mesh = mesh;
         self.shape.settle();
     }
 
-    /// Takes over mesh and place of an object that looks the same, so that who knows that one does nothing anew.
+    /// Takes over mesh and transform of an equal object, so that data derived from that one stay valid.
     pub fn share(&mut self, same: &Self) {
         self.shape = same.shape.clone();
     }
 
-    /// Whether both have one mesh at one place.
+    /// Whether both share one mesh and have the same transform.
     pub fn stands_as(&self, other: &Self) -> bool {
         let (a, b) = (&self.shape, &other.shape);
         Arc::ptr_eq(&a.mesh, &b.mesh) && a.world_from_object == b.world_from_object
@@ -250,7 +251,7 @@ impl Object {
 }
 
 impl Scene {
-    /// What an object's node turns about: the middle of the box around all of its parts, as it was loaded [m].
+    /// Pivot of an object's node: centre of the bounding box of all its parts, as loaded [m].
     pub fn pivot(&self, object: usize) -> DVec3 {
         let found = &self.objects[object];
         if *found.motion() != Motion::default() {

@@ -5,35 +5,35 @@ use glam::{DMat3, DVec2};
 use super::{InScene, Scene};
 use crate::optics::LinearSrgb;
 
-/// How a coordinate outside [0, 1] is brought back.
+/// Wrap mode for coordinates outside [0, 1].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wrap {
     /// Tiles.
     Repeat,
     /// Tiles, every second one mirrored.
     MirroredRepeat,
-    /// The border goes on.
+    /// Extends the border texels.
     ClampToEdge,
 }
 
-/// An 8-bit image, row 0 at v = 0: sRGB-encoded where it is a colour, linear where it holds normals.
+/// 8-bit image with row 0 at v = 0: sRGB-encoded if it holds a colour, linear if it holds normals.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
-    /// The file's name for it; `imageN` when it has none.
+    /// Name in the file; `imageN` without one.
     pub name: String,
-    /// Texels across, > 0.
+    /// Width in texels, > 0.
     pub width: u32,
-    /// Texels down, > 0.
+    /// Height in texels, > 0.
     pub height: u32,
     /// RGBA, row by row.
     pub rgba: Vec<[u8; 4]>,
-    /// Across and down.
+    /// In u and v.
     pub wrap: [Wrap; 2],
-    /// Whether a place has the colour of its nearest texel, and not one between four; slopes of normals are always between.
+    /// Whether look-ups take the nearest texel instead of interpolating; normal maps are always interpolated.
     pub is_nearest: bool,
 }
 
-/// A texture and how a material looks it up.
+/// A texture and the coordinates with which a material samples it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TextureRef {
     /// Index into `Scene::textures`.
@@ -45,7 +45,7 @@ pub struct TextureRef {
 }
 
 impl Texture {
-    /// Look-up in linear light at a texture coordinate.
+    /// Linear-light colour at a texture coordinate.
     pub fn sample(&self, uv: DVec2) -> LinearSrgb {
         let (low, share) = self.between(uv);
         let at = |dx: f64, dy: f64| self.texel(low.x + dx, low.y + dy);
@@ -53,7 +53,7 @@ impl Texture {
         row(0.0) * (1.0 - share.y) + row(1.0) * share.y
     }
 
-    /// Look-up of alpha, [0, 1], at a texture coordinate.
+    /// Alpha at a texture coordinate, [0, 1].
     pub fn alpha(&self, uv: DVec2) -> f64 {
         let (low, share) = self.between(uv);
         let at = |dx: f64, dy: f64| f64::from(self.code(low.x + dx, low.y + dy)[3]) / 255.0;
@@ -61,7 +61,7 @@ impl Texture {
         row(0.0) * (1.0 - share.y) + row(1.0) * share.y
     }
 
-    /// The texel below a place on both axes, and how far the place lies towards the next ones, [0, 1].
+    /// Lower texel of the interpolation on both axes, and the weights of the upper ones, [0, 1].
     fn between(&self, uv: DVec2) -> (DVec2, DVec2) {
         let place = uv * DVec2::new(f64::from(self.width), f64::from(self.height)) - 0.5;
         let low = place.floor();
@@ -69,7 +69,7 @@ impl Texture {
         (low, if self.is_nearest { share.round() } else { share })
     }
 
-    /// The texel of a column and a row, whole numbers that may lie anywhere.
+    /// Encoded texel at an integer column and row, which may lie outside the image.
     pub fn code(&self, column: f64, row: f64) -> [u8; 4] {
         let column = wrap_index(column, self.width, self.wrap[0]);
         let row = wrap_index(row, self.height, self.wrap[1]);
@@ -87,7 +87,7 @@ impl Texture {
 }
 
 impl TextureRef {
-    /// Where it is looked up at a place of a triangle; `None` where the mesh lacks its coordinates.
+    /// Texture coordinate at a point of a triangle; `None` if the mesh lacks the TEXCOORD set.
     pub fn place(&self, mesh: InScene, triangle: usize, barycentric: [f64; 3]) -> Option<DVec2> {
         let uvs = mesh.uvs(self.uv_set)?;
         let corners = mesh.triangle(triangle).into_iter().zip(barycentric);
@@ -97,15 +97,14 @@ impl TextureRef {
         Some(self.transform(uv))
     }
 
-    /// The texture coordinate after KHR_texture_transform.
+    /// Applies KHR_texture_transform to a texture coordinate.
     pub fn transform(&self, uv: DVec2) -> DVec2 {
         self.uv_transform.transform_point2(uv)
     }
 }
 
 impl Scene {
-    /// A texture, and where it is looked up at a place of a triangle of an object; `None` where its mesh lacks the
-    /// coordinates.
+    /// A texture and its coordinate at a point of an object's triangle; `None` if the mesh lacks the TEXCOORD set.
     pub fn placed_texture(
         &self,
         reference: &TextureRef,
@@ -117,11 +116,11 @@ impl Scene {
     }
 }
 
-/// Index in 0..size of a whole-numbered coordinate that may lie anywhere, also beyond the integers.
+/// Wraps an integer-valued coordinate, which may exceed the integer types, to an index in 0..size.
 fn wrap_index(coordinate: f64, size: u32, wrap: Wrap) -> usize {
     let size_f = f64::from(size);
     let index = match wrap {
-        // As each of them has it, without a division.
+        // Common case of all modes, without a division.
         _ if (0.0..size_f).contains(&coordinate) => coordinate,
         Wrap::ClampToEdge => coordinate.clamp(0.0, size_f - 1.0),
         Wrap::Repeat => coordinate.rem_euclid(size_f),
@@ -134,6 +133,6 @@ fn wrap_index(coordinate: f64, size: u32, wrap: Wrap) -> usize {
             }
         }
     };
-    // NaN and the rounding of rem_euclid up to its divisor both end on a valid texel.
+    // NaN, and rem_euclid rounded up to its divisor, also end on a valid texel.
     (index as usize).min(size as usize - 1)
 }

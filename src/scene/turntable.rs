@@ -6,7 +6,7 @@ use glam::{DQuat, DVec3};
 
 use super::{Camera, Scene};
 
-/// Cameras around the middle of the box that holds a scene; as [`turntable`].
+/// [`turntable`] about the centre of the scene's bounding box.
 pub fn around(scene: &Scene, camera: &Camera, frames: usize) -> Vec<Camera> {
     let pivot = scene
         .bounds()
@@ -14,11 +14,12 @@ pub fn around(scene: &Scene, camera: &Camera, frames: usize) -> Vec<Camera> {
     turntable(camera, pivot, frames)
 }
 
-/// A camera for each of some frames: the first is `camera`, each of the others is that turned about the vertical axis
-/// through `pivot`, clockwise as seen from above, by one more of the equal steps of a whole turn. The step after the
-/// last would be the first again.
+/// One camera per frame. The first is `camera`; each further one is rotated about the vertical axis through `pivot`,
+/// clockwise as seen from above, by another of the equal steps of a full turn. One more step would give the first
+/// again.
 ///
-/// Position and gaze turn together: what is composed stays so, and a camera beside the axis looks past it as before.
+/// Position and viewing direction rotate together, which keeps the composition: a camera that looks past the axis still
+/// does.
 pub fn turntable(camera: &Camera, pivot: DVec3, frames: usize) -> Vec<Camera> {
     let turned = |frame: usize| {
         let turn = DQuat::from_rotation_y(-TAU * frame as f64 / frames as f64);
@@ -58,10 +59,10 @@ mod tests {
             }
         }
         assert!(cameras[0].position.distance(first.position) < 1e-12);
-        // Half a turn on, it is at the other side.
+        // After half a turn, it is on the opposite side.
         let across = (cameras[4].position + first.position) / 2.0;
         assert!((across - pivot).with_y(0.0).length() < 1e-12);
-        // Clockwise from above: from +x, which is at its right, to +z, which is towards the viewer.
+        // Clockwise from above: from +x, on the right, to +z, towards the viewer.
         let quarter = cameras[2].position - pivot;
         let start = first.position - pivot;
         assert!(start.cross(quarter).y < 0.0);

@@ -6,10 +6,10 @@ use glam::DVec3;
 
 use crate::scene::{InScene, Mesh};
 
-/// Least volume of a solid over that of a cube of its area: what is flatter is a sheet with two sides.
+/// Smallest volume of a solid relative to a cube of the same surface area; anything flatter is a two-sided sheet.
 const MIN_FILLED: f64 = 1e-6;
 
-/// Whether a closed mesh encloses space where it stands, with its triangles wound so that they face outwards.
+/// Whether a closed mesh encloses a volume in the scene, with its triangles wound to face outwards.
 pub fn has_volume(mesh: InScene) -> bool {
     let middle = mesh.positions().next().unwrap_or_default();
     let volume_m3: f64 = (0..mesh.triangle_count())
@@ -21,8 +21,8 @@ pub fn has_volume(mesh: InScene) -> bool {
     volume_m3 > MIN_FILLED * (mesh.area_m2() / 6.0).powf(1.5)
 }
 
-/// Whether every edge is passed as often in one direction as in the other; vertices are one where their positions are
-/// equal bit by bit, since normals and texture coordinates split them.
+/// Whether every edge is traversed as often in one direction as in the other. Vertices at bitwise equal positions are
+/// welded, since normals and texture coordinates split them.
 pub fn is_closed(mesh: &Mesh) -> bool {
     let mut welded = HashMap::with_capacity(mesh.positions.len());
     let vertices: Vec<usize> = mesh
@@ -30,7 +30,7 @@ pub fn is_closed(mesh: &Mesh) -> bool {
         .iter()
         .map(|position| {
             let next = welded.len();
-            // Adding zero makes minus zero plus zero.
+            // Adding zero turns −0 into +0.
             let bits = (*position + DVec3::ZERO).to_array().map(f64::to_bits);
             *welded.entry(bits).or_insert(next)
         })

@@ -2,8 +2,8 @@
 //! that height would. The surface itself stays where it is, unless the scene [displaces](super::Scene::swells) its
 //! vertices too.
 //!
-//! Waves are a solid texture in the scene's coordinates: K is a vector in space, and each surface takes the part of
-//! ∇h along itself. They are smooth over any mesh, need no texture coordinates, and go on across its triangles. An
+//! Waves are a solid texture in the scene's coordinates: K is a vector in space, and each surface takes the component
+//! of ∇h along itself. They are smooth on any mesh, need no texture coordinates, and continue across triangles. An
 //! object that is moved moves through them.
 
 use std::f64::consts::TAU;
@@ -11,11 +11,11 @@ use std::f64::consts::TAU;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-/// Most waves of one material.
+/// Largest number of waves of one material.
 pub const MAX_WAVES: usize = 8;
 
-/// Largest sum of the waves' slopes A·2π/λ [1]: steeper normals would send much of the light through the surface that
-/// is not bent.
+/// Largest sum of the waves' slopes A·2π/λ [1]: steeper normals would deflect much of the light to the wrong side of
+/// the unperturbed surface.
 pub const STEEPEST_SLOPE: f64 = 1.0;
 
 /// Acceleration of gravity [m/s²].
@@ -28,17 +28,17 @@ pub struct Wave {
     pub amplitude_m: f64,
     /// λ [m]; > 0.
     pub wavelength_m: f64,
-    /// Where the phase grows, unit, in scene coordinates.
+    /// Direction of increasing phase, unit, in scene coordinates.
     pub direction: DVec3,
     /// φ [rad].
     pub phase_rad: f64,
-    /// T [s]: crests move along the direction by one wavelength in this time; 0 where they stand still.
+    /// T [s]: crests move along the direction by one wavelength in this time; 0 if they stand still.
     #[serde(default)]
     pub period_s: f64,
 }
 
 impl Wave {
-    /// A wave of height A·cos(kx·x + kz·z + φ) [m] that gravity moves over water of so many metres.
+    /// A gravity wave of height A·cos(kx·x + kz·z + φ) [m] on water of the given depth [m].
     pub fn on_water(amplitude_m: f64, [kx, kz]: [f64; 2], phase_rad: f64, depth_m: f64) -> Self {
         let vector = DVec3::new(kx, 0.0, kz);
         let wavelength_m = TAU / vector.length();
@@ -79,7 +79,7 @@ impl Wave {
     }
 }
 
-/// The waves of a material: one at least, all of them valid.
+/// Waves of a material: at least one, all of them valid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<Wave>", into = "Vec<Wave>")]
 pub struct Waves {
@@ -101,11 +101,11 @@ impl From<Waves> for Vec<Wave> {
 }
 
 impl Waves {
-    /// These waves.
+    /// Checks the waves.
     ///
     /// # Errors
-    /// What is wrong with them, to go after the name of what has them: none or too many, a number outside its range,
-    /// slopes that add up to more than [`STEEPEST_SLOPE`].
+    /// A message that continues the name of the owner: no waves or too many, a number out of range, slopes that add up
+    /// to more than [`STEEPEST_SLOPE`].
     pub fn new(waves: Vec<Wave>) -> Result<Self, String> {
         if waves.is_empty() || waves.len() > MAX_WAVES {
             return Err(format!("{} waves are not 1 to {MAX_WAVES}", waves.len()));
@@ -124,12 +124,12 @@ impl Waves {
         Ok(Self { waves })
     }
 
-    /// Each of them.
+    /// All waves.
     pub fn list(&self) -> &[Wave] {
         &self.waves
     }
 
-    /// The shortest wavelength [m] among those that bend anything; infinite where none does.
+    /// Shortest wavelength of the waves of non-zero amplitude [m]; infinite if there is none.
     pub fn shortest_m(&self) -> f64 {
         let bending = self.waves.iter().filter(|wave| wave.amplitude_m > 0.0);
         bending
@@ -137,19 +137,19 @@ impl Waves {
             .fold(f64::INFINITY, f64::min)
     }
 
-    /// h [m] at a point.
+    /// Height h [m] at a point.
     pub fn height_m(&self, point: DVec3) -> f64 {
         let height = |wave: &Wave| wave.amplitude_m * wave_phase(wave, point).cos();
         self.waves.iter().map(height).sum()
     }
 
-    /// ∇h [1] in space, at a point.
+    /// ∇h [1] in space at a point.
     pub fn gradient(&self, point: DVec3) -> DVec3 {
         let slope = |wave: &Wave| wave.wave_vector() * (-wave.amplitude_m * wave_phase(wave, point).sin());
         self.waves.iter().map(slope).sum()
     }
 
-    /// The change of ∇h [1] for a small step [m] from a point: the Hessian of h, applied to the step.
+    /// Change of ∇h [1] over a small step [m] from a point: the Hessian of h times the step.
     pub fn gradient_change(&self, point: DVec3, step: DVec3) -> DVec3 {
         let change = |wave: &Wave| {
             let vector = wave.wave_vector();
@@ -158,14 +158,14 @@ impl Waves {
         self.waves.iter().map(change).sum()
     }
 
-    /// Whether any of them moves.
+    /// Whether any wave moves.
     pub fn is_moving(&self) -> bool {
         self.waves
             .iter()
             .any(|wave| wave.period_s > 0.0 && wave.amplitude_m > 0.0)
     }
 
-    /// The waves after so much time [s], as if they had begun there.
+    /// The waves with their phases advanced by a time [s].
     #[must_use]
     pub fn after(&self, time_s: f64) -> Self {
         let mut moved = self.clone();
@@ -175,7 +175,7 @@ impl Waves {
         moved
     }
 
-    /// The waves with periods that fit so much time [s] a whole number of times, at least once each.
+    /// The waves with periods adjusted so that a whole number of each, at least one, fits a duration [s].
     #[must_use]
     pub fn looped(&self, duration_s: f64) -> Self {
         let mut fitted = self.clone();
@@ -185,7 +185,7 @@ impl Waves {
         fitted
     }
 
-    /// The same waves for coordinates whose origin was moved to `origin` [m].
+    /// The waves in coordinates whose origin is at `origin` [m].
     #[must_use]
     pub fn with_origin(&self, origin: DVec3) -> Self {
         let mut moved = self.clone();
@@ -201,7 +201,7 @@ fn wave_phase(wave: &Wave, point: DVec3) -> f64 {
     wave.wave_vector().dot(point) + wave.phase_rad
 }
 
-/// Period [s] of waves under gravity, ω² = g·k·tanh(k·h) (Lamb, *Hydrodynamics*, art. 228), over water of the depth h [m].
+/// Period [s] of gravity waves, ω² = g·k·tanh(k·h) (Lamb, *Hydrodynamics*, art. 228), on water of depth h [m].
 pub fn gravity_period_s(wavelength_m: f64, depth_m: f64) -> f64 {
     let wave_number = TAU / wavelength_m;
     TAU / (GRAVITY_M_PER_S2 * wave_number * (wave_number * depth_m).tanh()).sqrt()

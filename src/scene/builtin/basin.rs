@@ -6,25 +6,24 @@ use super::pool::{self, Ripple};
 use super::{parts, shapes};
 use crate::scene::Scene;
 
-/// Four walls around a bottom a little above the floor, and the water. Every face is an object of its own, since each is
-/// plane and gets its own map. The sheet of water ends inside the walls, so that no light slips past it.
+/// Four walls around a bottom a little above the floor, and the water. Every face is an object of its own, since each
+/// is plane and has its own map. The sheet of water ends inside the walls, so that no light leaks past it.
 pub struct Basin<'a> {
-    /// Middle on the floor [m].
+    /// Centre on the floor [m].
     pub centre: DVec3,
-    /// Half the sides of its inside along x and z [m].
+    /// Inner half sides along x and z [m].
     pub half_m: [f64; 2],
-    /// Thickness of its walls [m].
+    /// Wall thickness [m].
     pub wall_m: f64,
     /// Heights of the rim, of the bottom and of the water [m].
     pub rim_m: f64,
     pub bottom_m: f64,
     pub water_m: f64,
-    /// Amplitude [m], wave vector [rad/m] and phase [rad] of each wave.
     pub waves: &'a [Ripple],
 }
 
 impl Basin<'_> {
-    /// Adds it, of these materials.
+    /// Adds the basin with the given material indices.
     pub fn add(&self, scene: &mut Scene, bottom: usize, walls: usize) {
         let Self { centre, wall_m, .. } = *self;
         let [half_x, half_z] = self.half_m;

@@ -8,9 +8,8 @@ use crate::optics::LinearSrgb;
 use crate::scene::Scene;
 use crate::units::Flux;
 
-/// Flint glass, a third of it lead.
+/// Flint glass with a third of lead.
 const GLASS: &str = "F2";
-/// 28 cm wide and 10 cm high.
 const BOWL: CutGlass = CutGlass {
     corners: 14,
     rings_m: &[[0.055, 0.0], [0.1, 0.03], [0.13, 0.068], [0.14, 0.1]],
@@ -19,7 +18,7 @@ const BOWL: CutGlass = CutGlass {
     squareness: 2.0,
 };
 
-/// The bowl, 28 cm wide and 10 cm high, and a lamp of 20 W (13,660 lm) of daylight behind it.
+/// The bowl, 28 cm wide and 10 cm high, and a point light of 20 W (13,660 lm) of daylight behind it.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
     let table = shapes::floor([-1.5, 1.5], [-1.5, 1.0], 0.0);

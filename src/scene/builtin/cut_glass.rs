@@ -7,29 +7,28 @@ use glam::DVec3;
 use super::shapes;
 use crate::scene::Mesh;
 
-/// Segments of the smooth inside around for each corner.
+/// Segments of the smooth inside per facet of the outside.
 const FINER: u32 = 6;
-/// Height of the foot above the table: faces in the same place would have no order [m].
+/// Gap between foot and table [m]: coincident faces would have no order.
 const GAP_M: f64 = 0.001;
 
-/// Flat facets outside and below, a flat rim, a smooth inside.
 #[derive(Clone, Copy, Debug)]
 pub struct CutGlass {
-    /// Corners of the cut outside, around.
+    /// Corners of each ring of the cut outside.
     pub corners: u32,
-    /// Radius and height above the foot of each ring of corners, from the foot to the rim [m]; every other ring is turned
-    /// by half a corner.
+    /// Radius and height above the foot of each ring of corners, from the foot to the rim [m]; every other ring is
+    /// rotated by half a corner.
     pub rings_m: &'static [[f64; 2]],
-    /// Radius of the inside at the rim [m].
+    /// Inner radius at the rim [m].
     pub inside_m: f64,
     /// Depth of the inside [m].
     pub depth_m: f64,
-    /// Exponent of the inside: 2 is half an ellipsoid, more is nearer to a cylinder.
+    /// Exponent of the inner profile: 2 is half an ellipsoid, larger is closer to a cylinder.
     pub squareness: f64,
 }
 
 impl CutGlass {
-    /// Closed: flat facets outside and below, a flat rim, a smooth inside; its foot around the origin.
+    /// Closed mesh: flat facets outside and below, a flat rim, a smooth inside; its foot around the origin.
     pub fn mesh(&self) -> Mesh {
         let mut mesh = Mesh::default();
         self.add_foot(&mut mesh);
@@ -37,13 +36,13 @@ impl CutGlass {
             self.add_band(&mut mesh, ring);
         }
         self.add_rim(&mut mesh);
-        // The lower half of an ellipsoid, or of something squarer, hollow side up.
+        // The lower half of an ellipsoid, or of a superellipsoid, concave side up.
         let inside = shapes::sheet(self.corners * FINER, 20, |u, v| self.inside_at(u, v));
         shapes::append(&mut mesh, &inside);
         mesh
     }
 
-    /// A corner of a ring; the first is also the last, bit for bit.
+    /// A corner of a ring; the first and the last are equal bit for bit.
     fn corner(&self, ring: usize, index: u32) -> DVec3 {
         let turned = if ring % 2 == 1 { 0.5 } else { 0.0 };
         let angle = TAU * (f64::from(index % self.corners) + turned) / f64::from(self.corners);
@@ -62,16 +61,16 @@ impl CutGlass {
         }
     }
 
-    /// The triangles between a ring and the one below.
+    /// Triangles between a ring and the one below.
     fn add_band(&self, mesh: &mut Mesh, ring: usize) {
         let below = ring - 1;
-        // The corner above lies half a corner after the one below, or before it.
+        // The corner above is half a corner after the one below, or before it.
         let shift = below % 2;
         for index in 0..self.corners {
             let [low, next_low] = [self.corner(below, index), self.corner(below, index + 1)];
             let top = |step: u32| self.corner(ring, index + step + shift as u32);
             shapes::append(mesh, &shapes::facet([low, top(0), next_low]));
-            // The rim is finer: the facet below it shares its corners.
+            // The rim has more segments: the facet below it shares their corners.
             let is_rim = ring + 1 == self.rings_m.len();
             let pieces = if is_rim { FINER } else { 1 };
             for piece in 0..pieces {
@@ -81,7 +80,7 @@ impl CutGlass {
         }
     }
 
-    /// The flat ring between the cut edge and the smooth inside.
+    /// Flat ring between the cut edge and the smooth inside.
     fn add_rim(&self, mesh: &mut Mesh) {
         let last = self.rings_m.len() - 1;
         let outer = |step: u32| {
@@ -105,7 +104,7 @@ impl CutGlass {
         }
     }
 
-    /// Position and normal of the inside: `u` around, `v` from the rim to the bottom.
+    /// Position and normal of the inside: `u` around the axis, `v` from rim to bottom.
     fn inside_at(&self, u: f64, v: f64) -> (DVec3, DVec3) {
         let (sine, cosine) = (TAU * u.fract()).sin_cos();
         let (down, out) = if v == 1.0 {
@@ -128,7 +127,7 @@ impl CutGlass {
     }
 }
 
-/// A point on the way from one corner to the next, at a step of so many; the corners themselves bit for bit.
+/// Interpolates from one corner to the next; both ends are exact bit for bit.
 fn between(from: DVec3, to: DVec3, step: u32, steps: u32) -> DVec3 {
     match step {
         0 => from,

@@ -6,7 +6,7 @@ use super::{parts, shapes};
 use crate::scene::Scene;
 use crate::units::Flux;
 
-/// A vertical mirror of 0.6 m × 0.5 m, turned 15 degrees about y; a point light of 100 W.
+/// A vertical mirror of 0.6 m × 0.5 m, rotated by 15 degrees about y; a point light of 100 W.
 pub fn build() -> Scene {
     let (sine, cosine) = 15.0_f64.to_radians().sin_cos();
     let half_across = DVec3::new(sine, 0.0, cosine) * 0.3;

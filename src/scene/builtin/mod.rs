@@ -1,6 +1,6 @@
-//! Procedural scenes. All but `gallery`, `showroom`, `pool-bump`, `water-room`, `spectrum` and `bowl` have a reference solution and are
-//! meshes of the exact surfaces that it was computed on: in `assets/reference/`, or for `prism` by wavelength in closed
-//! form.
+//! Procedural scenes. All but `gallery`, `showroom`, `pool-bump`, `water-room`, `spectrum` and `bowl` have a reference
+//! solution and are meshes of exactly the surfaces for which it was computed: in `assets/reference/`, or for `prism` by
+//! wavelength in closed form.
 
 mod ball;
 mod basin;
@@ -39,7 +39,7 @@ pub const NAMES: [&str; 14] = [
     "bowl",
 ];
 
-/// The scene of that name; `None` where there is none.
+/// Builds a scene by name; `None` for an unknown one.
 pub fn build(name: &str) -> Option<Scene> {
     let mut scene = match name {
         "gallery" => gallery::build(),

@@ -6,15 +6,15 @@ use super::{parts, shapes};
 use crate::scene::{Mesh, Scene};
 use crate::units::Irradiance;
 
-/// Unit, from the mirror back to the sun.
+/// Unit, from the mirror towards the sun.
 const AXIS: DVec3 = DVec3::new(-0.8, 0.6, 0.0);
 const FOCUS: DVec3 = DVec3::new(0.0, -0.5, 0.0);
 const FOCAL_LENGTH_M: f64 = 0.5;
-/// From the focus to the mirror's middle; its length does not matter.
+/// From the focus to the middle of the mirror; of any length.
 const AIM: DVec3 = DVec3::new(0.3, 0.953_939_201_416_945_5, 0.0);
 const RADIUS_M: f64 = 0.4;
 
-/// Focal length 0.5 m, a round opening of 0.4 m radius across the beam; the sun shines with 1 W/m² along its axis.
+/// Focal length 0.5 m, circular aperture of radius 0.4 m across the beam; a sun of 1 W/m² shines along its axis.
 pub fn build() -> Scene {
     let mut scene = parts::reference_scene(0.5);
     parts::add(&mut scene, "paraboloid", dish(), parts::mirror());
@@ -22,8 +22,8 @@ pub fn build() -> Scene {
     scene
 }
 
-/// Points P = F + w + h·axis with w across the axis and |P − F| = h + 2f, hence h = w²/4f − f, as concentric circles
-/// of w around the middle; the normal is along axis − w/2f, on the side of the focus.
+/// Points P = F + w + h·axis with w normal to the axis and |P − F| = h + 2f, hence h = w²/4f − f, as concentric circles
+/// of w around the middle. The normal is along axis − w/2f, on the side of the focus.
 fn dish() -> Mesh {
     let aim = AIM.normalize();
     let across_1 = DVec3::Z;

@@ -9,7 +9,7 @@ use crate::optics::{Glass, LinearSrgb};
 use crate::scene::{Camera, Light, LightKind, Material, Mesh, Object, Scene, SurfaceKind, Volume};
 use crate::units::{Flux, Irradiance, RadiantIntensity, SolidAngle};
 
-/// Lambert of the given albedo.
+/// Lambertian material of the given albedo.
 pub fn matte(name: &str, albedo: LinearSrgb) -> Material {
     Material {
         name: name.into(),
@@ -18,7 +18,7 @@ pub fn matte(name: &str, albedo: LinearSrgb) -> Material {
     }
 }
 
-/// Mirror that reflects everything.
+/// Perfect mirror.
 pub fn mirror() -> Material {
     Material {
         name: "mirror".into(),
@@ -48,10 +48,10 @@ pub fn dielectric(name: &str, ior: f64) -> Material {
     }
 }
 
-/// Clear solid of a glass, as [`Glass::parse`] reads it.
+/// Clear solid of a glass that [`Glass::parse`] knows.
 ///
 /// # Panics
-/// Where there is no such glass.
+/// An unknown glass.
 pub fn glass(text: &str) -> Material {
     let glass = Glass::parse(text).expect("a built-in scene names a glass");
     let mut material = dielectric(text, glass.dispersion.n_d());
@@ -65,14 +65,14 @@ pub fn daylight(mut light: Light) -> Light {
     light
 }
 
-/// White light that sends `power` evenly into all directions.
+/// White point light that emits `power` uniformly.
 pub fn point_light(name: &str, position: DVec3, power: Flux) -> Light {
     let sphere = SolidAngle(4.0 * std::f64::consts::PI);
     let intensity: RadiantIntensity = power / sphere;
     Light::new(name, LightKind::Point { position, intensity })
 }
 
-/// White parallel light along `direction` (of any length).
+/// White parallel light along `direction`, of any length.
 pub fn sun(name: &str, direction: DVec3, normal_irradiance: Irradiance) -> Light {
     Light::new(
         name,
@@ -83,11 +83,11 @@ pub fn sun(name: &str, direction: DVec3, normal_irradiance: Irradiance) -> Light
     )
 }
 
-/// White light that sends `power` in all into a narrow cone, even within three quarters of its half-angle [rad].
+/// White spot that emits `power` in total into a narrow cone, uniformly within three quarters of its half-angle [rad].
 pub fn beam(name: &str, position: DVec3, direction: DVec3, half_angle_rad: f64, power: Flux) -> Light {
     let inner_cone_rad = 0.75 * half_angle_rad;
     let (cos_inner, cos_outer) = (inner_cone_rad.cos(), half_angle_rad.cos());
-    // The mean of the squared ramp at the edge is a third.
+    // Solid-angle mean of the squared ramp at the edge: 1/3.
     let cone = SolidAngle(std::f64::consts::TAU * (1.0 - cos_inner + (cos_inner - cos_outer) / 3.0));
     Light::new(
         name,
@@ -101,18 +101,18 @@ pub fn beam(name: &str, position: DVec3, direction: DVec3, half_angle_rad: f64, 
     )
 }
 
-/// Puts a material into the scene, and gives its index.
+/// Adds a material to the scene and returns its index.
 pub fn material(scene: &mut Scene, material: Material) -> usize {
     scene.materials.push(material);
     scene.materials.len() - 1
 }
 
-/// A camera at a place that looks at another [m], with its vertical angle of view [rad].
+/// A camera at one point that looks at another [m], with its vertical field of view [rad].
 pub fn look(name: &str, from: impl Into<DVec3>, to: impl Into<DVec3>, vertical_fov_rad: f64) -> Camera {
     Camera::look_at(name, from.into(), to.into(), vertical_fov_rad)
 }
 
-/// Four plates in one plane that leave a slit between them: its half sides along two axes, and how far they reach [m].
+/// Adds four plates in one plane around a slit: half sides of the slit along two axes, and half side of the whole [m].
 pub fn add_slit(
     scene: &mut Scene,
     (name, material): (&str, usize),
@@ -144,7 +144,7 @@ pub fn add(scene: &mut Scene, name: &str, mesh: Mesh, material: Material) {
     add_with(scene, name, mesh, material);
 }
 
-/// Adds an object that shares the material of that index.
+/// Adds an object with the material of an index.
 pub fn add_with(scene: &mut Scene, name: &str, mesh: Mesh, material: usize) {
     let node = (scene.objects.len(), 0);
     scene.objects.push(Object::new(name, node, material, mesh));

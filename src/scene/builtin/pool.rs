@@ -21,7 +21,7 @@ fn still(centre: DVec3, half: [f64; 2], quads: [u32; 2]) -> Mesh {
 /// Amplitude [m], wave vector along x and z [rad/m] and phase [rad] of a wave.
 pub type Ripple = (f64, [f64; 2], f64);
 
-/// Those waves as they run over water of the depth [m]; `None` for none.
+/// Waves of these ripples on water of a depth [m]; `None` if they are invalid.
 fn running(ripples: &[Ripple], depth_m: f64) -> Option<Waves> {
     let waves = ripples.iter();
     let waves =
@@ -36,13 +36,13 @@ fn rippled(waves: Option<Waves>) -> Material {
     }
 }
 
-/// Adds a flat sheet of water that waves bend but do not lift.
+/// Adds a flat sheet of water whose waves perturb the normals but do not displace the surface.
 pub fn add_rippled(scene: &mut Scene, centre: DVec3, half: [f64; 2], ripples: &[Ripple], depth_m: f64) {
     let material = rippled(running(ripples, depth_m));
     parts::add(scene, "water", still(centre, half, [1, 1]), material);
 }
 
-/// A sheet whose mesh alone has the waves: the vertices at their height, with the normals of the surface there.
+/// A sheet with the waves in its mesh: displaced vertices with the normals of the wavy surface.
 pub fn meshed(centre: DVec3, half: [f64; 2], quads: [u32; 2], waves: &Waves) -> Mesh {
     let mut mesh = still(centre, half, quads);
     for (position, normal) in mesh.positions.iter_mut().zip(&mut mesh.normals) {
@@ -61,7 +61,7 @@ const HALF_M: f64 = 1.5;
 /// Depth of the water [m].
 const DEPTH_M: f64 = 1.0;
 
-/// Quads across and down the sheet: straight ones miss the water by 0.2 mm at most.
+/// Quads across and down the sheet: flat ones deviate from the water surface by 0.2 mm at most.
 const QUADS: u32 = 149;
 
 fn waves(amplitude_m: f64) -> Option<Waves> {
@@ -77,7 +77,7 @@ pub fn build() -> Scene {
     displaced(AMPLITUDE_M)
 }
 
-/// The pool with waves of the given amplitude [m] that lift its surface.
+/// The pool with waves of the given amplitude [m] that displace its surface.
 pub fn displaced(amplitude_m: f64) -> Scene {
     let flat = still(DVec3::Y * DEPTH_M, [HALF_M; 2], [QUADS; 2]);
     let mut scene = with_water(flat.clone(), rippled(waves(amplitude_m)));
@@ -86,13 +86,13 @@ pub fn displaced(amplitude_m: f64) -> Scene {
     scene
 }
 
-/// The same waves on one flat quad, by its normals alone.
+/// The same waves on one flat quad, in its normals only.
 pub fn bumped(amplitude_m: f64) -> Scene {
     let flat = still(DVec3::Y * DEPTH_M, [HALF_M; 2], [1, 1]);
     with_water(flat, rippled(waves(amplitude_m)))
 }
 
-/// The pool with another sheet of water.
+/// The pool with the given water surface.
 fn with_water(surface: Mesh, material: Material) -> Scene {
     let mut scene = parts::reference_scene(1.0);
     parts::add(&mut scene, "water", surface, material);

@@ -11,45 +11,45 @@ use crate::units::Irradiance;
 /// Silicate flint glass: n_d = 1.635, V_d = 57.7.
 pub const GLASS: &str = "635577";
 
-/// An equilateral prism, in the plane across its edges.
+/// An equilateral prism, by its cross-section.
 #[derive(Clone, Copy, Debug)]
 pub struct Prism {
-    /// Middle of its cross-section [m].
+    /// Centroid of the cross-section [m].
     pub centroid: DVec3,
-    /// Unit, the way that light goes in it at minimum deviation: along the base.
+    /// Unit, direction of light inside it at minimum deviation: along the base.
     pub along_base: DVec3,
-    /// Unit, from the apex to the base: the way that light is bent to.
+    /// Unit, from the apex to the base: the direction towards which light is deflected.
     pub to_base: DVec3,
-    /// Of its cross-section [m].
+    /// Side of the cross-section [m].
     pub side_m: f64,
 }
 
 impl Prism {
-    /// Where light enters at minimum deviation: the middle of its first face [m].
+    /// Point where light enters at minimum deviation: the middle of the first face [m].
     pub fn entry(&self) -> DVec3 {
         let apothem_m = self.side_m / 12.0_f64.sqrt();
         self.centroid - self.along_base * (0.25 * self.side_m) - self.to_base * (0.5 * apothem_m)
     }
 
-    /// Direction of light that comes in at minimum deviation, in glass of the index `n`: it goes along the base, 30
-    /// degrees from the normals of both faces.
+    /// Direction of incoming light at minimum deviation for an index `n`: inside it runs along the base, at 30 degrees
+    /// to the normals of both faces.
     pub fn incoming(&self, n: f64) -> DVec3 {
         let turn_rad = (0.5 * n).asin() - 30.0_f64.to_radians();
         self.along_base * turn_rad.cos() - self.to_base * turn_rad.sin()
     }
 
-    /// Where such light leaves: the middle of its second face [m].
+    /// Point where this light leaves: the middle of the second face [m].
     pub fn exit(&self) -> DVec3 {
         self.entry() + self.along_base * (0.5 * self.side_m)
     }
 
-    /// Direction in which it leaves.
+    /// Direction in which it leaves, unit.
     pub fn outgoing(&self, n: f64) -> DVec3 {
         let incoming = self.incoming(n);
         incoming - self.to_base * (2.0 * incoming.dot(self.to_base))
     }
 
-    /// As a closed body of a length [m].
+    /// Closed mesh of the prism with a length [m].
     pub fn mesh(&self, length_m: f64) -> crate::scene::Mesh {
         let edge = self.to_base.cross(self.along_base) * length_m;
         let apothem_m = self.side_m / 12.0_f64.sqrt();
@@ -61,14 +61,14 @@ impl Prism {
     }
 }
 
-/// Half the sides of the slit, across and along the prism's edges [m].
+/// Half sides of the slit, across and along the prism's edges [m].
 const SLIT_HALF_M: [f64; 2] = [0.0005, 0.01];
-/// From the slit to the prism, along the beam [m].
+/// Distance from the slit to the prism along the beam [m].
 const SLIT_DISTANCE_M: f64 = 0.3;
-/// Half the side of the black plate that the slit is in [m].
+/// Half side of the black plate with the slit [m].
 const PLATE_HALF_M: f64 = 0.5;
 
-/// Edges of 6 cm along z, apex up; a sun of 1 W/m² through a slit of 1 mm × 20 mm; a wall of 1.4 m × 1.4 m.
+/// A prism of 6 cm length along z, apex up; a sun of 1 W/m² through a slit of 1 mm × 20 mm; a wall of 1.4 m × 1.4 m.
 pub fn build() -> Scene {
     let prism = Prism {
         centroid: DVec3::Y,
@@ -96,7 +96,7 @@ pub fn build() -> Scene {
     scene
 }
 
-/// Four black plates around a slit across the light, whose long side is z.
+/// Adds four black plates around a slit across the light, with its long side along z.
 fn add_slit(scene: &mut Scene, centre: DVec3, direction: DVec3) {
     let material = parts::material(scene, parts::matte("plate", LinearSrgb::BLACK));
     let across = DVec3::Z.cross(direction);

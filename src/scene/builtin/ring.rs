@@ -6,10 +6,10 @@ use super::{parts, shapes};
 use crate::scene::{Mesh, Scene};
 use crate::units::{Flux, Irradiance};
 
-/// Segments around: the mesh error is 0.14 % of the lit ring's map at 256².
+/// Segments around the ring: the meshing error is 0.14 % of the lit ring's map at 256².
 pub const SEGMENTS: u32 = 1024;
 
-/// Cylinder wall around the y axis from `base` up, reflecting side (and normals) inwards [m].
+/// Cylinder wall around the y axis, upwards from `base`, that reflects inwards and has its normals there [m].
 pub fn cylinder(base: DVec3, radius: f64, height: f64) -> Mesh {
     shapes::sheet(SEGMENTS, 1, |u, v| {
         let (sine, cosine) = (std::f64::consts::TAU * u.fract()).sin_cos();
@@ -29,7 +29,7 @@ pub fn ring() -> Scene {
     scene
 }
 
-/// The same ring under a sun of 1 W/m², 20 degrees above the horizon: the coffee cup's caustic.
+/// The same ring under a sun of 1 W/m², 20 degrees above the horizon: the caustic of a coffee cup.
 pub fn nephroid() -> Scene {
     let mut scene = unlit();
     let (sine, cosine) = 20.0_f64.to_radians().sin_cos();

@@ -47,7 +47,7 @@ pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
     mesh
 }
 
-/// Grid of a curved sheet. `surface(u, v)` gives position [m] and unit normal for u, v in [0, 1]; triangles without
+/// Grid over a curved sheet. `surface(u, v)` returns position [m] and unit normal for u, v in [0, 1]; triangles of zero
 /// area (at a pole) are left out.
 pub fn sheet(columns: u32, rows: u32, surface: impl Fn(f64, f64) -> (DVec3, DVec3)) -> Mesh {
     let mut mesh = Mesh::default();
@@ -72,7 +72,7 @@ pub fn sheet(columns: u32, rows: u32, surface: impl Fn(f64, f64) -> (DVec3, DVec
     mesh
 }
 
-/// Closed prism with flat faces: a triangle [m], counter-clockwise about `along`, and the same moved by `along` [m].
+/// Closed prism with flat faces: a triangle [m], counter-clockwise about `along`, extruded by `along` [m].
 pub fn prism(outline: [DVec3; 3], along: DVec3) -> Mesh {
     let mut mesh = Mesh::default();
     let [a, b, c] = outline;
@@ -93,7 +93,7 @@ pub fn prism(outline: [DVec3; 3], along: DVec3) -> Mesh {
     mesh
 }
 
-/// One flat triangle [m] with corners of its own.
+/// One flat triangle [m] with vertices of its own.
 pub fn facet(corners: [DVec3; 3]) -> Mesh {
     let [a, b, c] = corners;
     Mesh {
@@ -104,8 +104,8 @@ pub fn facet(corners: [DVec3; 3]) -> Mesh {
     }
 }
 
-/// Closed sphere [m]: an icosahedron whose edges are halved `levels` times (20·4^levels triangles), scaled to enclose
-/// exactly the volume of the sphere, so that the mesh lies half inside, half outside.
+/// Closed sphere [m]: an icosahedron subdivided `levels` times (20·4^levels triangles) and scaled to exactly the volume
+/// of the sphere, so that the mesh lies partly inside and partly outside of it.
 pub fn sphere(centre: DVec3, radius: f64, levels: u32) -> Mesh {
     let (mut directions, mut triangles) = icosahedron();
     for _ in 0..levels {
@@ -129,14 +129,14 @@ pub fn sphere(centre: DVec3, radius: f64, levels: u32) -> Mesh {
     }
 }
 
-/// A mesh elsewhere [m].
+/// A mesh moved by `offset` [m].
 #[must_use]
 pub fn moved(mut mesh: Mesh, offset: DVec3) -> Mesh {
     mesh.positions.iter_mut().for_each(|position| *position += offset);
     mesh
 }
 
-/// Adds a mesh to another, without its texture coordinates.
+/// Appends a mesh to another, without texture coordinates.
 pub fn append(mesh: &mut Mesh, part: &Mesh) {
     let offset = mesh.positions.len() as u32;
     mesh.positions.extend(&part.positions);
@@ -145,7 +145,7 @@ pub fn append(mesh: &mut Mesh, part: &Mesh) {
         .extend(part.triangles.iter().map(|t| t.map(|vertex| vertex + offset)));
 }
 
-/// Adds a triangle, turned to face the way its vertex normals do.
+/// Adds a triangle with the winding of its vertex normals.
 fn push_oriented(mesh: &mut Mesh, [a, b, c]: [u32; 3]) {
     let position = |vertex: u32| mesh.positions[vertex as usize];
     let face = (position(b) - position(a)).cross(position(c) - position(a));
@@ -169,7 +169,7 @@ fn icosahedron() -> (Vec<DVec3>, Vec<[u32; 3]>) {
         vertices.push(DVec3::new(short, long, 0.0).normalize());
         vertices.push(DVec3::new(long, 0.0, short).normalize());
     }
-    // Neighbours are the pairs at cosine 1/√5; every triple of mutual neighbours is a face.
+    // Neighbours are pairs at cosine 1/√5; every triple of mutual neighbours is a face.
     let near = |a: usize, b: usize| vertices[a].dot(vertices[b]) > 0.4;
     let mut triangles = Vec::with_capacity(20);
     for a in 0..12 {
@@ -186,7 +186,7 @@ fn icosahedron() -> (Vec<DVec3>, Vec<[u32; 3]>) {
     (vertices, triangles)
 }
 
-/// Splits every triangle in four; new vertices are shared and lie on the unit sphere.
+/// Subdivides every triangle into four; new vertices are shared and lie on the unit sphere.
 fn halve_edges(directions: &mut Vec<DVec3>, triangles: &[[u32; 3]]) -> Vec<[u32; 3]> {
     let mut midpoints: HashMap<(u32, u32), u32> = HashMap::with_capacity(triangles.len() * 3 / 2);
     let mut finer = Vec::with_capacity(triangles.len() * 4);

@@ -9,8 +9,8 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Camera, Light, Scene};
 use crate::units::{Flux, Irradiance};
 
-/// Floor of 6.4 m × 3.6 m with walls behind and to the right; sun from the front left, 38 degrees high, so that the ring
-/// shows the coffee cup's cusp, and a lamp over the middle that lights the shadows.
+/// Floor of 6.4 m × 3.6 m with walls behind and to the right. A sun from the front left, 38 degrees high, draws the
+/// cusp of a coffee cup in the ring, and a point light over the middle fills the shadows.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
     add_room(&mut scene);

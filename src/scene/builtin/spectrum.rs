@@ -9,16 +9,16 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Light, Scene};
 use crate::units::Flux;
 
-/// Half-angle of the beams [degrees]: much less than what the prism spreads white light over, 2.5.
+/// Half-angle of the beams [degrees]: much less than the 2.5 over which the prism disperses white light.
 const BEAM_HALF_ANGLE_DEG: f64 = 0.2;
-/// The wall [m].
+/// z of the wall [m].
 const WALL_Z: f64 = -0.6;
-/// Radius of the ball, a little above the table [m].
+/// Radius of the ball [m].
 const BALL_M: f64 = 0.06;
-/// What both stand above the table: faces in the same place would have no order [m].
+/// Gap between table and both exhibits [m]: coincident faces would have no order.
 const GAP_M: f64 = 0.001;
 
-/// A white table of 2.6 m × 1.6 m before a white wall, dimly lit by a lamp above.
+/// A white table of 2.6 m × 1.6 m before a white wall, dimly lit from above.
 pub fn build() -> Scene {
     let mut scene = Scene::default();
     let white = || parts::matte("white", LinearSrgb::grey(0.8));
@@ -49,7 +49,7 @@ pub fn build() -> Scene {
     scene
 }
 
-/// Upright, turned so that yellow light leaves it to the wall at 50 degrees from the wall's normal.
+/// Upright prism, oriented so that yellow light leaves it at 50 degrees to the wall's normal.
 fn prism(n: f64) -> Prism {
     let turn = (0.5 * n).asin() - 30.0_f64.to_radians();
     let (sine, cosine) = (50.0_f64.to_radians() + turn).sin_cos();
@@ -61,7 +61,7 @@ fn prism(n: f64) -> Prism {
     }
 }
 
-/// From 30 cm before the prism, at minimum deviation.
+/// Starts 30 cm before the prism, at minimum deviation.
 fn prism_beam(prism: &Prism, n: f64) -> Light {
     let direction = prism.incoming(n);
     beam(
@@ -72,9 +72,9 @@ fn prism_beam(prism: &Prism, n: f64) -> Light {
     )
 }
 
-/// From just before the wall, level, as far from the ball's middle as the rainbow's light comes in: there the way that
-/// light is turned by one reflection within the ball is least, so that a beam with some width stays one for each
-/// colour (R. Descartes, 1637). sin² of its angle of incidence is (4 − n²)/3.
+/// Starts just before the wall, horizontally, at the offset from the ball's centre of the rainbow ray. There the
+/// deviation by one internal reflection is stationary, so that a beam of some width stays one beam per colour (R.
+/// Descartes, 1637). sin² of its angle of incidence is (4 − n²)/3.
 fn rainbow_beam(ball: DVec3, n: f64) -> Light {
     let offset_m = BALL_M * ((4.0 - n * n) / 3.0).sqrt();
     let position = DVec3::new(ball.x + offset_m, ball.y, WALL_Z + 0.05);

@@ -1,5 +1,5 @@
-//! `water-room`: an indoor pool at night. A lamp under the water throws the net of its waves on walls and ceiling, a spot above
-//! it one on the bottom.
+//! `water-room`: an indoor pool at night. A lamp under the water casts the caustics of its waves on walls and ceiling,
+//! a spot above it casts them on the bottom.
 
 use glam::DVec3;
 
@@ -9,14 +9,14 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, Scene};
 use crate::units::RadiantIntensity;
 
-/// Half the sides of the room along x and z, its height, and half the sides of the pool [m].
+/// Half sides of the room along x and z, its height, and half sides of the pool [m].
 const ROOM_M: [f64; 2] = [3.2, 2.3];
 const HEIGHT_M: f64 = 2.8;
 const POOL_M: [f64; 2] = [2.2, 1.2];
-/// Heights of the bottom and of the water; the deck is at 0 [m].
+/// Heights of the bottom and of the water surface; the deck is at 0 [m].
 const BOTTOM_M: f64 = -1.3;
 const WATER_M: f64 = -0.08;
-/// Where the lamp under the water is [m].
+/// Position of the lamp under the water [m].
 const LAMP_M: DVec3 = DVec3::new(-0.35, -1.2, -0.1);
 
 /// The room with its pool.
@@ -97,7 +97,7 @@ fn add_pool(scene: &mut Scene) {
     add_rippled(scene, DVec3::Y * WATER_M, POOL_M, &waves, depth_m);
 }
 
-/// Under the water, shining up within the angle that the surface lets out.
+/// Under the water, shining up within the critical angle of the surface.
 fn lamp() -> Light {
     let kind = LightKind::Spot {
         position: LAMP_M,

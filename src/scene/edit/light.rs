@@ -16,21 +16,21 @@ use crate::scene::{Light, LightKind, LightSize, Scene};
 pub enum LightEdit {
     /// [`LightKind::strength`]; > 0 and finite.
     Strength(f64),
-    /// How large a point light, spot or sun is: a radius for the first two, an angle for suns; positive and finite.
+    /// Extent: a radius for point lights and spots, an angle for suns; positive and finite.
     Size(LightSize),
-    /// Place of a point or spot light, or of a flat lamp's middle, in scene coordinates [m].
+    /// Position of a point light or spot, or centre of a panel, in scene coordinates [m].
     Position(DVec3),
-    /// Where a spot points, or a sun's light travels. Of any length but 0; made unit.
+    /// Direction of travel of the light of a spot or sun; of any length but 0, normalised on application.
     Direction(DVec3),
-    /// Colour, and the spectrum that it is of. Its luminance is above 0; without a spectrum each channel is at least 0.
+    /// Colour and, if known, its spectrum. The luminance is above 0; without a spectrum each channel is at least 0.
     Colour(LinearSrgb, Option<Arc<Spectrum>>),
 }
 
-/// A direction whose squared length is this near to 1 is unit already and stays bit for bit.
+/// Tolerance of the squared length of a unit direction, which is then kept bit for bit.
 const UNIT: f64 = 1e-12;
 
 impl LightEdit {
-    /// For the log, and for people.
+    /// Names for the log and for people.
     pub(super) fn names(&self) -> [&'static str; 2] {
         match self {
             Self::Strength(_) => ["LightPower", "power"],
@@ -41,7 +41,6 @@ impl LightEdit {
         }
     }
 
-    /// Edits a light.
     pub(super) fn apply(&self, light: &mut Light) -> Result<()> {
         let owner = format!("light `{}`", light.name);
         let lacks = |what: &str, remedy: &str| Error::usage(&owner, format!("has no {what}"), remedy);
@@ -76,7 +75,7 @@ impl LightEdit {
         Ok(())
     }
 
-    /// Edits that make `was` what `is` is.
+    /// Edits that turn `was` into `is`.
     pub(in crate::scene) fn between(was: &Light, is: &Light) -> Vec<Self> {
         let mut edits = Vec::new();
         if was.kind.strength() != is.kind.strength() {
@@ -154,7 +153,7 @@ fn unit(direction: DVec3, owner: &str) -> Result<DVec3> {
         .ok_or_else(|| out_of_range(owner, "direction", direction, "what has a length"))
 }
 
-/// Puts a light into a scene, behind those that are there.
+/// Appends a light to a scene.
 pub(super) fn add(scene: &mut Scene, added: &Arc<Light>) -> Result<()> {
     check(added)?;
     scene.lights.push(Light::clone(added));
@@ -162,7 +161,6 @@ pub(super) fn add(scene: &mut Scene, added: &Arc<Light>) -> Result<()> {
     Ok(())
 }
 
-/// Takes a light out of a scene.
 pub(super) fn remove(scene: &mut Scene, index: usize) -> Result<()> {
     let found = existing(&mut scene.lights, index, "light")?;
     if let Some(why) = why_light_stays(&found.kind) {
@@ -185,7 +183,7 @@ pub(super) fn remove(scene: &mut Scene, index: usize) -> Result<()> {
     Ok(())
 }
 
-/// Why a light cannot be taken out of its scene; `None` where it can.
+/// Reason why a light cannot be removed from its scene; `None` if it can.
 pub fn why_light_stays(kind: &LightKind) -> Option<&'static str> {
     match kind {
         LightKind::Surface { .. } => Some("is the glow of an object, which would be seen without it"),
@@ -199,7 +197,7 @@ pub fn why_light_stays(kind: &LightKind) -> Option<&'static str> {
     }
 }
 
-/// What was kept may have been written by hand.
+/// Checks an added light, since an edit that was read from a file may have been written by hand.
 fn check(light: &Light) -> Result<()> {
     let numbers = |values: &[f64]| values.iter().all(|value| value.is_finite());
     let is_sound = match light.kind {

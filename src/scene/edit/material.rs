@@ -10,33 +10,33 @@ use crate::optics::glass::{Dispersion, Glass};
 use crate::optics::{LinearSrgb, Metal};
 use crate::scene::{Material, Waves};
 
-/// One property of a material; its class follows as it does on loading.
+/// One property of a material; the surface class is derived from it as on loading.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum MaterialEdit {
     /// Refractive index, at least 1; a glass keeps its Abbe number.
     Ior(f64),
-    /// What it is made of.
+    /// The substance: glass, or metal.
     Substance {
-        /// At least 1: the glass's at 587.56 nm.
+        /// At least 1: that of the glass at 587.56 nm.
         ior: f64,
-        /// `None` for one index at every wavelength.
+        /// `None` for the same index at all wavelengths.
         glass: Option<Arc<Glass>>,
         /// Each channel in [0, 1].
         base_colour: LinearSrgb,
-        /// `None` for no metal of a table.
+        /// `None` unless it is a tabulated metal.
         #[serde(serialize_with = "Metal::write_name", deserialize_with = "Metal::read_name")]
         metal: Option<&'static Metal>,
     },
-    /// The tint of glass, the albedo of what is matte, each channel in [0, 1]; it takes the place of a metal's table.
+    /// Tint of glass or albedo of a diffuse surface, each channel in [0, 1]; replaces a tabulated metal.
     BaseColour(LinearSrgb),
     /// [0, 1].
     Roughness(f64),
-    /// Waves that bend its normals; `None` for none.
+    /// Waves that perturb its normals, if any.
     Waves(Option<Waves>),
 }
 
 impl MaterialEdit {
-    /// For the log, and for people.
+    /// Names for the log and for people.
     pub(super) fn names(&self) -> [&'static str; 2] {
         match self {
             Self::Ior(_) => ["MaterialIor", "refractive index"],
@@ -47,10 +47,10 @@ impl MaterialEdit {
         }
     }
 
-    /// Edits a material; its class follows where it did before.
+    /// Edits a material and updates its class, if that was derived from the factors.
     pub(super) fn apply(&self, material: &mut Material) -> Result<()> {
         let owner = format!("material `{}`", material.name);
-        // A class that a file sets otherwise (unlit) is not ours to change.
+        // A class that the file sets by other means (unlit) is left alone.
         let follows = material.surface == material.classified();
         match self {
             Self::Ior(ior) => {
@@ -90,7 +90,7 @@ impl MaterialEdit {
         Ok(())
     }
 
-    /// Edits that make `was` what `is` is.
+    /// Edits that turn `was` into `is`.
     pub(in crate::scene) fn between(was: &Material, is: &Material) -> Vec<Self> {
         let mut edits = Vec::new();
         let is_same_substance = was.ior == is.ior
@@ -115,10 +115,10 @@ impl MaterialEdit {
     }
 }
 
-/// A glass of another index at 587.56 nm and the same Abbe number.
+/// A glass with another index at 587.56 nm and the same Abbe number.
 fn of_index(glass: &Glass, n_d: f64) -> Glass {
     let v_d = match glass.dispersion {
-        // What the formula gives says nothing where n_d is 1.
+        // The formula of the Abbe number is undefined where n_d is 1.
         Dispersion::Abbe { v_d, .. } => v_d,
         other => other.abbe_number(),
     };

@@ -19,21 +19,21 @@ pub use self::material::MaterialEdit;
 pub enum Edit {
     /// A property of a light.
     Light(usize, LightEdit),
-    /// One light more, behind the others.
+    /// Appends a light.
     AddLight(Arc<Light>),
-    /// One light less: not of the glow of an object, nor of the environment.
+    /// Removes a light; not that of an emissive object or of the environment.
     RemoveLight(usize),
     /// A property of a material.
     Material(usize, MaterialEdit),
-    /// Where an object's node stands, with all of its parts.
+    /// Moves an object's node, with all of its parts.
     Place(usize, Motion),
 }
 
 impl Edit {
-    /// The edited scene, which shares every mesh and image that is not touched.
+    /// The edited scene, which shares all untouched meshes and images.
     ///
     /// # Errors
-    /// An index that the scene lacks, a property that the light does not have, a value outside its range.
+    /// An index that does not exist, a property that the light does not have, a value out of range.
     pub fn apply(&self, scene: &Scene) -> Result<Scene> {
         let mut edited = scene.clone();
         match self {
@@ -49,7 +49,7 @@ impl Edit {
         Ok(edited)
     }
 
-    /// What it sets, by name and index: edits of the same target replace one another.
+    /// Edited property, by name and index: edits of the same target replace one another.
     pub fn target(&self) -> String {
         match self {
             Self::Light(light, edit) => format!("{}({light})", edit.names()[0]),
@@ -59,7 +59,7 @@ impl Edit {
         }
     }
 
-    /// The same in words, for a scene that it is possible in: "power of `lamp`".
+    /// Description for people, like "power of `lamp`"; the edit must be possible in `scene`.
     pub fn in_words(&self, scene: &Scene) -> String {
         let (what, whose) = match self {
             Self::Light(light, edit) => (edit.names()[1], &scene.lights[*light].name),
@@ -72,7 +72,7 @@ impl Edit {
     }
 }
 
-/// What edits change of a scene, to be set back exactly. It holds no mesh.
+/// Everything that edits can change, to be restored exactly. Holds no mesh.
 #[derive(Clone, Debug)]
 pub struct EditState {
     lights: Vec<Light>,
@@ -82,7 +82,7 @@ pub struct EditState {
 }
 
 impl EditState {
-    /// That of a scene.
+    /// State of a scene.
     pub fn of(scene: &Scene) -> Self {
         Self {
             lights: scene.lights.clone(),
@@ -92,7 +92,7 @@ impl EditState {
         }
     }
 
-    /// The same scene in this state.
+    /// The scene in this state.
     pub fn set(&self, scene: &Scene) -> Scene {
         let mut edited = scene.clone();
         edited.lights.clone_from(&self.lights);
@@ -142,7 +142,7 @@ fn existing<'a, T>(list: &'a mut [T], index: usize, noun: &str) -> Result<&'a mu
     })
 }
 
-/// Farthest that anything is moved to [m]: beyond it, squares of distances lose the scene.
+/// Largest coordinate after an edit [m]: beyond it, the scene is lost in the rounding of squared distances.
 const FARTHEST_M: f64 = 1e12;
 
 fn out_of_range(owner: &str, what: &str, value: impl std::fmt::Display, range: &str) -> Error {

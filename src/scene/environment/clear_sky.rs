@@ -1,4 +1,4 @@
-//! A clear sky with its sun and the ground below, for scenes without light.
+//! A clear sky and the ground below it, for scenes without light. Their sun is a light of its own.
 
 use std::f64::consts::{FRAC_1_PI, FRAC_PI_2, PI, TAU};
 
@@ -7,18 +7,18 @@ use glam::DVec3;
 use super::Environment;
 use crate::optics::LinearSrgb;
 
-/// Pixels across and down.
+/// Width and height in pixels.
 const SIZE: [usize; 2] = [128, 64];
 
-/// Colours straight above and at the horizon.
+/// Colours at the zenith and at the horizon.
 const ABOVE: LinearSrgb = LinearSrgb::new(0.35, 0.6, 1.0);
 const HORIZON: LinearSrgb = LinearSrgb::new(0.85, 0.95, 1.0);
 
-/// Of the ground.
+/// Albedo of the ground.
 const ALBEDO: f64 = 0.2;
 
-/// A clear sky that sends `sky_w_per_m2` to level ground, which itself is also lit by a sun of `sun_w_per_m2` across its
-/// beam. The sun is not in it.
+/// A clear sky that gives level ground an irradiance of `sky_w_per_m2`, above ground that is also lit by a sun of
+/// normal irradiance `sun_w_per_m2`. The sun itself is not included.
 pub fn clear_sky(to_sun: DVec3, sun_w_per_m2: f64, sky_w_per_m2: f64) -> Option<Environment> {
     let [width, height] = SIZE;
     let place = |pixel: usize| {
@@ -45,7 +45,7 @@ pub fn clear_sky(to_sun: DVec3, sun_w_per_m2: f64, sky_w_per_m2: f64) -> Option<
     Environment::new(width, height, radiance.collect())
 }
 
-/// Of a direction above the horizon, up to a factor: the standard clear sky of low turbidity (CIE S 011, type 12).
+/// Relative radiance of a direction above the horizon: standard clear sky of low turbidity (CIE S 011, type 12).
 fn radiance(direction: DVec3, to_sun: DVec3) -> LinearSrgb {
     let gradation = |height: f64| 1.0 - (-0.32 / height).exp();
     let angle = direction.angle_between(to_sun);

@@ -12,14 +12,14 @@ use crate::error::{Error, Result};
 use crate::files;
 use crate::scene::gltf::guard;
 
-/// Most pixels a side: the texture limit of common devices.
+/// Largest width and height [pixels]: the texture limit of common devices.
 const LARGEST_SIDE: u32 = 16384;
 
-/// Largest radiance that is read [W/(m² sr)]: what a map can hold, with room for several lights and their scales.
+/// Largest accepted radiance [W/(m² sr)]: what a map can hold, with room for several lights and their scales.
 const BRIGHTEST: f32 = 1e36;
 
-/// Reads an equirectangular image, told apart by its first bytes. Its values, linear sRGB, are taken as radiance
-/// [W/(m² sr)] as they are; those of a Radiance file are divided by the exposure that it states, as the format asks.
+/// Reads an equirectangular image, whose format is recognised by its first bytes. Its values, linear sRGB, are taken as
+/// radiance [W/(m² sr)]; those of a Radiance file are divided by its stated exposure, as the format requires.
 ///
 /// # Errors
 /// A file that cannot be read, is neither format, is damaged, has an unusable size or takes more than
@@ -33,7 +33,7 @@ pub fn read(path: &Path, memory_limit_bytes: u64) -> Result<Environment> {
             "name an equirectangular image as .hdr or .exr",
         )
     };
-    // Decoders of damaged files may panic.
+    // Decoders may panic on damaged files.
     let pixels = guard::without_panic(|| decode(&bytes, memory_limit_bytes))
         .unwrap_or_else(|| Err("is damaged".into()))
         .map_err(refused)?;
@@ -83,7 +83,7 @@ fn decoded(
     limits.max_image_height = Some(LARGEST_SIDE);
     limits.max_alloc = Some(most_bytes);
     decoder.set_limits(limits).map_err(reason)?;
-    // Decoded, and once more with its sums.
+    // Leaves room for the environment that is made from the decoded image.
     if decoder.total_bytes() > most_bytes / 2 {
         return Err(format!(
             "takes more memory than the limit of {} MB",

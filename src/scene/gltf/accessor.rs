@@ -11,23 +11,21 @@ use crate::error::{Error, Result};
 /// Reads the accessors of a file.
 #[derive(Clone, Copy, Debug)]
 pub struct Reader<'a> {
-    /// The typed JSON.
     pub root: &'a Root,
-    /// Its binary data.
     pub buffers: &'a Buffers<'a>,
 }
 
-/// Name of the extension that gives vertices integers.
+/// Extension that allows integers in vertex attributes.
 const QUANTISATION: &str = "KHR_mesh_quantization";
 
-/// What the numbers of vectors may be.
+/// Component formats that vectors may have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Formats {
-    /// 32-bit floats; where the file uses KHR_mesh_quantization, integers of 8 and 16 bits too.
+    /// 32-bit floats and, if the file uses KHR_mesh_quantization, integers of 8 and 16 bits.
     Float,
-    /// The same, and unsigned ones of 8 and 16 bits that stand for 0 to 1.
+    /// The same, and normalised unsigned integers of 8 and 16 bits, [0, 1].
     FloatOrShare,
-    /// Floats, and signed integers of 8 and 16 bits that stand for −1 to 1.
+    /// Floats, and normalised signed integers of 8 and 16 bits, [−1, 1].
     FloatOrSigned,
     /// Unsigned integers of 8 and 16 bits.
     Index,
@@ -47,10 +45,10 @@ impl Formats {
 }
 
 impl Reader<'_> {
-    /// Vectors of N numbers. `owner` says whose they are.
+    /// Vectors of N numbers. `owner` is named in errors.
     ///
     /// # Errors
-    /// No such accessor, another format, data beyond the buffer, too much memory.
+    /// A missing accessor, a format that is not allowed, data beyond the buffer, too little memory.
     pub fn vectors<const N: usize>(
         &self,
         index: Index<Accessor>,
@@ -87,7 +85,7 @@ impl Reader<'_> {
         Ok(numbers.as_chunks().0.to_vec())
     }
 
-    /// Whether an accessor has floats, that is, numbers which may have been rounded on their way into the file.
+    /// Whether an accessor holds floats: numbers that may have been rounded when the file was written.
     pub fn has_floats(&self, index: Index<Accessor>) -> bool {
         let component = self
             .root
@@ -100,7 +98,7 @@ impl Reader<'_> {
     /// Vertex indices.
     ///
     /// # Errors
-    /// As [`vectors`](Self::vectors).
+    /// Those of [`vectors`](Self::vectors).
     pub fn indices(&self, index: Index<Accessor>, owner: &str, budget: &mut Budget) -> Result<Vec<u32>> {
         let accessor = self.get(index, owner)?;
         let component = match (&accessor.type_, &accessor.component_type) {
@@ -129,7 +127,7 @@ impl Reader<'_> {
         found.ok_or_else(|| broken(owner, format!("refers to accessor {index}, which does not exist")))
     }
 
-    /// The accessor's elements without gaps, sparse ones filled in.
+    /// Elements of an accessor without gaps, sparse ones filled in.
     fn packed(
         &self,
         accessor: &Accessor,
@@ -139,12 +137,12 @@ impl Reader<'_> {
     ) -> Result<Vec<u8>> {
         let bytes = accessor.count.0.saturating_mul(element as u64);
         let mut packed = match accessor.buffer_view {
-            // Bounded by the buffer.
+            // The buffer limits the number of elements.
             Some(view) => {
                 let offset = accessor.byte_offset.unwrap_or_default().0;
                 self.elements(view, offset, accessor.count.0, element, owner)?
             }
-            // Without a buffer all elements are zero, and only the budget bounds their number.
+            // Without a view all elements are zero, and only the budget limits their number.
             None => {
                 budget.take(bytes, owner)?;
                 vec![0; bytes as usize]
@@ -192,7 +190,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// `count` elements of a view, packed.
+    /// `count` elements of a view, without gaps.
     fn elements(
         &self,
         view: Index<buffer::View>,
@@ -235,7 +233,7 @@ impl Reader<'_> {
     }
 }
 
-/// A little-endian number; where it is normalised, in [−1, 1].
+/// Decodes a little-endian number, which is in [−1, 1] if normalised.
 fn number(component: ComponentType, is_normalised: bool, bytes: &[u8]) -> f64 {
     let (number, most) = match (component, bytes) {
         (ComponentType::F32, &[a, b, c, d]) => return f64::from(f32::from_le_bytes([a, b, c, d])),

@@ -16,7 +16,7 @@ use super::report::{Budget, Report};
 use crate::error::Error;
 use crate::scene::{Animated, Clip, ClipNode, Interpolation, Track};
 
-/// The animations of a file as it states them. Faults in them cost the motion and not the scene.
+/// Animations as stated in the file. Faults in them must not stop the scene.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct Animations {
@@ -51,12 +51,11 @@ struct Sampler {
 }
 
 impl Animations {
-    /// Those of a file.
     pub fn of(file: &Map<String, Value>) -> Self {
         Self::deserialize(file).unwrap_or_default()
     }
 
-    /// The clip of all that move a node of the scene; `None` where nothing does.
+    /// Clip of all animations that move a node of the scene; `None` without any.
     pub fn read(
         &self,
         document: &Document,
@@ -103,7 +102,7 @@ impl Animations {
 
 /// The node that a channel moves.
 fn node_of(channel: &Channel, document: &Document) -> Result<usize, String> {
-    // Without a node an extension says what it moves.
+    // Without a node, an extension states the target.
     let node = channel.target.node.filter(|_| channel.target.path != "pointer");
     let node = node.ok_or("moves something that is no node, which stays")?;
     match document.transforms.get(node) {
@@ -115,7 +114,7 @@ fn node_of(channel: &Channel, document: &Document) -> Result<usize, String> {
     }
 }
 
-/// What a channel does, or why it is left out.
+/// Track of a channel, or the reason why it is left out.
 fn track(
     animation: &Animation,
     channel: &Channel,
@@ -165,7 +164,7 @@ fn track(
     Ok(track)
 }
 
-/// Checks the numbers of a track, and brings its rotations to the length 1.
+/// Checks the values of a track and normalises its rotations.
 fn check(track: &mut Track) -> Result<(), &'static str> {
     let per_keyframe = match track.interpolation {
         Interpolation::CubicSpline => 3,
@@ -225,7 +224,7 @@ fn clip(mut tracks: HashMap<usize, Vec<Track>>, document: &Document, placed: &[P
                 parent: parent.copied().filter(|parent| *parent < place),
                 at_rest,
                 pose,
-                // Joints place what a skin bends, and they stay at rest.
+                // A skinned mesh is placed by its joints, which stay at rest.
                 is_carried: !document.poses.has_skin(of.node),
                 tracks: tracks.remove(&of.node).unwrap_or_default(),
             }

@@ -1,7 +1,7 @@
 //! Area lights of EXT_lights_area, by its draft of 2025 (KhronosGroup/glTF, pull request 2525).
 //!
-//! A lamp lies in the node's xy plane around its origin and shines along −z. Its size is scaled by the largest scale of
-//! the node, the same way in all directions.
+//! A light lies in the node's xy plane around its origin and shines along −z. Its size is scaled uniformly, by the
+//! largest scale of the node.
 
 use std::path::Path;
 
@@ -21,11 +21,11 @@ use crate::units::{LUMENS_PER_WATT, Radiance};
 
 pub(super) const NAME: &str = "EXT_lights_area";
 
-/// A lamp as the file states it, unchecked.
+/// A light as stated in the file, unchecked.
 #[derive(Deserialize)]
 #[serde(default)]
 struct AreaLightEntry {
-    /// The draft's schema requires `shape` and then describes `type`: files have either or both.
+    /// The draft's schema requires `shape` but then describes `type`: files have either or both.
     #[serde(rename = "type")]
     kind: Option<String>,
     shape: Option<String>,
@@ -63,11 +63,11 @@ impl Default for Rect {
     }
 }
 
-/// Adds the flat lamps of the placed nodes that have some power, node by node. One that cannot be read is left out with
-/// a warning.
+/// Adds the area lights of the placed nodes that have non-zero power, node by node. Unreadable ones are left out with a
+/// warning.
 ///
 /// # Errors
-/// As [`spectrum::apply`].
+/// Those of [`spectrum::apply`].
 pub fn add_all(
     lights: &mut Vec<(Light, Origin)>,
     document: &Document,
@@ -107,7 +107,7 @@ pub fn add_all(
     Ok(())
 }
 
-/// Index of a lamp in the file's list, colour and kind.
+/// Index in the file's list, colour and kind of a light.
 fn lamp(
     on_node: &Value,
     sources: &[Value],
@@ -150,7 +150,7 @@ fn lamp(
     ))
 }
 
-/// From the middle of a lamp to its sides [m], across × down along the node's −z; `None` where it has no area.
+/// From the centre of a light to its sides [m], across × down along the node's −z; `None` if it has no area.
 fn half_axes(placed: &PlacedNode, size: f64, aspect: f64) -> Option<(DVec3, DVec3)> {
     let axes = placed.world_from_node.matrix3;
     let [x, y, z] = [axes.x_axis, axes.y_axis, axes.z_axis];

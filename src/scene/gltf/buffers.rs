@@ -11,30 +11,27 @@ use super::report::{Budget, Report};
 use super::uri;
 use crate::error::{Error, Result};
 
-/// All buffers of a file.
 #[derive(Debug)]
 pub struct Buffers<'a> {
     views: &'a [buffer::View],
-    /// `None` for a buffer that is a mere placeholder.
+    /// `None` for a placeholder buffer.
     data: Vec<Option<Cow<'a, [u8]>>>,
-    /// What the compressed views hold, or what is wrong with them; `None` for the others.
+    /// Decompressed views, or what is wrong with them; `None` for uncompressed ones.
     unpacked: Vec<Option<std::result::Result<Vec<u8>, String>>>,
 }
 
-/// A range of a buffer.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
-    /// Its bytes.
     pub data: &'a [u8],
-    /// Bytes from one element to the next, where they are not packed.
+    /// Distance of elements [bytes]; `None` if they are packed.
     pub stride: Option<usize>,
 }
 
 impl<'a> Buffers<'a> {
-    /// Reads every buffer of the file.
+    /// Reads every buffer of the file and decompresses the compressed views.
     ///
     /// # Errors
-    /// A buffer that cannot be read or is shorter than the file states; more memory than the budget has.
+    /// A buffer that cannot be read or is shorter than stated; more memory than the budget has left.
     pub fn resolve(
         all: &[buffer::Buffer],
         views: &'a [buffer::View],
@@ -45,7 +42,7 @@ impl<'a> Buffers<'a> {
     ) -> Result<Self> {
         let mut data = Vec::with_capacity(all.len());
         let compressed: Vec<_> = views.iter().map(compression).collect();
-        // Where compressed views would lie for readers that cannot unpack them.
+        // Buffers that hold compressed views for readers that cannot decompress them.
         let spare: HashSet<usize> = views
             .iter()
             .zip(&compressed)
@@ -115,7 +112,7 @@ impl<'a> Buffers<'a> {
         self.data.get(buffer)?.as_ref()?.get(range)
     }
 
-    /// The bytes of a view. `owner` says who wants them.
+    /// Bytes of a view. `owner` is named in errors.
     ///
     /// # Errors
     /// A view that does not exist or does not lie within its buffer.
@@ -152,12 +149,12 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// What a view states of its compression, if it is compressed.
+/// Compression parameters of a view, if it is compressed.
 fn compression(view: &buffer::View) -> Option<serde_json::Result<Compressed>> {
     Compressed::stated(&view.extensions.as_ref()?.others)
 }
 
-/// Whether a buffer has nothing of its own, or only what stands in for compressed views.
+/// Whether a buffer has no data of its own, or only a fallback for compressed views.
 fn is_fallback(buffer: &buffer::Buffer) -> bool {
     let is_marked = |stated: &Value| stated.get("fallback") == Some(&Value::Bool(true));
     let mut stated = buffer

@@ -11,17 +11,16 @@ use crate::optics::LinearSrgb;
 use crate::scene::material::SPECULAR_ROUGHNESS_LIMIT;
 use crate::scene::{Material, SurfaceKind};
 
-/// Name of the extension.
 pub const NAME: &str = "KHR_materials_clearcoat";
 
-/// n of the lacquer, as the extension fixes it.
+/// Refractive index of the coat, fixed by the extension.
 const IOR: f64 = 1.5;
 
-/// Reflectance of the lacquer at normal incidence: ((n − 1)/(n + 1))².
+/// Reflectance of the coat at normal incidence: ((n − 1)/(n + 1))².
 const F0: f64 = 0.04;
 
 impl MaterialReader<'_, '_> {
-    /// A lacquer over the surface, where the file has one.
+    /// Adds the clear coat that the file states, if any.
     ///
     /// # Errors
     /// Images that do not fit the memory budget.
@@ -69,33 +68,32 @@ impl MaterialReader<'_, '_> {
     }
 }
 
-/// Roughnesses that differ by more look different.
+/// Smallest difference of roughness that is visible.
 const UNLIKE: f64 = 0.1;
 
-/// The lacquer as the file states it.
+/// A clear coat as stated in the file.
 #[derive(Debug, Default, Deserialize)]
 #[serde(default, rename_all = "camelCase")]
 struct Coat {
-    /// Part of the surface that it covers.
+    /// Share of the surface that is coated.
     clearcoat_factor: f32,
-    /// Of its surface.
     clearcoat_roughness_factor: f32,
     clearcoat_texture: Option<Info>,
     clearcoat_roughness_texture: Option<Info>,
     clearcoat_normal_texture: Option<Value>,
 }
 
-/// Puts a lacquer of a factor and a roughness, both in [0, 1], over a material whose class is known.
+/// Adds a coat to a material whose class is known; factor and roughness in [0, 1].
 ///
 /// # Errors
-/// Why it has to be left out, to go after the name of the material.
+/// Reason why the coat is left out, to follow the name of the material.
 fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
     match material.surface {
         SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => Err(format!(
             "its clearcoat of roughness {roughness:.2} was left out, as it hardly shines"
         )),
         SurfaceKind::Diffuse => {
-            // What is below is matte, whatever it was.
+            // The body below the coat is diffuse, whatever it was.
             (material.metallic, material.transmission, material.volume) = (0.0, 0.0, None);
             (material.roughness, material.ior, material.polish) = (roughness, IOR, factor);
             material.surface = SurfaceKind::Mixed;

@@ -3,16 +3,14 @@
 use super::report::Report;
 use crate::error::{Error, Result};
 
-/// The parts of a `.glb` or `.gltf` file.
+/// Parts of a `.glb` or `.gltf` file.
 #[derive(Debug)]
 pub struct Container<'a> {
-    /// The JSON text.
     pub json: &'a [u8],
-    /// Whether it is a `.glb`.
     pub is_binary: bool,
-    /// The binary chunk of a `.glb`.
+    /// Binary chunk of a `.glb`.
     pub binary: Option<&'a [u8]>,
-    /// The chunks after these, with their headers.
+    /// Further chunks, with their headers.
     pub others: &'a [u8],
 }
 
@@ -21,10 +19,10 @@ const CHUNK_HEADER_BYTES: usize = 8;
 const JSON_CHUNK: [u8; 4] = *b"JSON";
 const BINARY_CHUNK: [u8; 4] = *b"BIN\0";
 
-/// Tells binary glTF by its first bytes, whatever the file is called; anything else is taken for JSON.
+/// Recognises binary glTF by its first bytes, whatever the name of the file; anything else is taken for JSON.
 ///
 /// # Errors
-/// A binary file that is cut short, of another version, or does not begin with a JSON chunk.
+/// A binary file that is truncated, has another version, or does not begin with a JSON chunk.
 pub fn split<'a>(bytes: &'a [u8], report: &mut Report) -> Result<Container<'a>> {
     if !bytes.starts_with(b"glTF") {
         return Ok(Container {
@@ -75,7 +73,7 @@ fn split_chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Result<Container
     while let Some((kind, data)) = next_chunk(&mut rest)? {
         match kind {
             BINARY_CHUNK if index == 1 => (binary, others) = (Some(data), rest),
-            // The specification wants unknown chunks passed over, but these two have their one place.
+            // The specification has unknown chunks ignored, but these two have a fixed place.
             BINARY_CHUNK | JSON_CHUNK => report.warn(
                 format!("GLB chunk {index}"),
                 "has no place there and was ignored",
@@ -93,7 +91,7 @@ fn split_chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Result<Container
     })
 }
 
-/// Kind and data of the chunk that `rest` begins with, which is taken off.
+/// Kind and data of the first chunk of `rest`, which is split off.
 fn next_chunk<'a>(rest: &mut &'a [u8]) -> Result<Option<([u8; 4], &'a [u8])>> {
     if rest.is_empty() {
         return Ok(None);

@@ -11,39 +11,34 @@ use super::report::Report;
 use super::{extensions, faults, glossiness, names};
 use crate::error::{Error, Result};
 
-/// The typed JSON, with node transforms in double precision beside it.
+/// The typed JSON, with node transforms in double precision.
 #[derive(Debug)]
 pub struct Document {
-    /// Everything else.
     pub root: Root,
     /// One per node.
     pub transforms: Vec<NodeTransform>,
-    /// What is stated in `extras`.
     pub extras: Extras,
-    /// What bends meshes.
+    /// Morph targets and skins.
     pub poses: Poses,
-    /// What moves nodes.
     pub animations: Animations,
 }
 
-/// A node's own transform as the file states it, unchecked.
+/// A node's local transform as stated in the file, unchecked.
 #[derive(Clone, Debug, Default, Deserialize)]
 pub struct NodeTransform {
-    /// Column by column.
+    /// Column-major.
     pub matrix: Option<[f64; 16]>,
     /// [m].
     pub translation: Option<[f64; 3]>,
     /// Quaternion x, y, z, w.
     pub rotation: Option<[f64; 4]>,
-    /// Per axis.
     pub scale: Option<[f64; 3]>,
 }
 
 /// Reads the JSON text.
 ///
 /// # Errors
-/// Text that is no JSON, another version than glTF 2, a required extension that is not supported, values of the wrong
-/// type.
+/// Text that is not JSON, another version than glTF 2, an unsupported required extension, a value of the wrong type.
 pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
     let mut value: Value = serde_json::from_slice(json).map_err(|error| broken_json(json, &error))?;
     let Some(file) = value.as_object_mut() else {
@@ -137,7 +132,8 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
     }
 }
 
-/// Takes out animations, skins and morph targets, so that faults in them cannot stop a scene, brings old materials up to date, and fills in what the typed reader wants although glTF does not.
+/// Removes animations, skins and morph targets, so that faults in them cannot stop a scene; converts outdated
+/// materials; and adds fields that the typed reader requires although glTF does not.
 fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
         let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
@@ -195,7 +191,8 @@ fn name_variants(file: &Map<String, Value>, report: &mut Report) {
     }
 }
 
-/// A material that transmits light is no metal unless it says so: what glTF assumes would let nothing through.
+/// Reads a transmissive material without a metallic factor as a dielectric: glTF's default, metal, would block all
+/// light.
 fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
         let extensions = material.get("extensions");
@@ -228,7 +225,8 @@ fn objects(list: Option<&mut Value>) -> impl Iterator<Item = &mut Map<String, Va
     items.into_iter().flatten().filter_map(Value::as_object_mut)
 }
 
-/// Application data of any depth: read by now, and raw text that the typed reader cannot take everywhere.
+/// Removes application data at any depth: they have been read already, and the typed reader does not accept raw text
+/// everywhere.
 fn remove_extras(value: &mut Value) {
     match value {
         Value::Array(items) => items.iter_mut().for_each(remove_extras),

@@ -13,27 +13,26 @@ use super::guard;
 use super::report::Budget;
 use crate::error::{Error, Result};
 
-/// Name of the extension.
 pub const NAME: &str = "KHR_draco_mesh_compression";
 
 #[derive(Deserialize)]
 #[serde(rename_all = "camelCase")]
 struct DracoExtension {
     buffer_view: u32,
-    /// The block's own numbers of its attributes.
+    /// Identifiers of the attributes within the compressed data.
     attributes: BTreeMap<String, u32>,
 }
 
-/// A block, unpacked.
+/// A decompressed primitive.
 pub struct Unpacked {
     mesh: Mesh,
     attributes: BTreeMap<String, u32>,
 }
 
-/// The block of a primitive; `None` where it has none, or its data lies in the file without compression too.
+/// Decompresses a primitive; `None` if it is not compressed, or the file also has its uncompressed data.
 ///
 /// # Errors
-/// A damaged block, more memory than the budget has.
+/// Damaged data; more memory than the budget has left.
 pub fn unpack(
     reader: Reader,
     primitive: &Primitive,
@@ -56,7 +55,7 @@ pub fn unpack(
     let stated = DracoExtension::deserialize(stated).map_err(|error| damaged(&error.to_string()))?;
     let data = reader.buffers.view(Index::new(stated.buffer_view), owner)?.data;
 
-    // Unpacking takes several times the memory of what comes of it.
+    // Decompression takes several times the memory of its result.
     let most = budget.left() / 4;
     let limits = DecodeLimits::default()
         .with_max_points(most / 12)
@@ -81,13 +80,13 @@ pub fn unpack(
 }
 
 impl Unpacked {
-    /// Three indices of vertices per triangle.
+    /// Vertex indices, three per triangle.
     pub fn indices(&self) -> Vec<u32> {
         let faces = self.mesh.faces().iter().flatten();
         faces.map(|point| point.0).collect()
     }
 
-    /// An attribute, of numbers in [−1, 1] where integers are `normalised`; `None` where the block does not have it so.
+    /// An attribute, with integers mapped to [−1, 1] if `normalised`; `None` if the data have none of N components.
     pub fn vectors<const N: usize>(&self, semantic: &Semantic, normalised: bool) -> Option<Vec<[f64; N]>> {
         let id = *self.attributes.get(&semantic.to_string())?;
         let attribute = self.mesh.attribute_by_unique_id(id)?;
@@ -110,7 +109,6 @@ impl Unpacked {
         )
     }
 
-    /// Whether the block has an attribute.
     pub fn has(&self, semantic: &Semantic) -> bool {
         self.attributes.contains_key(&semantic.to_string())
     }

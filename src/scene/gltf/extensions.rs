@@ -4,10 +4,10 @@ use super::report::Report;
 use super::{draco, glossiness, instancing, meshopt, nodes};
 use crate::error::{Error, Result};
 
-/// Name of an extension that gives a scene several sets of materials.
+/// Extension with alternative sets of materials.
 pub const VARIANTS: &str = "KHR_materials_variants";
 
-/// Read in full, or in the parts that say so in a warning.
+/// Extensions that are read in full, or in part with a warning.
 const READ: [&str; 21] = [
     "EXT_lights_area",
     instancing::NAME,
@@ -32,7 +32,7 @@ const READ: [&str; 21] = [
     "KHR_texture_transform",
 ];
 
-/// Passed over with a warning even where the file requires them: what is left is still the same scene.
+/// Extensions that are ignored with a warning even if the file requires them: the scene is the same without them.
 const LEFT_OUT: [&str; 5] = [
     "KHR_animation_pointer",
     "KHR_materials_anisotropy",
@@ -41,7 +41,7 @@ const LEFT_OUT: [&str; 5] = [
     "KHR_xmp_json_ld",
 ];
 
-/// Refuses a file that requires what is not supported, and names what it uses and is left out.
+/// Refuses a file that requires an unsupported extension, and warns of used ones that are ignored.
 ///
 /// # Errors
 /// A required extension without which the scene cannot be read.
@@ -83,7 +83,7 @@ pub fn check(required: &[String], used: &[String], report: &mut Report) -> Resul
     Ok(())
 }
 
-/// Materials say themselves what they leave out.
+/// Materials warn of their own ignored extensions.
 fn is_named_by_materials(extension: &str) -> bool {
     extension.starts_with("KHR_materials_")
 }

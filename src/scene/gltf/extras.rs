@@ -4,19 +4,18 @@ use gltf::json::Value;
 
 use crate::error::{Error, ErrorKind, Result};
 
-/// The extras of items, in file order; null where an item has none.
+/// Extras of items, in file order; null for an item without any.
 #[derive(Clone, Debug)]
 pub struct Extras {
     pub materials: Vec<Value>,
     pub nodes: Vec<Value>,
-    /// Of KHR_lights_punctual.
+    /// KHR_lights_punctual.
     pub lights: Vec<Value>,
-    /// Of EXT_lights_area.
+    /// EXT_lights_area.
     pub area_lights: Vec<Value>,
 }
 
 impl Extras {
-    /// Those of a file.
     pub fn of(file: &Value) -> Self {
         let of_each = |list: &str| {
             let items = file.pointer(list).and_then(Value::as_array);
@@ -32,15 +31,15 @@ impl Extras {
     }
 }
 
-/// What an item of a list states under a key.
+/// Value that an item of a list states under a key.
 pub fn stated<'a>(list: &'a [Value], item: usize, key: &str) -> Option<&'a Value> {
     list.get(item)?.get(key)
 }
 
-/// What has to be a text. `owner` has it, under `key`.
+/// A value that must be text. `owner` and `key` are named in the error.
 ///
 /// # Errors
-/// Anything else.
+/// Any other type.
 pub fn text<'a>(stated: &'a Value, key: &str, owner: &str) -> Result<&'a str> {
     let wrong = || {
         Error::failure(
@@ -52,7 +51,7 @@ pub fn text<'a>(stated: &'a Value, key: &str, owner: &str) -> Result<&'a str> {
     stated.as_str().ok_or_else(wrong)
 }
 
-/// A fault of what a file says, where the same words on a command line would be its fault.
+/// Makes a usage error one of the file: the same text may come from the command line or from a file.
 pub fn of_file(error: Error) -> Error {
     Error {
         kind: ErrorKind::Failure,

@@ -10,18 +10,18 @@ use crate::optics::LinearSrgb;
 use crate::scene::texture::Wrap;
 use crate::scene::{Material, SurfaceKind, Texture};
 
-/// A surface is of one class unless more than this part of it is of others.
+/// Largest share of other classes on a surface that still counts as one class.
 const MOST_OF_OTHERS: f64 = 0.01;
 
-/// Factors that differ by less are the same everywhere: two steps of an 8-bit image.
+/// Smallest difference that counts as variation of a factor: two steps of an 8-bit image.
 const EVEN: f64 = 2.0 / 255.0;
 
-/// Linear channels of an image.
+/// A factor texture with its linear channels.
 pub struct FactorImage {
     pub pixels: Rc<RgbaImage>,
     pub wrap: [Wrap; 2],
     pub is_nearest: bool,
-    /// Set and transform of its coordinates; `None` for a set that is not read.
+    /// TEXCOORD set and transform; `None` for a set that is not read.
     pub place: Option<(usize, DMat3)>,
 }
 
@@ -32,7 +32,7 @@ impl FactorImage {
         sum / f64::from(self.pixels.width() * self.pixels.height())
     }
 
-    /// The texel nearest to one of an image of another size.
+    /// Code of the texel that lies nearest to a texel of an image of another size.
     fn code(&self, channel: usize, place: [u32; 2], [width, height]: [u32; 2]) -> u8 {
         let scaled =
             |at: u32, own: u32, other: u32| (u64::from(at) * u64::from(own) / u64::from(other)) as u32;
@@ -42,7 +42,7 @@ impl FactorImage {
     }
 }
 
-/// The textures of a material's factors, at least one of them.
+/// Factor textures of a material, at least one.
 pub struct Factors<'a> {
     pub transmission: Option<&'a FactorImage>,
     pub metallic_roughness: Option<&'a FactorImage>,
@@ -63,7 +63,7 @@ impl Factors<'_> {
         )
     }
 
-    /// Set and transform of the coordinates of all images; `None` where they differ.
+    /// TEXCOORD set and transform of all images; `None` if they differ.
     pub fn place(&self) -> Option<(usize, DMat3)> {
         let mut places = self.images().map(|image| image.place);
         let first = places.next()??;
@@ -92,8 +92,8 @@ impl Factors<'_> {
         })
     }
 
-    /// The class of a surface whose factors they multiply; `None` where their means serve as well: where they are the
-    /// same everywhere, or the roughness of a single class is.
+    /// Surface class if these textures multiply the factors of a material; `None` if their means do as well, since no
+    /// factor varies, or all texels are of one class and the roughness does not vary.
     pub fn class(&self, material: &Material) -> Option<SurfaceKind> {
         let whole = [material.transmission, material.roughness, material.metallic];
         let (mut low, mut high) = ([u8::MAX; 3], [0; 3]);
@@ -118,7 +118,7 @@ impl Factors<'_> {
         }
     }
 
-    /// One image of all of them, encoded as colours are.
+    /// All factors in one image, sRGB-encoded like colours.
     pub fn texture(&self, name: String) -> Texture {
         let encoded: Vec<u8> = (0..=u8::MAX)
             .map(|code| (LinearSrgb::encode_channel(f64::from(code) / 255.0) * 255.0).round() as u8)

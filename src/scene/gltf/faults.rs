@@ -8,23 +8,23 @@ use gltf::json::validation::{Error, Validate};
 use super::guard;
 use super::report::Report;
 
-/// Says what is wrong with the typed JSON.
+/// Reports violations in the typed JSON.
 pub fn report(root: &Root, report: &mut Report) {
     let mut found = Vec::new();
-    // It panics on some broken references.
+    // Validation panics on some broken references.
     let finished = guard::without_panic(|| {
         root.validate(root, Path::new, &mut |path, error| {
             found.push((path().to_string(), error))
         });
     });
     for (path, error) in found {
-        // Extensions were checked before, against what this program reads.
+        // Extensions have been checked already, against those that this program reads.
         if path.starts_with("extensionsRequired") {
             continue;
         }
-        // Accessors may stand without a buffer view (all zero), textures without a plain image (WebP).
+        // Accessors may lack a buffer view (all zero), and textures a plain image (WebP).
         let may_miss = path.ends_with("bufferView") || path.ends_with("source");
-        // Bounds are computed, whatever the file says of them.
+        // Bounds are computed, whatever the file states.
         let unread = path.ends_with(".min") || path.ends_with(".max");
         if unread || error == Error::Missing && may_miss {
             continue;

@@ -12,7 +12,7 @@ use crate::error::{Error, Result};
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 
-/// Document and binary data of a file to be.
+/// Document and binary data of a `.glb` file in the making.
 #[derive(Clone, Debug)]
 pub struct Glb {
     /// The document; [`into_bytes`](Self::into_bytes) states the length of its first buffer.
@@ -37,11 +37,11 @@ impl Glb {
         }
     }
 
-    /// A file that was there. What lies beside a `.gltf` is taken in: its first buffer as the binary chunk, everything
-    /// else as data URIs.
+    /// Opens an existing file. A `.gltf` takes in everything beside it: its first buffer as the binary chunk, all else
+    /// as data URIs.
     ///
     /// # Errors
-    /// Text that is no JSON; a buffer or an image that cannot be read.
+    /// Text that is not JSON; a buffer or an image that cannot be read.
     pub(super) fn of(file: &Container, folder: &Path, most_bytes: u64) -> Result<Self> {
         let json = serde_json::from_slice(file.json).map_err(|error| {
             let what = format!("is damaged ({error})");
@@ -52,7 +52,7 @@ impl Glb {
             binary: file.binary.unwrap_or_default().to_vec(),
             others: file.others.to_vec(),
         };
-        // Chunks are padded.
+        // Removes the padding of the chunk.
         if glb.owns_first_buffer()
             && let Some(stated) = glb.json["buffers"][0]["byteLength"].as_u64()
         {
@@ -87,18 +87,18 @@ impl Glb {
         Ok(())
     }
 
-    /// Whether the first buffer, if there is one, is the binary chunk and does not lie elsewhere.
+    /// Whether the first buffer, if any, is the binary chunk.
     pub(super) fn owns_first_buffer(&self) -> bool {
         self.json["buffers"][0].get("uri").is_none()
     }
 
-    /// The data so far.
+    /// Binary data so far.
     pub fn binary(&self) -> &[u8] {
         &self.binary
     }
 
-    /// The value at a JSON pointer, null where it is missing; objects on the way are made. `None` where something else
-    /// is in the way: a number is no object, and a list has no names.
+    /// The value at a JSON pointer, null if it is missing; creates the objects on the way. `None` if the path leads
+    /// through a number, a text or beyond the end of a list.
     fn at(&mut self, pointer: &str) -> Option<&mut Value> {
         let mut place = &mut self.json;
         for name in pointer.split('/').skip(1) {
@@ -114,19 +114,19 @@ impl Glb {
         Some(place)
     }
 
-    /// Sets the value at a JSON pointer, as far as the document lets it be there.
+    /// Sets the value at a JSON pointer, if the document has room for it there.
     pub fn set(&mut self, pointer: &str, value: Value) {
         if let Some(place) = self.at(pointer) {
             *place = value;
         }
     }
 
-    /// Takes a member out of an object.
+    /// Removes a member of an object.
     pub fn remove(&mut self, pointer: &str) {
         remove(&mut self.json, pointer);
     }
 
-    /// Gives what stands at a JSON pointer all that differs between two ways to state the same thing, and nothing else.
+    /// Applies the differences between two statements of the same thing at a JSON pointer, and changes nothing else.
     pub fn patch(&mut self, pointer: &str, before: &Value, after: &Value) {
         if before != after
             && let Some(place) = self.at(pointer)
@@ -137,7 +137,7 @@ impl Glb {
         }
     }
 
-    /// Appends to a list of the document, which is made where it is missing, and returns the index.
+    /// Appends to a list of the document, which is created if missing, and returns the index.
     pub fn push(&mut self, list: &str, item: Value) -> usize {
         self.name_extensions(&item);
         match self.at(list) {
@@ -149,23 +149,23 @@ impl Glb {
                 *list = json!([item]);
                 0
             }
-            // It is no list: whoever reads the file sees that the item is missing.
+            // Not a list: whoever reads the file will notice that the item is missing.
             _ => 0,
         }
     }
 
-    /// Adds a node at the top of the scene that is shown and returns its index.
+    /// Adds a root node to the default scene and returns its index.
     pub fn push_root(&mut self, node: Value) -> usize {
         let node = self.push("/nodes", node);
         let scene = self.json["scene"].as_u64().unwrap_or(0);
-        // Without scenes, nodes that are nobody's child are at the top.
+        // Without scenes, all nodes that are no child are roots.
         if self.json.pointer(&format!("/scenes/{scene}")).is_some() {
             self.push(&format!("/scenes/{scene}/nodes"), json!(node));
         }
         node
     }
 
-    /// Names an extension among those that the file uses.
+    /// Adds an extension to `extensionsUsed`.
     pub fn name_extension(&mut self, name: &str) {
         let named = self.json["extensionsUsed"].as_array();
         if !named.is_some_and(|named| named.iter().any(|other| other == name)) {
@@ -173,7 +173,7 @@ impl Glb {
         }
     }
 
-    /// The same of those of an item.
+    /// Adds all extensions within an item.
     fn name_extensions(&mut self, item: &Value) {
         match item {
             Value::Array(items) => items.iter().for_each(|item| self.name_extensions(item)),
@@ -187,7 +187,7 @@ impl Glb {
         }
     }
 
-    /// Adds data, aligned to four bytes, and returns the index of its view.
+    /// Appends binary data, aligned to four bytes, and returns the index of its view.
     pub fn push_view(&mut self, bytes: &[u8]) -> usize {
         self.binary.resize(self.binary.len().next_multiple_of(4), 0);
         let offset = self.binary.len();
@@ -198,8 +198,8 @@ impl Glb {
         )
     }
 
-    /// Adds vectors of two to four components with their bounds and returns the index of their accessor. There has to be
-    /// one at least, and all have to be finite.
+    /// Adds vectors of two to four components with their bounds and returns the index of the accessor. There must be at
+    /// least one, and all must be finite.
     pub fn push_vectors<const N: usize>(&mut self, vectors: &[[f32; N]]) -> usize {
         let bytes: Vec<u8> = vectors
             .iter()
@@ -224,7 +224,7 @@ impl Glb {
         )
     }
 
-    /// Adds indices of vertices and returns the index of their accessor.
+    /// Adds vertex indices and returns the index of the accessor.
     pub fn push_indices(&mut self, indices: impl IntoIterator<Item = u32>) -> usize {
         let bytes: Vec<u8> = indices.into_iter().flat_map(u32::to_le_bytes).collect();
         let view = self.push_view(&bytes);
@@ -235,7 +235,7 @@ impl Glb {
         )
     }
 
-    /// Adds a PNG as an image and returns its index.
+    /// Adds a PNG image and returns its index.
     pub fn push_png(&mut self, name: &str, bytes: &[u8]) -> usize {
         let view = self.push_view(bytes);
         self.push(
@@ -244,10 +244,10 @@ impl Glb {
         )
     }
 
-    /// The bytes of the file.
+    /// Serialises the file.
     ///
     /// # Errors
-    /// More than the 4 GiB that such a file can hold.
+    /// More than the 4 GiB that a `.glb` can hold.
     pub fn into_bytes(mut self) -> Result<Vec<u8>> {
         let mut chunks = Vec::new();
         if !self.binary.is_empty() && self.owns_first_buffer() {
@@ -273,7 +273,7 @@ impl Glb {
     }
 }
 
-/// Adds data with a header, padded to four bytes.
+/// Appends a chunk with its header, padded to four bytes.
 fn push_chunk(chunks: &mut Vec<u8>, kind: [u8; 4], data: &[u8], padding: u8) {
     chunks.extend((data.len().next_multiple_of(4) as u32).to_le_bytes());
     chunks.extend(kind);
@@ -290,7 +290,7 @@ fn kind(list: &str, data: &[u8]) -> &'static str {
     }
 }
 
-/// Takes a member out of an object within a value.
+/// Removes a member of an object within a value.
 pub fn remove(value: &mut Value, pointer: &str) {
     if let Some((owner, name)) = pointer.rsplit_once('/')
         && let Some(Value::Object(owner)) = value.pointer_mut(owner)
@@ -323,7 +323,7 @@ fn patch(place: &mut Value, before: &Value, after: &Value) {
                 }
             }
         }
-        // Something else stands there, which is not ours to replace.
+        // A value of another kind belongs to somebody else and is kept.
         (_, Value::Object(_)) => {}
         (place, after) => *place = after.clone(),
     }

@@ -6,10 +6,9 @@ use serde_json::{Map, json};
 
 use super::report::Report;
 
-/// Name of the extension.
 pub const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
 
-/// Reflectance at normal incidence of what is no metal.
+/// Reflectance of dielectrics at normal incidence.
 const F0: f64 = 0.04;
 
 #[derive(Deserialize)]
@@ -34,7 +33,7 @@ impl Default for SpecularGlossiness {
     }
 }
 
-/// Gives a material that is stated in that way alone its metallic-roughness model.
+/// Converts a material that is stated in this way only to metallic-roughness.
 pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Report) {
     let own = material.get("pbrMetallicRoughness").and_then(Value::as_object);
     if own.is_some_and(|own| !own.is_empty()) {
@@ -55,7 +54,7 @@ pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Repo
     let [red, green, blue, alpha] = stated.diffuse_factor;
     let diffuse = [red, green, blue];
     let specular = stated.specular_factor;
-    // A texture tells metals from others where no factor can: most of what has one is none.
+    // With a specular-glossiness texture the factors do not reveal metals; most such materials are dielectrics.
     let is_told = stated.specular_glossiness_texture.is_null();
     let metallic = if is_told { metallic(diffuse, specular) } else { 0.0 };
     let base = |channel: usize| {
@@ -92,8 +91,8 @@ fn strongest(colour: [f64; 3]) -> f64 {
     colour.into_iter().fold(0.0, f64::max)
 }
 
-/// How metallic a surface is that reflects so much, diffusely and like a mirror: the root of a quadratic equation which the
-/// extension's text derives.
+/// Metallic factor for given diffuse and specular colours: root of a quadratic equation derived in the extension's
+/// specification.
 fn metallic(diffuse: [f64; 3], specular: [f64; 3]) -> f64 {
     let brightness = |[r, g, b]: [f64; 3]| (0.299 * r * r + 0.587 * g * g + 0.114 * b * b).sqrt();
     let (diffuse, mirrored) = (brightness(diffuse), brightness(specular));

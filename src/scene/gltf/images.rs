@@ -19,13 +19,13 @@ use crate::optics::LinearSrgb;
 use crate::scene::Texture;
 use crate::scene::texture::Wrap;
 
-/// Texels across or down that an image may have.
+/// Largest width and height of an image [texels].
 const LARGEST_SIDE: u32 = 16_384;
 
 /// sRGB code of linear 0.5: stands in for an image that cannot be read.
 const GREY: u8 = 188;
 
-/// Texels, how they repeat along u and v, and whether the nearest one counts.
+/// Texels, wrap modes in u and v, and whether look-ups take the nearest texel.
 type Pixels = (Rc<RgbaImage>, [Wrap; 2], bool);
 
 /// Reads the images that materials ask for, each once.
@@ -124,7 +124,7 @@ impl<'a> Images<'a> {
         &self.textures[texture]
     }
 
-    /// Mean over a texture of what `value` makes of each texel; `None` where it has no image.
+    /// Mean of `value` over the texels of a texture; `None` if it has no image.
     ///
     /// # Errors
     /// More memory than the budget has.
@@ -260,7 +260,7 @@ fn decode(bytes: &[u8], most_bytes: u64) -> std::result::Result<RgbaImage, Strin
     Ok(image.into_rgba8())
 }
 
-/// An image of Basis Universal, in a KTX2 file. What it states is checked first: the transcoder takes its word for it.
+/// Decodes a Basis Universal image in a KTX2 file. Its header is checked first, since the transcoder trusts it.
 fn decode_basis(bytes: &[u8], most_bytes: u64) -> std::result::Result<RgbaImage, String> {
     let damaged = |why: String| format!("cannot be decoded ({why})");
     let file = ktx2::Reader::new(bytes).map_err(|error| damaged(error.to_string()))?;

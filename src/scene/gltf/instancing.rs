@@ -13,10 +13,9 @@ use super::names;
 use super::report::Budget;
 use crate::error::{Error, Result};
 
-/// Name of the extension.
 pub const NAME: &str = "EXT_mesh_gpu_instancing";
 
-/// Bytes that a node takes.
+/// Memory of a node [bytes].
 const NODE_BYTES: u64 = 1000;
 
 #[derive(Default, Deserialize)]
@@ -27,17 +26,17 @@ struct Attributes {
     scale: Option<u32>,
 }
 
-/// A node that is taken apart.
+/// A node to be expanded into one node per instance.
 #[derive(Debug)]
 pub struct Instanced {
     node: usize,
-    /// What its parts are called.
+    /// Names of its instances.
     names: Vec<String>,
-    /// Where they stand below it.
+    /// Transforms of its instances, relative to the node.
     transforms: Vec<NodeTransform>,
 }
 
-/// Whether a file has such nodes.
+/// Whether a file has instanced nodes.
 pub fn is_used(root: &Root) -> bool {
     root.nodes.iter().any(|node| stated(node).is_some())
 }
@@ -47,10 +46,10 @@ fn stated(node: &Node) -> Option<&Value> {
     node.extensions.as_ref()?.others.get(NAME)?.get("attributes")
 }
 
-/// All such nodes of a file.
+/// All instanced nodes of a file.
 ///
 /// # Errors
-/// Places that cannot be read or are not equally many, more memory than the budget has.
+/// Instance transforms that cannot be read or differ in number; more memory than the budget has left.
 pub fn read(root: &Root, buffers: &Buffers, budget: &mut Budget) -> Result<Vec<Instanced>> {
     let reader = Reader { root, buffers };
     let mut all = Vec::new();
@@ -101,14 +100,14 @@ pub fn read(root: &Root, buffers: &Buffers, budget: &mut Budget) -> Result<Vec<I
     Ok(all)
 }
 
-/// Integers make a turn only nearly unit.
+/// Normalises a rotation, which integers represent only approximately.
 fn unit(rotation: [f64; 4]) -> [f64; 4] {
     DVec4::from(rotation)
         .try_normalize()
         .map_or(rotation, DVec4::into)
 }
 
-/// Gives a document a node for each instance.
+/// Adds a child node for each instance.
 pub fn take_apart(document: &mut Document, instanced: &[Instanced]) {
     for whole in instanced {
         let first = document.root.nodes.len();
@@ -129,7 +128,7 @@ pub fn take_apart(document: &mut Document, instanced: &[Instanced]) {
 }
 
 impl Glb {
-    /// The same for a document to be written.
+    /// The same in a document to be written.
     pub(super) fn take_apart(&mut self, instanced: &[Instanced]) {
         for whole in instanced {
             let node = format!("/nodes/{}", whole.node);

@@ -17,10 +17,10 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind};
 use crate::units::{Irradiance, LUMENS_PER_WATT, RadiantIntensity};
 
-/// All lamps of a file: those without a surface, then the flat ones. One that cannot be read is left out with a warning.
+/// All lights of a file: punctual lights, then area lights. Unreadable ones are left out with a warning.
 ///
 /// # Errors
-/// As [`spectrum::apply`].
+/// Those of [`spectrum::apply`].
 pub fn all(
     document: &Document,
     placed: &[PlacedNode],
@@ -32,7 +32,7 @@ pub fn all(
     Ok(lights)
 }
 
-/// The lights of the placed nodes that have some power, node by node.
+/// Punctual lights of non-zero power of the placed nodes, node by node.
 fn punctual(
     document: &Document,
     placed: &[PlacedNode],
@@ -79,21 +79,21 @@ fn punctual(
     Ok(lights)
 }
 
-/// Where in a file a light stands.
+/// Origin of a light in its file.
 #[derive(Clone, Copy, Debug)]
 pub struct Origin {
     /// glTF index of its node.
     pub node: usize,
-    /// The extension that lists it.
+    /// Extension that lists it.
     pub list: &'static str,
-    /// Its place in that list.
+    /// Index in that list.
     pub index: usize,
 }
 
-/// The extension of lights without a surface.
+/// Extension of punctual lights.
 pub(super) const NAME: &str = "KHR_lights_punctual";
 
-/// The node's name; `lightN` where the file gives none.
+/// Name of the node; `lightN` without one.
 pub(super) fn light_name(placed: &PlacedNode, index: usize) -> String {
     let unnamed = placed.name == format!("node{}", placed.node);
     if unnamed {
@@ -103,7 +103,7 @@ pub(super) fn light_name(placed: &PlacedNode, index: usize) -> String {
     }
 }
 
-/// Warns of a light that is not read.
+/// Warns of a light that is left out.
 pub(super) fn left_out(report: &mut Report, owner: &str, why: &str) {
     report.warn(
         owner,
@@ -176,7 +176,7 @@ fn cone(spot: Option<&Spot>, owner: &str, report: &mut Report) -> (f64, f64) {
         return (0.0, FRAC_PI_4);
     };
     let (inner, mut outer) = (widen(spot.inner_cone_angle), widen(spot.outer_cone_angle));
-    // 32-bit π/2 lies a little above ours.
+    // π/2 in single precision lies slightly above that in double precision.
     if outer > FRAC_PI_2 && outer <= FRAC_PI_2 + 1e-6 {
         outer = FRAC_PI_2;
     }
@@ -191,7 +191,7 @@ fn cone(spot: Option<&Spot>, owner: &str, report: &mut Report) -> (f64, f64) {
     if inner >= 0.0 && inner < outer {
         return (inner, outer);
     }
-    // An edge as hard as asked for, with a width that can still be divided by.
+    // As hard an edge as stated, but of non-zero width, by which falloff can be divided.
     let repaired = if inner >= outer { outer * (1.0 - 1e-6) } else { 0.0 };
     report.warn(
         owner,

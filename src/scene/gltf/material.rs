@@ -20,7 +20,7 @@ use crate::optics::LinearSrgb;
 use crate::scene::{Material, SurfaceKind, Volume};
 use crate::units::LUMENS_PER_WATT;
 
-/// What a primitive without a material has: glTF's default material is a rough metal, which is taken for matte.
+/// Material of a primitive without one: glTF's default is a rough metal, which is read as diffuse.
 pub fn default() -> Material {
     Material {
         name: "default".into(),
@@ -30,7 +30,7 @@ pub fn default() -> Material {
     }
 }
 
-/// Whether it lets light through without being the surface of a body.
+/// Whether it transmits light without bounding a solid body.
 pub fn is_thin(material: &Material) -> bool {
     material.transmits() && material.volume.is_none()
 }
@@ -70,7 +70,7 @@ const CLEAR: Volume = Volume {
 /// glTF's refractive index where a material states none.
 const DEFAULT_IOR: f64 = 1.5;
 
-/// The least that an attenuation colour lets through: black would need an infinite absorption.
+/// Smallest attenuation colour: black would need infinite absorption.
 const DARKEST_ATTENUATION: f64 = 1e-6;
 
 /// All materials, in file order.
@@ -115,12 +115,12 @@ pub(super) fn linear([r, g, b, _]: [u8; 4]) -> LinearSrgb {
 pub struct MaterialReader<'a, 'b> {
     pub owner: String,
     pub source: &'a Source,
-    /// As its extras state them.
+    /// From the extras.
     pub waves: Option<&'a Value>,
     pub glass: Option<&'a Value>,
     pub metal: Option<&'a Value>,
     pub spectrum: Option<&'a Value>,
-    /// Where the file is.
+    /// Folder of the file.
     pub folder: &'a Path,
     pub images: &'a mut Images<'b>,
     pub budget: &'a mut Budget,
@@ -194,7 +194,7 @@ impl MaterialReader<'_, '_> {
         self.report.warn(self.owner.clone(), what, remedy);
     }
 
-    /// A factor brought into [0, 1]; what is no number counts as 0.
+    /// Clamps a factor to [0, 1]; NaN becomes 0.
     pub(super) fn share(&mut self, value: f32, what: &str) -> f64 {
         let read = if value.is_nan() {
             0.0
@@ -210,7 +210,7 @@ impl MaterialReader<'_, '_> {
         read
     }
 
-    /// What part of a polish reflects, by KHR_materials_specular.
+    /// Factor on the reflection of a coat, by KHR_materials_specular.
     fn polish(&mut self, stated: &extension::Specular) -> Result<f64> {
         let factor = self.share(stated.specular_factor.0, "specular factor");
         let colour = LinearSrgb::from(stated.specular_color_factor.0.map(widen));
@@ -229,7 +229,7 @@ impl MaterialReader<'_, '_> {
         Ok((factor * mean * brightness).clamp(0.0, 1.0))
     }
 
-    /// Mean over a texture of what `value` makes of each texel; white without one.
+    /// Mean of `value` over the texels of a texture; white without one.
     pub(super) fn mean_of(
         &mut self,
         texture: Option<&Info>,
@@ -323,7 +323,7 @@ impl MaterialReader<'_, '_> {
         factor * (strength / LUMENS_PER_WATT)
     }
 
-    /// Gives what it emits the spectrum that is stated for it, if any, in place of its colour.
+    /// Replaces the colour of the emission by the stated spectrum, if any.
     fn emission_spectrum(&mut self, material: &mut Material) -> Result<()> {
         let Some(stated) = self.spectrum else {
             return Ok(());
@@ -350,7 +350,7 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    /// What it is made of: as its extras say, else by KHR_materials_dispersion.
+    /// Sets glass or metal, from the extras or else from KHR_materials_dispersion.
     fn substance(&mut self, material: &mut Material, extensions: &extension::Material) -> Result<()> {
         match substance::read(self.glass, self.metal, &self.owner)? {
             Some(Composition::Glass(glass)) => material.set_glass(Arc::new(glass)),
@@ -376,13 +376,13 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    /// The material's class, with a word on what is not as the file has it.
+    /// Surface class of a material; warns where it departs from the file.
     fn classify(&mut self, material: &Material) -> SurfaceKind {
         let surface = material.classified();
         let roughness = material.roughness;
         let is_metal = material.metallic >= 0.5;
         match surface {
-            // Metallic 1 with roughness 1 is what glTF assumes where a file says nothing.
+            // Metallic 1 with roughness 1 is glTF's default, which needs no warning.
             SurfaceKind::Diffuse if is_metal && (roughness < 1.0 || material.metal.is_some()) => self.warn(
                 format!("is a metal of roughness {roughness:.2}, treated as diffuse"),
                 "lower its roughness for a mirror",

@@ -18,17 +18,17 @@ use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Variation};
 
-/// Alphas that are neither there nor not [codes].
+/// Alphas that are neither transparent nor opaque [codes].
 const BETWEEN: RangeInclusive<u8> = 26..=229;
 
-/// A texture whose alpha is between in no more than this part of it cuts out.
+/// Largest share of texels with alphas [`BETWEEN`] in an image that is read as a cut-out.
 const MAX_BETWEEN: f64 = 0.02;
 
-/// Alpha from which on nothing is seen through a surface [codes].
+/// Alpha at and above which a surface is opaque [codes].
 const OPAQUE: u8 = 254;
 
 impl MaterialReader<'_, '_> {
-    /// The image of what it emits, or its mean where that has a spectrum.
+    /// Emission texture, or its mean if the emission has a spectrum.
     pub(super) fn glow(&mut self, material: &mut Material) -> Result<()> {
         let source = self.source;
         let Some(info) = source.emissive_texture.as_ref() else {
@@ -50,7 +50,7 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    /// The image of a texture of factors.
+    /// Image of a factor texture.
     fn factor_image(&mut self, what: &str, stated: Option<&Info>) -> Result<Option<FactorImage>> {
         let Some(info) = stated else {
             return Ok(None);
@@ -69,7 +69,8 @@ impl MaterialReader<'_, '_> {
         }))
     }
 
-    /// Takes over the textures of factors: as an image where that changes what the surface does, else as their means.
+    /// Applies factor textures: as an image if they change the surface class or vary the roughness, else by their
+    /// means.
     pub(super) fn vary(
         &mut self,
         material: &mut Material,
@@ -113,7 +114,7 @@ impl MaterialReader<'_, '_> {
             material.metallic * mean.b,
         );
         if class == Some(SurfaceKind::Diffuse) && material.classified() != SurfaceKind::Diffuse {
-            // Matte metal and matte body may have a shining mean.
+            // The means of diffuse metal and diffuse dielectric may fall into a specular class.
             material.roughness = 1.0;
         } else if class.is_some_and(|class| class != SurfaceKind::Diffuse) {
             self.warn(
@@ -128,7 +129,7 @@ impl MaterialReader<'_, '_> {
         Ok(())
     }
 
-    /// Alpha that blends: what part of the surface is there.
+    /// Blended alpha: the share of the surface that is present.
     pub(super) fn blend(&mut self, material: &mut Material) {
         if !matches!(self.source.alpha_mode, Checked::Valid(AlphaMode::Blend)) {
             return;
@@ -203,7 +204,7 @@ impl MaterialReader<'_, '_> {
         Some((uv_set, DMat3::IDENTITY))
     }
 
-    /// What bends the normals of a specular surface.
+    /// Normal map of a specular surface.
     pub(super) fn normal_map(&mut self, material: &Material) -> Result<Option<NormalMap>> {
         let source = self.source;
         let Some(stated) = source
@@ -233,7 +234,7 @@ impl MaterialReader<'_, '_> {
         };
         let texture = self.images.get(image.texture);
         let map = NormalMap::new(image, scale, texture);
-        // Also what stands in for an image that could not be read.
+        // Includes the substitute for an image that could not be read.
         if map.detail_texels == f64::INFINITY {
             self.warn(
                 "its normal texture is the same everywhere and was left out",
@@ -255,7 +256,7 @@ impl MaterialReader<'_, '_> {
         self.texture_at(info.index, place)
     }
 
-    /// Where the surface is cut out, if it is.
+    /// Cut-out by alpha, if any.
     pub(super) fn alpha_mask(&mut self) -> Option<AlphaMask> {
         let is_mask = matches!(self.source.alpha_mode, Checked::Valid(AlphaMode::Mask));
         is_mask.then(|| AlphaMask {
@@ -271,7 +272,7 @@ fn coordinates(tex_coord: u32, transform: Option<&TextureTransform>) -> (usize, 
         return (tex_coord as usize, DMat3::IDENTITY);
     };
     let vector = |[x, y]: [f32; 2]| DVec2::new(widen(x), widen(y));
-    // v runs downwards, so that the extension's counter-clockwise turn is a negative one in (u, v).
+    // v runs downwards, so that the extension's counter-clockwise rotation is negative in (u, v).
     let matrix = DMat3::from_scale_angle_translation(
         vector(transform.scale.0),
         -widen(transform.rotation.0),

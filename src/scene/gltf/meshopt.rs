@@ -6,19 +6,17 @@ use std::array;
 use gltf::json::Value;
 use serde::Deserialize;
 
-/// The names under which buffer views state it; one text covers both.
+/// Names of the extension in buffer views; one specification covers both.
 pub const NAMES: [&str; 2] = ["EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// What a buffer view states.
+/// Compression parameters of a buffer view.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Compressed {
-    /// Where the data is.
+    /// Index of the buffer with the compressed data.
     pub buffer: usize,
-    /// Within the buffer.
     #[serde(default)]
     pub byte_offset: u64,
-    /// Within the buffer.
     pub byte_length: u64,
     byte_stride: usize,
     count: usize,
@@ -46,20 +44,20 @@ enum Filter {
     Color,
 }
 
-/// Elements of a group of deltas.
+/// Elements per group of deltas.
 const GROUP: usize = 16;
 
-/// Elements of the largest block.
+/// Largest number of elements per block.
 const BLOCK: usize = 256;
 
 impl Compressed {
-    /// What the extensions of a buffer view state; `None` where it is not compressed.
+    /// Compression parameters among the extensions of a buffer view; `None` if it is not compressed.
     pub fn stated(extensions: &serde_json::Map<String, Value>) -> Option<serde_json::Result<Self>> {
         let stated = NAMES.iter().find_map(|name| extensions.get(*name))?;
         Some(Self::deserialize(stated))
     }
 
-    /// Bytes of the unpacked data; `None` where so many cannot come of the stored ones.
+    /// Size of the decompressed data; `None` if the compressed data are too few for it.
     pub fn unpacked_bytes(&self) -> Option<u64> {
         let least = match self.mode {
             Mode::Attributes => self.count.div_ceil(BLOCK),
@@ -72,7 +70,7 @@ impl Compressed {
             .filter(|_| is_possible)
     }
 
-    /// The data; `None` where it is damaged.
+    /// Decompresses the data; `None` if they are damaged.
     pub fn unpack(&self, data: &[u8]) -> Option<Vec<u8>> {
         let (count, stride) = (self.count, self.byte_stride);
         let indices = match self.mode {
@@ -89,7 +87,7 @@ impl Compressed {
     }
 }
 
-/// Takes bytes off the front.
+/// Splits bytes off the front.
 fn take<'a>(data: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
     let (taken, rest) = data.split_at_checked(count)?;
     *data = rest;
@@ -146,7 +144,7 @@ fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     data.is_empty().then_some(unpacked)
 }
 
-/// The deltas of one byte of the elements of a block, by its `control` where the version has one.
+/// Deltas of one byte position for the elements of a block; `control` is `None` in version 0.
 fn read_deltas(data: &mut &[u8], control: Option<u8>, deltas: &mut [u8], elements: usize) -> Option<()> {
     let bits_of_headers = match control {
         None => [0, 2, 4, 8],
@@ -169,7 +167,8 @@ fn read_deltas(data: &mut &[u8], control: Option<u8>, deltas: &mut [u8], element
                 let sentinel = (1 << bits) - 1;
                 for (index, delta) in deltas.iter_mut().enumerate() {
                     let at = index * bits;
-                    // Single bits begin at the least significant one, pairs and nibbles at the most significant.
+                    // Single bits are packed from the least significant one, pairs and nibbles from the most
+                    // significant.
                     let shift = if bits == 1 { at % 8 } else { 8 - bits - at % 8 };
                     let value = packed[at / 8] >> shift & sentinel;
                     *delta = if value == sentinel { byte(data)? } else { value };
@@ -180,7 +179,7 @@ fn read_deltas(data: &mut &[u8], control: Option<u8>, deltas: &mut [u8], element
     Some(())
 }
 
-/// Four bytes after those before them, by the `channel mode`.
+/// The four bytes that follow `last`, by the `channel mode`.
 fn next(last: [u8; 4], delta: [u8; 4], mode: u8) -> Option<[u8; 4]> {
     let halves = |[a, b, c, d]: [u8; 4]| [u16::from_le_bytes([a, b]), u16::from_le_bytes([c, d])];
     Some(match mode {
@@ -199,7 +198,7 @@ fn next(last: [u8; 4], delta: [u8; 4], mode: u8) -> Option<[u8; 4]> {
     })
 }
 
-/// The 16 values that were pushed last.
+/// The last 16 values pushed.
 struct Fifo<T>([T; 16], usize);
 
 impl<T: Copy> Fifo<T> {
@@ -208,13 +207,13 @@ impl<T: Copy> Fifo<T> {
         self.1 += 1;
     }
 
-    /// The value with `age` later ones.
+    /// The value after which `age` others were pushed.
     fn get(&self, age: u8) -> T {
         self.0[(self.1 + 15 - usize::from(age)) % 16]
     }
 }
 
-/// An index that is stored as its difference from the last such one.
+/// An index stored as the difference from the last one stored so.
 fn explicit(data: &mut &[u8], last: &mut u32) -> Option<u32> {
     *last = last.wrapping_add(unzigzag(varint(data)?));
     Some(*last)
@@ -328,7 +327,7 @@ impl Filter {
     }
 }
 
-/// Changes all elements of four signed numbers of so many bytes each.
+/// Maps all elements of four signed integers of `BYTES` bytes each.
 fn change<const BYTES: usize>(data: &mut [u8], changed: impl Fn([i32; 4]) -> [i32; 4]) {
     for element in data.chunks_exact_mut(4 * BYTES) {
         let number = |i: usize| match BYTES {

@@ -60,7 +60,7 @@ pub(super) use save::save;
 /// Reads a `.glb` or `.gltf` file with the buffers and images beside it.
 ///
 /// # Errors
-/// As [`super::load`].
+/// Those of [`super::load`].
 pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     let bytes = files::read_file(path, options.memory_limit_bytes)?;
     let in_file = |error: Error| Error {
@@ -80,7 +80,7 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
-/// The file and those that its text may refer to: every text in it that names a file beside it.
+/// The file, and all files that its text may refer to: every string in it that names an existing file beside it.
 pub(super) fn files_of(path: &Path, most_bytes: u64) -> Vec<PathBuf> {
     let mut found = vec![path.to_path_buf()];
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -184,10 +184,10 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     Ok(scene)
 }
 
-/// A scene whose middle is farther away than this many of its own extents would lose digits.
+/// Distance of the centre from the origin, in scene extents, beyond which coordinates would lose precision.
 const FAR_IN_EXTENTS: f64 = 16.0;
 
-/// Makes the middle of a far scene its origin, and leaves any other scene alone.
+/// Moves the origin of a far scene to its centre; leaves other scenes alone.
 pub fn rebase(scene: &mut Scene) {
     let Some((low, high)) = scene.bounds() else {
         return;
@@ -211,9 +211,8 @@ pub fn rebase(scene: &mut Scene) {
     }
 }
 
-/// Adds a light for every object whose material emits light, in their order. Its radiance is the luminance of what is
-/// emitted, its colour has a luminance of 1, and its
-/// spectrum is the material's.
+/// Adds a light for every object with an emissive material, in object order. Its radiance is the luminance of the
+/// emission, its colour has luminance 1, and its spectrum is the material's.
 pub fn add_lights(scene: &mut Scene) {
     for object in 0..scene.objects.len() {
         let mesh = scene.objects[object].in_scene();
@@ -238,21 +237,21 @@ pub fn add_lights(scene: &mut Scene) {
     }
 }
 
-/// A document with everything that it needs.
+/// A document with all the data it needs.
 #[derive(Debug)]
 pub struct Opened {
-    /// Document and data.
+    /// The document with its data.
     pub glb: Glb,
-    /// From each node to the world, by glTF index; nodes outside the scene are missing.
+    /// Transform from each node to the world, by glTF index; nodes outside the scene are missing.
     pub world_from_node: BTreeMap<usize, DAffine3>,
-    /// What the document cannot hold of the scene.
+    /// Content of the scene that the document cannot hold.
     pub warnings: Vec<Warning>,
 }
 
-/// The document of a scene: its file as it is, or for a built-in one a new one.
+/// Document of a scene: its file as it is, or a new document for a built-in.
 ///
 /// # Errors
-/// A file that cannot be read any more or whose first buffer lies where nothing can be added.
+/// A file that can no longer be read, or whose first buffer lies where nothing can be added.
 pub fn open(scene: &Scene, most_bytes: u64) -> Result<Opened> {
     if scene.source.starts_with("builtin:") {
         let (glb, warnings) = write::document(scene)?;
@@ -283,7 +282,7 @@ pub fn open(scene: &Scene, most_bytes: u64) -> Result<Opened> {
     })
 }
 
-/// A file that is to be changed: as it is, and as it is read.
+/// A file to be modified: its content as stored and as parsed.
 struct File {
     bytes: Vec<u8>,
     is_binary: bool,

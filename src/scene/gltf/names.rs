@@ -1,7 +1,6 @@
 //! Names from a file, sanitised for printing.
 
-/// The file's name for a thing, else `kind` and its index. Control characters could steer a terminal: they are
-/// replaced.
+/// Name in the file, or else `kind` and index. Control characters are replaced, since they could steer a terminal.
 pub fn name(given: Option<&String>, kind: &str, index: usize) -> String {
     match given {
         Some(name) if !name.is_empty() => name

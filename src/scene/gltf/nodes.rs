@@ -17,15 +17,14 @@ use crate::scene::Camera;
 /// A node of the scene.
 #[derive(Clone, Debug)]
 pub struct PlacedNode {
-    /// glTF index.
     pub node: usize,
-    /// The file's name for it, or `nodeN`.
+    /// Name in the file, or `nodeN`.
     pub name: String,
-    /// From the node to the world.
     pub world_from_node: DAffine3,
 }
 
-/// The nodes of the default scene (else the first; else all that are nobody's child) that are not hidden, parents first.
+/// Visible nodes of the default scene, parents first; without a default scene, of the first one; without scenes, of all
+/// nodes that are no child.
 ///
 /// # Errors
 /// A reference to a node that does not exist; a transform that is not finite.
@@ -33,7 +32,7 @@ pub fn place(document: &Document, report: &mut Report) -> Result<Vec<PlacedNode>
     let root = &document.root;
     let mut reached = vec![false; root.nodes.len()];
     let mut placed = Vec::new();
-    // A stack of our own: a chain of a million nodes must not exhaust the thread's.
+    // Explicit stack: a chain of a million nodes must not overflow that of the thread.
     let mut waiting: Vec<(usize, DAffine3, bool)> = Vec::new();
     for node in top_nodes(root, report).into_iter().rev() {
         waiting.push((node, DAffine3::IDENTITY, false));
@@ -86,7 +85,7 @@ pub fn place(document: &Document, report: &mut Report) -> Result<Vec<PlacedNode>
     Ok(placed)
 }
 
-/// Name of the extension that hides nodes with all below them.
+/// Extension that hides nodes and their descendants.
 pub const VISIBILITY: &str = "KHR_node_visibility";
 
 fn is_hidden(node: &Node) -> bool {
@@ -193,10 +192,11 @@ fn unit(rotation: DQuat) -> DQuat {
     }
 }
 
-/// From a placed node to its parent, and the same as scale, rotation and translation [m] where it has no matrix.
+/// Transform from a placed node to its parent, and the same as scale, rotation and translation [m], which holds for
+/// nodes without a matrix.
 pub fn at_rest(document: &Document, node: usize) -> (DAffine3, (DVec3, DQuat, DVec3)) {
     let transform = &document.transforms[node];
-    // Placed nodes have a transform that can be read.
+    // The transforms of placed nodes are valid.
     let at_rest = local(transform, "", &mut Report::default()).unwrap_or(DAffine3::IDENTITY);
     let (scale, rotation, translation) = stated(transform);
     (at_rest, (scale, unit(rotation), translation))
@@ -210,7 +210,7 @@ fn not_finite(name: &str) -> Error {
     )
 }
 
-/// All perspective cameras of the placed nodes, with the glTF indices of these. What cannot be read is left out with a
+/// Perspective cameras of the placed nodes, with the glTF indices of these. Unreadable ones are left out with a
 /// warning.
 pub fn read_all(root: &Root, placed: &[PlacedNode], report: &mut Report) -> (Vec<Camera>, Vec<usize>) {
     let mut nodes = Vec::new();
@@ -260,7 +260,7 @@ fn read_one(source: &Source, placed: &PlacedNode) -> std::result::Result<Camera,
     }
     let axis = |axis: DVec3| placed.world_from_node.transform_vector3(axis).try_normalize();
     let forward = axis(DVec3::NEG_Z);
-    // Scaled or sheared nodes do not bend a camera: its axes are made perpendicular again.
+    // Scale and shear do not affect a camera: its axes are made orthogonal again.
     let right = axis(DVec3::Y)
         .zip(forward)
         .and_then(|(up, forward)| forward.cross(up).try_normalize());

@@ -13,7 +13,8 @@ use crate::error::{Error, Result};
 use crate::scene::Mesh;
 use crate::scene::mesh::cofactors;
 
-/// What bends meshes, as the file states it. Faults in it cost the pose and not the scene, so it is read by itself.
+/// Morph targets and skins as stated in the file. They are read separately, since faults in them must not stop the
+/// scene.
 #[derive(Clone, Debug, Default, Deserialize)]
 #[serde(default)]
 pub struct Poses {
@@ -22,7 +23,7 @@ pub struct Poses {
     skins: Vec<Maybe<Skin>>,
 }
 
-/// A part of a file that faults in it cost alone.
+/// A part of a file whose faults affect only itself.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(untagged)]
 pub enum Maybe<T> {
@@ -66,10 +67,10 @@ struct Skin {
     inverse_bind_matrices: Option<u32>,
 }
 
-/// For each vertex four joints of its skin, and their weights.
+/// Per vertex, four joints of its skin, and their weights.
 pub type SkinWeights = (Vec<[f64; 4]>, Vec<[f64; 4]>);
 
-/// A primitive of a mesh at a node.
+/// A primitive of a mesh, at a node.
 #[derive(Clone, Copy, Debug)]
 pub struct PrimitiveInstance {
     pub node: usize,
@@ -78,23 +79,22 @@ pub struct PrimitiveInstance {
 }
 
 impl Poses {
-    /// Those of a file.
     pub fn of(file: &Map<String, Value>) -> Self {
         Self::deserialize(file).unwrap_or_default()
     }
 
-    /// Whether a node has a skin, which stands where its joints do.
+    /// Whether a node has a skin, which then places its mesh instead of the node's transform.
     pub fn has_skin(&self, node: usize) -> bool {
         self.node(node).is_some_and(|node| node.skin.is_some())
     }
 
-    /// Whether a node bends its mesh by itself, so that no other node can share it.
+    /// Whether a node deforms its mesh individually, so that no other node can share it.
     pub fn is_own(&self, node: usize) -> bool {
         let node = self.node(node);
         node.is_some_and(|node| node.skin.is_some() || !node.weights.is_empty())
     }
 
-    /// Whether a primitive is bent.
+    /// Whether a primitive is deformed.
     pub fn bend(&self, place: PrimitiveInstance) -> bool {
         let mesh = self.meshes.get(place.mesh).and_then(Maybe::get);
         let part = mesh.and_then(|mesh| mesh.primitives.get(place.primitive));
@@ -105,7 +105,7 @@ impl Poses {
         self.nodes.get(node)?.get()
     }
 
-    /// Moves a mesh by its morph targets.
+    /// Applies the morph targets of a primitive to its mesh.
     ///
     /// # Errors
     /// Targets that do not fit the mesh.
@@ -145,10 +145,10 @@ impl Poses {
         Ok(())
     }
 
-    /// What brings vertices that hang on the joints of a node's skin into the world.
+    /// World transforms of the joints of a node's skin, to apply to its vertices.
     ///
     /// # Errors
-    /// A skin that does not exist, or whose joints do not stand in the scene.
+    /// A skin that does not exist, or whose joints are not in the scene.
     pub fn joints(
         &self,
         node: usize,
@@ -179,10 +179,10 @@ impl Poses {
     }
 }
 
-/// Puts the vertices of a mesh where the joints that they hang on have them in the world.
+/// Skinning: moves the vertices of a mesh to the world by a weighted mean of joint transforms.
 ///
 /// # Errors
-/// Vertices that hang on joints which do not exist, or on nothing.
+/// Vertices without weights, or with joints that do not exist.
 pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[SkinWeights], owner: &str) -> Result<()> {
     let mut sums = vec![DMat4::ZERO; mesh.positions.len()];
     for (indices, weights) in influences {
@@ -197,7 +197,7 @@ pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[SkinWeights], owner
         }
     }
     for (vertex, sum) in sums.into_iter().enumerate() {
-        // Weights need not add up to exactly 1.
+        // Normalises weights that do not add up to exactly 1.
         let matrix = DAffine3::from_mat4(sum * sum.w_axis.w.recip());
         if !matrix.is_finite() {
             return Err(unlike(owner));

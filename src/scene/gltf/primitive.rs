@@ -18,78 +18,76 @@ use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::scene::Mesh;
 
-/// Beyond this [m], squares and volumes leave the range in which they are exact enough to be of use.
+/// Limit of the coordinates of vertices [m]: beyond it, squares and volumes are too inexact to be of use.
 const FARTHEST_M: f64 = 1e12;
 
-/// Share of a mesh's extent by which its vertices may be rounded without a word [1].
+/// Largest rounding of vertices relative to the extent of their mesh that needs no warning [1].
 const LARGEST_ROUNDING: f64 = 1e-5;
 
-/// Bytes of a vertex and a triangle while they are read.
+/// Memory of a vertex, a triangle and a vertex colour while they are read [bytes].
 const VERTEX_BYTES: u64 = 2 * 80;
 const TRIANGLE_BYTES: u64 = 2 * 12;
 const COLOUR_BYTES: u64 = 2 * 12;
 
-/// Takes the memory of one more copy of a mesh.
+/// Reserves the memory of one more copy of a mesh.
 ///
 /// # Errors
-/// Not so much is left.
+/// Too little is left.
 pub fn take_copy(mesh: &Mesh, owner: &str, budget: &mut Budget) -> Result<()> {
     budget.take(mesh.positions.len() as u64 * VERTEX_BYTES, owner)?;
     budget.take(3 * mesh.triangles.len() as u64 * TRIANGLE_BYTES, owner)
 }
 
-/// The primitives that were read: nodes with the same mesh share them.
+/// Primitives read so far; nodes with the same mesh share them.
 #[derive(Debug, Default)]
 pub struct Primitives {
-    /// By the indices of mesh and primitive, and of the node that bends it, if one does.
+    /// By mesh, primitive and, if the node deforms the mesh by itself, node.
     known: HashMap<(usize, usize, Option<usize>), KnownPrimitive>,
-    /// Triangles without an area.
+    /// Number of triangles without area.
     pub degenerate: usize,
 }
 
-/// A primitive of the file.
 #[derive(Debug)]
 struct KnownPrimitive {
-    /// `None` where it has no triangles.
+    /// `None` if it has no triangles.
     source: Option<Local>,
-    /// What objects were made of it. Which triangles have an area depends on the transform by what it rounds.
+    /// Meshes made of it for objects. Rounding in the transform decides which triangles have an area.
     made: Vec<(Variant, Arc<Mesh>)>,
 }
 
-/// A primitive as the file has it.
+/// A primitive as stored in the file.
 #[derive(Debug)]
 struct Local {
     mesh: Mesh,
     has_normals: bool,
-    /// Whether its positions were rounded to single precision.
+    /// Whether its positions are stored in single precision.
     is_rounded: bool,
-    /// Of all its vertices, or their mean over the area; `None` where the mesh has their colours.
+    /// Uniform vertex colour or area-weighted mean; `None` without colours, or if the mesh has them per vertex.
     colour: Option<LinearSrgb>,
 }
 
-/// What primitives are read from.
+/// Source data of primitives.
 #[derive(Clone, Copy, Debug)]
 pub struct PrimitiveSource<'a> {
-    /// The file's data.
     pub reader: Reader<'a>,
-    /// What bends meshes.
+    /// Morph targets and skins.
     pub poses: &'a Poses,
-    /// Where nodes stand, by their glTF index.
+    /// World transforms of nodes, by glTF index.
     pub stands: &'a HashMap<usize, DAffine3>,
 }
 
-/// What two meshes of one primitive differ in.
+/// Properties in which two meshes of one primitive differ.
 #[derive(Debug, PartialEq)]
 struct Variant {
     has_area: Vec<bool>,
-    /// Corners are split in the order of the scene's triangles.
+    /// Whether split corners are in the order of mirrored triangles, as in the scene.
     is_split_mirrored: bool,
-    /// Normals are unit already, so that mesh and mesh in the scene are one.
+    /// Whether the transform is the identity; the mesh then has unit normals and is also that of the scene.
     stands_at_origin: bool,
 }
 
 impl Variant {
-    /// The mesh of a primitive, without what would not be seen.
+    /// Mesh of a primitive, without triangles and vertices that would not be seen.
     fn of(&self, source: &Mesh, has_normals: bool, owner: &str, report: &mut Report) -> Mesh {
         let mut mesh = source.clone();
         let mut has_area = self.has_area.iter();
@@ -105,12 +103,12 @@ impl Variant {
 }
 
 impl Primitives {
-    /// The triangles of a primitive, in coordinates from which `world_from_node` brings them into the world, and the
-    /// colour of its vertices, if they have one; their mean unless it `has_colours`. `None`, with a warning, where it has
-    /// none there.
+    /// Triangles of a primitive, in coordinates that `world_from_node` maps to the world, and their vertex colour, if
+    /// any. Colours that vary are kept in the mesh if it `has_colours`, and averaged otherwise. `None`, with a warning,
+    /// if no triangle has an area there.
     ///
     /// # Errors
-    /// Positions that are not finite or too far, indices of vertices that do not exist, broken accessors.
+    /// Positions that are not finite or too far away, indices of missing vertices, broken accessors.
     pub fn read(
         &mut self,
         source: PrimitiveSource,
@@ -168,13 +166,13 @@ impl Primitives {
         Ok(Some((mesh, local.colour)))
     }
 
-    /// Forgets a mesh that no other node has.
+    /// Drops a mesh that no further node has.
     pub fn forget(&mut self, mesh: usize) {
         self.known.retain(|(known, ..), _| *known != mesh);
     }
 }
 
-/// What a primitive has of each vertex.
+/// Vertex attributes of a primitive.
 struct Vertices<'a> {
     reader: Reader<'a>,
     primitive: &'a Primitive,
@@ -187,7 +185,7 @@ impl Vertices<'_> {
         self.primitive.attributes.get(&Checked::Valid(semantic)).copied()
     }
 
-    /// An attribute; `None` where the primitive does not have it.
+    /// An attribute; `None` if the primitive does not have it.
     fn read<const N: usize>(
         &self,
         semantic: Semantic,
@@ -209,7 +207,7 @@ impl Vertices<'_> {
             .ok_or_else(|| Error::failure(self.owner, what(), "export the file again"))
     }
 
-    /// The same for every vertex, or `None`, with a warning where there is another number of them.
+    /// An attribute of every vertex; `None` if it is missing or, with a warning, has another number of values.
     fn one_each<const N: usize, T: From<[f64; N]>>(
         &self,
         (semantic, what): (Semantic, &str),
@@ -223,7 +221,7 @@ impl Vertices<'_> {
         Ok(fits.map(convert))
     }
 
-    /// The mesh as its file has it at rest.
+    /// The mesh with morph targets and skin applied, in the file's rest pose.
     fn bent(
         &self,
         source: PrimitiveSource,
@@ -276,7 +274,7 @@ impl Vertices<'_> {
         }
     }
 
-    /// Mean of the colours over the area of the triangles, and the colours themselves where they vary.
+    /// Area-weighted mean of the colours and, if they vary, the colours themselves.
     fn colours(&self, mesh: &Mesh, budget: &mut Budget, report: &mut Report) -> Result<Option<Colours>> {
         let Some(index) = self.index(Semantic::Colors(0)) else {
             return Ok(None);
@@ -311,7 +309,7 @@ impl Vertices<'_> {
             return Ok(None);
         }
         let mean = mean.clamp(DVec3::ZERO, DVec3::ONE);
-        // One colour is the same wherever it is averaged, and white is white.
+        // Rounded, so that a uniform colour is independent of the averaging and white stays white.
         let mean = (mean / COLOUR_STEP).round() * COLOUR_STEP;
         let varies = colours.iter().any(|colour| colour.distance(mean) > SAME_COLOUR);
         let linear = |colour: &DVec3| colour.clamp(DVec3::ZERO, DVec3::ONE).as_vec3().to_array();
@@ -322,20 +320,19 @@ impl Vertices<'_> {
     }
 }
 
-/// Colours of vertices.
 struct Colours {
     mean: LinearSrgb,
-    /// Where they vary.
+    /// `None` if they are uniform.
     of_vertices: Option<Vec<[f32; 3]>>,
 }
 
-/// Colours of vertices differ by no more where they are one colour.
+/// Largest distance from the mean at which vertex colours count as uniform.
 const SAME_COLOUR: f64 = 1e-3;
 
-/// Mean colours are rounded to multiples of this, a power of 2.
+/// Step to which mean colours are rounded, a power of 2.
 const COLOUR_STEP: f64 = 1.0 / 1_048_576.0;
 
-/// The primitive in its node's coordinates.
+/// Reads a primitive in its node's coordinates.
 fn read_local(
     source: PrimitiveSource,
     (place, primitive, has_colours): (PrimitiveInstance, &Primitive, bool),
@@ -488,8 +485,8 @@ fn finite_uvs(mut uvs: Vec<DVec2>, owner: &str, report: &mut Report) -> Vec<DVec
     uvs
 }
 
-/// Single precision places vertices to a share of their distance from their node's origin: says so, with the figure,
-/// where that is much of the mesh itself.
+/// Warns if single precision rounds vertices, in proportion to their distance from the node's origin, by much relative
+/// to the size of the mesh; states the rounding error.
 fn warn_of_rounding(mesh: &Mesh, world_from_node: &DAffine3, owner: &str, report: &mut Report) {
     let Some((low, high)) = mesh.bounds() else {
         return;
@@ -497,7 +494,7 @@ fn warn_of_rounding(mesh: &Mesh, world_from_node: &DAffine3, owner: &str, report
     let far = low.abs().max(high.abs()).max_element();
     let rounding = 0.5 * f64::from(f32::EPSILON) * far.log2().floor().exp2();
     let extent = (high - low).max_element();
-    // Not finite: refused when it is placed.
+    // If not finite, the mesh is refused on placement.
     if !(rounding.is_finite() && extent.is_finite() && rounding > LARGEST_ROUNDING * extent) {
         return;
     }
@@ -518,7 +515,7 @@ fn warn_of_rounding(mesh: &Mesh, world_from_node: &DAffine3, owner: &str, report
     );
 }
 
-/// Which triangles have an area in the world.
+/// Which triangles have an area in world coordinates.
 ///
 /// # Errors
 /// A vertex that is not finite, or too far away.
@@ -549,7 +546,7 @@ fn have_area(mesh: &Mesh, world_from_node: &DAffine3, owner: &str) -> Result<Vec
     Ok(mesh.triangles.iter().map(has_area).collect())
 }
 
-/// Leaves only the vertices of triangles, since others would widen the bounds.
+/// Drops vertices without triangles, since these would widen the bounds.
 fn drop_unused_vertices(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.positions.len()];
     for vertex in mesh.triangles.iter().flatten() {
@@ -576,10 +573,10 @@ fn drop_unused_vertices(mesh: &mut Mesh) {
     }
 }
 
-/// How far from 1 [relative] the length of a normal may be before it is worth a word; 8-bit normals stay within it.
+/// Largest deviation of a normal's length from 1 that needs no warning [1]; 8-bit normals stay within it.
 const UNIT_TOLERANCE: f64 = 0.02;
 
-/// Splits all corners, so that each triangle has its own normal, as glTF wants where normals are missing.
+/// Splits all corners for flat shading, which glTF requires where normals are missing.
 fn split_corners(mesh: &mut Mesh, is_mirrored: bool) {
     let [second, third] = if is_mirrored { [2, 1] } else { [1, 2] };
     let order: Vec<u32> = mesh
@@ -606,7 +603,7 @@ fn split_corners(mesh: &mut Mesh, is_mirrored: bool) {
     };
 }
 
-/// Tells of normals that are not unit, and makes those 0 that are nothing.
+/// Warns of normals that are not unit length, and sets invalid ones to 0.
 fn check_normals(mesh: &mut Mesh, owner: &str, report: &mut Report) {
     let (mut replaced, mut rescaled) = (0, 0);
     for normal in &mut mesh.normals {

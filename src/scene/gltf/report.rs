@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result, Warning};
 
-/// Warnings: the same thing met at several places is said once.
+/// Collects warnings; a warning of several places is given once.
 #[derive(Debug, Default)]
 pub struct Report {
     found: Vec<CheckResult>,
@@ -16,14 +16,14 @@ struct CheckResult {
     locations: Vec<String>,
 }
 
-/// More would bury the ones that matter.
+/// Largest number of warnings: more would bury the ones that matter.
 const MAX_FINDINGS: usize = 60;
 
-/// Places that a warning names before it only counts them.
+/// Largest number of places that a warning names; further ones are counted.
 const MAX_LOCATIONS: usize = 4;
 
 impl Report {
-    /// Notes something repaired or ignored.
+    /// Warns of something repaired or ignored.
     pub fn warn(&mut self, location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) {
         let (location, what, remedy) = (location.into(), what.into(), remedy.into());
         let same = |known: &&mut CheckResult| known.what == what && known.remedy == remedy;
@@ -42,7 +42,7 @@ impl Report {
         }
     }
 
-    /// All of them, in the order they were first met.
+    /// All warnings, in the order of their first occurrence.
     pub fn into_warnings(self) -> Vec<Warning> {
         let mut warnings: Vec<Warning> = self.found.into_iter().map(CheckResult::into_warning).collect();
         if self.left_out > 0 {
@@ -75,17 +75,16 @@ pub struct Budget {
 }
 
 impl Budget {
-    /// A budget of `limit` bytes.
     pub fn new(limit: u64) -> Self {
         Self { limit, left: limit }
     }
 
-    /// What may still be taken [bytes].
+    /// Remaining memory [bytes].
     pub fn left(&self) -> u64 {
         self.left
     }
 
-    /// Books memory before it is allocated.
+    /// Reserves memory before it is allocated.
     ///
     /// # Errors
     /// More than is left.

@@ -6,8 +6,8 @@ use gltf::json::Value;
 use super::report::Report;
 use crate::scene::{LightKind, LightSize};
 
-/// The size of a light of that kind, where the extras of its node or else its own state one that can be; 0 is none. What
-/// is stated and not taken is named.
+/// Extent of a light, from the extras of its node or else its own; 0 means none. Values that are invalid or unsuitable
+/// for the kind cause a warning.
 pub fn read(extras: [Option<&Value>; 2], kind: &LightKind, owner: &str, report: &mut Report) -> LightSize {
     let stated = |key: &str| extras.into_iter().flatten().find_map(|extras| extras.get(key));
     let (radius_m, angle_deg) = (stated("radius_m"), stated("angular_diameter_deg"));

@@ -1,5 +1,5 @@
-//! Spectra of lamps: `spectrum` in the `extras` of the node or else of the light, or of a material that glows; by name or
-//! as a CSV file beside the scene.
+//! Spectra of lights: `spectrum` in the `extras` of a node, of its light, or of an emissive material; by name or as a
+//! CSV file beside the scene.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -16,13 +16,13 @@ use crate::optics::spectrum::csv::read_lamp;
 use crate::optics::spectrum::{Spectrum, illuminant};
 use crate::scene::Light;
 
-/// Where a spectrum stands in extras.
+/// Key of a spectrum in extras.
 pub const KEY: &str = "spectrum";
 
-/// More than any table of a lamp takes [bytes].
+/// Size limit, larger than any table of a spectrum [bytes].
 const MAX_CSV_BYTES: u64 = 16 << 20;
 
-/// What is stated for a light: by its node, or else by its entry in a list of lights.
+/// Spectrum stated for a light: by its node, or else by its entry in a list of lights.
 pub fn stated<'a>(
     document: &'a Document,
     node: usize,
@@ -33,11 +33,10 @@ pub fn stated<'a>(
     of_node.or_else(|| extras::stated(of_lights, light, KEY))
 }
 
-/// Gives a lamp the spectrum that is stated for it, if any, in place of its colour.
+/// Replaces the colour of a light by its stated spectrum, if any.
 ///
 /// # Errors
-/// A spectrum that does not exist or that nobody could see, a file that cannot be read or lies elsewhere than in
-/// `folder` or below.
+/// A spectrum that does not exist or is not visible; a file that cannot be read or lies outside `folder`.
 pub fn apply(
     light: &mut Light,
     stated: Option<&Value>,
@@ -60,10 +59,10 @@ pub fn apply(
     Ok(())
 }
 
-/// The spectrum that is stated, scaled to one luminous-equivalent watt.
+/// Reads a stated spectrum and scales it to one luminous-equivalent watt.
 ///
 /// # Errors
-/// As [`apply`].
+/// Those of [`apply`].
 pub fn read(stated: &Value, folder: &Path, owner: &str) -> Result<Arc<Spectrum>> {
     by_name_or_file(text(stated, KEY, owner)?, folder, owner).map(Arc::new)
 }

@@ -12,26 +12,26 @@ use crate::optics::wavelength::VISIBLE;
 use crate::optics::{Glass, Metal, Nanometres};
 use crate::scene::Scene;
 
-/// The extension that states an Abbe number, as 20/V_d.
+/// Extension that states an Abbe number, as 20/V_d.
 pub const NAME: &str = "KHR_materials_dispersion";
-/// Where a glass stands in a material's extras.
+/// Key of a glass in the extras of a material.
 pub const GLASS_KEY: &str = "glass";
-/// Where a metal does.
+/// Key of a metal in the extras of a material.
 pub const METAL_KEY: &str = "metal";
 
-/// What a material says that it is made of.
+/// Substance that a material states.
 #[derive(Debug)]
 pub enum Composition {
-    /// A glass by number, name or formula.
+    /// By number, name or formula.
     Glass(Glass),
-    /// A metal by name.
+    /// By name.
     Metal(&'static Metal),
 }
 
-/// What extras state; `None` where they state nothing.
+/// Reads the extras; `None` if they state nothing.
 ///
 /// # Errors
-/// A glass or metal that does not exist, or both at once. `owner` says whose they are.
+/// An unknown glass or metal, or both at once. `owner` is named in errors.
 pub fn read(glass: Option<&Value>, metal: Option<&Value>, owner: &str) -> Result<Option<Composition>> {
     let substance = match (glass, metal) {
         (None, None) => return Ok(None),
@@ -51,18 +51,18 @@ pub fn read(glass: Option<&Value>, metal: Option<&Value>, owner: &str) -> Result
     Ok(Some(substance))
 }
 
-/// How a file states a glass beside its index at 587.56 nm.
+/// How a file states a glass, apart from its index at 587.56 nm.
 #[derive(Debug)]
 pub enum GlassStatement<'a> {
     /// In the extras, under [`GLASS_KEY`].
     Name(&'a str),
-    /// By the extension [`NAME`]: 20/V_d.
+    /// As 20/V_d, by the extension [`NAME`].
     Dispersion(f64),
-    /// Not at all: it has one index.
+    /// Not at all: the index is constant.
     Nothing,
 }
 
-/// How to state a glass; `None` where a file cannot.
+/// How to state a glass; `None` if a file cannot.
 pub fn stated(glass: &Glass) -> Option<GlassStatement<'_>> {
     let is_named = Glass::parse(&glass.name).is_ok_and(|found| found.dispersion == glass.dispersion);
     match glass.dispersion {
@@ -73,10 +73,10 @@ pub fn stated(glass: &Glass) -> Option<GlassStatement<'_>> {
     }
 }
 
-/// The glass of an index at 587.56 nm and of what the extension states; `None` for no dispersion.
+/// Glass of an index at 587.56 nm with the dispersion that the extension states; `None` without dispersion.
 ///
 /// # Errors
-/// What cannot be, and what was done about it, for a warning.
+/// The fault and how it was handled, for a warning.
 pub fn dispersion(ior: f64, extension: &Value) -> std::result::Result<Option<Glass>, String> {
     let stated = match extension.get("dispersion") {
         None => return Ok(None),
@@ -94,7 +94,7 @@ pub fn dispersion(ior: f64, extension: &Value) -> std::result::Result<Option<Gla
     }
 }
 
-/// Says of which dispersive objects the glass is used beyond what its formula was made for, in the scene's light.
+/// Warns of dispersive objects whose glass is used outside the range of its formula, in the scene's light.
 pub fn warn_of_ranges(scene: &Scene, report: &mut Report) {
     let light = wavelengths(scene);
     for (index, material) in scene.materials.iter().enumerate() {
@@ -112,7 +112,7 @@ pub fn warn_of_ranges(scene: &Scene, report: &mut Report) {
     }
 }
 
-/// The visible wavelengths that the lamps have; all of them where a lamp says nothing of its own.
+/// Range of visible wavelengths in the scene's light; a light without a spectrum has all of them.
 fn wavelengths(scene: &Scene) -> RangeInclusive<Nanometres> {
     let (first, last) = VISIBLE.into_inner();
     let range = |light: &crate::scene::Light| {

@@ -16,11 +16,11 @@ use crate::optics::LinearSrgb;
 use crate::scene::watertight::{has_volume, is_closed};
 use crate::scene::{Material, Mesh, Object, Scene, instances};
 
-/// Adds all objects, and to `materials` (in file order so far) those that the file only implies. `solid_glass` reads thin
-/// walls as solid glass where their mesh encloses space.
+/// Adds all objects, and to `materials`, which has those of the file, any that the file only implies. `solid_glass`
+/// reads thin walls as solid glass if their mesh encloses space.
 ///
 /// # Errors
-/// A mesh that does not exist, or as [`Primitives::read`].
+/// A mesh that does not exist; those of [`Primitives::read`].
 pub fn add_objects(
     scene: &mut Scene,
     source: primitive::PrimitiveSource,
@@ -51,7 +51,7 @@ pub fn add_objects(
                 "export the file again",
             ));
         };
-        // Joints place what they bend, wherever its node stands.
+        // A skinned mesh is placed by its joints, whatever the transform of its node.
         let world_from_node = match source.poses.has_skin(placed.node) {
             true => DAffine3::IDENTITY,
             false => placed.world_from_node,
@@ -99,10 +99,10 @@ pub fn add_objects(
     Ok(())
 }
 
-/// Takes the memory of the copies that will be made of meshes that several objects have.
+/// Reserves the memory of copies of meshes that several objects share but that are not instanced.
 ///
 /// # Errors
-/// Not so much is left.
+/// Too little is left.
 fn take_copies(objects: &[Object], budget: &mut Budget) -> Result<()> {
     let mut known = HashSet::new();
     for (object, is_instance) in objects
@@ -124,20 +124,20 @@ fn owner(mesh: &mesh::Mesh, mesh_index: usize, primitive: usize) -> String {
     )
 }
 
-/// The file's materials, and those that it only implies after them.
+/// Materials of the file, followed by those that it only implies.
 #[derive(Debug)]
 pub struct Materials {
     all: Vec<Material>,
     in_file: usize,
     default: Option<usize>,
-    /// What became of each thin wall among the file's materials: as which it is used, and its twin of the other kind.
+    /// For each thin wall of the file: whether it became solid, and its variant of the other kind.
     thin: HashMap<usize, (bool, Option<usize>)>,
-    /// The twins in other colours: of which material, by what it is multiplied, and which it is.
+    /// Tinted variants: original material, tint, variant.
     tinted: Vec<(usize, LinearSrgb, usize)>,
 }
 
 impl Materials {
-    /// Starts with the file's own.
+    /// Starts with the materials of the file.
     pub fn new(in_file: Vec<Material>) -> Self {
         Self {
             in_file: in_file.len(),
@@ -148,7 +148,6 @@ impl Materials {
         }
     }
 
-    /// All materials that objects refer to.
     pub fn into_all(self) -> Vec<Material> {
         self.all
     }
@@ -171,14 +170,14 @@ impl Materials {
         })
     }
 
-    /// Whether a material is diffuse, or diffuse under polish.
+    /// Whether a material is diffuse, with or without a coat.
     fn is_opaque_body(&self, material: usize) -> bool {
         let surface = self.all[material].surface;
         surface.is_receiver() && surface.is_opaque()
     }
 
-    /// The material of a thin wall for a mesh that is solid or not; any other stays. The first mesh decides what the
-    /// material itself becomes, and meshes of the other kind have a twin of it.
+    /// Variant of a thin-walled material for a solid or an open mesh; other materials stay the same. The first mesh
+    /// decides what the material itself becomes; meshes of the other kind get a variant.
     fn thin_or_solid(&mut self, material: usize, is_solid: impl FnOnce() -> bool) -> usize {
         let is_known = self.thin.contains_key(&material);
         if !is_known && !material::is_thin(&self.all[material]) {
@@ -204,7 +203,7 @@ impl Materials {
         })
     }
 
-    /// Warns of the thin walls that are left.
+    /// Warns of the remaining thin walls.
     pub fn warn_of_thin_walls(&self, solid_glass: bool, report: &mut Report) {
         for material in self.all.iter().filter(|material| material::is_thin(material)) {
             report.warn(
@@ -219,7 +218,7 @@ impl Materials {
         }
     }
 
-    /// The material with its base colour multiplied, where that changes it.
+    /// Variant of a material with its base colour multiplied by `colour`.
     fn tinted(&mut self, material: usize, colour: Option<LinearSrgb>) -> usize {
         let Some(colour) = colour.filter(|colour| *colour != LinearSrgb::WHITE) else {
             return material;

@@ -9,7 +9,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use crate::error::{Error, Result};
 use crate::files;
 
-/// Writers leave the padding out, or something in its bits.
+/// Tolerant, since some writers omit the padding or leave bits set in it.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
     &STANDARD,
     GeneralPurposeConfig::new()
@@ -17,16 +17,16 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
         .with_decode_allow_trailing_bits(true),
 );
 
-/// Bytes of a kind as a URI of their own.
+/// Data URI of bytes with a media type.
 pub fn data(kind: &str, bytes: &[u8]) -> String {
     format!("data:{kind};base64,{}", BASE64.encode(bytes))
 }
 
-/// The bytes behind a URI, at most `max_bytes`.
+/// Content behind a URI, at most `max_bytes`.
 ///
 /// # Errors
-/// Another scheme than `data:`; a path that leaves `folder`; a missing or too large file; data that is no base64.
-/// `owner` says whose URI it is.
+/// Another scheme than `data:`; a path that leaves `folder`; a missing or too large file; invalid base64. `owner` is
+/// named in errors.
 pub fn read(uri: &str, folder: &Path, max_bytes: u64, owner: &str) -> Result<Vec<u8>> {
     if let Some(data) = strip_prefix_ignoring_case(uri, "data:") {
         return read_data(data, owner);
@@ -47,9 +47,9 @@ fn read_data(data: &str, owner: &str) -> Result<Vec<u8>> {
     percent_decode(payload).ok_or_else(|| refused("its data URI is not valid"))
 }
 
-/// The file that a URI names, where it may be read.
+/// Path of the file that a URI names; `None` if it may not be read.
 pub fn file(uri: &str, folder: &Path) -> Option<PathBuf> {
-    // Data, and texts that no system takes for a name.
+    // Longer strings are data, or too long for a file name on any system.
     const MAX_BYTES: usize = 1024;
     if uri.len() > MAX_BYTES {
         return None;
@@ -57,7 +57,8 @@ pub fn file(uri: &str, folder: &Path) -> Option<PathBuf> {
     path_within(folder, uri, "").ok()
 }
 
-/// A relative path below the folder. A file from elsewhere must not make us open what it likes.
+/// Resolves a relative path below `folder`. Files from elsewhere are refused, since a scene must not make the program
+/// open arbitrary ones.
 fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
     let refused = |what: &str| {
         Error::failure(
@@ -85,7 +86,8 @@ fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
     let Some(relative) = decoded.filter(|path| !path.is_empty() && !path.contains('\0')) else {
         return Err(refused("its URI is not valid"));
     };
-    // Backslashes and drives are path syntax on Windows only; refused everywhere, so that a scene reads alike.
+    // Backslashes and drives are path syntax on Windows only; refused everywhere, so that a scene reads the same on all
+    // systems.
     let mut components = Path::new(&relative).components();
     let stays = components.all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
     if !stays || relative.contains('\\') || relative.contains(':') {
@@ -96,7 +98,7 @@ fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
     Ok(folder.join(relative))
 }
 
-/// Percent-encoding (RFC 3986, section 2.1) resolved; `None` where it is broken.
+/// Resolves percent-encoding (RFC 3986, section 2.1); `None` if it is malformed.
 fn percent_decode(text: &str) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.bytes();

@@ -11,10 +11,10 @@ use super::report::Report;
 use crate::scene::waves::gravity_period_s;
 use crate::scene::{Wave, Waves};
 
-/// Where waves stand in a material's extras.
+/// Key of waves in the extras of a material.
 pub const KEY: &str = "nephroid_waves";
 
-/// A wave as the file states it.
+/// A wave as stated in the file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct WaveEntry {
@@ -23,13 +23,13 @@ struct WaveEntry {
     direction: Vec<f64>,
     #[serde(default)]
     phase_rad: f64,
-    /// 0 stands still; without it gravity moves the wave.
+    /// 0 if the wave stands still; `None` if gravity moves it.
     period_s: Option<f64>,
-    /// Of the water [m]; deep without it.
+    /// Depth of the water [m]; `None` for deep water.
     depth_m: Option<f64>,
 }
 
-/// The waves that a material states; those that cannot be are left out with a warning.
+/// Waves that a material states; `None`, with a warning, if any is invalid.
 pub fn read(stated: &Value, owner: &str, report: &mut Report) -> Option<Waves> {
     let waves = Vec::<WaveEntry>::deserialize(stated)
         .map_err(|error| format!("its `{KEY}` cannot be read ({error})"))
@@ -71,7 +71,7 @@ fn wave(stated: &WaveEntry) -> Result<Wave, String> {
     })
 }
 
-/// Waves as a file states them, of a scene whose origin is shifted by so much [m].
+/// Waves as a file states them; `shift` leads from scene to world coordinates [m].
 pub fn written(waves: &Waves, shift: DVec3) -> Value {
     let stated = Vec::<Wave>::from(waves.with_origin(-shift));
     let wave = |wave: &Wave| {

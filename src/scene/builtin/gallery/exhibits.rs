@@ -11,21 +11,20 @@ use crate::scene::builtin::{parts, shapes};
 use crate::scene::{Light, Scene};
 use crate::units::Flux;
 
-/// Middle of the basin on the floor [m].
+/// Centre of the basin on the floor [m].
 pub const BASIN: DVec3 = DVec3::new(-1.4, 0.0, -1.0);
-/// Middle of the prism [m].
+/// Centre of the prism [m].
 pub const PRISM: DVec3 = DVec3::new(-0.5, PEDESTAL_M + 0.5 * PRISM_LENGTH_M + GAP_M, -0.78);
-/// Height of the water [m].
+/// Height of the water surface [m].
 pub const WATER_M: f64 = 0.74;
 
 const PEDESTAL_M: f64 = 1.34;
 const PRISM_LENGTH_M: f64 = 0.14;
 /// Dense flint: n_d = 1.785, V_d = 25.8.
 const FLINT: &str = "785258";
-/// Above what a thing stands on: faces in the same place would have no order [m].
+/// Gap between an exhibit and its support [m]: coincident faces would have no order.
 const GAP_M: f64 = 0.001;
 
-/// All of them.
 pub fn add(scene: &mut Scene) {
     let stone = patterns::add(scene, "stone", 0.9, |place| {
         patterns::stone(place, DVec3::new(168.0, 160.0, 148.0))
@@ -35,7 +34,7 @@ pub fn add(scene: &mut Scene) {
     add_block(scene, stone);
 }
 
-/// A box that something stands on: its top has a map of its own.
+/// Adds a box for something to stand on; each face has a map of its own.
 fn add_stand(scene: &mut Scene, name: &str, top: DVec3, half_m: f64, material: usize) {
     let half = DVec3::new(half_m, 0.5 * top.y, half_m);
     let middle = top - DVec3::Y * half.y;
@@ -85,17 +84,17 @@ fn add_basin(scene: &mut Scene, stone: usize) {
     }
 }
 
-/// Half the sides of the slit that the beam goes through, and of the plate around it [m].
+/// Half sides of the slit for the beam, and of the plate around it [m].
 const SLIT_HALF_M: [f64; 2] = [0.0014, 0.03];
 const PLATE_HALF_M: f64 = 0.05;
-/// From lamp to slit and from slit to prism [m].
+/// Distances from light to slit and from slit to prism [m].
 const TO_SLIT_M: f64 = 0.45;
 const TO_PRISM_M: f64 = 0.22;
 
 fn prism() -> (Prism, f64) {
     let n = parts::glass(FLINT).ior;
     let (sine, cosine) = 8.0_f64.to_radians().sin_cos();
-    // Upright; yellow light comes in along the back wall and leaves towards it.
+    // Upright; yellow light arrives along the back wall and is deflected towards it.
     let prism = Prism {
         centroid: PRISM,
         along_base: DVec3::new(cosine, 0.0, -sine),
@@ -124,14 +123,14 @@ fn add_prism(scene: &mut Scene, stone: usize) {
     );
 }
 
-/// Middle of the spectrum on the back wall [m].
+/// Centre of the spectrum on the back wall [m].
 pub fn spectrum() -> DVec3 {
     let (prism, n) = prism();
     let (exit, direction) = (prism.exit(), prism.outgoing(n));
     exit + direction * ((room::Z[0] - exit.z) / direction.z)
 }
 
-/// The beam through the slit, at minimum deviation.
+/// Light that reaches the slit, at minimum deviation.
 pub fn prism_beam() -> Light {
     let (prism, n) = prism();
     let direction = prism.incoming(n);
@@ -140,7 +139,7 @@ pub fn prism_beam() -> Light {
     parts::beam("prism beam", from, direction, half_angle_rad, Flux(0.4))
 }
 
-/// Middle of the block, and the lamp before it [m].
+/// Centre of the block, and position of its light [m].
 const BLOCK: DVec3 = DVec3::new(1.0, 1.27, -0.8);
 pub const BLOCK_LAMP: DVec3 = DVec3::new(-0.3, 1.5, 0.4);
 
@@ -157,7 +156,7 @@ pub fn block() -> Block {
     }
 }
 
-/// Middle of its picture on the back wall [m].
+/// Centre of the block's picture on the back wall [m].
 pub fn picture() -> DVec3 {
     let block = block();
     block.centre + block.forward * block.to_picture_m
@@ -171,7 +170,7 @@ fn add_block(scene: &mut Scene, stone: usize) {
         block.mesh(),
         parts::dielectric("acrylic", block.ior),
     );
-    // Nothing of the lamp's light goes past it.
+    // Blocks light that would pass beside the block.
     let black = parts::material(scene, parts::matte("black frame", LinearSrgb::grey(0.02)));
     let half_m = 0.5 * block.side_m - 0.002;
     let (centre, axes) = (block.centre - block.forward * 0.004, block.axes());

@@ -7,9 +7,9 @@ use glam::{DVec2, DVec3};
 use crate::scene::Mesh;
 use crate::scene::builtin::shapes;
 
-/// A surface around the y axis through the points (radius, height) [m] of its outline, smooth but for where one curve
-/// ends and the next begins. Seen with the axis to the left, its inside lies to the left of the way along the outline.
-/// It has so many segments around, and rows from one point to the next.
+/// Surface of revolution about the y axis through points (radius, height) [m] of its outline, smooth except where one
+/// curve ends and the next begins. With the axis to the left, the interior lies to the left of the outline's direction.
+/// The mesh has `around` segments, and `rows` rows between two points.
 pub fn turned(curves: &[&[[f64; 2]]], [around, rows]: [u32; 2]) -> Mesh {
     let mut mesh = Mesh::default();
     for curve in curves {
@@ -28,8 +28,8 @@ pub fn turned(curves: &[&[[f64; 2]]], [around, rows]: [u32; 2]) -> Mesh {
     mesh
 }
 
-/// Place and derivative of a curve through `points`, `part` of the way from one to the next: cubic, with the slopes of
-/// parabolas through three neighbours. It meets the axis at a right angle.
+/// Position and derivative of a curve through `points`, at `part` of the way from one to the next: cubic, with the
+/// slopes of parabolas through three neighbours. It meets the axis at a right angle.
 fn between(points: &[DVec2], piece: usize, part: f64) -> (DVec2, DVec2) {
     let mirrored = |point: DVec2| DVec2::new(-point.x, point.y);
     let end = points.len() - 1;
@@ -62,7 +62,7 @@ fn between(points: &[DVec2], piece: usize, part: f64) -> (DVec2, DVec2) {
     (at, derivative)
 }
 
-/// Of glass, 18 cm high, on a short stem, so that the sun is gathered where it stands.
+/// Outline of the glass, 18 cm high, with a stem so short that the sun is focused on the table.
 pub const WINE_GLASS_M: [[f64; 2]; 29] = [
     [0.0, 0.002],
     [0.02, 0.002],
@@ -95,7 +95,7 @@ pub const WINE_GLASS_M: [[f64; 2]; 29] = [
     [0.0, 0.042],
 ];
 
-/// Of the wine in it: its side lies within the wall, so that no air is between them.
+/// Outline of its wine: the side lies within the glass, so that there is no air between them.
 pub const WINE_M: [&[[f64; 2]]; 2] = [
     &[
         [0.0, 0.0412],

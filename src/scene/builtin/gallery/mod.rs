@@ -27,10 +27,10 @@ pub fn build() -> Scene {
     scene
 }
 
-/// Warm as filament lamps are.
+/// Colour of filament lamps.
 const WARM: LinearSrgb = LinearSrgb::new(1.12, 0.98, 0.8);
 
-/// Low daylight.
+/// Colour of the low sun.
 const SUN: LinearSrgb = LinearSrgb::new(1.07, 0.99, 0.88);
 
 fn lights() -> Vec<Light> {

@@ -11,14 +11,14 @@ use crate::scene::builtin::parts;
 use crate::scene::texture::Wrap;
 use crate::scene::{Scene, Texture, TextureRef};
 
-/// Texels along a side.
+/// Texels per side.
 const SIDE: u32 = 512;
 
 /// An sRGB-encoded colour [0, 255].
 type Code = DVec3;
 
-/// Adds a matte material whose image covers `size_m` [m], of which `colour` gives the sRGB code at a place of the unit
-/// square; it goes on beyond.
+/// Adds a diffuse material with an image that covers `size_m` [m] and repeats; `colour` returns the sRGB code at a
+/// point of the unit square.
 pub fn add(scene: &mut Scene, name: &str, size_m: f64, colour: impl Fn(DVec2) -> Code + Sync) -> usize {
     let texel = |index: u32| {
         let place = DVec2::new(f64::from(index % SIDE) + 0.5, f64::from(index / SIDE) + 0.5);
@@ -42,7 +42,7 @@ pub fn add(scene: &mut Scene, name: &str, size_m: f64, colour: impl Fn(DVec2) ->
     parts::material(scene, material)
 }
 
-/// A whole number for each place of a lattice, evenly spread over [0, 1].
+/// Hash of a lattice point, uniform in [0, 1].
 fn hash(x: i32, y: i32, seed: u32) -> f64 {
     let mut bits = (x as u32).wrapping_mul(0x9e37_79b1) ^ (y as u32).wrapping_mul(0x85eb_ca77) ^ seed;
     for factor in [0x7feb_352d_u32, 0x846c_a68b] {
@@ -51,7 +51,7 @@ fn hash(x: i32, y: i32, seed: u32) -> f64 {
     f64::from(bits ^ (bits >> 16)) / f64::from(u32::MAX)
 }
 
-/// Smooth noise [0, 1] that repeats after as many cells as the unit square has across and down.
+/// Smooth noise in [0, 1], with period 1 and `cells` lattice cells per period across and down.
 fn noise(place: DVec2, cells: [i32; 2], seed: u32) -> f64 {
     let at = place * DVec2::new(f64::from(cells[0]), f64::from(cells[1]));
     let (low, part) = (at.floor(), at - at.floor());
@@ -64,7 +64,7 @@ fn noise(place: DVec2, cells: [i32; 2], seed: u32) -> f64 {
     row(0) + (row(1) - row(0)) * ease.y
 }
 
-/// The same over several octaves, the coarsest of `cells`.
+/// Sum of several octaves of noise, the coarsest with `cells`.
 fn turbulence(place: DVec2, cells: [i32; 2], octaves: u32, seed: u32) -> f64 {
     let octave = |index: u32| {
         noise(place, cells.map(|count| count << index), seed + index) * 0.5_f64.powi(index as i32)
@@ -72,13 +72,13 @@ fn turbulence(place: DVec2, cells: [i32; 2], octaves: u32, seed: u32) -> f64 {
     (0..octaves).map(octave).sum::<f64>() / (2.0 - 0.5_f64.powi(octaves as i32 - 1))
 }
 
-/// 1 within `half` of a whole number, 0 beyond, with an edge as wide as `soft`.
+/// 1 within `half` of an integer and 0 beyond, with an edge of width `soft`.
 fn line(value: f64, half: f64, soft: f64) -> f64 {
     let off = (value - value.round()).abs();
     ((half - off) / soft + 0.5).clamp(0.0, 1.0)
 }
 
-/// Boards along u, with grain and pores.
+/// Wooden boards along u, with grain and pores.
 pub fn wood(place: DVec2, boards: i32, [dark, light]: [Code; 2]) -> Code {
     let board = (place.y * f64::from(boards)).floor();
     let seed = 1000 + board as u32 * 17;
@@ -98,7 +98,7 @@ pub fn plaster(place: DVec2, mean: Code) -> Code {
     mean * (1.0 + 0.06 * clouds + 0.07 * strokes)
 }
 
-/// Stone with grains and a few veins.
+/// Stone with grain and a few veins.
 pub fn stone(place: DVec2, mean: Code) -> Code {
     let clouds = turbulence(place, [3, 4], 5, 31);
     let vein = line(3.0 * clouds + place.x, 0.012, 0.05);
@@ -106,7 +106,7 @@ pub fn stone(place: DVec2, mean: Code) -> Code {
     mean * (0.84 + 0.34 * clouds + 0.16 * grain - 0.14 * vein)
 }
 
-/// Square tiles between joints, none quite like the next.
+/// Square tiles of varying tone between joints.
 pub fn tiles(place: DVec2, across: i32, [tile, joint]: [Code; 2]) -> Code {
     let at = place * f64::from(across);
     let tone =

@@ -1,8 +1,9 @@
 //! A block of clear plastic whose front is ground so that the light of a lamp behind it draws a butterfly.
 //!
-//! The light has to be moved within the block's square so that it is as dense as the picture wants it: with x + ∇φ for
-//! where light of x goes, det(1 + D²φ)·target(x + ∇φ) = 1, a Monge–Ampère equation. It is solved by Poisson equations
-//! alone (Benamou, Froese and Oberman, 2010), whose solutions are sums of cosines. The height of the glass goes with φ.
+//! Light must be moved within the block's square so that its density becomes that of the picture: if light of x goes to
+//! x + ∇φ, then det(1 + D²φ)·target(x + ∇φ) = 1, a Monge–Ampère equation. It is solved by a sequence of Poisson
+//! equations (Benamou, Froese and Oberman, 2010), whose solutions are sums of cosines. The height of the glass is
+//! proportional to φ.
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,48 +12,47 @@ use glam::{DVec2, DVec3};
 use crate::scene::Mesh;
 use crate::scene::builtin::shapes;
 
-/// Cells along a side of the square.
+/// Grid cells per side of the square.
 const CELLS: usize = 64;
-/// Poisson equations that are solved.
+/// Number of iterations, each of which solves a Poisson equation.
 const ROUNDS: usize = 60;
-/// Quads along a side of the front.
+/// Quads per side of the front.
 const QUADS: u32 = 96;
-/// How many times as dense light is on a line as beside it.
+/// Density of light on a line relative to the background.
 const CONTRAST: f64 = 14.0;
-/// Half-width of a line, in parts of the square.
+/// Half-width of a line, relative to the square's side.
 const LINE: f64 = 0.011;
 
-/// Values in the middles of the cells, or factors of cosines, row by row.
+/// Values at cell centres, or coefficients of cosines, row by row.
 type Grid = Vec<f64>;
 
-/// The block and what it does.
+/// Geometry of the block and its projection.
 #[derive(Clone, Copy, Debug)]
 pub struct Block {
-    /// Middle of its flat back [m].
+    /// Centre of its flat back [m].
     pub centre: DVec3,
-    /// Unit: the way light goes through it.
+    /// Unit, direction of the light through it.
     pub forward: DVec3,
-    /// Its side, and its thickness in the mean [m].
+    /// Side and mean thickness [m].
     pub side_m: f64,
     pub thickness_m: f64,
-    /// From the lamp to it, and from it to the picture [m].
+    /// Distances from the light to the block and from the block to the picture [m].
     pub from_lamp_m: f64,
     pub to_picture_m: f64,
-    /// Refractive index.
     pub ior: f64,
 }
 
 impl Block {
-    /// Unit, to its right as seen from the lamp, and upwards.
+    /// Unit axes: to the right as seen from the light, and up.
     pub fn axes(&self) -> [DVec3; 2] {
         let right = self.forward.cross(DVec3::Y).normalize();
         [right, right.cross(self.forward)]
     }
 
-    /// As a closed body.
+    /// Closed mesh of the block.
     pub fn mesh(&self) -> Mesh {
         let magnified = (self.from_lamp_m + self.to_picture_m) / self.from_lamp_m;
-        // A thin prism turns light by (n − 1) times its slope.
+        // A thin prism deflects light by (n − 1) times its slope.
         let height_m = magnified * self.side_m / (self.to_picture_m * (self.ior - 1.0)) * self.side_m;
         let factors = potential(&butterfly());
         let [right, up] = self.axes();
@@ -73,7 +73,7 @@ impl Block {
             &mut mesh,
             &shapes::sheet(QUADS, QUADS, |u, v| (at(u, v, 0.0), -self.forward)),
         );
-        // Along u at v = 0 and 1, along v at u = 0 and 1.
+        // Sides along u at v = 0 and 1, and along v at u = 0 and 1.
         for (outward, is_along_u, end) in [
             (-up, true, 0.0),
             (up, true, 1.0),
@@ -91,7 +91,7 @@ impl Block {
     }
 }
 
-/// Density of the picture, 1 in the mean: the curve of T. H. Fay (1989) as a bright line.
+/// Density of the picture, with mean 1: the curve of T. H. Fay (1989) as a bright line.
 fn butterfly() -> Grid {
     let points: Vec<DVec2> = (0..900)
         .map(|step| {
@@ -117,7 +117,7 @@ fn middle(index: usize) -> DVec2 {
     DVec2::new((index % CELLS) as f64 + 0.5, (index / CELLS) as f64 + 0.5) / CELLS as f64
 }
 
-/// The value of a grid at a place, linear between the middles of cells.
+/// Value of a grid at a point, interpolated bilinearly between cell centres.
 fn look_up(grid: &[f64], place: DVec2) -> f64 {
     let last = (CELLS - 1) as f64;
     let at = (place * CELLS as f64 - 0.5).clamp(DVec2::ZERO, DVec2::splat(last));
@@ -127,7 +127,7 @@ fn look_up(grid: &[f64], place: DVec2) -> f64 {
     row(y) * (1.0 - fy) + row(y + 1) * fy
 }
 
-/// φ as factors of cosines.
+/// φ, as coefficients of cosines.
 fn potential(target: &Grid) -> Grid {
     let waves = cosines();
     let mut factors = vec![0.0; CELLS * CELLS];
@@ -139,7 +139,7 @@ fn potential(target: &Grid) -> Grid {
         factors = analysed(&laplacian, &waves);
         for (index, factor) in factors.iter_mut().enumerate() {
             let (m, n) = ((index % CELLS) as f64, (index / CELLS) as f64);
-            // The cosine of each cell's step, so that it solves the differences below.
+            // Eigenvalue of the finite differences below, not of the continuous Laplacian.
             let eigenvalue =
                 |wave: f64| (2.0 - 2.0 * (PI * wave / CELLS as f64).cos()) * (CELLS * CELLS) as f64;
             *factor = if index == 0 {
@@ -152,10 +152,10 @@ fn potential(target: &Grid) -> Grid {
     factors
 }
 
-/// Δφ in one cell, by the second derivatives and the gradient of the last round.
+/// Δφ in a cell, from the second derivatives and the gradient of the previous iteration.
 fn wanted_laplacian(phi: &[f64], target: &[f64], index: usize) -> f64 {
     let (column, row) = (index % CELLS, index / CELLS);
-    // Beyond the border it goes on as in a mirror.
+    // Mirrored at the border.
     let at = |dx: isize, dy: isize| {
         let within = |cell: usize, step: isize| cell.saturating_add_signed(step).min(CELLS - 1);
         phi[within(row, dy) * CELLS + within(column, dx)]
@@ -170,14 +170,14 @@ fn wanted_laplacian(phi: &[f64], target: &[f64], index: usize) -> f64 {
     (squares + 2.0 / density).sqrt() - 2.0
 }
 
-/// cos(π m x) for each wave m (row) and each middle of a cell x (column).
+/// cos(π m x) for each wave m (row) and cell centre x (column).
 fn cosines() -> Grid {
     let value =
         |index: usize| (PI * (index / CELLS) as f64 * ((index % CELLS) as f64 + 0.5) / CELLS as f64).cos();
     (0..CELLS * CELLS).map(value).collect()
 }
 
-/// The product of two matrices.
+/// Product of two matrices.
 fn product(a: &[f64], b: &[f64]) -> Grid {
     let mut result = vec![0.0; CELLS * CELLS];
     for (sums, row) in result.chunks_mut(CELLS).zip(a.chunks(CELLS)) {
@@ -196,12 +196,12 @@ fn transposed(a: &[f64]) -> Grid {
         .collect()
 }
 
-/// Values of a sum of cosines in the middles of the cells.
+/// Values of a cosine sum at the cell centres.
 fn evaluated(factors: &[f64], waves: &[f64]) -> Grid {
     product(&transposed(waves), &product(factors, waves))
 }
 
-/// Factors of the cosines whose sum has these values.
+/// Coefficients of the cosine sum with these values.
 fn analysed(values: &[f64], waves: &[f64]) -> Grid {
     let mut factors = product(&product(waves, values), &transposed(waves));
     let share = |wave: usize| if wave == 0 { 1.0 } else { 2.0 } / CELLS as f64;
@@ -211,7 +211,7 @@ fn analysed(values: &[f64], waves: &[f64]) -> Grid {
     factors
 }
 
-/// Value and gradient of a sum of cosines anywhere in the square.
+/// Value and gradient of a cosine sum at any point of the square.
 fn cosine_sum(factors: &[f64], place: DVec2) -> (f64, DVec2) {
     let table = |x: f64| -> Vec<(f64, f64)> {
         let wave = |m: usize| {

@@ -8,27 +8,26 @@ use super::patterns;
 use crate::scene::builtin::{parts, shapes};
 use crate::scene::{Environment, Mesh, Scene};
 
-/// Inner borders [m].
+/// Inner bounds [m].
 pub const X: [f64; 2] = [-2.3, 2.3];
-/// Inner borders [m].
+/// Inner bounds [m].
 pub const Z: [f64; 2] = [-1.6, 2.9];
-/// Height [m].
 const HEIGHT_M: f64 = 2.7;
 
-/// The opening in the right wall: along it and up [m].
+/// Opening in the right wall, along z and y [m].
 const WINDOW_Z: [f64; 2] = [-0.9, 0.5];
 const WINDOW_Y: [f64; 2] = [0.9, 2.4];
-/// How deep the wall is there [m].
+/// Depth of the wall at the opening [m].
 const REVEAL_M: f64 = 0.14;
-/// Where the sun goes: 27 degrees below the horizon, away from the window.
+/// Direction of travel of the sun's light: 27 degrees downwards, in through the window.
 pub const SUN_DIRECTION: DVec3 = DVec3::new(-0.8, -0.43, 0.22);
 
-/// Radiance at the zenith, at the horizon and of the land below it [W/(m² sr)].
+/// Radiance at the zenith, at the horizon, and of the land below it [W/(m² sr)].
 const ZENITH: DVec3 = DVec3::new(0.05, 0.09, 0.19);
 const HORIZON: DVec3 = DVec3::new(0.25, 0.24, 0.22);
 const LAND: DVec3 = DVec3::new(0.045, 0.042, 0.03);
 
-/// The sky that is seen through the window and in what reflects it. It is no lamp: beside the sun it would add little.
+/// Sky as seen through the window and in reflections. It is not a light, since it would add little to the sun.
 pub fn sky() -> Option<Arc<Environment>> {
     const ROWS: usize = 128;
     let row = |row: usize| {
@@ -40,7 +39,7 @@ pub fn sky() -> Option<Arc<Environment>> {
     Environment::new(1, ROWS, (0..ROWS).map(row).collect()).map(Arc::new)
 }
 
-/// Everything but what is shown in it.
+/// Adds everything but the exhibits.
 pub fn add(scene: &mut Scene) {
     let middle = DVec3::new(0.5 * (X[0] + X[1]), 0.5 * HEIGHT_M, 0.5 * (Z[0] + Z[1]));
     let (half_x, half_z) = (0.5 * (X[1] - X[0]), 0.5 * (Z[1] - Z[0]));
@@ -77,8 +76,8 @@ pub fn add(scene: &mut Scene) {
     add_window_wall(scene, plaster);
 }
 
-/// A rectangle whose textures are as large as they are on every other: its TEXCOORD_0 in metres, along its sides.
-/// TEXCOORD_1 has what was there, for maps.
+/// Sets TEXCOORD_0 of a rectangle to metres along its sides, so that textures have the same scale everywhere. The
+/// original coordinates become TEXCOORD_1, for maps.
 #[must_use]
 pub fn in_metres(mut mesh: Mesh) -> Mesh {
     mesh.uv1 = mesh.uv0.take();
@@ -86,13 +85,13 @@ pub fn in_metres(mut mesh: Mesh) -> Mesh {
         return mesh;
     };
     let [u, v] = [second - first, last - first].map(DVec3::normalize);
-    // From the scene's origin: faces side by side go on where the other ends.
+    // Relative to the scene's origin, so that textures continue across adjacent faces.
     let place = |position: &DVec3| DVec2::new(position.dot(u), -position.dot(v));
     mesh.uv0 = Some(mesh.positions.iter().map(place).collect());
     mesh
 }
 
-/// Four pieces around the opening, and its four sides.
+/// Adds four pieces of wall around the opening, and the four sides of the opening.
 fn add_window_wall(scene: &mut Scene, plaster: usize) {
     let x = X[1];
     let pieces = [

@@ -9,21 +9,20 @@ use crate::scene::builtin::ring::cylinder;
 use crate::scene::builtin::{parts, shapes};
 use crate::scene::{Material, Scene, Volume};
 
-/// Height of its top [m].
+/// Height of the table top [m].
 const TOP_M: f64 = 0.75;
-/// Its borders [m].
+/// Bounds of the table top [m].
 const X: [f64; 2] = [-1.2, 1.2];
 const Z: [f64; 2] = [-0.4, 0.8];
-/// Its thickness [m].
+/// Thickness of the table top [m].
 const THICK_M: f64 = 0.06;
 
-/// Middles of what stands on it [m].
+/// Positions of the objects on it [m].
 pub const WINE_GLASS: DVec3 = DVec3::new(0.4, TOP_M, 0.42);
 pub const TUMBLER: DVec3 = DVec3::new(0.74, TOP_M, 0.08);
 pub const RING: DVec3 = DVec3::new(-0.3, TOP_M + 0.001, 0.52);
 pub const MIRROR: DVec3 = DVec3::new(-0.45, TOP_M + 0.19, -0.24);
 
-/// All of it.
 pub fn add(scene: &mut Scene) {
     add_table(scene);
     add_wine_glass(scene);
@@ -102,7 +101,7 @@ fn add_wine_glass(scene: &mut Scene) {
     parts::add(scene, "wine", shapes::moved(body, WINE_GLASS), wine);
 }
 
-/// 12 cm high, nine facets around in each of three rows.
+/// 12 cm high, with three rows of nine facets.
 const TUMBLER_CUT: CutGlass = CutGlass {
     corners: 9,
     rings_m: &[[0.042, 0.0], [0.049, 0.034], [0.049, 0.076], [0.052, 0.118]],
@@ -111,7 +110,7 @@ const TUMBLER_CUT: CutGlass = CutGlass {
     squareness: 5.0,
 };
 
-/// Upright, and turned so that the overview sees the ring in it.
+/// Upright, oriented so that the overview camera sees the ring in it.
 fn add_mirror(scene: &mut Scene) {
     let (turn, up) = (DVec3::new(0.965, 0.0, -0.264).normalize(), DVec3::Y);
     let (right, up, normal) = (turn * 0.22, up * 0.18, turn.cross(up));

@@ -12,11 +12,9 @@ use crate::scene::gltf::spectrum;
 use crate::scene::gltf::write::lights;
 use crate::scene::{Light, LightKind, Scene};
 
-/// A light before and after it was edited.
+/// A light before and after editing.
 pub struct Edited<'a> {
-    /// As it was loaded.
     pub was: &'a Light,
-    /// As it is now.
     pub is: &'a Light,
 }
 
@@ -29,7 +27,7 @@ impl Edited<'_> {
         )
     }
 
-    /// Writes a light that stands at a node.
+    /// Writes a light that has a node.
     ///
     /// # Errors
     /// A spectrum without a name.
@@ -46,7 +44,7 @@ impl Edited<'_> {
         let new_spectrum = was.spectrum != is.spectrum;
         if new_spectrum {
             check_spectrum(is)?;
-            // What is read of a file is not its colour then.
+            // With a spectrum, the colour as loaded is not that in the file.
             before["color"] = Value::Null;
         }
         let [had, has] = [was, is].map(lights::extras);
@@ -69,7 +67,7 @@ impl Edited<'_> {
         self.place(origin, shift, placing)
     }
 
-    /// Turns and moves its node, as little as the light itself was.
+    /// Rotates and moves its node, as little as the light itself was.
     fn place(&self, origin: &Origin, shift: DVec3, placing: &mut NodePlacement<'_>) -> Result<()> {
         let (was, is) = (&self.was.kind, &self.is.kind);
         let turn = match (was.direction(), is.direction()) {
@@ -95,10 +93,10 @@ impl Edited<'_> {
         placing.put(origin.node, wanted, &self.is.name)
     }
 
-    /// Writes a light that is the glow of an object: its material's.
+    /// Writes the light of an emissive object, as the strength of its material.
     ///
     /// # Errors
-    /// Another colour, or a material that glows elsewhere too and did not change there.
+    /// Another colour or spectrum; a light that is not an object's; a material that the file only implies.
     pub fn write_glow(&self, edited: &Scene, in_file: usize, glb: &mut Glb) -> Result<()> {
         let (was, is) = (self.was, self.is);
         if was.colour != is.colour || was.spectrum != is.spectrum {
@@ -120,13 +118,13 @@ impl Edited<'_> {
     }
 }
 
-/// The extension that states how brightly a material glows.
+/// Extension with the strength of a material's emission.
 const STRENGTH: &str = "KHR_materials_emissive_strength";
 
 /// Refuses a spectrum that a file cannot hold.
 ///
 /// # Errors
-/// One without a name.
+/// A spectrum without a name.
 pub fn check_spectrum(light: &Light) -> Result<()> {
     if light.spectrum.is_none() || lights::named_spectrum(light).is_some() {
         return Ok(());
@@ -138,7 +136,7 @@ pub fn check_spectrum(light: &Light) -> Result<()> {
     ))
 }
 
-/// A light's entry in its list: one of its own where other nodes refer to the same.
+/// JSON pointer to a light's entry in its list; an entry that other nodes share is copied first.
 fn own_entry(origin: &Origin, glb: &mut Glb) -> String {
     let list = origin.list;
     let lights = format!("/extensions/{list}/lights");

@@ -21,14 +21,14 @@ use crate::scene::{Light, LightKind, LoadOptions, Motion, Scene};
 mod lights;
 mod placing;
 
-/// Corners of a scene that is read back may differ by this share of its extent, and other numbers of themselves: lights and
-/// materials are 32-bit numbers in a file [1].
+/// Tolerance for a scene that is read back, relative to its extent for positions and to the value for other numbers:
+/// files store lights and materials as 32-bit numbers [1].
 const SAME: f64 = 1e-6;
 
-/// Writes `edited`, which `loaded` from `original` was edited to, as a `.glb`.
+/// Writes `edited`, which was derived from `loaded`, read from `original`, as a `.glb`.
 ///
 /// # Errors
-/// A file that changed since it was loaded; an edit that no file can hold; a place that cannot be written.
+/// A file that changed since it was loaded; an edit that no file can hold; a target that cannot be written.
 pub fn save(
     original: &Path,
     target: &Path,
@@ -62,7 +62,7 @@ pub fn save(
     files::write_atomically(target, |writer| writer.write_all(&bytes))
 }
 
-/// What is written while it is written.
+/// A file in the course of being written.
 struct Patch<'a> {
     loaded: &'a Scene,
     edited: &'a Scene,
@@ -72,7 +72,7 @@ struct Patch<'a> {
 }
 
 impl Patch<'_> {
-    /// Another program may have written the file since.
+    /// Refuses a file that another program has changed since it was loaded.
     fn check_original(&self, placed: &[PlacedNode], origins: &[Origin], path: &Path) -> Result<()> {
         let has_nodes = self.loaded.objects.iter().all(|object| {
             let mut placed = placed.iter();
@@ -140,7 +140,7 @@ impl Patch<'_> {
                 {
                     return Err(Error::failure(location, what, remedy));
                 }
-                // A file may state both, of which one is not read.
+                // A file may state both, of which only one is read.
                 let name = format!("/extras/{}", substance::GLASS_KEY);
                 let dispersion = format!("/extensions/{}/dispersion", substance::NAME);
                 for stated in [&name, &dispersion] {
@@ -171,14 +171,14 @@ impl Patch<'_> {
     }
 }
 
-/// Whether a light that is not the file's becomes so: it was added, or edited, or others make the file one with light, so
-/// that it would not be given a sun any more.
+/// Whether a light that is not in the file is written to it: it was added or edited, or there are added lights, with
+/// which the file would no longer be given a default sun.
 fn is_to_be_written(light: usize, loaded: &Scene, edited: &Scene) -> bool {
     let was = edited.light_when_loaded(light).map(|place| &loaded.lights[place]);
     was != Some(&edited.lights[light]) || !edited.light_list.added.is_empty()
 }
 
-/// Reads what is to be written as anybody would, and refuses it where that is not the edited scene.
+/// Reads the new file as any other, and refuses it if the result is not the edited scene.
 fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -> Result<()> {
     let read = super::read_scene(bytes, original, options)?;
     let differs = |what: String| {
@@ -215,12 +215,12 @@ fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -
     check_lights(&read, edited, &is_at).map_err(differs)
 }
 
-/// Whether two numbers are the same but for what 32 bits make of them.
+/// Whether two numbers are equal within 32-bit rounding.
 fn is_near(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME * a.abs().max(b.abs()).max(1e-9)
 }
 
-/// Every light that is to be in the file is there, in whatever order, and no other; or what is wrong.
+/// Checks that the file has exactly the expected lights, in any order; else returns one that is wrong.
 fn check_lights(
     read: &Scene,
     edited: &Scene,
@@ -248,8 +248,8 @@ fn check_lights(
     }
 }
 
-/// Whether a light is what the program gives a scene, and no part of its file: the environment, or the sun of a scene
-/// without light.
+/// Whether a light belongs to the program and not to the file: the environment, or the default sun of a scene without
+/// light.
 fn is_of_program(light: &Light, read: &Scene) -> bool {
     let is_sun_of_dark = matches!(light.kind, LightKind::Sun { .. }) && read.lights.is_empty();
     is_sun_of_dark || matches!(light.kind, LightKind::Environment { .. })

@@ -11,18 +11,17 @@ use crate::scene::gltf::document::Document;
 use crate::scene::gltf::glb::Glb;
 use crate::scene::gltf::nodes::PlacedNode;
 
-/// Largest difference of two transforms that are the same, as a share of their size [1].
+/// Tolerance for equal transforms, relative to their size [1].
 const SAME: f64 = 1e-12;
 
-/// Nodes with where they stand and where they are to stand.
+/// World transforms of nodes, in the file and as edited.
 pub struct NodePlacement<'a> {
     placed: &'a [PlacedNode],
-    /// By the node's index.
+    /// By node index.
     wanted: BTreeMap<usize, DAffine3>,
 }
 
 impl<'a> NodePlacement<'a> {
-    /// Nothing is moved yet.
     pub fn new(placed: &'a [PlacedNode]) -> Self {
         Self {
             placed,
@@ -30,16 +29,16 @@ impl<'a> NodePlacement<'a> {
         }
     }
 
-    /// Where a node stands in the file.
+    /// World transform of a node in the file.
     pub fn of(&self, node: usize) -> Option<DAffine3> {
         let placed = self.placed.iter().find(|placed| placed.node == node)?;
         Some(placed.world_from_node)
     }
 
-    /// Has a node stand elsewhere.
+    /// Sets the new world transform of a node.
     ///
     /// # Errors
-    /// It is to stand elsewhere already: what hangs on it was moved apart.
+    /// The node has another new transform already: things attached to it were moved apart.
     pub fn put(&mut self, node: usize, world_from_node: DAffine3, name: &str) -> Result<()> {
         match self.wanted.insert(node, world_from_node) {
             Some(other) if !is_same(&other, &world_from_node) => Err(Error::failure(
@@ -51,7 +50,7 @@ impl<'a> NodePlacement<'a> {
         }
     }
 
-    /// Writes the transforms of all nodes that move, and of their children, which stay where they are.
+    /// Writes the transforms of all moved nodes, and of their children, which keep their place.
     pub fn write(&self, document: &Document, glb: &mut Glb) {
         for placed in self.placed {
             let node = placed.node;
@@ -66,7 +65,7 @@ impl<'a> NodePlacement<'a> {
         }
     }
 
-    /// Where a node stands in the end.
+    /// Final world transform of a node.
     fn stands(&self, node: usize) -> DAffine3 {
         let wanted = self.wanted.get(&node).copied();
         wanted.or_else(|| self.of(node)).unwrap_or(DAffine3::IDENTITY)
@@ -81,7 +80,7 @@ fn is_same(a: &DAffine3, b: &DAffine3) -> bool {
     a.abs_diff_eq(*b, SAME * size)
 }
 
-/// The node that a placed one hangs on.
+/// Parent of a placed node.
 fn parent_of(root: &Root, node: usize, placed: &[PlacedNode]) -> Option<usize> {
     let is_parent = |candidate: &&PlacedNode| {
         let children = root.nodes[candidate.node].children.as_deref();
@@ -93,8 +92,8 @@ fn parent_of(root: &Root, node: usize, placed: &[PlacedNode]) -> Option<usize> {
     placed.iter().find(is_parent).map(|parent| parent.node)
 }
 
-/// As translation, rotation and scale where the file has those and they can say it; only those that change. Otherwise as a
-/// matrix.
+/// Writes the translation, rotation and scale that changed, if the file uses these and they can represent the
+/// transform; otherwise a matrix.
 fn write_transform(document: &Document, node: usize, transform: &DAffine3, glb: &mut Glb) {
     let stated = &document.transforms[node];
     let path = |name: &str| format!("/nodes/{node}/{name}");

@@ -13,7 +13,7 @@ use crate::optics::spectrum::illuminant;
 use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
 use crate::units::LUMENS_PER_WATT;
 
-/// Adds every light that is not the glow of an object, which its material states.
+/// Adds every light but those of emissive objects, which their materials state.
 pub fn add_all(scene: &Scene, glb: &mut Glb, warnings: &mut Vec<Warning>) {
     for source in &scene.lights {
         let lost = match (&source.kind, &source.spectrum) {
@@ -33,7 +33,7 @@ pub fn add_all(scene: &Scene, glb: &mut Glb, warnings: &mut Vec<Warning>) {
     }
 }
 
-/// Adds a light at a node of its own, if glTF has a place for it.
+/// Adds a light on a node of its own, if glTF can represent it.
 pub fn add(source: &Light, shift: DVec3, glb: &mut Glb) {
     let Some((list, stated)) = stated(source) else {
         return;
@@ -48,7 +48,7 @@ pub fn add(source: &Light, shift: DVec3, glb: &mut Glb) {
     glb.push_root(node);
 }
 
-/// The extension that lists a light, and its entry there.
+/// Extension that lists a light, and the light's entry there.
 pub fn stated(source: &Light) -> Option<(&'static str, Value)> {
     let (list, mut stated) = by_kind(source)?;
     let colour = match named_spectrum(source) {
@@ -59,16 +59,16 @@ pub fn stated(source: &Light) -> Option<(&'static str, Value)> {
     Some((list, stated))
 }
 
-/// The name of a light's spectrum, by which it is found again.
+/// Name of a light's spectrum, if the spectrum can be found by it.
 pub fn named_spectrum(source: &Light) -> Option<&str> {
     let name = source.spectrum.as_ref()?.name()?;
     illuminant(name).is_ok().then_some(name)
 }
 
-/// What glTF has no place for, by where it stands in the extras of a light's node.
+/// Keys of light properties that glTF lacks, in the extras of the light's node.
 pub const EXTRAS: [&str; 3] = [spectrum::KEY, "radius_m", "angular_diameter_deg"];
 
-/// What a light states of that.
+/// Values of a light for these keys.
 pub fn extras(source: &Light) -> Value {
     let size = match source.size {
         LightSize::None => [None; 2],
@@ -113,7 +113,7 @@ fn by_kind(source: &Light) -> Option<(&'static str, Value)> {
     }
 }
 
-/// A node whose −z is the way that the light goes.
+/// A node whose −z is the light's direction of travel.
 fn node(source: &Light, shift: DVec3) -> Value {
     let position = source
         .kind

@@ -9,7 +9,7 @@ use crate::error::Warning;
 use crate::scene::{Material, TextureRef};
 use crate::units::LUMENS_PER_WATT;
 
-/// A material. The world's origin lies at −`shift` of the scene [m].
+/// glTF of a material. `shift` leads from scene to world coordinates [m].
 pub fn written(material: &Material, shift: DVec3, warnings: &mut Vec<Warning>) -> Value {
     let [red, green, blue] = material.base_colour.to_array();
     let alpha = material.alpha_mask.as_ref().map_or(1.0, |mask| mask.factor);
@@ -47,7 +47,7 @@ fn reference(texture: &TextureRef) -> Value {
     let mut reference = json!({ "index": texture.texture, "texCoord": texture.uv_set });
     let [x, y, z] = texture.uv_transform.to_cols_array_2d();
     if texture.uv_transform != glam::DMat3::IDENTITY {
-        // Turned by the angle and scaled, as the extension composes them.
+        // Rotation and scale, composed in the order of the extension.
         let (scale_u, scale_v) = (x[0].hypot(x[1]), y[0].hypot(y[1]));
         let transform = json!({ "offset": [z[0], z[1]], "rotation": -x[1].atan2(x[0]),
             "scale": [scale_u, scale_v] });

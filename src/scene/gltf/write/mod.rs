@@ -12,8 +12,8 @@ use crate::error::{Error, Result, Warning};
 use crate::files;
 use crate::scene::{Camera, Mesh, Object, Scene, Texture, texture::Wrap};
 
-/// The document of a scene. Node `i` is object `i`, its mesh's one primitive the object's. What glTF has no words for is
-/// told.
+/// Document of a scene. Node `i` is object `i`, and the only primitive of its mesh is that of the object. Warns of
+/// content that glTF cannot represent.
 ///
 /// # Errors
 /// A scene without surfaces; an image that cannot be written.
@@ -109,7 +109,7 @@ fn add_camera(camera: &Camera, shift: DVec3, glb: &mut Glb) {
     glb.push_root(node);
 }
 
-/// A node of that name, place [m] and turn.
+/// A node with name, position [m] and rotation.
 fn placed(name: &str, position: DVec3, rotation: DQuat) -> Value {
     json!({ "name": name, "translation": position.to_array(), "rotation": rotation.normalize().to_array() })
 }
@@ -120,7 +120,7 @@ mod tests {
     use crate::scene::{LoadOptions, builtin};
     use std::path::Path;
 
-    /// Numbers of a file are 32-bit floats.
+    /// A file stores 32-bit floats.
     const SAME: f64 = 1e-6;
 
     #[test]
