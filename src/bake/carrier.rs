@@ -15,7 +15,7 @@ use crate::plan::Effect;
 use crate::settings::Estimator;
 
 /// Cost of a patch cell relative to a photon segment, at one segment per photon. It grows with the cube of the segments
-/// per photon, as the branches do that patches follow.
+/// per photon, like the number of branches that patches follow.
 const CELL: f64 = 8.0;
 
 /// Cost of a receiver query, including the deposit of its triangle, relative to a photon segment.

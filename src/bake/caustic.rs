@@ -55,7 +55,7 @@ pub(super) struct CausticLayer<'a> {
     pub(super) aim: &'a LightVisibility,
     pub(super) settings: &'a BakeSettings,
     pub(super) sizes: &'a ChartCache,
-    /// Spectra of the lights with dispersion.
+    /// Spectra of the lights that are traced by wavelength.
     pub(super) spectra: &'a Spectra,
     pub(super) plan: &'a EffectPlan,
     pub(super) progress: &'a dyn Progress,

@@ -513,8 +513,8 @@ fn error_of(chart: &Chart, lit: &[LitMap]) -> Option<Vec<f32>> {
     (!lit.is_empty()).then(|| squares.iter().map(root).collect())
 }
 
-/// Area-weighted RMSE over the mean irradiance of the caustic and indirect layers, which it belongs to; `None` if the
-/// error of a map is unknown, or no light arrived.
+/// RMSE of the caustic and indirect layers over their mean irradiance, weighted by area; `None` if the error of a map
+/// is unknown, or no light arrived.
 fn relative_rmse(maps: &[IlluminationMap]) -> Option<f64> {
     let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for map in maps {

@@ -1,7 +1,7 @@
 //! Predicts the cost of an error target from the levels baked so far, and records how well earlier predictions did.
 //!
-//! Error falls with a power of the work, once the lattice that refinement begins from is through. The exponent is measured
-//! over the levels since then and drawn towards the usual one, since two levels alone say little.
+//! Error falls with a power of the work once refinement has started. The exponent is measured over the levels since
+//! then and drawn towards the usual one, since two levels alone say little.
 
 use serde::{Deserialize, Serialize};
 

@@ -175,7 +175,7 @@ impl CausticLayer<'_> {
         self.unit_for(light, light.launch.power_bound_w(), 1.0)
     }
 
-    /// Unit for so many sums of a light, each of up to `power_w` [W per channel] at unit strength.
+    /// Unit for `sums` sums of a light, each of up to `power_w` [W per channel] at unit strength.
     ///
     /// # Errors
     /// A power that is not finite or not positive.

@@ -25,7 +25,7 @@ pub(super) struct MapSize {
 pub(super) type Sizes = BTreeMap<Receiver, MapSize>;
 
 impl MapSize {
-    /// A map of uniform texels at this size.
+    /// A dense map of this size.
     pub(super) fn dense(size: (usize, usize)) -> Self {
         Self {
             size,
@@ -108,7 +108,7 @@ pub(super) struct Borders {
 }
 
 impl Borders {
-    /// Requires at least a level of all tiles of a map that a border runs through.
+    /// Requires at least the resolution of a level from all tiles of a map that a border runs through.
     pub(super) fn refine(&self, map: (usize, usize), level: u8, needs: &mut [TileDemand]) {
         let (columns, rows) = tiles::tile_counts(map.0, map.1);
         // The tiles that a place and its neighbours lie in.
@@ -151,7 +151,7 @@ pub(super) enum MemoryReduction {
 }
 
 impl SizeRequest {
-    /// A map without tiles.
+    /// A dense map.
     pub(super) fn dense(size: (usize, usize)) -> Self {
         Self {
             size,
@@ -182,7 +182,7 @@ impl SizeRequest {
         }
     }
 
-    /// Without tiles, coarser by a number of levels.
+    /// A dense map, coarser by a number of levels.
     fn in_one(&self, levels: f64) -> MapSize {
         let halved_times = levels.clamp(0.0, 32.0) as u32;
         MapSize {
@@ -192,7 +192,7 @@ impl SizeRequest {
         }
     }
 
-    /// With tiles as requested, or coarser by `sparing` levels; without if tiles save too little.
+    /// A tiled map as requested, or coarser by `sparing` levels; a dense one if tiles save too little.
     fn in_tiles(&self, tiles: &[TileDemand], sparing: Option<f64>) -> MapSize {
         let (columns, _) = tiles::tile_counts(self.size.0, self.size.1);
         let balanced = |level: &dyn Fn(&TileDemand) -> f64, coarsest: u8| {

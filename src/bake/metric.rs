@@ -22,10 +22,10 @@ pub(super) struct ComparisonView {
     pub(super) indirect: Vec<f64>,
 }
 
-/// What the error of a bake is made of.
+/// The terms that a bake's error is made of.
 pub(super) enum ErrorTerms {
     Rmse,
-    /// Weighted by its visibility.
+    /// Squared errors weighted by visibility.
     Visible(Counts),
 }
 

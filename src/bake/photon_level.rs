@@ -1,4 +1,4 @@
-//! One level of one light by photons: at least twice as many as the level before, whose photons are reused.
+//! One level of one light by photons: more of them than the level before, whose photons are reused.
 
 use std::borrow::Cow;
 use std::time::Instant;
@@ -171,7 +171,7 @@ impl CausticLayer<'_> {
             return Ok(());
         }
         let made = self.more_photons(light, sizes, state, (last, light_progress.aim), course)?;
-        // No better estimate is worth its cost.
+        // The light is negligible: a better estimate is not worth its cost.
         light_progress.done |= !light_progress.is_underrated && made.is_some() && self.is_negligible(light);
         light_progress.levels.extend(made);
         // Only the last level is needed, but the next bake reaches it sooner with all of them.

@@ -44,7 +44,7 @@ pub(super) struct Showing<'a, 'level> {
     pub(super) is_first: bool,
     /// Stand-in for layers that are not baked yet, if nothing was shown before the bake.
     pub(super) first_look: Option<FirstLook>,
-    /// Coarse indirect light for the error metric, if there is no callback and none is cached.
+    /// Coarse indirect light for the error metric, if neither `first_look` nor the cache has any.
     pub(super) glance: Option<FirstLook>,
 }
 

@@ -79,11 +79,11 @@ impl MapMemory {
 pub struct ChartCache {
     scene: Arc<Scene>,
     parametrisations: Vec<OnceLock<Option<Arc<Parametrisation>>>>,
-    /// Generated parametrisations for another than the default side, by object and side.
+    /// Generated parametrisations for sides other than the default, by object and side.
     laid_out: Mutex<BTreeMap<(usize, usize), Arc<Parametrisation>>>,
-    /// Whether each object's mesh bounds a solid.
+    /// Whether each object's mesh is closed.
     closed: Vec<OnceLock<bool>>,
-    /// Charts without tiles, by receiver and size.
+    /// Dense charts, by receiver and size.
     charts: Mutex<BTreeMap<ChartKey, KeptChart>>,
     /// Tiled charts, the latest last.
     tiled: Mutex<Vec<Arc<Chart>>>,
@@ -96,13 +96,13 @@ pub struct ChartCache {
 /// Receiver, and width and height of the chart.
 type ChartKey = (Receiver, (usize, usize));
 
-/// A chart, and the number of requests before its last one.
+/// A chart, and the number of requests before its last use.
 type KeptChart = (Arc<Chart>, u64);
 
 /// Approximate number of charts kept per receiver.
 const CHARTS_PER_RECEIVER: usize = 4;
 
-/// Charts that are kept even if there are few receivers.
+/// Minimum number of charts kept.
 const MIN_CHARTS: usize = 256;
 
 /// Maximum number of tiled charts kept.
@@ -156,7 +156,7 @@ impl ChartCache {
             .as_ref()
     }
 
-    /// The parametrisation of an object for maps of a given side, for which generated charts have their gutters.
+    /// The parametrisation of an object for maps of a given side, on which the gutters of generated charts depend.
     fn laid_out(&self, object: usize, side: usize) -> Option<Arc<Parametrisation>> {
         let usual = &self.parametrisations[object];
         let is_for_all = |usual: &Arc<Parametrisation>| usual.uv_set != UvSet::Generated;
@@ -211,7 +211,7 @@ impl ChartCache {
         })
     }
 
-    /// A chart without tiles.
+    /// A dense chart.
     pub fn chart(&self, receiver: Receiver, (width, height): (usize, usize)) -> Option<Arc<Chart>> {
         let key = (receiver, (width, height));
         // Even after a panic under the lock, the charts in the map are complete.
@@ -236,7 +236,7 @@ impl ChartCache {
         Some(chart)
     }
 
-    /// A chart with or without tiles.
+    /// A chart of a size, dense or tiled.
     pub fn chart_of(&self, receiver: Receiver, size: &MapSize) -> Option<Arc<Chart>> {
         let Some(layout) = &size.layout else {
             return self.chart(receiver, size.size);
@@ -462,7 +462,7 @@ fn border_doublings(settings: &BakeSettings) -> u32 {
 /// Minimum side of a grid of indirect light, if there is room for it [texels].
 const MIN_GRID_SIDE: usize = 8;
 
-/// A size of about FIRST_SIDE² texels whose sides differ by a power of two, at most 8:1.
+/// A size of about FIRST_SIDE² texels whose aspect ratio is a power of two, at most 8:1.
 pub fn first_size(aspect: f64) -> (usize, usize) {
     let steps = aspect.log2().round().clamp(-3.0, 3.0) as i32;
     let stretch = |steps: i32| FIRST_SIDE << steps.max(0);

@@ -61,7 +61,7 @@ pub(super) struct Spectra {
     of_lights: BTreeMap<usize, SpectralLight>,
     /// Bands, the same for every light; empty if wavelengths are interpolated.
     bands: Vec<SpectralBand>,
-    /// Rays of the lattice that share the wavelengths of one ray among them.
+    /// Number of lattice rays that the wavelengths are distributed over; 1 if every ray is split into all of them.
     rays_per_split: f64,
     keeps_bands: bool,
 }
@@ -313,8 +313,8 @@ fn middle_of(lamp: &Spectrum, band: &SpectralBand) -> Option<Nanometres> {
     (weights > 0.0).then(|| Nanometres(weighted / weights))
 }
 
-/// A light's own spectrum, or a smooth one for its colour. For a sky it is white, as its colours by direction are
-/// factors.
+/// A light's own spectrum, or a smooth one for its colour. A sky gets a white one, which its colours by direction
+/// scale.
 fn lamp_of(light: &Light) -> std::result::Result<Arc<Spectrum>, crate::optics::spectrum::SpectrumError> {
     match (&light.spectrum, &light.kind) {
         (Some(spectrum), _) => Ok(Arc::clone(spectrum)),

@@ -213,7 +213,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// How often cells are split.
+    /// Limits on splitting cells.
     pub(super) fn splits(&self) -> SubdivisionLimits {
         if self.settings.max_error.is_some() {
             SubdivisionLimits::BEFORE_ROUNDS

@@ -23,7 +23,7 @@ use super::moments::MomentOptions;
 use super::options::{RunOptions, SceneOptions};
 use super::values;
 
-/// Round targets of the error that forecasts are made for [1].
+/// Round error targets, for which forecasts are made [1].
 const ROUND_TARGETS: [f64; 9] = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001];
 
 #[derive(Debug, Args)]

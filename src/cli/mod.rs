@@ -154,7 +154,7 @@ fn report(error: &Error) -> ExitCode {
     }
 }
 
-/// Clap's report without its usage block, tips joined.
+/// Clap's report as one line, without its usage block.
 fn in_one_sentence(error: &clap::Error) -> Error {
     let report = error.render().to_string();
     let what: Vec<&str> = report

@@ -57,7 +57,7 @@ pub enum Bits {
 pub struct GlbOptions {
     /// How materials carry the light.
     pub carrier: Carrier,
-    /// Meaning of the maps' values. Emission is never E or lux, but those divided by π.
+    /// Meaning of the maps' values. Emission is never E or lux, but either of them divided by π.
     pub quantity: Quantity,
     /// What becomes of the lights.
     pub lights: SceneLights,
