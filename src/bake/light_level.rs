@@ -98,7 +98,7 @@ pub(super) struct LightLevel {
     /// Work of the level if nothing were cached: cells of patches and receiver queries, or closest-hit queries of
     /// photons and 0.
     pub(super) work: (u64, u64),
-    /// Share of the patches' light in which part of the spectrum lies in one place.
+    /// Share of the patches' flux that concentrates a part of the spectrum in one place.
     pub(super) lumped_share: f64,
     /// Paths that can be deposited again; `None` if they were too large to keep.
     pub(super) traced: Option<TracedLight>,
