@@ -29,7 +29,7 @@
 //! [many machines](guide::many_machines), [accuracy](guide::accuracy), [hard cases](guide::hard_cases),
 //! [how it works](guide::how_it_works), [contributing](guide::contributing), [changes](guide::changes).
 
-// Units stand in brackets, as in `area [m²]`, which are no links.
+// Brackets hold units, as in `area [m²]`, and no links.
 #![allow(rustdoc::broken_intra_doc_links)]
 
 pub use bake::{Bake, Baker, StopReason};
@@ -47,8 +47,8 @@ pub use settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 pub mod guide;
 pub mod settings;
 
-// Internals, which the crate's own program and tests reach: what is here may change without notice. A module imports only
-// from modules above it.
+// Internals for the crate's own program and tests; they may change without notice. Imports between modules form no
+// cycle.
 #[doc(hidden)]
 pub mod bake;
 #[doc(hidden)]

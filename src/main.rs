@@ -1,4 +1,5 @@
-//! The `nephroid` program: parse, a validated job before any long work, run, exit code.
+//! The `nephroid` program: parses the command line, validates the job before any long work, runs it, sets the exit
+//! code.
 
 mod cli;
 mod memory;

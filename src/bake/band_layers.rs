@@ -10,30 +10,30 @@ use crate::light_pass::receiver_maps::ReceiverMaps;
 /// Maps of one band of one light at one level.
 #[derive(Clone, Debug)]
 pub(super) struct LevelBand {
-    /// Place among the bake's bands.
+    /// Index among the bake's bands.
     pub(super) index: usize,
     pub(super) band: SpectralBand,
     /// Flux as X, Y and Z per texel.
     pub(super) maps: ReceiverMaps,
-    /// Which of these tells its light best.
+    /// The channel, X, Y or Z, in which the band is brightest.
     pub(super) channel: usize,
-    /// Radiant watts for one of it.
+    /// Radiant watts per unit of that channel.
     pub(super) radiant: f64,
 }
 
-/// What one band gives to the caustic layer of one map.
+/// One band's share of the caustic layer of one map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BandLayer {
-    /// Whose light it is.
+    /// Receiver of the map.
     pub receiver: Receiver,
-    /// The wavelengths.
+    /// Range of wavelengths.
     pub band: SpectralBand,
-    /// Mean of E over the band's wavelengths, per texel [W/(m² nm), radiant].
+    /// Mean spectral irradiance over the band, per texel [W/(m² nm), radiant].
     pub irradiance: Vec<f32>,
 }
 
 impl MapAssembler<'_> {
-    /// Bands of all maps: map by map, from the shortest wavelength on; none where they are not kept.
+    /// Band layers of all maps, map by map, by rising wavelength; empty unless bands are kept.
     pub(super) fn band_layers(&self, maps: &[IlluminationMap], levels: &Levels) -> Vec<BandLayer> {
         let mut bands: Vec<(usize, &SpectralBand)> = levels
             .iter()

@@ -1,7 +1,7 @@
-//! What carries a light: patches of its wavefront, or photons.
+//! Chooses the carrier of each light: patches of its wavefront, or photons.
 //!
-//! Light of many places and on rough surfaces is for photons. Of any other light `auto` makes a few photons first; they
-//! tell what the target would cost by photons, and patches go on while they cost less than that. Costs are counted
+//! Area lights and light on rough surfaces always need photons. For any other light, `auto` first traces a few photons,
+//! which tell what the target would cost with photons, and refines patches while they cost less. Costs are counts of
 //! operations, so that the choice does not depend on the machine.
 
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
@@ -14,31 +14,30 @@ use crate::light_pass::photon::pass::HALVES;
 use crate::plan::Effect;
 use crate::settings::Estimator;
 
-/// Time of a cell of patches over that of a photon's segment, where a photon has but one; it grows with the cube of their
-/// number, as the branches do that patches follow.
+/// Cost of a patch cell relative to a photon segment, at one segment per photon. It grows with the cube of the segments
+/// per photon, like the number of branches that patches follow.
 const CELL: f64 = 8.0;
 
-/// Time of a ray that only looks for its receiver, with its triangle's deposit, over that of a photon's segment.
+/// Cost of a receiver query, including the deposit of its triangle, relative to a photon segment.
 const RECEIVER_QUERY: f64 = 0.4;
 
-/// A level of patches costs so many times the one before it.
+/// Cost of a level of patches relative to the level before it.
 const LEVEL_GROWTH: f64 = 4.0;
 
-/// Light whose photons have more segments than this goes more ways than patches should follow.
+/// Segments per photon above which light branches too much for patches.
 const MAX_PATHS: f64 = 4.0;
 
-/// Patches have to promise the target for this part of what photons take: they may promise too much, and what they took is
-/// lost with the change.
+/// Patches have to promise the target at this fraction of the photons' cost: their forecasts tend to be too low, and
+/// their work is lost if the carrier changes.
 const PROMISE: f64 = 0.5;
 
-/// Relative RMSE of the photons that audit patches which interpolate between wavelengths. On the map of a prism, with some
-/// sixty lit texels, it shows a bias of a tenth.
+/// Relative RMSE of the photons that audit patches which interpolate between wavelengths. On the map of a prism, with
+/// some sixty lit texels, it reveals a bias of 10 %.
 const AUDITORS: f64 = 0.15;
 
-/// Work grows with the inverse of the error to a power between these.
+/// Range of the power of 1/error with which work grows.
 const POWERS: (f64, f64) = (1.0, 2.5);
 
-/// What carries a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Carrier {
     /// Patches, or photons once they are known to be cheaper.
@@ -47,12 +46,12 @@ pub(super) enum Carrier {
     #[default]
     Patches,
     Photons,
-    /// The paper's kernels.
+    /// Kernel splats of the paper.
     Splats,
 }
 
 impl LightProgress {
-    /// Goes on from the first photons.
+    /// Continues from the first photons; the last level of patches becomes the rival.
     pub(super) fn turn_to_photons(&mut self) {
         self.carrier = Carrier::Photons;
         self.rounds.clear();
@@ -63,12 +62,12 @@ impl LightProgress {
 }
 
 impl CausticLayer<'_> {
-    /// Whether its light comes from many places.
+    /// Whether the light is sampled as an area light.
     pub(super) fn has_places(&self, light: &VisibleLight) -> bool {
         self.plan.is_on(Effect::AreaLights) && self.tracer.scene().lights[light.light].has_extent()
     }
 
-    /// A rough surface that light meets, or one that changes from place to place.
+    /// The first rough or spatially varying object that the light reaches; `None` if roughness is off.
     pub(super) fn rough_object(&self, light: &VisibleLight) -> Option<usize> {
         let scene = self.tracer.scene();
         let reached = self.aim.sights[light.light].reached.iter();
@@ -77,13 +76,13 @@ impl CausticLayer<'_> {
         rough.filter(|_| self.plan.is_on(Effect::Roughness))
     }
 
-    /// Whether only photons can carry a light.
+    /// Whether only photons can carry the light.
     pub(super) fn is_soft(&self, light: &VisibleLight) -> bool {
         self.has_places(light) || self.rough_object(light).is_some()
     }
 
     /// # Errors
-    /// A light of many places or on rough surfaces, for an estimator that has neither.
+    /// A light with an extent or on rough surfaces, with an estimator that supports neither.
     pub(super) fn refuse_soft_light(&self, lights: &[&VisibleLight]) -> Result<()> {
         let estimator = self.settings.estimator;
         if matches!(estimator, Estimator::Auto | Estimator::Photon) {
@@ -119,7 +118,7 @@ impl CausticLayer<'_> {
         Ok(())
     }
 
-    /// What carries a light to begin with.
+    /// The carrier that a light starts with.
     pub(super) fn carrier(&self, light: &VisibleLight) -> Carrier {
         match self.settings.estimator {
             Estimator::Photon => Carrier::Photons,
@@ -130,8 +129,9 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Of a light that may have either: makes the photons that tell their cost, and more of them while they cost less than
-    /// the first patches would; then decides whether another level of patches is worth it. True where it made photons.
+    /// Chooses the carrier of an undecided light: traces the photons that tell their cost, more of them while they are
+    /// cheaper than the first level of patches, then judges whether another level of patches pays off. True if photons
+    /// were traced.
     pub(super) fn decide_carrier(
         &self,
         light: &VisibleLight,
@@ -157,7 +157,7 @@ impl CausticLayer<'_> {
             }
         }
         let Some((segments, per_photon)) = light_progress.rival.as_ref().and_then(photon_segments) else {
-            // Nothing arrived: patches find what is too rare for a few photons.
+            // Nothing arrived: patches find paths that are too rare for a few photons.
             light_progress.carrier = Carrier::Patches;
             return Ok(false);
         };
@@ -185,13 +185,13 @@ impl CausticLayer<'_> {
         {
             light_progress.turn_to_photons();
         }
-        // How many ways its cells have to be divided shows only when they are.
+        // The number of queries is not known before cells are subdivided, so it is capped.
         course.most_queries = ((by_photons - so_far) / RECEIVER_QUERY) as u64;
         Ok(false)
     }
 
-    /// Whether patches may have a bias that the first photons are too few to see, and more of them take less than the
-    /// patches did.
+    /// Whether patches may have a bias that the first photons are too few to detect, and more photons cost less than
+    /// the patches did.
     fn lacks_auditors(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
         let Some(rival) = light_progress
             .rival
@@ -210,7 +210,7 @@ impl CausticLayer<'_> {
         })
     }
 
-    /// Whether another level of photons takes less than the first one of patches.
+    /// Whether another level of photons costs less than the first level of patches.
     fn are_photons_sooner(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
         let known = light_progress.rival.as_ref().and_then(photon_segments);
         let (Some((segments, per_photon)), true) = (known, light_progress.levels.is_empty()) else {
@@ -230,25 +230,26 @@ impl CausticLayer<'_> {
     }
 }
 
-/// Time of a level of patches over that of a photon's segment, where a photon has so many.
+/// Cost of a level of patches in photon segments, at `per_photon` segments per photon.
 fn cost(level: &LightLevel, per_photon: f64) -> f64 {
     let (cells, queries) = level.work;
     CELL * per_photon.powi(3) * cells as f64 + RECEIVER_QUERY * queries as f64
 }
 
-/// Of all levels.
+/// Total [`cost`] of the levels.
 fn cost_of(levels: &[LightLevel], per_photon: f64) -> f64 {
     levels.iter().map(|level| cost(level, per_photon)).sum()
 }
 
-/// Whether audits found more than the last two levels of patches show of themselves: finer ones will not mend that.
+/// Whether audits exceed the error that the last two levels of patches estimate for themselves: finer patches would not
+/// reduce that.
 fn is_biased(light_progress: &LightProgress) -> bool {
     let mut last = light_progress.levels.iter().rev().take(2);
     light_progress.levels.len() > 1
         && last.all(|level| level.error.as_ref().is_some_and(|error| error.estimate.is_raised))
 }
 
-/// Whether there is no time left for another level of patches, but for photons that are better than the last one.
+/// Whether the time left is too short for another level of patches, but enough for photons that beat the last one.
 fn are_photons_in_time(light_progress: &LightProgress, state: &LightState, course: &BakeContext) -> bool {
     let (Some(left_s), Some(photon_s)) = (course.limited.time_left_s(), state.photon_s) else {
         return false;
@@ -268,7 +269,8 @@ fn are_photons_in_time(light_progress: &LightProgress, state: &LightState, cours
     light_progress.level_s * LEVEL_GROWTH > own_s && of_photons / times.sqrt() < of_patches
 }
 
-/// What patches are expected to take for a share of the whole error, by their last two levels whose own share is known.
+/// Predicted total cost of patches that contribute `most_share` to the error of the bake, extrapolated from the last
+/// two levels with a known share; `None` with fewer.
 fn promised(
     light_progress: &LightProgress,
     cost: impl Fn(&LightLevel) -> f64,
@@ -298,7 +300,7 @@ fn promised(
     (fine > 0.0 && power.is_finite()).then(|| after * (fine / most_share).max(1.0).powf(power))
 }
 
-/// Segments that photons took, and those of one of them; `None` where none arrived.
+/// Segments of all photons, and per photon; `None` if none arrived.
 fn photon_segments(level: &LightLevel) -> Option<(f64, f64)> {
     let rmse = level.error.as_ref()?.estimate.relative_rmse;
     let segments = level.work.0 as f64;

@@ -31,96 +31,94 @@ use crate::progress::{Control, Progress};
 use crate::settings::{BakeSettings, Estimator};
 use crate::transport::Tracer;
 
-/// Levels that an error estimate needs: each lattice with half the steps of the one before.
+/// Levels needed for an error estimate; each lattice has half the step of the one before.
 pub(super) const ESTIMATED_LEVELS: usize = 3;
 
-/// A refinement aims at this part of the target, so that it need not be done again for little.
+/// A round of refinement aims at this fraction of the target, so that a near miss does not cost another round.
 const GOAL: f64 = 0.85;
 
-/// No round of refinement aims at less than this part of the error before it.
+/// Lower bound of a round's goal, relative to the error before it.
 const ROUND_GAIN: f64 = 0.4;
 
-/// Rounds of refinement at most: cells are then a 2¹⁶th of the first ones.
+/// Maximum rounds of refinement; cells are then 2¹⁶ times smaller than the first ones.
 const MAX_ROUNDS: usize = 8;
 
-/// Patches with more of their light where a part of the spectrum is held in one place look finer than they are.
+/// Lumped share of patches above which photons take over: such light looks more converged than it is.
 const MAX_LUMPED_SHARE: f64 = 0.3;
 
-/// Part of the time that there is when light between surfaces is still to be gathered.
+/// Fraction of the time limit for this layer if indirect light is still to be gathered.
 const PART_BEFORE_INDIRECT: f64 = 0.85;
 
-/// All that the layer needs.
+/// Inputs of the caustic layer.
 pub(super) struct CausticLayer<'a> {
     pub(super) tracer: &'a Tracer,
     pub(super) aim: &'a LightVisibility,
     pub(super) settings: &'a BakeSettings,
     pub(super) sizes: &'a ChartCache,
-    /// Of lights whose wavelengths go different ways.
+    /// Spectra of the lights that are traced by wavelength.
     pub(super) spectra: &'a Spectra,
     pub(super) plan: &'a EffectPlan,
     pub(super) progress: &'a dyn Progress,
-    /// What the user asks.
+    /// Cancellation by the user.
     pub(super) control: &'a Control,
-    /// When the bake began.
+    /// Start of the whole bake.
     pub(super) began: Instant,
 }
 
-/// Where the bake of the layer stands.
+/// State of the layer's bake.
 #[derive(Clone, Debug, Default)]
 pub(super) struct CausticOutcome {
-    /// Of this layer, this time.
+    /// Work of this layer in this bake.
     pub(super) counts: BakeCounts,
-    /// Where it stood after each level whose error is known.
+    /// Cost and error after each level whose error is known.
     pub(super) course: Vec<CostPoint>,
-    /// What the target was expected to cost when its error was first known.
+    /// Cost point and forecast from when the error was first known.
     pub(super) forecast: Option<(CostPoint, Forecast)>,
-    /// Maps coarser than they should be.
     pub(super) warnings: Vec<Warning>,
-    /// Why no finer level came, where that was not the end of the lattice.
+    /// Why refinement ended before the finest lattice; `None` if it did not.
     pub(super) stopped: Option<Stopped>,
-    /// Lights with maps: the last level of their state is the picture.
+    /// Lights with maps; the last level of each one's state is shown.
     pub(super) finished: Vec<usize>,
 }
 
-/// What ended a bake before its lattice did.
+/// Why refinement ended early.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stopped {
-    /// The estimated error is below the target.
+    /// The estimated error met the target.
     Target,
-    /// The time was up.
+    /// The time limit was reached.
     Time,
-    /// It was asked to.
+    /// The user cancelled.
     Cancelled,
 }
 
-/// The levels of one light in the bake under way.
+/// Levels of one light in the running bake.
 #[derive(Debug, Default)]
 pub(super) struct LightProgress {
-    /// What they are made of.
     pub(super) carrier: Carrier,
-    /// The last level of the other carrier, shown until this one is better: photons, which tell what more of them would cost,
-    /// or patches that were given up.
+    /// Last level of the other carrier, shown while its error is lower: photons traced to predict their cost, or
+    /// abandoned patches.
     pub(super) rival: Option<LightLevel>,
-    /// The coarsest first.
+    /// From coarse to fine.
     pub(super) levels: Vec<LightLevel>,
-    /// Wall-clock seconds of the last level of patches.
+    /// Wall-clock time of the last level of patches [s].
     pub(super) level_s: f64,
     pub(super) rounds: Vec<Round>,
     /// Relative RMSE that the last round aims at.
     pub(super) goal: Option<f64>,
-    /// Relative RMSE of its own maps that the target of the whole bake asks for.
+    /// Relative RMSE of this light's maps that the target of the whole bake asks for.
     pub(super) aim: Option<f64>,
-    /// What it added to the error of the whole bake while so many levels were there, in the metric that is aimed at.
+    /// Number of levels, and the light's share of the error of the whole bake with that many, in the target metric.
     pub(super) shares: Vec<(usize, f64)>,
-    /// What it may add.
+    /// Upper limit of that share.
     pub(super) most_share: Option<f64>,
     pub(super) done: bool,
-    /// Whether it was taken to be dim and is not.
+    /// Whether it was treated as negligible by mistake.
     pub(super) is_underrated: bool,
 }
 
 impl LightProgress {
-    /// The picture: the last level, or the rival while that is better.
+    /// The level to show: the last one, or the rival while it is better.
     pub(super) fn shown(&self) -> Option<&LightLevel> {
         if self.is_rival_better() {
             self.rival.as_ref()
@@ -140,18 +138,18 @@ impl LightProgress {
         }
     }
 
-    /// Of the last level, where it is known.
+    /// Error of the last level, if known.
     pub(super) fn error(&self) -> Option<&LightError> {
         Some(&self.levels.last()?.error.as_ref()?.estimate)
     }
 }
 
-/// Observer of a bake.
+/// Receives the intermediate results of a bake.
 pub(super) trait BakeObserver {
-    /// Takes a picture that is not the last: levels, where the bake stands, and the clock.
+    /// Takes a result that is not the final one.
     ///
     /// # Errors
-    /// What ends the bake.
+    /// An error ends the bake.
     fn show(
         &mut self,
         _levels: &[CompletedLevel],
@@ -161,10 +159,10 @@ pub(super) trait BakeObserver {
         Ok(())
     }
 
-    /// Takes the first picture, where the light of other layers is not known yet.
+    /// Takes the first result, when the light of other layers is not known yet.
     ///
     /// # Errors
-    /// What ends the bake.
+    /// An error ends the bake.
     fn show_first(
         &mut self,
         _levels: &[CompletedLevel],
@@ -174,16 +172,15 @@ pub(super) trait BakeObserver {
         Ok(())
     }
 
-    /// The light of other layers on the maps of these levels and of all others.
+    /// Light of other layers on the maps of these levels and on all other maps.
     fn backdrop(&mut self, _levels: &[CompletedLevel]) -> Backdrop {
         Backdrop::new()
     }
 }
 
-/// No observer.
 impl BakeObserver for () {}
 
-/// The pictures of all lights so far.
+/// The level to show of each light that has one.
 pub(super) fn shown<'a>(
     lights: &[&VisibleLight],
     all_progress: &'a [LightProgress],
@@ -199,24 +196,24 @@ pub(super) struct BakeContext<'a> {
     pub(super) control: &'a Control,
     pub(super) clock: &'a mut Clock,
     pub(super) outcome: &'a mut CausticOutcome,
-    /// Where passes are traced and deposited.
+    /// Whether passes run here, in part, or come from shards.
     pub(super) role: &'a mut ShardRole,
-    /// Mean footprints, where they are wanted.
+    /// Mean footprints, if needed.
     pub(super) statistics: Option<FootprintStatistics>,
-    /// Receivers that the patches of the next level may ask for before it is given up.
+    /// Receiver queries after which the next level of patches is abandoned.
     pub(super) most_queries: u64,
-    /// With the time that there is for it.
+    /// Cancellation, including the time limit.
     pub(super) limited: &'a Control,
-    /// Lights that are to become better.
+    /// Lights that are still being refined.
     pub(super) open_lights: usize,
 }
 
 impl BakeContext<'_> {
-    /// A pass over the lattice of a light: `run` does it, or a share of it, adding to the sums that it is given, which are
-    /// nothing yet; or shards did.
+    /// Runs a pass over the lattice of a light. `run` adds the pass, or this shard's share of it, to the empty sums
+    /// that it gets; a merge takes the sums from the shards instead.
     ///
     /// # Errors
-    /// Shards that did not.
+    /// Sums that cannot be recorded or read from shards.
     pub(super) fn pass(
         &mut self,
         chart_for: &ChartFor,
@@ -234,10 +231,11 @@ impl BakeContext<'_> {
 }
 
 impl CausticLayer<'_> {
-    /// Bakes all lights, taking from the states what still holds. The onlooker sees every picture but the last.
+    /// Bakes all lights, reusing levels that are still valid. The observer sees every result but the last.
     ///
     /// # Errors
-    /// A light whose power is no number.
+    /// Light that the estimator cannot follow; a power that is not finite; shards whose maps may exceed the memory
+    /// limit.
     pub(super) fn bake(
         &self,
         states: &mut LightStates,
@@ -338,7 +336,7 @@ impl CausticLayer<'_> {
             }
             self.decide(&lights, &mut all_progress, &errors, &counting);
             self.note_cost(states, &lights, &all_progress, &errors, &mut course);
-            // The first picture is worth waiting for, the others have their time.
+            // The first picture ignores the time limit, the others respect it.
             course.control = &limited;
             if limited.is_cancelled() || all_progress.iter().all(|light_progress| light_progress.done) {
                 break errors;
@@ -347,7 +345,7 @@ impl CausticLayer<'_> {
         };
         outcome.stopped = self.stopped(&all_progress, &errors, &limited);
         for (light, mut light_progress) in lights.iter().zip(all_progress) {
-            // The last level is the picture; a rival that is not is kept for the next bake.
+            // The last level is shown; a rival that is worse is kept for the next bake.
             let is_better = light_progress.is_rival_better();
             if let Some(rival) = light_progress.rival.take() {
                 let place = if is_better { light_progress.levels.len() } else { 0 };
@@ -364,7 +362,7 @@ impl CausticLayer<'_> {
         Ok(outcome)
     }
 
-    /// Writes down what the error of this level took, where it is known.
+    /// Records the cost of this level if its error is known.
     fn note_cost(
         &self,
         states: &LightStates,
@@ -374,7 +372,7 @@ impl CausticLayer<'_> {
         course: &mut BakeContext,
     ) {
         let error = errors.error();
-        // What the first photons cost says nothing of patches.
+        // The cost of the first photons says nothing about patches.
         let is_open = all_progress.iter().any(|light_progress| {
             light_progress.carrier == Carrier::Undecided
                 && light_progress
@@ -382,7 +380,7 @@ impl CausticLayer<'_> {
                     .last()
                     .is_none_or(|level| level.error.is_none())
         });
-        // Nor does a level that was cut off.
+        // An unchanged error means that the level was cut off.
         let is_known = course
             .outcome
             .course
@@ -423,7 +421,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Says that a map was given up.
+    /// The warning about a map that was dropped.
     fn stray(&self, light: &VisibleLight, receiver: Receiver) -> Warning {
         let scene = self.tracer.scene();
         Warning::new(
@@ -441,7 +439,7 @@ impl CausticLayer<'_> {
         )
     }
 
-    /// Why there is no finer level.
+    /// Why no finer level follows.
     fn stopped(&self, all_progress: &[LightProgress], errors: &Errors, limited: &Control) -> Option<Stopped> {
         if self.control.is_cancelled() {
             return Some(Stopped::Cancelled);
@@ -453,14 +451,14 @@ impl CausticLayer<'_> {
         (errors.is_empty() || errors.error() <= target).then_some(Stopped::Target)
     }
 
-    /// Lights that see something specular and shine at all.
+    /// Lights of nonzero strength that reach something specular.
     pub(super) fn lit(&self) -> impl Iterator<Item = &VisibleLight> {
         let scene = self.tracer.scene();
         let lights = self.aim.lights.iter();
         lights.filter(|light| scene.lights[light.light].strength().max_channel() > 0.0)
     }
 
-    /// One level more of a light.
+    /// Adds one level to a light.
     fn advance(
         &self,
         light: &VisibleLight,
@@ -470,7 +468,7 @@ impl CausticLayer<'_> {
         course: &mut BakeContext,
     ) -> Result<()> {
         if light_progress.carrier == Carrier::Undecided {
-            // Photons are shown before anything that takes longer.
+            // Photons are shown before patches, which take longer.
             let made_photons = self.decide_carrier(light, sizes, state, light_progress, course)?;
             if made_photons {
                 return Ok(());
@@ -501,7 +499,7 @@ impl CausticLayer<'_> {
             return Ok(());
         }
         if level.key.trace.is_negligible {
-            // Not known better, and not worth knowing.
+            // No better estimate is worth its cost: all of its light counts as error.
             let whole = accuracy::images(&level.maps, level.unit);
             let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
             let estimate = accuracy::by_difference(&whole, &Images::new(), 1.0, &ledger);
@@ -529,7 +527,7 @@ impl CausticLayer<'_> {
         Ok(())
     }
 
-    /// Which lights go on, and what each of them aims at.
+    /// Decides which lights continue, and towards which goal.
     fn decide(
         &self,
         lights: &[&VisibleLight],
@@ -579,7 +577,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// The error of a level, from the levels before it; `None` where nothing is known yet, and of a shard's part.
+    /// Error of a level, estimated from the levels before it; `None` while unknown, and for a shard's part.
     fn error_of(
         &self,
         light: &VisibleLight,
@@ -625,7 +623,7 @@ impl CausticLayer<'_> {
         })
     }
 
-    /// Decides on another round of refinement towards a relative RMSE; false where there is nothing more to do.
+    /// Plans another round of refinement towards a relative RMSE; false if nothing is left to refine.
     fn refine(&self, light_progress: &mut LightProgress, target: f64, counting: &ErrorTerms) -> bool {
         let Some(error) = light_progress.error() else {
             return false;
@@ -633,7 +631,7 @@ impl CausticLayer<'_> {
         if error.relative_rmse <= target {
             return false;
         }
-        // No round can do much more, and a bake that has its time shows what came of it.
+        // One round hardly gains more, and smaller steps leave a result to show if time runs out.
         let goal = (GOAL * target).max(ROUND_GAIN * error.relative_rmse);
         if self.settings.estimator == Estimator::Splat || light_progress.rounds.len() >= MAX_ROUNDS {
             return false;
@@ -656,7 +654,7 @@ impl CausticLayer<'_> {
 }
 
 impl CausticOutcome {
-    /// Counts what a pass did.
+    /// Adds the counts and times of a pass.
     pub(super) fn count(&mut self, report: &PassReport, clock: &mut Clock) {
         self.counts.rays += report.rays;
         self.counts.segments += report.segments;

@@ -3,7 +3,6 @@
 use super::result::Timings;
 use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
 
-/// Both clocks of every stage.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {
     pub(super) build: Seconds,

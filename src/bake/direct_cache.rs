@@ -8,18 +8,18 @@ use crate::light_pass::direct::{DirectLayer, bake_direct};
 use crate::progress::{Control, Progress};
 use crate::transport::Tracer;
 
-/// What direct light is baked on.
+/// The charts that direct light of one map is baked on.
 #[derive(Clone, Debug)]
 pub(super) struct DirectChart {
     pub(super) own: Arc<Chart>,
-    /// Of the smaller texels into which it is divided where light ends within little.
+    /// Finer chart of the texels that are subdivided at shadow borders.
     pub(super) smaller: Option<Arc<Chart>>,
 }
 
 pub(super) type DirectCharts = BTreeMap<Receiver, DirectChart>;
 
 impl DirectChart {
-    /// Texels across and down, and of the smaller ones.
+    /// Width and height, and the width of the finer chart (0 without one).
     fn size(&self) -> [usize; 3] {
         let smaller = self.smaller.as_ref().map_or(0, |smaller| smaller.width);
         [self.own.width, self.own.height, smaller]
@@ -30,36 +30,35 @@ impl DirectChart {
     }
 }
 
-/// One light on one map: its place in the scene, the receiver, and the map's size.
+/// Light, receiver, and size of the chart.
 type Key = (usize, Receiver, [usize; 3]);
 
-/// Lights of unit strength, by light and map.
+/// Direct light at unit strength, by light and map.
 #[derive(Debug, Default)]
 pub(super) struct DirectCache {
     layers: BTreeMap<Key, DirectLayer>,
-    /// All lights together, at their strengths of this bake.
+    /// Sum over all lights, at their strengths in this bake.
     together: Mutex<BTreeMap<Receiver, SummedIrradiance>>,
 }
 
-/// E of all lights on a chart [W/m²].
+/// A chart and E of all lights on it [W/m²].
 type SummedIrradiance = (Arc<Chart>, Vec<[f32; 3]>);
 
-/// What a look for direct light took.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct DirectReport {
     pub(super) shadow_rays: u64,
-    /// False where it was cancelled: what is missing is black.
+    /// False if cancelled; unfinished layers are not kept.
     pub(super) complete: bool,
 }
 
 impl DirectCache {
-    /// Shapes or materials are not what they were.
+    /// Drops everything, because shapes or materials changed.
     pub(super) fn clear(&mut self) {
         self.layers.clear();
         self.begin();
     }
 
-    /// The strengths of lights may not be what they were.
+    /// Drops the sums, because strengths of lights may have changed.
     pub(super) fn begin(&mut self) {
         self.together
             .get_mut()
@@ -67,7 +66,7 @@ impl DirectCache {
             .clear();
     }
 
-    /// All lights together on a chart, as `add_up` does it, or as it was done before in this bake.
+    /// Sum of all lights on a chart, from `add_up` unless this bake has it already.
     pub(super) fn together(
         &self,
         chart: &Arc<Chart>,
@@ -85,18 +84,17 @@ impl DirectCache {
         Some(sum)
     }
 
-    /// A light is not what it was.
+    /// Drops a light that changed.
     pub(super) fn forget(&mut self, light: usize) {
         self.layers.retain(|key, _| key.0 != light);
         self.begin();
     }
 
-    /// Whether nothing is known.
     pub(super) fn is_empty(&self) -> bool {
         self.layers.is_empty()
     }
 
-    /// Whether all lights are known on all charts.
+    /// Whether all lights are cached on all charts.
     pub(super) fn knows(&self, lights: usize, charts: &DirectCharts) -> bool {
         let is_known = |light: usize| {
             charts
@@ -106,7 +104,7 @@ impl DirectCache {
         (0..lights).all(is_known)
     }
 
-    /// Bakes what is missing, and forgets maps of other sizes.
+    /// Bakes missing layers and drops those of other sizes.
     pub(super) fn complete(
         &mut self,
         tracer: &Tracer,
@@ -144,7 +142,7 @@ impl DirectCache {
         report
     }
 
-    /// A light of unit strength on a map; `None` where it was not baked.
+    /// A light at unit strength on a map; `None` if it was not baked.
     pub(super) fn layer(&self, light: usize, chart: &DirectChart) -> Option<&DirectLayer> {
         self.layers.get(&chart.key(light))
     }

@@ -9,7 +9,7 @@ use crate::progress::{Control, Progress};
 use crate::settings::BakeSettings;
 use crate::transport::Tracer;
 
-/// Direct light in the course of a bake.
+/// Work of the direct layer in this bake.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct DirectWork {
     shadow_rays: u64,
@@ -17,7 +17,7 @@ pub(super) struct DirectWork {
 }
 
 impl DirectWork {
-    /// Finds where light ends within little, which maps are to show.
+    /// Finds the shadow borders that maps have to resolve.
     pub(super) fn look_for_borders(
         &mut self,
         tracer: &Tracer,
@@ -30,7 +30,7 @@ impl DirectWork {
         self.seconds.add(watch.elapsed());
     }
 
-    /// Bakes what is missing; false where it was cancelled.
+    /// Bakes missing layers; false if cancelled.
     pub(super) fn shine(
         &mut self,
         tracer: &Tracer,
@@ -45,7 +45,7 @@ impl DirectWork {
         report.complete
     }
 
-    /// The bake with this.
+    /// The outcome with this work added.
     pub(super) fn added_to(&self, outcome: &CausticOutcome) -> CausticOutcome {
         let mut both = outcome.clone();
         both.counts.shadow_rays += self.shadow_rays;

@@ -33,31 +33,31 @@ use crate::plan::{self, Effect, EffectPlan};
 use crate::scene::{Light, Scene};
 use crate::settings::{BakeSettings, LayerKind, Sigma};
 
-/// The finest level of a light, with the light's place in the scene.
+/// Index of a light in the scene, and its finest level.
 pub(super) type CompletedLevel<'a> = (usize, &'a LightLevel);
 
-/// All that finishing needs.
+/// Inputs of the assembly.
 #[derive(Clone, Copy)]
 pub(super) struct MapAssembler<'a> {
     pub(super) scene: &'a Scene,
     pub(super) sizes: &'a ChartCache,
     pub(super) settings: &'a BakeSettings,
     pub(super) plan: &'a EffectPlan,
-    /// Halvings of maps of direct light below the size that is asked for.
+    /// Halvings of direct maps below the requested size.
     pub(super) coarsening: u32,
 }
 
-/// Levels of all lights that have maps, in the scene's order.
+/// Levels of all lights with maps, in scene order.
 pub(super) type Levels<'a> = [CompletedLevel<'a>];
 
 /// Charts of all maps, by receiver.
 pub(super) type Charts = BTreeMap<Receiver, Arc<Chart>>;
 
-/// Light on one map.
+/// Light of one level on one map.
 type LitMap<'a> = (&'a Light, &'a LightLevel, &'a ReceiverMap);
 
 impl MapAssembler<'_> {
-    /// Puts everything together, but for layers that were baked only for others to gather from.
+    /// Assembles the result, without layers that were baked only as sources of indirect light.
     pub(super) fn result(
         &self,
         (mut maps, mut light_layers): (Vec<IlluminationMap>, Vec<LightLayer>),
@@ -131,8 +131,8 @@ impl MapAssembler<'_> {
         }
     }
 
-    /// Caustic and direct light on all maps, all lights at their strengths, with the caustic's error; and each light's part
-    /// where that is asked for.
+    /// Caustic and direct layers of all maps, with all lights at their strengths and the error of the caustic layer;
+    /// and each light's part if requested.
     pub(super) fn maps(
         &self,
         levels: &Levels,
@@ -146,8 +146,8 @@ impl MapAssembler<'_> {
         (maps, self.light_layers(charts, levels, direct))
     }
 
-    /// Charts of all maps: those that received flux, and every receiver that direct light may reach where that or
-    /// indirect light is asked for; with a warning where the latter are coarser than they should be for want of memory.
+    /// Charts of all maps: those that received flux and, if direct or indirect light is requested, every receiver that
+    /// a light may reach; with a warning if the memory limit makes the latter coarser.
     pub(super) fn charts(&self, levels: &Levels) -> (Charts, Option<Warning>) {
         let (mut charts, mut wishes) = (Charts::new(), BTreeMap::new());
         let is_everywhere = self.plan.is_on(Effect::Direct) || self.plan.is_on(Effect::Indirect);
@@ -177,7 +177,7 @@ impl MapAssembler<'_> {
         (charts, warning)
     }
 
-    /// The charts that direct light is baked on: row by row, and no finer than it needs where a map is in tiles.
+    /// The charts that direct light is baked on: not tiled, and no finer than needed.
     pub(super) fn direct_charts(&self, charts: &Charts) -> DirectCharts {
         let charts = charts.values();
         charts
@@ -185,7 +185,7 @@ impl MapAssembler<'_> {
             .collect()
     }
 
-    /// A map of direct and indirect light only.
+    /// Size request of a map with direct and indirect light only.
     fn direct_wish(&self, receiver: Receiver) -> Option<SizeRequest> {
         if self.coarsening > 0 {
             return self.direct_size(receiver.object()).map(SizeRequest::dense);
@@ -203,7 +203,7 @@ impl MapAssembler<'_> {
             0 => self.sizes.border_doublings(chart.receiver, self.settings),
             _ => 0,
         };
-        // Unwrapped charts lie elsewhere in maps of other sizes.
+        // Unwrapped charts have another layout at every size.
         let is_fixed = chart.uv_set == UvSet::Generated || self.coarsening == 0;
         if chart.layout.is_none() && is_fixed && doublings == 0 {
             return Some(DirectChart {
@@ -252,7 +252,7 @@ impl MapAssembler<'_> {
         }
     }
 
-    /// E = ΣΦ/A per texel; nothing where the surface does not reach, but for the gutter.
+    /// E = ΣΦ/A per texel; 0 where the texel holds no surface, except in the gutter.
     fn caustic_layer(&self, chart: &Chart, lit: &[LitMap]) -> Layer {
         let fluxes: Vec<(FluxAccumulator, LinearSrgb)> = lit
             .iter()
@@ -283,9 +283,9 @@ impl MapAssembler<'_> {
         }
     }
 
-    /// Smooths light on a map by sigma, but for splats, whose kernels have it: the radius is that of the footprint which
-    /// a ray at the nominal density has at the light's reach, however far the bake refines. Maps with gaps are left as
-    /// they are: their borders are no mirrors.
+    /// Smooths flux on a map by sigma; splats have it in their kernels. The radius is that of a ray's footprint at
+    /// nominal density and at the light's reach, whatever the refinement. Maps with gaps are not smoothed: the filter
+    /// mirrors at the borders of the map, not at those of charts.
     pub(super) fn smooth(&self, chart: &Chart, level: &LightLevel, flux: &mut FluxAccumulator) {
         if let (true, Sigma::Constant(sigma)) = (self.settings.estimator.refines(), self.settings.sigma)
             && chart.is_full()
@@ -296,7 +296,7 @@ impl MapAssembler<'_> {
         }
     }
 
-    /// Each light's part of all layers, where that is asked for.
+    /// Each light's part of all layers, if requested.
     fn light_layers(&self, charts: &Charts, levels: &Levels, direct: &DirectCache) -> Vec<LightLayer> {
         let mut layers = Vec::new();
         if !self.settings.per_light {
@@ -335,7 +335,7 @@ impl MapAssembler<'_> {
         })
     }
 
-    /// Direct light of some lights [W/m²]; `None` where that of one is not known.
+    /// Direct light of some lights [W/m²]; `None` if the layer of one is missing.
     fn direct_of(
         &self,
         chart: &Arc<Chart>,
@@ -364,12 +364,12 @@ impl MapAssembler<'_> {
     }
 }
 
-/// In the precision of maps; what is beyond its range is the most that it holds, and is named by [`beyond_single`].
+/// Converts to the precision of maps, clamped to `f32::MAX`; [`beyond_single`] reports clamped texels.
 fn single(value: f64) -> f32 {
     value.min(f64::from(f32::MAX)) as f32
 }
 
-/// Says where light is too strong for maps.
+/// The warning about clamped texels.
 fn beyond_single(maps: &[IlluminationMap]) -> Option<Warning> {
     let values = maps
         .iter()
@@ -388,17 +388,17 @@ fn beyond_single(maps: &[IlluminationMap]) -> Option<Warning> {
     })
 }
 
-/// Direct light on a map whose texels are others than those it was baked on.
+/// Direct light on a map whose texels differ from those it was baked on.
 struct Resampled<'a> {
     chart: &'a Chart,
-    /// What it was baked on.
+    /// The chart that it was baked on.
     own: &'a Chart,
-    /// By light, of unit strength, and its strength.
+    /// Each light's layer at unit strength, and the strength.
     lit: Vec<(&'a DirectLayer, LinearSrgb)>,
 }
 
 impl Resampled<'_> {
-    /// Values at the middle of each texel, of the sum of all lights; means where the texels are larger than its own.
+    /// Values of the sum of all lights at texel centres; means where texels are larger than those of `own`.
     fn of(&self, sum: &[[f32; 3]]) -> Vec<[f32; 3]> {
         let value = |corner: [usize; 2], side: f64| self.value(sum, corner, side).to_array().map(single);
         let Some(layout) = &self.chart.layout else {
@@ -424,7 +424,7 @@ impl Resampled<'_> {
         tiles.flat_map_iter(of_tile).collect()
     }
 
-    /// The same of one texel by its corner and side, in texels of the finest size.
+    /// Value of one texel, given by its corner and side in texels of the finest size.
     fn value(&self, sum: &[[f32; 3]], corner: [usize; 2], side: f64) -> LinearSrgb {
         let size = DVec2::new(self.chart.width as f64, self.chart.height as f64);
         let own_size = DVec2::new(self.own.width as f64, self.own.height as f64);
@@ -443,8 +443,8 @@ impl Resampled<'_> {
         mean / (times.x * times.y)
     }
 
-    /// The sum of all lights where one of them ends within little, for texels as small as those that it was divided into;
-    /// their width is a part of the map's.
+    /// Sum of all lights where one of them was subdivided at a shadow border, for texels as small as its subdivision.
+    /// `width` is relative to that of the map.
     fn divided(&self, uv: DVec2, width: f64) -> Option<LinearSrgb> {
         let divided = |layer: &DirectLayer| {
             let divided = layer.divided.as_ref()?;
@@ -463,7 +463,7 @@ impl Resampled<'_> {
     }
 }
 
-/// The error with what texels larger than they should be leave out.
+/// The error including detail lost in texels that are larger than requested.
 fn with_resolution(chart: &Chart, lit: &[LitMap], layers: &[Layer], error: Vec<f32>) -> Vec<f32> {
     let halved = lit
         .iter()
@@ -484,7 +484,7 @@ fn with_resolution(chart: &Chart, lit: &[LitMap], layers: &[Layer], error: Vec<f
     error.into_iter().zip(variances).map(both).collect()
 }
 
-/// Share of all light that no map shows though it should.
+/// Truncated share of the light of all maps.
 fn truncated_share(ledgers: &[LightLedger]) -> f64 {
     let (mut lost_w, mut deposited_w) = (0.0, 0.0);
     for ledger in ledgers {
@@ -499,7 +499,7 @@ fn truncated_share(ledgers: &[LightLedger]) -> f64 {
     }
 }
 
-/// Error of each texel's luminance [W/m²], of all lights together; `None` where one is not known.
+/// Error of each texel's luminance over all lights [W/m²]; `None` if one is unknown or there is no light.
 fn error_of(chart: &Chart, lit: &[LitMap]) -> Option<Vec<f32>> {
     let mut squares = vec![0.0; chart.texel_count()];
     for (light, level, _) in lit {
@@ -513,8 +513,8 @@ fn error_of(chart: &Chart, lit: &[LitMap]) -> Option<Vec<f32>> {
     (!lit.is_empty()).then(|| squares.iter().map(root).collect())
 }
 
-/// Root mean square of the error over the mean irradiance of the caustic and indirect layers, whose error it is, by area;
-/// `None` where the error of a map is not known, or no light arrived.
+/// RMSE of the caustic and indirect layers over their mean irradiance, weighted by area; `None` if the error of a map
+/// is unknown, or no light arrived.
 fn relative_rmse(maps: &[IlluminationMap]) -> Option<f64> {
     let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for map in maps {

@@ -1,7 +1,7 @@
 //! A coarse preview of direct and indirect light, shown until the final layers are finished.
 //!
-//! Before there are caustics, light goes straight through clear bodies: where it comes to lie is wrong, but not how much
-//! of it there is.
+//! Before caustics are known, light goes straight through clear bodies: it arrives at wrong places, but in the right
+//! amount.
 
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
@@ -15,20 +15,20 @@ use crate::plan::{Effect, wants_caustics};
 use crate::progress::{Control, Progress};
 use crate::transport::Tracer;
 
-/// Halvings of maps of direct light below the size that is asked for.
+/// Halvings of direct maps below the requested size.
 const HALVINGS: u32 = 2;
 
-/// Elements of all grids of indirect light.
+/// Elements of all grids of indirect light together.
 const ELEMENTS: u64 = 1_500;
 
-/// The rays between surfaces, kept while the bake goes on.
+/// Rays between surfaces, kept for the rest of the bake.
 #[derive(Debug, Default)]
 pub(super) struct FirstLook {
     indirect: IndirectCache,
 }
 
 impl FirstLook {
-    /// All maps: caustics of the levels, with both layers where they are asked for.
+    /// All maps: the caustics of the levels, and direct and indirect layers if requested.
     pub(super) fn maps(
         &mut self,
         finish: &MapAssembler,
@@ -57,7 +57,7 @@ impl FirstLook {
         (maps, parts)
     }
 
-    /// What surfaces send each other, traced where it was not yet.
+    /// The rays between surfaces, traced on first use.
     pub(super) fn traced(
         &mut self,
         finish: &MapAssembler,
@@ -73,7 +73,6 @@ impl FirstLook {
         indirect
     }
 
-    /// What surfaces send each other.
     pub(super) fn indirect(&self) -> &IndirectCache {
         &self.indirect
     }

@@ -1,69 +1,69 @@
 //! Predicts the cost of an error target from the levels baked so far, and records how well earlier predictions did.
 //!
-//! Error falls with a power of the work, once the lattice that refinement begins from is through. The exponent is measured
-//! over the levels since then and drawn towards the usual one, since two levels alone say little.
+//! Error falls with a power of the work once refinement has started. The exponent is measured over the levels since
+//! then and drawn towards the usual one, since two levels alone say little.
 
 use serde::{Deserialize, Serialize};
 
 use crate::settings::Estimator;
 
-/// Where a bake stood after a level.
+/// Cost and error of a bake after a level.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CostPoint {
     /// Light rays traced so far.
     pub rays: u64,
-    /// CPU seconds of the light pass so far: plan, trace, deposit.
+    /// CPU time of the light pass so far: plan, trace, deposit [s].
     pub cpu_s: f64,
-    /// The same on the wall [s].
+    /// Wall-clock time of the same stages [s].
     #[serde(default)]
     pub wall_s: f64,
     /// Memory held for maps, rays and patches [bytes].
     pub bytes: u64,
-    /// Of all maps, estimated, in the metric of the bake.
+    /// Estimated error of all maps, in the metric of the bake.
     #[serde(alias = "relative_rmse")]
     pub error: f64,
-    /// Whether the lattice that refinement begins from is still to come: no bake ends before it.
+    /// Whether the lattice that refinement starts from is still to come; no bake ends before it.
     pub is_coarse: bool,
-    /// Whether photons carry some light: they are what takes long then.
+    /// Whether photons carry some light; they then dominate the cost.
     #[serde(default)]
     pub is_by_photons: bool,
 }
 
-/// What a target is expected to cost.
+/// Predicted cost of an error target.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Forecast {
-    /// Error that is aimed at.
+    /// Error target.
     pub target: f64,
     /// Light rays.
     pub rays: u64,
-    /// CPU seconds of the light pass.
+    /// CPU time of the light pass [s].
     pub cpu_s: f64,
-    /// The same on the wall [s], with threads as busy as so far.
+    /// Wall-clock time [s], if threads stay as busy as so far.
     #[serde(default)]
     pub wall_s: f64,
     /// Memory for maps, rays and patches [bytes].
     pub bytes: u64,
-    /// It may be this many times more or less; 1 where it was measured.
+    /// The cost may be this many times higher or lower; 1 if it was measured.
     pub factor: f64,
 }
 
-/// A forecast with what it was made from and what became of it.
+/// A forecast with its basis and its outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ForecastReport {
-    /// Where the bake stood when it was made.
+    /// State of the bake when the forecast was made.
     pub made_at: CostPoint,
-    /// What was expected.
+    /// The forecast.
     pub expected: Forecast,
-    /// Where the bake ended.
+    /// State at the end of the bake.
     pub actual: CostPoint,
 }
 
-/// How a cost grows while a bake goes on.
+/// Growth of a cost in the course of a bake.
 #[derive(Clone, Copy, Debug)]
 struct Growth {
-    /// With this power of 1/error as a rule.
+    /// Typical exponent of 1/error.
     usual_exponent: f64,
-    /// So many times with the lattice that refinement begins from.
+    /// Factor at the lattice that refinement starts from.
     beginning: f64,
 }
 
@@ -72,40 +72,40 @@ const RAYS: Growth = Growth {
     usual_exponent: 1.4,
     beginning: 2.2,
 };
-/// The same; texels take time whatever the rays.
+/// The same; smaller, because the cost of texels does not depend on rays.
 const SECONDS: Growth = Growth {
     usual_exponent: 0.85,
     beginning: 2.0,
 };
-/// Splats are many rays: all grows with them, and their error about with the square root.
+/// Splats: every cost is proportional to rays, and the error falls about with their square root.
 const SPLATS: Growth = Growth {
     usual_exponent: 1.8,
     beginning: 1.0,
 };
 
-/// Noise falls with the square root of their number.
+/// Noise falls with the square root of the number of photons.
 const PHOTONS: Growth = Growth {
     usual_exponent: 2.0,
     beginning: 1.0,
 };
 
-/// The error falls so many times with the lattice that refinement begins from, as a rule.
+/// Typical factor by which the error falls at the lattice that refinement starts from.
 const BEGINNING_GAIN: f64 = 3.0;
 
-/// Exponents are taken no farther than this.
+/// Range of exponents.
 const EXPONENTS: (f64, f64) = (0.3, 4.0);
 
-/// The usual exponent counts as much as measurements with this sum of squared distances from their mean error's logarithm.
+/// Weight of the usual exponent, as the sum of squared distances of ln(1/error) from its mean.
 const WEIGHT_OF_USUAL: f64 = 2.0;
 
-/// Spread of exponents among scenes.
+/// Spread of exponents across scenes.
 const DOUBT: f64 = 0.35;
 
-/// Rounds of refinement come whole, and one may double the work: no forecast is better than this.
+/// Refinement comes in whole rounds, and one may double the work: no forecast is more certain than this.
 const WHOLE_ROUND: f64 = 2.0;
 
-/// What `target` is expected to cost by an estimator; `None` where nothing is known of the error yet. Splats are not
-/// refined: for them it is the cost of another bake, with more rays.
+/// Predicted cost of `target` with an estimator; `None` while no error is known. Splats are not refined: for them it is
+/// the cost of another bake with more rays.
 pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Option<Forecast> {
     let met =
         |point: &&CostPoint| (!point.is_coarse || estimator == Estimator::Splat) && point.error <= target;
@@ -114,7 +114,7 @@ pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Opti
         rays: (point.rays.max(1) as f64 * times[0]) as u64,
         cpu_s: point.cpu_s * times[1],
         wall_s: point.wall_s * times[1],
-        // Maps stay as large as they are; what is kept of rays grows with them.
+        // Maps keep their size; what is kept of rays grows with their number.
         bytes: (point.bytes as f64 * times[0].sqrt()) as u64,
         factor,
     };
@@ -140,18 +140,18 @@ pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Opti
     Some(of_point(last, times, factor.max(WHOLE_ROUND)))
 }
 
-/// How a cost grew over a course.
+/// Growth of a cost over a course.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Slope {
     /// d ln(cost) / d ln(1/error).
     exponent: f64,
-    /// Its expected error.
+    /// Expected error of the exponent.
     doubt: f64,
 }
 
 impl Slope {
-    /// The line of least squares through the levels since refinement began, drawn to the usual exponent by as much as it
-    /// rests on little.
+    /// Least-squares fit through the levels since refinement started, drawn towards the usual exponent where it rests
+    /// on little data.
     fn of(course: &[CostPoint], cost: fn(&CostPoint) -> f64, usual: f64) -> Self {
         let is_measured = |point: &&CostPoint| !point.is_coarse && cost(point) > 0.0;
         let logarithms = |point: &CostPoint| (-point.error.ln(), cost(point).ln());
@@ -173,8 +173,8 @@ impl Slope {
     }
 }
 
-/// The last level of a course before its target came near: the first at or below `error`, else the last above it, but
-/// for the last of all. `None` of a course of one level.
+/// Index of the last level before the target came near: the first at or below `error`, else the last above it, never
+/// the final level. `None` for fewer than two levels.
 pub fn stood_at(course: &[CostPoint], error: f64) -> Option<usize> {
     let before_end = course.len().checked_sub(2)?;
     let first = course.iter().position(|point| point.error <= error);
@@ -199,7 +199,7 @@ impl Forecast {
     }
 }
 
-/// Two significant digits.
+/// Rounds to two significant digits.
 fn two_digits(value: f64) -> String {
     if value <= 0.0 || !value.is_finite() {
         return format!("{value}");
@@ -242,7 +242,7 @@ mod tests {
 
     #[test]
     fn a_power_law_that_was_seen_long_enough_goes_on() {
-        // Rays with 1/error², seconds with 1/error, over a thousandfold.
+        // Rays grow with 1/error², seconds with 1/error, over a factor of a thousand.
         let law = |error: f64| point((1e3 / (error * error)) as u64, 0.1 / error, error);
         let course: Vec<_> = (0..10).map(|level| law(0.5_f64.powi(level))).collect();
         let target = 0.5_f64.powi(11);

@@ -9,43 +9,43 @@ use super::metric::ErrorTerms;
 use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::ledger_sum::Account;
 
-/// A light whose error is below this share of what it might be need not even go through all lattices; one whose whole
-/// light is, is dim.
+/// A light whose share of the error is below this fraction of the limit skips its remaining lattices; one whose whole
+/// flux is below it is dim.
 const NEGLIGIBLE: f64 = 0.25;
 
-/// Share of the squared error that is aimed at which all dim lights may have together.
+/// Fraction of the squared target that all dim lights together may contribute.
 const DIM_SHARE: f64 = 0.5;
 
-/// What a light aims at.
+/// What a light is refined towards next.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Goal {
-    /// Nothing more.
+    /// No further refinement.
     Converged,
     /// The next lattice.
     NextLevel,
-    /// A relative RMSE of its own maps.
+    /// A relative RMSE of the light's own maps.
     Refine(f64),
 }
 
-/// The error of a light that deposits light.
+/// Error of a light that deposited flux.
 #[derive(Clone, Copy, Debug)]
 struct ErrorOfLight {
-    /// Its place among the lights.
+    /// Index among the lights.
     index: usize,
-    /// Relative RMSE of the maps that it reaches.
+    /// Relative RMSE of the maps that the light reaches.
     relative_rmse: f64,
-    /// What it adds to the error of all maps, in the metric that is aimed at; squares add up.
+    /// Contribution to the error of all maps, in the target metric; contributions add in squares.
     share: f64,
 }
 
-/// Errors of lights as they show on the maps.
+/// The lights whose error is known.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Errors {
     lights: Vec<ErrorOfLight>,
 }
 
 impl Errors {
-    /// Of all together, in the metric that is aimed at.
+    /// Error of all lights together, in the target metric.
     pub(super) fn error(&self) -> f64 {
         let squares: f64 = self.lights.iter().map(|light| light.share.powi(2)).sum();
         squares.sqrt()
@@ -56,13 +56,12 @@ impl Errors {
         !lights.is_empty() && self.lights.len() == lights.len()
     }
 
-    /// Whether no light has one.
     pub(super) fn is_empty(&self) -> bool {
         self.lights.is_empty()
     }
 
-    /// The share that no light may exceed for all to have an error of `target`: the largest ones are cut down to it, the
-    /// others stay. Infinite where that is so already.
+    /// The largest share that a light may have for the error of all to meet `target`: larger shares are cut down to it,
+    /// smaller ones stay. Infinite if the target is met already.
     fn level(&self, target: f64) -> f64 {
         let mut shares: Vec<f64> = self.lights.iter().map(|light| light.share).collect();
         shares.sort_by(f64::total_cmp);
@@ -79,8 +78,8 @@ impl Errors {
 }
 
 impl CausticLayer<'_> {
-    /// Whether all the flux that a light can add to the maps is less than the error that is aimed at: then one coarse
-    /// lattice is enough, whatever it misses, unless it shines all on one spot.
+    /// Whether all flux that a light can add to the maps is below the target: one coarse lattice is then enough,
+    /// whatever it misses, unless the light is concentrated on one spot.
     pub(super) fn is_negligible(&self, light: &VisibleLight) -> bool {
         let Some(target) = self.settings.max_error else {
             return false;
@@ -98,7 +97,7 @@ impl CausticLayer<'_> {
         sends_w(light) < NEGLIGIBLE * target * all_w / f64::from(count).sqrt()
     }
 
-    /// Lights that were taken to be dim and, bright on some spot, are worth knowing better.
+    /// Lights that were treated as negligible but are bright enough on some spot to need refinement.
     pub(super) fn promote_dim_lights(&self, errors: &Errors, all_progress: &[LightProgress]) -> Vec<usize> {
         let Some(target) = self.settings.max_error else {
             return Vec::new();
@@ -118,7 +117,7 @@ impl CausticLayer<'_> {
         dim[kept..].iter().map(|light| light.index).collect()
     }
 
-    /// What a light deposits [W], as far as that is known.
+    /// Deposited flux of a light [W], if known.
     fn flux_w(&self, light: &VisibleLight, light_progress: &LightProgress) -> Option<f64> {
         let level = light_progress.shown()?;
         let strength = level.strength(&self.tracer.scene().lights[light.light]);
@@ -153,13 +152,13 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// By area and flux: the relative RMSE over all maps.
+    /// Errors as shares of the relative RMSE over all maps, by area and flux.
     fn errors_by_rmse(&self, lights: &[&VisibleLight], all_progress: &[LightProgress]) -> Errors {
         let (mut areas_m2, mut all_w) = (BTreeMap::new(), 0.0);
         let of = |(index, (light, light_progress)): (usize, (&&VisibleLight, &LightProgress))| {
             let level = light_progress.shown()?;
             let flux_w = self.flux_w(light, light_progress)?;
-            // Light whose error is not known yet counts as well.
+            // Lights without a known error count in the total, too.
             all_w += flux_w;
             let of_light = level.maps.iter();
             let of_light: Vec<_> = of_light
@@ -180,7 +179,7 @@ impl CausticLayer<'_> {
         let of = |&(index, relative_rmse, flux_w, area_m2): &(usize, f64, f64, f64)| ErrorOfLight {
             index,
             relative_rmse,
-            // As if it shone alone on all maps, by its part of the flux.
+            // As if the light shone alone on all maps, weighted by its share of the flux.
             share: if flux_w > 0.0 {
                 relative_rmse * (all_m2 / area_m2).sqrt() * flux_w / all_w
             } else {
@@ -192,7 +191,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// What each light aims at next; sets what it aims at in the end.
+    /// The next goal of each light. Also updates its aim and its shares of the error.
     pub(super) fn goals(
         &self,
         lights: &[&VisibleLight],
@@ -208,7 +207,7 @@ impl CausticLayer<'_> {
         };
         let all_known = errors.are_of_all(lights);
         let level = errors.level(target);
-        // Without an error there is nothing to aim at once all lattices are through.
+        // Without an error there is nothing to aim at after the last lattice.
         let without_error = |(light, light_progress): (&&VisibleLight, &LightProgress)| {
             if has_ladder(light, light_progress) || light_progress.carrier == Carrier::Photons {
                 Goal::NextLevel
@@ -232,7 +231,7 @@ impl CausticLayer<'_> {
             light_progress.aim = (share > 0.0 && level.is_finite()).then(|| relative_rmse * level / share);
             goals[index] = if level.is_infinite() && all_known && light_progress.carrier == Carrier::Undecided
             {
-                // Its first photons are enough.
+                // Its first photons suffice.
                 Goal::Converged
             } else if has_ladder(lights[index], light_progress) {
                 let is_negligible = all_known && lights.len() > 1 && share < NEGLIGIBLE * level;

@@ -9,7 +9,7 @@ use crate::progress::{Control, Progress};
 use crate::settings::BakeSettings;
 use crate::transport::Tracer;
 
-/// What the rays depend on beside the scene: grids by receiver, most surfaces on the way, seed.
+/// What the rays depend on besides the scene: grids by receiver, maximum depth, seed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct Key {
     grids: Vec<(Receiver, (usize, usize))>,
@@ -17,29 +17,29 @@ struct Key {
     seed: u64,
 }
 
-/// Elements of all grids for a draft, and for each better preset four times as many.
+/// Elements of all grids for the draft preset; each better preset has four times as many.
 const DRAFT_TEXELS: u64 = 8_000;
 
-/// Rays that are kept from bake to bake.
+/// Rays that are kept between bakes.
 #[derive(Debug, Default)]
 pub(super) struct IndirectCache {
     network: Option<(Key, Network)>,
-    /// Passes of each element that the last maps were made of.
+    /// Passes of each element in the last maps.
     pub(super) passes: Vec<u8>,
 }
 
 impl IndirectCache {
-    /// Shapes or materials are not what they were.
+    /// Drops everything, because shapes or materials changed.
     pub(super) fn clear(&mut self) {
         *self = Self::default();
     }
 
-    /// The elements with what was traced, if anything was.
+    /// The elements with their traced rays, once prepared.
     pub(super) fn network(&self) -> Option<&Network> {
         self.network.as_ref().map(|(_, network)| network)
     }
 
-    /// Makes ready for settings, with so many texels of all grids at most: what was traced for others goes.
+    /// Prepares the grids for `settings`, with at most `most_texels` texels in total; drops the rays of other grids.
     pub(super) fn prepare(
         &mut self,
         tracer: &Tracer,
@@ -64,7 +64,7 @@ impl IndirectCache {
         (self.network, self.passes) = (Some((key, network)), Vec::new());
     }
 
-    /// Traces what is missing for every element to have so many passes; false where it was cancelled.
+    /// Traces what is missing for each element to have its number of passes; false if cancelled.
     pub(super) fn trace(
         &mut self,
         tracer: &Tracer,
@@ -81,16 +81,16 @@ impl IndirectCache {
     }
 }
 
-/// Most texels of all grids: as the target needs, and as memory allows for.
+/// Maximum texels of all grids: as many as the preset wants and memory allows.
 pub(super) fn most_texels(settings: &BakeSettings) -> u64 {
     let wanted = DRAFT_TEXELS << (2 * settings.detail());
     wanted.min(link_bytes(settings) / BYTES_OF_FIRST_PASSES).max(1)
 }
 
-/// Memory of one texel with its first rays [bytes].
+/// Memory of one texel with its first passes [bytes].
 const BYTES_OF_FIRST_PASSES: u64 = 1 << 10;
 
-/// Memory that rays between diffuse surfaces may take [bytes]: a quarter of all.
+/// Memory limit of the rays between diffuse surfaces [bytes]: a quarter of the whole.
 pub(super) fn link_bytes(settings: &BakeSettings) -> u64 {
     settings.memory_bytes / 4
 }

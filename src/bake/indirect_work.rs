@@ -16,47 +16,47 @@ use crate::progress::{Control, Progress};
 use crate::settings::{BakeSettings, LayerKind};
 use crate::transport::Tracer;
 
-/// Relative error of the rays that is aimed at without a target [1].
+/// Target of the relative error of the rays if the settings have none [1].
 const USUAL_TARGET: f64 = 0.03;
 
-/// Share of what rays carry that may be given up without a word.
+/// Lost share of what rays carry above which a warning is due.
 const UNSPOKEN_LOSS: f64 = 1e-3;
 
 /// Indirect light in the course of a bake.
 #[derive(Clone, Debug, Default)]
 pub(super) struct IndirectWork {
-    /// What was traced this time.
+    /// Work of this bake.
     counts: TraceCounts,
     seconds: Seconds,
-    /// What the last maps are made of.
+    /// The solution that the last maps show.
     solution: Option<Solution>,
-    /// Passes of each element.
+    /// Passes per element.
     passes: Vec<u8>,
-    /// Error that was aimed at.
+    /// Target of the relative error.
     target: f64,
-    /// Whether memory did not allow more rays.
+    /// Whether the memory limit prevents more rays.
     is_cramped: bool,
-    /// Share of what all rays carried that was given up.
+    /// Lost share of what all rays carried.
     loss: f64,
     /// Whether no more rays follow.
     is_done: bool,
 }
 
-/// What the gathering needs of a bake.
+/// Inputs of the gathering.
 pub(super) struct GatherInput<'a> {
     pub(super) tracer: &'a Tracer,
     pub(super) sizes: &'a ChartCache,
     pub(super) settings: &'a BakeSettings,
     pub(super) progress: &'a dyn Progress,
-    /// What the user asks.
+    /// Cancellation by the user.
     pub(super) control: &'a Control,
-    /// The same with the time limit: after the first rays, no more are begun beyond it.
+    /// The same with the time limit: after the first passes, none starts beyond it.
     pub(super) limited: &'a Control,
 }
 
 impl IndirectWork {
-    /// Traces rays between the elements until their error is below the target, and solves for the light of maps; false
-    /// where it was cancelled before there was anything. `better` is called for each solution but the last.
+    /// Traces rays between the elements until their error meets the target, and solves for the indirect light of
+    /// `maps`; false if cancelled before the first solution. Calls `better` for each solution but the last.
     pub(super) fn gather(
         &mut self,
         gathering: &GatherInput,
@@ -92,7 +92,7 @@ impl IndirectWork {
         }
     }
 
-    /// One solution by as many passes as are asked for; whether there is one.
+    /// Solves with the requested passes; false if they could not be traced.
     fn step(
         &mut self,
         gathering: &GatherInput,
@@ -127,7 +127,7 @@ impl IndirectWork {
         is_traced
     }
 
-    /// Solves with what was traced for maps before, if anything was: for pictures on the way.
+    /// Solves for `maps` with rays that were traced earlier, if any, for intermediate pictures.
     pub(super) fn of_known(cache: &IndirectCache, maps: &[IlluminationMap]) -> Self {
         let mut known = Self::default();
         if let Some(network) = cache.network().filter(|_| !cache.passes.is_empty()) {
@@ -137,7 +137,7 @@ impl IndirectWork {
         known
     }
 
-    /// Adds the layer to the maps, and its error to theirs; each light's part where there are parts of the other layers.
+    /// Adds the layer to the maps, and its error to theirs; also each light's part if other layers have parts.
     pub(super) fn add_to(
         &self,
         cache: &IndirectCache,
@@ -162,7 +162,7 @@ impl IndirectWork {
             let has_caustic = map.layer(LayerKind::Caustic).is_some();
             map.error = match map.error.take() {
                 Some(other) => Some(other.iter().zip(&error).map(|(a, b)| a.hypot(b[0])).collect()),
-                // The error of the caustic is not known: neither is that of both.
+                // If the error of the caustic is unknown, so is that of the sum.
                 None if has_caustic => None,
                 None => Some(error.iter().map(|e| e[0]).collect()),
             };
@@ -173,7 +173,7 @@ impl IndirectWork {
         }
     }
 
-    /// What each light gives to the layer: the same rays, its own sources.
+    /// Each light's part of the layer: the same rays, its own sources.
     fn parts(
         &self,
         network: &Network,
@@ -213,7 +213,7 @@ impl IndirectWork {
         parts
     }
 
-    /// The bake with this.
+    /// The outcome with this work added.
     pub(super) fn added_to(&self, outcome: &CausticOutcome) -> CausticOutcome {
         let mut both = outcome.clone();
         both.counts.gather_rays += self.counts.rays;
@@ -275,7 +275,7 @@ impl IndirectWork {
     }
 }
 
-/// Sums of all layers on all elements [W/m²].
+/// Sums of all source layers on all elements [W/m²].
 fn sources(network: &Network, maps: &[IlluminationMap]) -> Vec<LinearSrgb> {
     let mut sources = vec![LinearSrgb::BLACK; network.element_count()];
     for map in maps {

@@ -18,35 +18,36 @@ use crate::light_pass::wavefront::refine::Round;
 use crate::settings::{BakeSettings, Estimator, Footprint, Kernel, MapResolution, Sigma};
 use crate::transport::EffectSet;
 
-/// The coarsest lattice has fewer rays than this [rays/sr]: it is the first picture.
+/// Upper limit of the density of the coarsest lattice [rays/sr]; it gives the first picture.
 const FIRST_PICTURE_PER_SR: f64 = 1_600.0;
 
-/// Cells of the first lattice whose error is known, over the error that is aimed at.
+/// Cells of the lattice that refinement starts from, times the target.
 const CELLS_FOR_AN_ERROR: f64 = 30.0;
 
-/// No target asks for more cells to begin with than this one.
+/// Smaller targets start with no more cells than this one.
 const STARTING_TARGET: f64 = 0.005;
 
-/// Cells to begin with, at least.
+/// Minimum number of cells to start with.
 const MIN_CELLS: f64 = 500.0;
 
-/// A small caster makes the lattice so many times denser at most.
+/// Maximum factor by which a small caster makes the lattice denser.
 const MAX_DENSER: f64 = 64.0;
 
-/// Density at which cells are counted: high enough that no side is rounded by much [rays/sr].
+/// Density at which cells are counted [rays/sr], high enough that rounding of the sides does not matter.
 const UNIT_DENSITY_PER_SR: f64 = 1e5;
 
-/// Least side of the lattice that mean footprints are taken from [cells].
+/// Minimum side of the lattice that mean footprints are taken from [cells].
 const MIN_STATISTICS_SIDE: usize = 32;
 
-/// How much coarser than the last one a coarse lattice is deposited at most.
+/// Maximum coarseness of the deposits of coarse lattices, relative to the last lattice.
 const MAX_COARSE: f64 = 16.0;
 
-/// How coarse triangles may be for a target, relative to those of a bake without one: over this relative RMSE.
+/// Relative RMSE whose triangles are as coarse as those of a bake without a target.
 const USUAL_ERROR: f64 = 0.012;
 
 impl CausticLayer<'_> {
-    /// Cells across and down each face, from the coarsest lattice to that of the settings. Splats have strides instead.
+    /// Cells across and down each face, from the coarsest lattice to that of the settings. Splats vary the stride
+    /// instead.
     pub(super) fn lattices(&self, light: &VisibleLight) -> Vec<(usize, usize)> {
         let finest = self.lattice_size(light);
         if self.settings.estimator == Estimator::Splat {
@@ -69,15 +70,15 @@ impl CausticLayer<'_> {
             .lattice_size(self.density_per_sr(light), light.reach_m)
     }
 
-    /// Density of a light's lattice [rays/sr]: as it is set or, with a target, so much that a small caster has its share
-    /// of cells.
+    /// Density of a light's lattice [rays/sr]: as set or, with a target, high enough for a small caster to get its
+    /// share of cells.
     fn density_per_sr(&self, light: &VisibleLight) -> f64 {
         let set = self.settings.density_per_sr;
         let Some(target) = self.settings.max_error else {
             return set;
         };
         let wanted = (CELLS_FOR_AN_ERROR / target.max(STARTING_TARGET)).max(MIN_CELLS);
-        // A lattice of 1 ray/sr has as many cells on casters as this; suns scale it by their reach.
+        // Cells on casters are proportional to density; suns scale it by their reach.
         let (columns, rows) = light.launch.lattice_size(UNIT_DENSITY_PER_SR, light.reach_m);
         let whole = (columns * rows * light.launch.face_count()) as f64;
         let share = light.visible().marked_share(&light.launch);
@@ -85,7 +86,7 @@ impl CausticLayer<'_> {
             .min(set * MAX_DENSER)
     }
 
-    /// All that a level depends on.
+    /// Everything that a level depends on.
     pub(super) fn key(
         &self,
         light: &VisibleLight,
@@ -95,7 +96,7 @@ impl CausticLayer<'_> {
     ) -> LevelKey {
         let lattices = self.lattices(light);
         let size = lattices[step.min(lattices.len() - 1)];
-        // Coarse lattices are deposited as coarsely, so that their difference shows both kinds of error.
+        // Coarse lattices are deposited just as coarsely, so that their difference shows both kinds of error.
         let before_last = (lattices.len() - 1).saturating_sub(step);
         LevelKey {
             trace: TraceKey {
@@ -114,7 +115,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// For a lattice of a size, so many lattices before the usual finest.
+    /// Key of the paths on a lattice of a size, which is `coarser` lattices before the usual finest.
     pub(super) fn trace_key(
         &self,
         light: &VisibleLight,
@@ -149,7 +150,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Whether normals of anything have detail that no mesh shows.
+    /// Whether any object has normals with more detail than its mesh.
     fn has_bumps(&self) -> bool {
         (0..self.tracer.scene().objects.len()).any(|object| self.tracer.finest_bump_m(object).is_finite())
     }
@@ -169,15 +170,15 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// The unit of a light's sums: by its own launch, so that other lights do not change a bit.
+    /// Unit of a light's sums, derived from its own launch so that other lights do not change its bits.
     pub(super) fn unit(&self, light: &VisibleLight) -> Result<FluxUnit> {
         self.unit_for(light, light.launch.power_bound_w(), 1.0)
     }
 
-    /// The unit of so many sums of a light, each of up to `power_w` [W per channel] at unit strength.
+    /// Unit for `sums` sums of a light, each of up to `power_w` [W per channel] at unit strength.
     ///
     /// # Errors
-    /// A power that is no number, or none at all.
+    /// A power that is not finite or not positive.
     pub(super) fn unit_for(&self, light: &VisibleLight, power_w: f64, sums: f64) -> Result<FluxUnit> {
         let source = &self.tracer.scene().lights[light.light];
         let real_w = power_w * source.strength().max_channel();
@@ -192,7 +193,7 @@ impl CausticLayer<'_> {
         ))
     }
 
-    /// The lattice of rays, as splats have it.
+    /// The lattice of rays for splats.
     pub(super) fn lattice<'a>(&'a self, light: &'a VisibleLight, unit: FluxUnit) -> Lattice<'a> {
         Lattice {
             tracer: self.tracer,
@@ -209,7 +210,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Of the paths of a wavefront.
+    /// Limits of a wavefront's paths.
     pub(super) fn limits(&self) -> PathLimits {
         PathLimits {
             max_depth: self.settings.depth(),
@@ -219,7 +220,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Whether mean footprints are wanted.
+    /// Whether mean footprints are needed.
     fn wants_statistics(&self) -> bool {
         let settings = self.settings;
         let adaptive = settings.kernel == Kernel::Gaussian && settings.sigma == Sigma::Adaptive;
@@ -229,8 +230,7 @@ impl CausticLayer<'_> {
             || (settings.estimator == Estimator::Splat && of_splats)
     }
 
-    /// Mean footprints at the settings' density, where they are wanted, from a thinner lattice; and the sizes of all
-    /// maps.
+    /// Sizes of all maps. Measures mean footprints at the settings' density on a thinner lattice, if needed.
     pub(super) fn sizes_of_maps(
         &self,
         states: &mut LightStates,
@@ -260,7 +260,7 @@ impl CausticLayer<'_> {
                         _ => self.splat_statistics(light, unit, state, course),
                     });
                 }
-                // What a cancelled run saw is not all.
+                // A cancelled run has seen only a part.
                 let complete = !course.control.is_cancelled();
                 states.statistics = complete.then_some((key, statistics));
             }
@@ -285,7 +285,7 @@ impl CausticLayer<'_> {
     }
 }
 
-/// How coarse triangles may be for a target or, in a round of refinement, its goal.
+/// Coarseness of triangles for a target or, in a round of refinement, for its goal.
 fn coarseness(target: Option<f64>, goal: Option<f64>) -> f64 {
     match (target, goal) {
         (None, _) => 1.0,

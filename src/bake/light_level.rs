@@ -25,48 +25,49 @@ use crate::scene::Light;
 use crate::settings::{BakeSettings, Estimator};
 use crate::transport::EffectSet;
 
-/// All that a light's paths depend on beside the scene.
+/// Everything that a light's paths depend on besides the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TraceKey {
-    /// With what does not matter to paths at its default.
+    /// Those that do not matter to paths are at their defaults.
     pub(super) settings: BakeSettings,
-    /// What they may need.
+    /// Effects that are on.
     pub(super) effects: EffectSet,
     /// Cells across and down each face.
     pub(super) size: (usize, usize),
-    /// How many lattices this one comes before the usual finest, where surfaces have bumps: what cells may miss of them.
+    /// How many lattices this one comes before the usual finest, if surfaces have bumps: cells may miss that much of
+    /// them.
     pub(super) coarser: i32,
-    /// How often cells are split.
+    /// How often cells may be split.
     pub(super) splits: SubdivisionLimits,
-    /// Where cells are divided further, round by round.
+    /// Where cells are subdivided further, round by round.
     pub(super) rounds: Vec<Round>,
-    /// What chose its wavelengths, where it is traced by wavelength.
+    /// What its wavelengths depend on, if it is traced by wavelength.
     pub(super) spectrum: Option<SpectralKey>,
-    /// Whether the light is taken to show hardly beside the others.
+    /// Whether the light is treated as hardly visible beside the others.
     pub(super) is_negligible: bool,
 }
 
-/// All that mean footprints depend on: the paths of each light, and the density that maps are made for [rays/sr].
+/// Everything that mean footprints depend on: the paths of each light, and the density that maps are made for
+/// [rays/sr].
 pub(super) type StatisticsKey = (BTreeMap<usize, TraceKey>, f64);
 
-/// All that a light's maps depend on beside the scene.
+/// Everything that a light's maps depend on besides the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LevelKey {
-    /// Its paths.
     pub(super) trace: TraceKey,
-    /// Of the maps; those of the rounds are the same.
+    /// Sizes of the maps, the same for all rounds.
     pub(super) sizes: Sizes,
-    /// How much coarser or finer triangles are than is usual.
+    /// Size of triangles relative to the usual.
     pub(super) coarseness: f64,
-    /// Kernels of splats; with what does not matter to them at its default.
+    /// Kernels of splats; settings that do not matter to them are at their defaults.
     pub(super) kernels: BakeSettings,
-    /// Every so many-th ray alone (splats).
+    /// Only every `stride`-th ray across and down is traced (splats).
     pub(super) stride: usize,
-    /// Of a light by photons: how many each half has.
+    /// Photons in each half; `None` for other carriers.
     pub(super) photons: Option<u32>,
 }
 
-/// Levels that are kept whatever they take: an error needs them.
+/// Levels that are kept whatever their size, because an error estimate needs them.
 const LEVELS_TO_KEEP: usize = 3;
 
 /// Maps of one light at one level, as of a white light of unit strength.
@@ -75,46 +76,45 @@ pub(super) struct LightLevel {
     pub(super) key: LevelKey,
     /// Flux per texel.
     pub(super) maps: ReceiverMaps,
-    /// The same by band of its spectrum, as X, Y and Z; none unless that is to be kept.
+    /// The same per band of the spectrum, in X, Y and Z; empty unless bands are kept.
     pub(super) bands: Vec<LevelBand>,
-    /// Radiant watts of the light over its luminous-equivalent ones, where it has a spectrum.
+    /// Radiant over luminous-equivalent power of the light, if it has a spectrum.
     pub(super) radiant: Option<f64>,
     pub(super) unit: FluxUnit,
-    /// From the casters to the farthest receiver [m].
+    /// Distance from the casters to the farthest receiver [m].
     pub(super) reach_m: f64,
-    /// Of all paths.
+    /// Energy of all paths.
     pub(super) ledger: LedgerSum,
-    /// Maps that were given up: next to no light was on them.
+    /// Maps that were dropped because next to no light reached them.
     pub(super) strays: Vec<Receiver>,
     /// Patches that reach farther than their rays.
     pub(super) overshoots: Vec<PatchOvershoot>,
-    /// Of splats: the squared difference of half sets, by receiver.
+    /// Squared difference between the half sets of splats, by receiver.
     pub(super) noise: Option<Noise>,
-    /// By the levels before it; `None` where there are none, or no light arrived.
+    /// `None` if there are too few levels before it, or no light arrived.
     pub(super) error: Option<KeptError>,
-    /// Of the last level of a light by photons: what the next one adds to.
+    /// Sums that the next level adds to; only the last level of a light by photons has them.
     pub(super) photons: Option<PhotonSums>,
-    /// What the level took, whatever was known before: cells of patches and rays that looked for their receivers, or
-    /// closest-hit queries of photons and nothing.
+    /// Work of the level if nothing were cached: cells of patches and receiver queries, or closest-hit queries of
+    /// photons and 0.
     pub(super) work: (u64, u64),
-    /// Of patches: share of their light that holds a part of the spectrum in one place.
+    /// Share of the patches' flux that concentrates a part of the spectrum in one place.
     pub(super) lumped_share: f64,
-    /// To be deposited again; `None` where that was too much to keep.
+    /// Paths that can be deposited again; `None` if they were too large to keep.
     pub(super) traced: Option<TracedLight>,
-    /// Whether the maps have the light's colour already.
+    /// Whether the maps include the light's colour.
     pub(super) has_own_colour: bool,
 }
 
-/// What photons have left so far, before it is divided by their number.
+/// Sums over all photons so far, not yet divided by their number.
 #[derive(Clone, Debug)]
 pub(super) struct PhotonSums {
     pub(super) ledger: LedgerSum,
-    /// Maps of both halves, in the channels that the light is followed in.
+    /// Maps of both halves, in the channels that the light is traced in.
     pub(super) halves: Vec<BandMaps>,
 }
 
 impl PhotonSums {
-    /// Adds other photons of the same light.
     pub(super) fn add(&mut self, other: &Self) {
         self.ledger.merge(&other.ledger);
         for (half, more) in self.halves.iter_mut().zip(&other.halves) {
@@ -123,31 +123,30 @@ impl PhotonSums {
     }
 }
 
-/// An estimate with what it was made from.
+/// An error estimate and its basis.
 #[derive(Clone, Debug)]
 pub(super) struct KeptError {
-    /// Coarser levels that it is made from.
+    /// Number of coarser levels that it is based on.
     pub(super) predecessors: usize,
-    /// Photons of each half that patches were compared with.
+    /// Photons in each half that audited the patches.
     pub(super) auditors: Option<u32>,
     pub(super) estimate: LightError,
 }
 
-/// What is kept of all lights of a scene.
+/// What is kept of all lights of a scene between bakes.
 #[derive(Debug, Default)]
 pub(super) struct LightStates {
     by_light: BTreeMap<usize, LightState>,
-    /// Mean footprints that set the sizes of maps, with what they depend on.
+    /// Mean footprints that set the sizes of maps, and what they depend on.
     pub(super) statistics: Option<(StatisticsKey, FootprintStatistics)>,
 }
 
 impl LightStates {
-    /// Whether nothing is known of any light.
     pub(super) fn is_empty(&self) -> bool {
         self.by_light.is_empty()
     }
 
-    /// Of a light, by its place in the scene.
+    /// The state of a light, by its index in the scene.
     pub(super) fn of_mut(&mut self, light: usize) -> &mut LightState {
         self.by_light.entry(light).or_default()
     }
@@ -156,44 +155,43 @@ impl LightStates {
         self.by_light.get(&light)?.levels.last()
     }
 
-    /// A light is not what it was.
+    /// Drops a light that changed.
     pub(super) fn forget(&mut self, light: usize) {
         self.by_light.remove(&light);
         self.statistics = None;
     }
 
-    /// Memory of all that is kept [bytes].
+    /// Memory of everything that is kept [bytes].
     pub(super) fn bytes(&self) -> u64 {
         self.by_light.values().map(LightState::bytes).sum()
     }
 
-    /// All states.
     pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut LightState> {
         self.by_light.values_mut()
     }
 }
 
-/// What is kept of one light.
+/// What is kept of one light between bakes.
 #[derive(Debug, Default)]
 pub(super) struct LightState {
     /// Where its rays start.
     launch: Option<Launch>,
-    /// Whether bumps bent them.
+    /// Whether bumps bent its rays.
     has_bumps: bool,
-    /// What chose their wavelengths.
+    /// What the wavelengths of its rays depended on.
     spectrum: Option<SpectralKey>,
-    /// What its rays met.
+    /// Hits of its rays.
     pub(super) rays: RayCache,
-    /// Levels of the last bake, the coarsest first.
+    /// Levels of the last bake, from coarse to fine.
     pub(super) levels: Vec<LightLevel>,
-    /// Wall-clock seconds of a photon, of those that were followed last.
+    /// Wall-clock time per photon of each half in the last level of photons [s].
     pub(super) photon_s: Option<f64>,
-    /// What splats were made of.
+    /// Arrivals that splats were made of.
     pub(super) arrivals: Option<(TraceKey, ArrivalCache)>,
 }
 
 impl LightLevel {
-    /// What its maps are multiplied by per channel.
+    /// Factor of its maps per channel.
     pub(super) fn strength(&self, light: &Light) -> LinearSrgb {
         if self.has_own_colour {
             LinearSrgb::grey(light.strength().luminance())
@@ -202,7 +200,7 @@ impl LightLevel {
         }
     }
 
-    /// Radiant flux on all maps [W], where bands are kept.
+    /// Radiant flux on all maps [W]; `None` unless bands are kept.
     pub(super) fn deposited_radiant_w(&self, light: &Light) -> Option<f64> {
         if self.bands.is_empty() {
             return None;
@@ -215,7 +213,7 @@ impl LightLevel {
         Some(flux * self.unit.watts() * self.strength(light).luminance())
     }
 
-    /// What it deposited [W], by what carried it.
+    /// Deposited flux by carrier [W].
     pub(super) fn carried_w(&self, deposited: f64, light: &Light, estimator: Estimator) -> CarriedFlux {
         let bundles = self
             .ledger
@@ -252,14 +250,14 @@ impl LightLevel {
 }
 
 impl LightState {
-    /// Memory of all that is kept [bytes].
+    /// Memory of everything that is kept [bytes].
     pub(super) fn bytes(&self) -> u64 {
         self.rays.bytes()
             + self.levels.iter().map(LightLevel::bytes).sum::<u64>()
             + self.arrivals.as_ref().map_or(0, |(_, arrivals)| arrivals.bytes())
     }
 
-    /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes.
+    /// Drops rays that start elsewhere or took other paths, and caches of more than `kept_bytes`.
     pub(super) fn begin(
         &mut self,
         launch: &Launch,
@@ -281,19 +279,19 @@ impl LightState {
             .take_if(|(_, arrivals)| arrivals.bytes() > kept_bytes);
     }
 
-    /// Paths have changed: maps are to be made anew. Rays stay, as they know what holds of them.
+    /// Drops maps whose paths changed. Rays stay, as their cache knows which of them are valid.
     pub(super) fn forget_maps(&mut self) {
         self.levels.clear();
         self.arrivals = None;
     }
 
-    /// Takes the level of a key out, if it is there.
+    /// Removes and returns the level with a key, if there is one.
     pub(super) fn take(&mut self, key: &LevelKey) -> Option<LightLevel> {
         let place = self.levels.iter().position(|level| level.key == *key)?;
         Some(self.levels.remove(place))
     }
 
-    /// Takes the paths of a level out that differs in its maps alone.
+    /// Removes and returns the traced paths of a level that differs in its maps alone.
     pub(super) fn take_traced(&mut self, key: &LevelKey) -> Option<TracedLight> {
         self.levels
             .iter_mut()
@@ -301,15 +299,14 @@ impl LightState {
             .and_then(|level| level.traced.take())
     }
 
-    /// Keeps the levels of a bake for the next one; older ones only while that bake was stopped early, coarse ones only
-    /// as memory allows.
+    /// Keeps the levels of a bake for the next one, coarse ones only as memory allows.
     pub(super) fn keep(&mut self, levels: Vec<LightLevel>, memory_bytes: u64) {
         self.levels = levels;
         drop_coarse(&mut self.levels, LEVELS_TO_KEEP, memory_bytes / 2);
     }
 }
 
-/// Drops the first levels while all take more than so many bytes.
+/// Drops the coarsest levels while all together take more than `most_bytes`, but keeps `least` of them.
 pub(super) fn drop_coarse(levels: &mut Vec<LightLevel>, least: usize, most_bytes: u64) {
     let mut bytes: u64 = levels.iter().map(LightLevel::bytes).sum();
     while bytes > most_bytes && levels.len() > least {

@@ -14,20 +14,20 @@ use crate::plan::Effect;
 use crate::settings::MapResolution;
 
 impl CausticLayer<'_> {
-    /// Whether maps of the size that is set fit into memory, whatever is lit.
+    /// Whether maps of the requested fixed size fit into memory whatever is lit; true for automatic sizes.
     pub(super) fn fits_anyway(&self) -> bool {
         let MapResolution::Fixed { width, height } = self.settings.map_resolution else {
             return true;
         };
         let scene = self.tracer.scene();
         let is_receiver = |&object: &usize| scene.material_of(object).surface.is_receiver();
-        // Both sides of each.
+        // Both sides of each object.
         let receivers = 2 * (0..scene.objects.len()).filter(is_receiver).count();
         let (limit, memory) = self.map_memory();
         memory.bytes(std::iter::repeat_n(width as u64 * height as u64, receivers)) <= limit
     }
 
-    /// Bytes that all maps may take, and what they take.
+    /// Memory limit of all maps [bytes], and the memory that they need.
     fn map_memory(&self) -> (u64, MapMemory) {
         (
             self.settings.map_memory_bytes(),
@@ -35,7 +35,7 @@ impl CausticLayer<'_> {
         )
     }
 
-    /// Sizes of the maps that the coarse run saw lit, with what is to be said of them.
+    /// Sizes of the maps that the coarse run found lit, and warnings about them.
     pub(super) fn map_sizes(&self, statistics: Option<&FootprintStatistics>) -> (Sizes, Vec<Warning>) {
         let receivers = Receiver::all(self.tracer.scene().objects.len());
         if let (MapResolution::Fixed { width, height }, true) =
@@ -61,7 +61,7 @@ impl CausticLayer<'_> {
         let mut sizes = map_size::fit(&wishes, (limit, memory));
         let is_scarce = sizes != requested;
         if let (MapResolution::Fixed { width, height }, false) = (self.settings.map_resolution, is_scarce) {
-            // What only the full lattice lights.
+            // Maps that only the full lattice lights.
             for receiver in Receiver::all(self.tracer.scene().objects.len()) {
                 sizes.entry(receiver).or_insert(MapSize::dense((width, height)));
             }
@@ -76,7 +76,7 @@ impl CausticLayer<'_> {
         (sizes, warnings)
     }
 
-    /// As large as it is set, and as fine everywhere if memory allows.
+    /// At the requested size, with all texels equally fine if memory allows.
     fn fixed_wish(
         &self,
         receiver: Receiver,
@@ -94,7 +94,7 @@ impl CausticLayer<'_> {
         })
     }
 
-    /// As fine as its light asks for; in tiles where that takes less.
+    /// As fine as the light requires; tiled where that takes less memory.
     fn automatic_wish(&self, receiver: Receiver, seen: &FootprintStatistics) -> Option<SizeRequest> {
         let object = receiver.object();
         let mut times = self.sizes.doublings(receiver, seen, LARGEST_TILED_SIDE)?;
@@ -136,7 +136,7 @@ impl CausticLayer<'_> {
         None
     }
 
-    /// Whether a map of a size can be in tiles: where the estimator refines, on surfaces that fill their maps.
+    /// Whether a map of a size can be tiled: the estimator has to refine, and the surface to fill its map.
     fn may_be_tiled(&self, object: usize, size: (usize, usize)) -> bool {
         self.settings.estimator.refines()
             && map_size::is_divisible(size)
@@ -156,7 +156,7 @@ impl CausticLayer<'_> {
             .min(u32::from(COARSEST)) as u8
     }
 
-    /// Says which automatic maps stay coarser than their light, for the largest automatic size.
+    /// Warnings about automatic maps that stay coarser than their light because of the largest automatic size.
     fn coarse_maps(&self, sizes: &Sizes, statistics: &FootprintStatistics) -> Vec<Warning> {
         let coarse = |(&receiver, MapSize { size, .. }): (&Receiver, &MapSize)| {
             let (width, height) = *size;
@@ -175,7 +175,7 @@ impl CausticLayer<'_> {
         sizes.iter().filter_map(coarse).collect()
     }
 
-    /// The chart of a receiver at its size among `sizes`.
+    /// The chart of a receiver at its size among `sizes`, else at its default size.
     pub(super) fn chart(&self, receiver: Receiver, sizes: &Sizes) -> Option<Arc<Chart>> {
         match sizes.get(&receiver) {
             Some(size) => self.sizes.chart_of(receiver, size),
@@ -183,7 +183,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// For a surface that only the full lattice reached.
+    /// Size for a surface that only the full lattice reached.
     fn default_size(&self, object: usize) -> Option<(usize, usize)> {
         let (width, height) = self.first_size(object)?;
         Some(match self.settings.map_resolution {
@@ -203,10 +203,10 @@ impl CausticLayer<'_> {
     }
 }
 
-/// Where warnings of scarce memory belong.
+/// Location of warnings about scarce memory.
 pub(super) const MEMORY: &str = "--memory";
 
-/// Says that maps are coarser than wished for, for want of memory [bytes].
+/// The warning that the memory limit [bytes] makes maps coarser than requested.
 pub(super) fn memory_warning(
     requested: &Sizes,
     granted: &Sizes,

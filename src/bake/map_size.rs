@@ -1,7 +1,8 @@
 //! Chooses size and tile refinement of each map: as fine as its light needs, within the memory limit.
 //!
-//! A tile's texels are to be no larger than the footprints that fall on it (section 3.1.1 of the paper). Where memory is
-//! short, all texels grow alike beside their footprints: those that are far finer than their light are spared first.
+//! The texels of a tile should be no larger than the footprints that fall on it (section 3.1.1 of the paper). If memory
+//! is short, texels grow by the same factor relative to their footprints everywhere, beginning with those that are far
+//! finer than their light.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,21 +12,20 @@ use crate::illumination::Receiver;
 use crate::illumination::tiles::{self, COARSEST, TileLayout};
 use crate::light_pass::caustic::statistics::FootprintSample;
 
-/// Size of one map.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct MapSize {
-    /// Texels across and down; of the finest size.
+    /// Width and height [texels of the finest size].
     pub(super) size: (usize, usize),
-    /// Where it is in tiles.
+    /// The tiles, if the map is tiled.
     pub(super) layout: Option<Arc<TileLayout>>,
-    /// How often it was halved for memory.
+    /// Number of halvings to save memory.
     pub(super) halved: u32,
 }
 
 pub(super) type Sizes = BTreeMap<Receiver, MapSize>;
 
 impl MapSize {
-    /// As large as it is, all texels alike.
+    /// A dense map of this size.
     pub(super) fn dense(size: (usize, usize)) -> Self {
         Self {
             size,
@@ -34,7 +34,6 @@ impl MapSize {
         }
     }
 
-    /// Number of texels.
     pub(super) fn texels(&self) -> u64 {
         match &self.layout {
             Some(layout) => layout.texel_count() as u64,
@@ -43,39 +42,39 @@ impl MapSize {
     }
 }
 
-/// Half the size, so many times; never nothing.
+/// The size after a number of halvings, each rounded up.
 pub(super) fn halved((width, height): (usize, usize), times: u32) -> (usize, usize) {
     let half = |side: usize| (0..times).fold(side, |side, _| side.div_ceil(2));
     (half(width), half(height))
 }
 
-/// Maps with fewer tiles than this are not worth them.
+/// Maps with fewer tiles are not tiled.
 const MIN_TILES: usize = 32;
 
-/// Tiles are worth their trouble where they take less than this share of a dense map.
+/// A tiled map must take less than this share of the dense one.
 const WORTH: f64 = 0.75;
 
-/// A part of a tile's light that may lie on footprints smaller than its texels.
+/// Share of a tile's light whose footprints may be smaller than its texels.
 const FINER_PART: f64 = 0.25;
 
-/// What a tile asks for.
+/// The resolution that the light on a tile requires.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TileDemand {
-    /// Levels by which texels of the finest size are finer than its footprints.
+    /// Levels by which texels of the finest size are finer than the footprints on the tile.
     fineness: f64,
-    /// Mean irradiance of the map over that of the tile, as levels: where light is half as bright, twice as much of it may
-    /// be missed.
+    /// log₂ of the map's mean irradiance over that of the tile [levels]: where light is half as bright, twice as much
+    /// of it may be missed.
     dimness: f64,
 }
 
 impl TileDemand {
-    /// Where no light was seen.
+    /// A tile without light.
     pub(super) const NOTHING: Self = Self {
         fineness: MAX_LEVELS,
         dimness: 0.0,
     };
 
-    /// Asks for a level at least.
+    /// Requires at least the resolution of a level.
     fn refine(&mut self, level: u8) {
         if self.requested() > f64::from(level) {
             *self = Self {
@@ -85,34 +84,34 @@ impl TileDemand {
         }
     }
 
-    /// The level at which nothing is missed.
+    /// The level that resolves the footprints.
     fn requested(&self) -> f64 {
         self.fineness + self.dimness.clamp(0.0, MAX_DIM)
     }
 
-    /// The level at which as much is missed everywhere, but for a number of levels.
+    /// The level, up to a common offset, at which all tiles miss the same amount of light.
     fn reduced(&self) -> f64 {
         self.fineness + self.dimness
     }
 }
 
-/// Dim light has texels that are larger than its footprints by so many levels at most.
+/// Maximum number of levels by which texels of dim light are larger than its footprints.
 const MAX_DIM: f64 = 1.0;
 
-/// Where light ends within little on a map, or beside a place of it.
+/// Places of a map on or next to a shadow border.
 #[derive(Clone, Debug)]
 pub(super) struct Borders {
-    /// Across and down.
+    /// Columns and rows of places.
     pub(super) size: (usize, usize),
     /// Row by row.
     pub(super) marked: Vec<bool>,
 }
 
 impl Borders {
-    /// Tiles of a map that a border runs through ask for a level at least.
+    /// Requires at least the resolution of a level from all tiles of a map that a border runs through.
     pub(super) fn refine(&self, map: (usize, usize), level: u8, needs: &mut [TileDemand]) {
         let (columns, rows) = tiles::tile_counts(map.0, map.1);
-        // Of the tiles that a place and its neighbours lie in.
+        // The tiles that a place and its neighbours lie in.
         let reach = |place: usize, places: usize, texels: usize, tiles: usize| {
             let tile = |place: usize| (place * texels / places / tiles::SIDE).min(tiles - 1);
             tile(place.saturating_sub(1))..=tile(place + 1)
@@ -128,32 +127,31 @@ impl Borders {
     }
 }
 
-/// What one map wants.
+/// Requested size of one map.
 #[derive(Clone, Debug)]
 pub(super) struct SizeRequest {
-    /// Texels across and down that are asked for, or that the finest light asks for.
+    /// Width and height that are requested, or that the finest light requires [texels].
     pub(super) size: (usize, usize),
-    /// Whether each texel is to be as fine, if memory allows.
+    /// Whether all texels should be equally fine, if memory allows.
     pub(super) is_even: bool,
-    /// What each tile asks for, row by row; `None` where the map cannot be in tiles.
+    /// What each tile requires, row by row; `None` if the map cannot be tiled.
     pub(super) tiles: Option<Vec<TileDemand>>,
-    /// Levels by which texels of the size are finer than the footprints of the whole map.
+    /// Levels by which texels of that size are finer than the mean footprint of the map.
     pub(super) fineness: f64,
-    /// No tile's texels are to be larger than at this level, if memory allows.
+    /// Coarsest level of tiles, if memory allows.
     pub(super) coarsest: u8,
 }
 
-/// By how many levels texels may be larger than footprints: more takes less memory.
+/// Levels by which texels may be larger than footprints, to save memory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum MemoryReduction {
-    /// As is wished for.
+    /// As requested.
     Nothing,
-    /// So many levels.
     Levels(f64),
 }
 
 impl SizeRequest {
-    /// A map of one level.
+    /// A dense map.
     pub(super) fn dense(size: (usize, usize)) -> Self {
         Self {
             size,
@@ -164,7 +162,7 @@ impl SizeRequest {
         }
     }
 
-    /// The size that it gets.
+    /// The size that the map gets.
     pub(super) fn granted(&self, sparing: MemoryReduction) -> MapSize {
         match (sparing, &self.tiles) {
             (MemoryReduction::Nothing, Some(tiles)) if !self.is_even => self.in_tiles(tiles, None),
@@ -184,7 +182,7 @@ impl SizeRequest {
         }
     }
 
-    /// Every texel as large.
+    /// A dense map, coarser by a number of levels.
     fn in_one(&self, levels: f64) -> MapSize {
         let halved_times = levels.clamp(0.0, 32.0) as u32;
         MapSize {
@@ -194,7 +192,7 @@ impl SizeRequest {
         }
     }
 
-    /// As it is wished for, or with so many levels spared.
+    /// A tiled map as requested, or coarser by `sparing` levels; a dense one if tiles save too little.
     fn in_tiles(&self, tiles: &[TileDemand], sparing: Option<f64>) -> MapSize {
         let (columns, _) = tiles::tile_counts(self.size.0, self.size.1);
         let balanced = |level: &dyn Fn(&TileDemand) -> f64, coarsest: u8| {
@@ -211,7 +209,7 @@ impl SizeRequest {
         let mut levels = wanted.clone();
         if let Some(reduced) = sparing {
             let coarser = balanced(&|tile| tile.reduced() + reduced, COARSEST);
-            // Nothing gets finer than it asks for.
+            // No tile gets finer than requested.
             levels = wanted
                 .iter()
                 .zip(coarser)
@@ -231,19 +229,19 @@ impl SizeRequest {
     }
 }
 
-/// Whether a map of a size may be in tiles.
+/// Whether a map of a size has enough tiles to be tiled.
 pub(super) fn is_divisible((width, height): (usize, usize)) -> bool {
     let (columns, rows) = tiles::tile_counts(width, height);
     columns * rows >= MIN_TILES
 }
 
-/// Steps in which texels grow where memory is short [levels].
+/// Step in which texels grow if memory is short [levels].
 const SPARING_STEP: f64 = 0.125;
 
-/// Most that texels of whole maps are finer, or coarser, than their light.
+/// Maximum number of levels by which texels are finer, or coarser, than their light.
 const MAX_LEVELS: f64 = 20.0;
 
-/// Sizes of all maps as they are wished for.
+/// Requested sizes of all maps.
 pub(super) fn requested(wishes: &BTreeMap<Receiver, SizeRequest>) -> Sizes {
     granted(wishes, MemoryReduction::Nothing)
 }
@@ -262,7 +260,7 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u6
     if fits(&requested) {
         return requested;
     }
-    // Tiles with far more texels than light needs come first; then every other.
+    // Tiles that are far finer than their light are reduced first, then all others.
     let steps = (2.0 * MAX_LEVELS / SPARING_STEP) as i32;
     let sparing = |step: i32| MemoryReduction::Levels(f64::from(step) * SPARING_STEP - MAX_LEVELS);
     let (mut low, mut high) = (0, steps);
@@ -277,13 +275,13 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u6
     granted(wishes, sparing(high))
 }
 
-/// Cells across and down that light is sorted into, at most.
+/// Maximum number of cells across and down that light is sorted into.
 const MAX_CELLS: usize = 64;
 
-/// Powers of two that shares of a map are told apart by: from the whole map on.
+/// Bins for the share of a map that a footprint covers, one per power of two, from the whole map down.
 const BINS: usize = 36;
 
-/// What each tile of a map asks for, row by row.
+/// What each tile of a map requires, row by row.
 pub(super) fn needs<'a>(
     size: (usize, usize),
     spots: impl Iterator<Item = &'a FootprintSample>,
@@ -305,7 +303,7 @@ pub(super) fn needs<'a>(
     let mean = cells.iter().flatten().sum::<f64>() / cells.len() as f64;
     let of_cell = |bins: &[f64; BINS]| {
         finer_bin(bins).map_or(TileDemand::NOTHING, |bin| TileDemand {
-            // Half the logarithm of the footprint's texels.
+            // Half the logarithm of the footprint's texels, because a level halves both sides.
             fineness: 0.5 * (texels - (bin as f64 + 0.5)),
             dimness: (mean / bins.iter().sum::<f64>()).log2(),
         })
@@ -319,7 +317,7 @@ pub(super) fn needs<'a>(
         .collect()
 }
 
-/// The bin up to which, from the finest on, [`FINER_PART`] of the light lies; `None` without light.
+/// The bin, from the finest on, up to which [`FINER_PART`] of the light lies; `None` without light.
 fn finer_bin(bins: &[f64; BINS]) -> Option<usize> {
     let all: f64 = bins.iter().sum();
     let mut sum = 0.0;
@@ -329,7 +327,7 @@ fn finer_bin(bins: &[f64; BINS]) -> Option<usize> {
     })
 }
 
-/// Cells of a line of `count` that an interval within [0, 1] reaches, each with its part of it.
+/// Cells of a line of `count` that an interval within [0, 1] overlaps, each with its share of the interval.
 fn parts(low: f64, high: f64, count: usize) -> Vec<(usize, f64)> {
     let cell = |place: f64| ((place * count as f64) as usize).min(count - 1);
     let length = high - low;

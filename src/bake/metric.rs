@@ -15,26 +15,25 @@ use crate::settings::ErrorMetric;
 /// Light of other layers, by receiver.
 pub(super) type Backdrop = BTreeMap<Receiver, ComparisonView>;
 
-/// Light of other layers on one map: luminance of E of each texel [W/m²].
+/// Light of other layers on one map: luminance of E per texel [W/m²].
 pub(super) struct ComparisonView {
     pub(super) chart: Arc<Chart>,
     pub(super) direct: Vec<f64>,
     pub(super) indirect: Vec<f64>,
 }
 
-/// What the error of a bake is made of.
+/// The terms that a bake's error is made of.
 pub(super) enum ErrorTerms {
-    /// The relative RMSE.
     Rmse,
-    /// What an eye sees.
+    /// Squared errors weighted by visibility.
     Visible(Counts),
 }
 
-/// What a texel's squared error counts, times its area [m²/W²], by receiver.
+/// Weight of a texel's squared error times its area [m²/W²], by receiver.
 pub(super) struct Counts(BTreeMap<Receiver, Vec<f64>>);
 
 impl CausticLayer<'_> {
-    /// How errors count, by the pictures of all lights so far, beside light of other layers.
+    /// How errors are weighted, given the shown levels of all lights and the light of other layers.
     pub(super) fn counting(
         &self,
         lights: &[&VisibleLight],
@@ -82,13 +81,13 @@ impl CausticLayer<'_> {
         let lit = charts.iter().map(|(receiver, chart)| {
             let blocks = Blocks::new(chart);
             let own = traced.get(receiver);
-            // Charts of another size are those of a level that was not shown.
+            // A chart of another size belongs to a level that was not shown.
             let beside = backdrop.get(receiver);
             let beside = beside.filter(|beside| beside.chart.texel_count() == chart.texel_count());
             let at = |values: Option<&Vec<f64>>, texel: usize| {
                 values.and_then(|values| values.get(texel)).map_or(0.0, |e| *e)
             };
-            // Caustics count where they are seen; indirect light has an error of its own, and is only seen beside them.
+            // Weights follow the caustics. Indirect light has an error of its own and only adds to the brightness.
             let own_means = blocks.means(chart, |texel| at(own, texel));
             let all = blocks.means(chart, |texel| {
                 let others =
@@ -121,7 +120,7 @@ impl CausticLayer<'_> {
 }
 
 impl Counts {
-    /// The error of a light's maps, of unit strength [1 per unit of strength].
+    /// Error of a light's maps at unit strength [1 per unit of strength].
     pub(super) fn of_light(&self, level: &LightLevel, error: &LightError) -> f64 {
         let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
         let truncated = accuracy::truncated_share(&ledger);
@@ -136,7 +135,7 @@ impl Counts {
         squares.sum::<f64>().sqrt()
     }
 
-    /// Squared errors of tiles, as they count.
+    /// Weighted squared errors of tiles.
     pub(super) fn of_tiles(&self, level: &LightLevel, error: &LightError) -> BTreeMap<Receiver, Vec<f64>> {
         let images = accuracy::images(&level.maps, level.unit);
         let tiles = images.iter().map(|(&receiver, image)| {
@@ -146,7 +145,7 @@ impl Counts {
         tiles.collect()
     }
 
-    /// Squared errors of texels, with what was given up of their light, as they count.
+    /// Weighted squared errors of texels, including the truncated share of their light.
     fn squares(&self, receiver: Receiver, image: &Image, error: &LightError, truncated: f64) -> Vec<f64> {
         let (Some(counts), Some(map)) = (self.0.get(&receiver), error.maps.get(&receiver)) else {
             return vec![0.0; image.luminance.len()];

@@ -66,8 +66,8 @@ use showing::{LevelCallback, Showing};
 use sizes::ChartCache;
 use spectra::Spectra;
 
-/// Owns a scene with all that is derived from it, and bakes it as often as scene or settings change. What a change does
-/// not touch is kept: hierarchy, parametrisations, item buffers, what rays met, patches, maps, and their errors.
+/// Owns a scene and everything derived from it, and bakes it again whenever scene or settings change. What a change
+/// does not affect is kept: hierarchy, parametrisations, item buffers, hits of rays, patches, maps and their errors.
 #[derive(Debug)]
 pub struct Baker {
     scene: Arc<Scene>,
@@ -80,8 +80,8 @@ pub struct Baker {
     threads: Threads,
 }
 
-/// What a [`LightVisibility`] depends on beside the scene: how directions are divided, how thoroughly what cannot matter is left out,
-/// and whether lights have sizes.
+/// What a [`LightVisibility`] depends on besides the scene: the kind of item buffer, what is culled, and whether lights
+/// have an extent.
 type VisibilityKey = (ItemBufferKind, CullMode, bool);
 
 fn aim_key(settings: &BakeSettings) -> VisibilityKey {
@@ -93,10 +93,10 @@ fn aim_key(settings: &BakeSettings) -> VisibilityKey {
     (settings.item_buffer, aiming, sizes)
 }
 
-/// What `inspect` says before any bake.
+/// What `inspect` reports before any bake.
 #[derive(Clone, Debug)]
 pub struct BakeEstimate {
-    /// Which effects are on, and why.
+    /// Effects that are on, and why.
     pub plan: EffectPlan,
     /// Upper bound of the light rays of the caustic layer.
     pub rays: u64,
@@ -105,7 +105,7 @@ pub struct BakeEstimate {
 }
 
 impl Baker {
-    /// A session on a scene; builds nothing yet.
+    /// A baker of a scene; builds nothing yet.
     ///
     /// # Errors
     /// More triangles than the hierarchy can count.
@@ -136,11 +136,11 @@ impl Baker {
         &self.scene
     }
 
-    /// Goes on with another scene, an edited one as a rule: what the difference does not touch is kept. Another strength
-    /// or colour of a light touches nothing: it is a scale of its maps.
+    /// Switches to another scene, usually an edited copy, and keeps what the edit does not affect. Strength and colour
+    /// of a light affect nothing: they scale its maps.
     ///
     /// # Errors
-    /// As [`Self::new`]; the session then keeps its scene.
+    /// As [`Self::new`]; the baker then keeps its scene.
     pub fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()> {
         match SceneChange::between(&self.scene, &scene) {
             Some(change) => self.edit(scene, &change),
@@ -202,7 +202,7 @@ impl Baker {
             .clone()
     }
 
-    /// Which effects the scene calls for under these settings.
+    /// The effects that the scene needs under these settings.
     ///
     /// # Errors
     /// Settings outside their ranges.
@@ -210,7 +210,7 @@ impl Baker {
         Ok(self.estimate(settings)?.plan)
     }
 
-    /// The plan and what a bake would take.
+    /// The plan, and the work of a bake.
     ///
     /// # Errors
     /// Settings outside their ranges.
@@ -233,10 +233,10 @@ impl Baker {
         Ok(estimate)
     }
 
-    /// Bakes. Cancelled bakes return what they have, marked partial.
+    /// Bakes. A cancelled bake returns what it has, marked partial.
     ///
     /// # Errors
-    /// Settings outside their ranges; no threads to be had.
+    /// Settings outside their ranges; threads that cannot be started.
     pub fn bake(
         &mut self,
         settings: &BakeSettings,
@@ -246,8 +246,8 @@ impl Baker {
         self.bake_on_threads(settings, progress, control, None)
     }
 
-    /// Bakes like [`Self::bake`] and hands out whole maps of lower quality on the way, from the coarsest on; each is
-    /// better than the one before. The last is returned, not handed out.
+    /// Bakes like [`Self::bake`], and passes complete maps of rising quality to `level` on the way. The final maps are
+    /// returned, not passed.
     ///
     /// # Errors
     /// As [`Self::bake`].
@@ -295,7 +295,7 @@ impl Baker {
         }
     }
 
-    /// What every bake begins with.
+    /// Prepares a bake.
     fn ground<'a>(
         &mut self,
         settings: &'a BakeSettings,
@@ -321,7 +321,7 @@ impl Baker {
         }
     }
 
-    /// Shows direct and indirect light before anybody has looked for caustics, unless something was shown before.
+    /// Shows direct and indirect light before item buffers are built, unless maps were shown before.
     fn first_look(
         &mut self,
         settings: &BakeSettings,
@@ -342,7 +342,7 @@ impl Baker {
         let mut look = FirstLook::default();
         let maps = look.maps(&finish, &tracer, &[], (progress, control));
         let mut result = finish.result(maps, &[], &CausticOutcome::default());
-        // What there is to do is not known yet.
+        // The plan is not known before item buffers are built.
         result.plan = EffectPlan::default();
         if !result.maps.is_empty() {
             level(result);
@@ -466,7 +466,7 @@ impl Baker {
     }
 }
 
-/// What the user asks, and the time that there is since a bake began [s].
+/// Cancellation by the user, or by a time limit since the bake began [s].
 fn limited(control: &Control, limit_s: Option<f64>, began: Instant) -> Control {
     match limit_s {
         Some(limit_s) => control.with_deadline(began + Duration::from_secs_f64(limit_s)),
@@ -474,12 +474,12 @@ fn limited(control: &Control, limit_s: Option<f64>, began: Instant) -> Control {
     }
 }
 
-/// The threads of the last bake, kept for the next one.
+/// Thread pool of the last bake, kept for the next one.
 #[derive(Clone, Debug, Default)]
 struct Threads(Option<(usize, Arc<ThreadPool>)>);
 
 impl Threads {
-    /// As many threads as settings say.
+    /// A pool of as many threads as the settings ask for.
     fn of(&mut self, settings: &BakeSettings) -> Result<Arc<ThreadPool>> {
         match &self.0 {
             Some((count, pool)) if *count == settings.threads => Ok(Arc::clone(pool)),
@@ -496,22 +496,22 @@ impl Threads {
     }
 }
 
-/// What every bake begins with: the scene made ready, and what there is to do.
+/// What every bake starts from: the prepared scene and the plan.
 struct PreparedBake<'a> {
     tracer: Arc<Tracer>,
     aim: Arc<LightVisibility>,
     plan: EffectPlan,
-    /// Tests that looking around took, where it was done now.
+    /// Tests of the item buffers, if this bake built them.
     item_buffer_tests: u64,
     settings: &'a BakeSettings,
     progress: &'a dyn Progress,
     control: &'a Control,
-    /// When the bake began.
+    /// Start of the bake.
     began: Instant,
 }
 
 impl PreparedBake<'_> {
-    /// The caustic layer, where there is one.
+    /// Bakes the caustic layer, if the plan has one.
     fn bake(
         &self,
         sizes: &ChartCache,
@@ -540,13 +540,13 @@ impl PreparedBake<'_> {
     }
 }
 
-/// Writes down what a bake took so far.
+/// Records times and item buffers.
 fn account(result: &mut Bake, finish: &MapAssembler, aim: &LightVisibility, clock: &Clock) {
     (result.timings_s, result.cpu_s) = clock.timings();
     result.item_buffers = item_buffers(finish.scene, aim);
 }
 
-/// What looking around took, light by light.
+/// Cost of the item buffers, light by light.
 fn item_buffers(scene: &Scene, aim: &LightVisibility) -> Vec<ItemBufferReport> {
     let lights = scene.lights.iter().zip(&aim.looks);
     lights

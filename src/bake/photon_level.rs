@@ -1,4 +1,4 @@
-//! One level of one light by photons: at least twice as many as the level before, whose photons are reused.
+//! One level of one light by photons: more of them than the level before, whose photons are reused.
 
 use std::borrow::Cow;
 use std::time::Instant;
@@ -22,41 +22,41 @@ use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use crate::optics::LinearSrgb;
 use crate::transport::EffectSet;
 
-/// Photons of each half of the first picture.
+/// Photons in each half of the first level.
 const FIRST_PHOTONS: u32 = 1 << 13;
 
-/// Photons of each half, at most.
+/// Maximum number of photons in each half.
 const MAX_PHOTONS: u32 = 1 << 30;
 
-/// A light that has given no error by so many photons of each half gives none.
+/// A light whose error is still unknown after so many photons in each half is given up.
 const MAX_WITHOUT_ERROR: u32 = 1 << 20;
 
-/// Growth from level to level, least and most.
+/// Minimum and maximum growth from level to level.
 pub(super) const GROWTH: (f64, f64) = (1.5, 8.0);
 
-/// Photons grow with the square of the error to this power where bundles become finer with their number.
+/// Exponent of the squared error with which photons grow where bundles become finer with their number.
 const POWER_WITH_BUNDLES: f64 = 0.8;
 
-/// Somewhat more photons than the target should need, so that no level is made for little.
+/// Margin over the photons that the target should need, so that a near miss does not cost another level.
 const MARGIN: f64 = 1.1;
 
-/// Noise that is this part of the error aimed at is little enough, whatever else the error holds.
+/// Noise below this fraction of the goal is low enough, whatever else the error contains.
 const MIN_NOISE: f64 = 0.7;
 
-/// The mean flux of all photons may be so many times that of the first ones.
+/// Upper limit of the mean flux of all photons, relative to that of the first ones.
 const MEAN_MARGIN: f64 = 4.0;
 
-/// Part of the time left that a level may be expected to take by the one before.
+/// Fraction of the remaining time that a level may take, as predicted from the level before.
 const PART_OF_TIME: f64 = 0.85;
 
-/// The same where bundles come to it.
+/// The same where bundles add to the cost.
 const PART_OF_TIME_WITH_BUNDLES: f64 = 0.5;
 
-/// Fewer photons than so many times those before are not worth a level.
+/// Minimum growth that is worth another level.
 const MIN_GROWTH: f64 = 1.2;
 
-/// Photons of a level after one with fewer, or as many as there is part of the time for: a level that is cut off leaves
-/// nothing.
+/// Limits the photons of a level to what `part` of the remaining time allows, because an interrupted level is lost. The
+/// first level is not limited.
 fn in_time(photons: u32, before: u32, part: f64, state: &LightState, course: &BakeContext) -> u32 {
     let (1.., Some(left_s), Some(photon_s)) = (before, course.control.time_left_s(), state.photon_s) else {
         return photons;
@@ -68,8 +68,7 @@ fn in_time(photons: u32, before: u32, part: f64, state: &LightState, course: &Ba
 }
 
 impl CausticLayer<'_> {
-    /// Photons of each half of the level after one, of a light that aims at a relative RMSE; `None` where there is nothing
-    /// more.
+    /// Photons in each half of the next level of a light that aims at a relative RMSE; `None` if nothing is left to do.
     pub(super) fn next_photons(
         &self,
         light: &VisibleLight,
@@ -96,7 +95,7 @@ impl CausticLayer<'_> {
         let goal = aim.unwrap_or(target);
         let times = match known {
             Some((error, truncated)) => {
-                // More photons do not bring back what was given up.
+                // More photons do not recover truncated light.
                 let noise2 = error * error - truncated * truncated;
                 let wanted2 = (goal * goal - truncated * truncated).max((MIN_NOISE * goal).powi(2));
                 if noise2 <= wanted2 {
@@ -116,7 +115,7 @@ impl CausticLayer<'_> {
         (before < MAX_PHOTONS).then_some(wanted.min(f64::from(MAX_PHOTONS)) as u32)
     }
 
-    /// Photons of each half at the density of the settings.
+    /// Photons in each half at the density of the settings.
     fn photons_at_density(&self, light: &VisibleLight) -> u32 {
         let launch_measure = self.with_launch(light, |launch| launch.measure());
         let per_measure = if light.launch.is_fitted() {
@@ -129,7 +128,7 @@ impl CausticLayer<'_> {
             .clamp(1.0, f64::from(MAX_PHOTONS)) as u32
     }
 
-    /// Whether its light may stay together.
+    /// Whether photons of the light may form bundles.
     fn has_bundles(&self, light: &VisibleLight) -> bool {
         let spectrum = self.spectra.photons(light.light);
         let is_smooth = spectrum.is_none_or(|spectrum| spectrum.tracers().is_some());
@@ -151,10 +150,10 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// One level more of a light by photons.
+    /// Adds a level of photons to a light.
     ///
     /// # Errors
-    /// A light whose power is no number.
+    /// A power that is not finite.
     pub(super) fn advance_photons(
         &self,
         light: &VisibleLight,
@@ -172,18 +171,18 @@ impl CausticLayer<'_> {
             return Ok(());
         }
         let made = self.more_photons(light, sizes, state, (last, light_progress.aim), course)?;
-        // Not known better, and not worth knowing.
+        // The light is negligible: a better estimate is not worth its cost.
         light_progress.done |= !light_progress.is_underrated && made.is_some() && self.is_negligible(light);
         light_progress.levels.extend(made);
-        // None but the last is needed, though a bake after this one is sooner at it with all of them.
+        // Only the last level is needed, but the next bake reaches it sooner with all of them.
         drop_coarse(&mut light_progress.levels, 1, self.settings.memory_bytes / 8);
         Ok(())
     }
 
-    /// The level after one, of a light that aims at a relative RMSE; `None` where there is nothing more, or it was stopped.
+    /// The next level of a light that aims at a relative RMSE; `None` if nothing is left to do, or it was stopped.
     ///
     /// # Errors
-    /// A light whose power is no number.
+    /// A power that is not finite.
     pub(super) fn more_photons(
         &self,
         light: &VisibleLight,
@@ -218,7 +217,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Follows the photons that are missing; `None` where it was stopped.
+    /// Traces the missing photons; `None` if it was stopped.
     fn make_photons(
         &self,
         light: &VisibleLight,
@@ -337,7 +336,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Maps of both halves, before they are divided by their photons.
+    /// Maps of both halves, not divided by the number of photons.
     fn half_maps<'a>(&self, light: &VisibleLight, raw: &'a PhotonSums) -> [Cow<'a, ReceiverMaps>; HALVES] {
         [0, 1].map(|half| {
             let mut maps = raw.halves[half].sum();
@@ -349,8 +348,8 @@ impl CausticLayer<'_> {
         })
     }
 
-    /// Raises the estimated error of a level of patches to what photons of the same light see of it: what patches miss
-    /// alike at every level, no difference between levels shows.
+    /// Raises the estimated error of a level of patches to what photons of the same light reveal: no difference between
+    /// levels shows what patches miss at every level.
     pub(super) fn audit(
         &self,
         light: &VisibleLight,
@@ -370,10 +369,10 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// The unit of a single photon, for the sums of as many as there may be.
+    /// Unit of a single photon's flux, for sums over the maximum number of photons.
     fn photon_unit(&self, light: &VisibleLight) -> Result<FluxUnit> {
         let mean_w = self.with_launch(light, |launch| launch.mean_flux_w(self.settings.seed));
-        // Where no photon starts, any unit will do.
+        // If no photon starts, any unit will do.
         let power_w = (mean_w * MEAN_MARGIN).max(f64::MIN_POSITIVE);
         self.unit_for(light, power_w, f64::from(MAX_PHOTONS) * HALVES as f64)
     }

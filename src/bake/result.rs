@@ -14,43 +14,43 @@ use crate::settings::{ErrorMetric, LayerKind};
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
-    /// The lattice of the asked density was traced.
+    /// The lattice of the requested density was traced.
     Density,
-    /// The estimated error is below the target.
+    /// The estimated error met the target.
     MaxError,
-    /// The time was up.
+    /// The time limit was reached.
     MaxTime,
-    /// More rays do not help: the maps are as fine as memory allows, and the estimated error is above the target.
+    /// More rays do not help: maps are as fine as memory allows, and the estimated error exceeds the target.
     Memory,
-    /// Nothing specular is lit, or nothing can receive it: there was nothing to do.
+    /// Nothing specular is lit, or nothing can receive its light.
     NothingToDo,
-    /// It was asked to stop.
+    /// The user cancelled.
     Cancelled,
 }
 
-/// Counters of a bake; DESIGN's `counts`.
+/// Counters of a bake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct BakeCounts {
-    /// Light directions launched for light transport.
+    /// Light rays launched.
     pub rays: u64,
-    /// Rays traced to build item buffers: none, the scene is projected onto their cells.
+    /// Rays traced to build item buffers: none, as the scene is projected onto their cells.
     pub item_buffer_rays: u64,
     /// Nodes, triangles and cells tested to build item buffers.
     pub item_buffer_tests: u64,
-    /// Closest-hit queries along light paths, without those that look for bundles.
+    /// Closest-hit queries along light paths, without those that search for bundles.
     pub segments: u64,
-    /// Any-hit queries of the direct layer.
+    /// Shadow rays of the direct layer.
     pub shadow_rays: u64,
-    /// Rays that diffuse surfaces sent out to gather indirect light.
+    /// Rays traced from diffuse surfaces to gather indirect light.
     #[serde(default)]
     pub gather_rays: u64,
-    /// Closest-hit queries along them.
+    /// Closest-hit queries along gather rays.
     #[serde(default)]
     pub gather_segments: u64,
-    /// How often indirect light was sent on until it stood.
+    /// Bounces of indirect light until it converged.
     #[serde(default)]
     pub bounces: u32,
-    /// Interpolated rays against candidate receivers.
+    /// Interpolated rays tested against candidate receivers.
     pub receiver_queries: u64,
     /// Kernels deposited.
     pub splats: u64,
@@ -58,22 +58,22 @@ pub struct BakeCounts {
     pub cells: u64,
 }
 
-/// What it took to look around from one light: tests, no rays.
+/// Cost of one light's item buffers: tests, no rays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ItemBufferReport {
     /// The light's name.
     pub light: String,
     /// Cells that may see something specular.
     pub cells: u64,
-    /// Cells that would, if opaque surfaces did not cover them.
+    /// Cells that would, if opaque surfaces did not hide it.
     pub hidden_cells: u64,
-    /// Nodes, triangles and cells that were tested.
+    /// Nodes, triangles and cells tested.
     pub tests: u64,
     /// CPU time [ms].
     pub cpu_ms: f64,
 }
 
-/// Seconds per stage; used for wall-clock times and for CPU times of the whole process.
+/// Seconds per stage: wall-clock time, or CPU time of the whole process.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Timings {
     /// Reading the scene.
@@ -90,54 +90,54 @@ pub struct Timings {
     pub total: f64,
 }
 
-/// What one light gives to one layer of one map.
+/// One light's part of one layer of one map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LightLayer {
-    /// Whose light it is.
+    /// Receiver of the map.
     pub receiver: Receiver,
     /// Index into `Scene::lights`.
     pub light: usize,
-    /// Of which layer.
+    /// Layer of the map.
     pub kind: LayerKind,
-    /// E per texel [W/m²], as in the map; all lights add up to its layer.
+    /// E per texel [W/m²]; the parts of all lights add up to the layer.
     pub irradiance: Vec<[f32; 3]>,
 }
 
-/// Maps with everything that is known of how they came about.
+/// Maps and everything that is known about how they were made.
 #[derive(Clone, Debug)]
 pub struct Bake {
     /// One per surface that received flux, in the order of `Scene::objects`.
     pub maps: Vec<IlluminationMap>,
-    /// What each light gives to them, where that is asked for: map by map, caustic before direct, in the order of lights, and all of
-    /// indirect after them.
+    /// Each light's part of the maps, if requested: map by map, caustic before direct, in the order of lights; then the
+    /// indirect parts.
     pub light_layers: Vec<LightLayer>,
-    /// What each band of the spectrum gives to them, where that is asked for: map by map, from the shortest wavelength on.
+    /// Each band's part of the maps, if requested: map by map, by rising wavelength.
     pub band_layers: Vec<BandLayer>,
-    /// Which effects were on, and why.
+    /// Effects that were on, and why.
     pub plan: EffectPlan,
-    /// What looking around from each light took.
+    /// Cost of each light's item buffers.
     pub item_buffers: Vec<ItemBufferReport>,
-    /// Energy of the caustic layer, one per light with its name.
+    /// Energy of the caustic layer, one ledger per light.
     pub ledgers: Vec<LightLedger>,
     /// Counters.
     pub counts: BakeCounts,
-    /// Where it stood after each level whose error was known.
+    /// Cost and error after each level whose error was known.
     pub course: Vec<CostPoint>,
-    /// What the target was expected to cost, and what it cost; `None` without a target.
+    /// Forecast and actual cost of the target; `None` without a target.
     pub forecast: Option<ForecastReport>,
     /// Wall-clock seconds.
     pub timings_s: Timings,
     /// CPU seconds over all threads of the process.
     pub cpu_s: Timings,
-    /// Estimated relative RMSE over all maps; `None` where nothing was estimated.
+    /// Estimated relative RMSE over all maps; `None` if nothing was estimated.
     pub estimated_relative_rmse: Option<f64>,
-    /// Estimated visible error of all maps; `None` where nothing was estimated.
+    /// Estimated visible error of all maps; `None` if nothing was estimated.
     pub estimated_visible: Option<f64>,
-    /// Why it ended.
+    /// Why the bake ended.
     pub stop_reason: StopReason,
-    /// True where it was stopped before it was done.
+    /// Whether it was cancelled before it was done.
     pub partial: bool,
-    /// What the user should know of.
+    /// Warnings for the user.
     pub warnings: Vec<Warning>,
 }
 

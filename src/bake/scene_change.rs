@@ -7,18 +7,18 @@ use crate::scene::{Light, LightKind, Material, Scene};
 /// The difference between a scene and its edited copy.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct SceneChange {
-    /// Objects of another shape or at another place.
+    /// Objects with another shape or place.
     pub(super) shapes: Vec<usize>,
-    /// Objects that light leaves in other directions.
+    /// Objects whose material sends light in other directions.
     pub(super) directions: Vec<usize>,
-    /// Whether surfaces take another share of the light, the directions included.
+    /// Whether any material reflects, transmits or absorbs another share of light, changed directions included.
     pub(super) shares: bool,
-    /// Lights at another place or of another size, or that shine another way; another strength alone is no change.
+    /// Lights with another place, size or emission profile; strength and colour alone do not count.
     pub(super) lights: Vec<usize>,
 }
 
 impl SceneChange {
-    /// `None` where the scenes do not have the same objects, materials and lights.
+    /// `None` if the scenes do not have the same textures and environment, or as many objects and lights.
     pub(super) fn between(old: &Scene, new: &Scene) -> Option<Self> {
         let same_parts = old.objects.len() == new.objects.len()
             && old.lights.len() == new.lights.len()
@@ -56,13 +56,13 @@ impl SceneChange {
         })
     }
 
-    /// Whether paths of light may go elsewhere than before.
+    /// Whether light may take other paths than before.
     pub(super) fn moves_paths(&self) -> bool {
         !(self.shapes.is_empty() && self.directions.is_empty())
     }
 }
 
-/// Whether light leaves both materials in the same directions.
+/// Whether both materials send light in the same directions.
 fn leave_alike(a: &Material, b: &Material) -> bool {
     let has_alpha = a.alpha_mask.is_some() || a.coverage.is_some();
     a.surface == b.surface
@@ -79,7 +79,7 @@ fn leave_alike(a: &Material, b: &Material) -> bool {
         && (!has_alpha || a.base_colour_texture == b.base_colour_texture)
 }
 
-/// Whether both materials take and send on the same shares of light.
+/// Whether both materials also reflect, transmit and absorb the same shares of light.
 fn share_alike(a: &Material, b: &Material) -> bool {
     leave_alike(a, b)
         && a.base_colour == b.base_colour
@@ -91,13 +91,13 @@ fn share_alike(a: &Material, b: &Material) -> bool {
         && a.volume == b.volume
 }
 
-/// Whether both lights are one, but for strength and colour.
+/// Whether both lights are the same except for strength and colour.
 fn shine_alike(a: &Light, b: &Light) -> bool {
     let unit = |light: &Light| -> LightKind { light.of_unit_strength().kind };
     unit(a) == unit(b) && a.size == b.size
 }
 
-/// The object that glows as a light.
+/// The object whose emission is the light.
 fn glowing_object(light: &Light) -> Option<usize> {
     match light.kind {
         LightKind::Surface { object, .. } => Some(object),

@@ -22,29 +22,29 @@ use crate::progress::{Control, Progress};
 use crate::settings::LayerKind;
 use crate::transport::Tracer;
 
-/// Takes pictures.
+/// Receives intermediate results.
 pub(super) type LevelCallback<'a> = dyn FnMut(Bake) + Send + 'a;
 
-/// Hands the levels of a bake to a callback.
+/// Passes the levels of a bake to a callback.
 pub(super) struct Showing<'a, 'level> {
     pub(super) finish: &'a MapAssembler<'a>,
     pub(super) tracer: &'a Tracer,
     pub(super) aim: &'a LightVisibility,
     pub(super) progress: &'a dyn Progress,
     pub(super) control: &'a Control,
-    /// Of the whole bake.
+    /// Runs since the start of the bake.
     pub(super) watch: &'a Stopwatch,
-    /// Tests that looking around took.
+    /// Tests that built the item buffers.
     pub(super) item_buffer_tests: u64,
     pub(super) level: Option<&'a mut LevelCallback<'level>>,
     pub(super) direct: &'a mut DirectCache,
     pub(super) indirect: &'a mut IndirectCache,
     pub(super) lamps: DirectWork,
-    /// Whether no caustics were shown yet.
+    /// Whether no caustics have been shown yet.
     pub(super) is_first: bool,
-    /// What stands in for layers that are not baked yet, where nothing was shown before the bake.
+    /// Stand-in for layers that are not baked yet, if nothing was shown before the bake.
     pub(super) first_look: Option<FirstLook>,
-    /// No stand-in for indirect light: there is no callback.
+    /// Coarse indirect light for the error metric, if neither `first_look` nor the cache has any.
     pub(super) glance: Option<FirstLook>,
 }
 
@@ -100,7 +100,7 @@ impl BakeObserver for Showing<'_, '_> {
         let (finish, plan) = (self.finish, self.finish.plan);
         let (charts, memory_warning) = finish.charts(levels);
         let direct_charts = finish.direct_charts(&charts);
-        // The first picture after a change is to come soon: direct light follows with the second.
+        // The first picture after a change has to come soon; direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
         if !waits && plan.is_on(Effect::Direct) {
             let on_whom = (self.progress, self.control);

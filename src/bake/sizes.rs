@@ -21,32 +21,33 @@ use crate::transport::Tracer;
 /// Side of a map before the first doubling [texels].
 pub const FIRST_SIDE: usize = 64;
 
-/// Largest side that doubling leads to by itself where all texels are as fine [texels]; larger maps have to be asked for.
+/// Largest side that automatic doubling reaches without tiles [texels]; larger maps have to be requested.
 pub const LARGEST_AUTOMATIC_SIDE: usize = 2048;
 
-/// Largest side in tiles [texels of the finest size].
+/// Largest side of tiled maps [texels of the finest size].
 pub const LARGEST_TILED_SIDE: usize = 4096;
 
-/// Memory per texel while flux is summed and finished [bytes]: three 64-bit sums, three floats per layer, an area.
+/// Memory per texel while flux is summed and maps are finished [bytes]: three 64-bit sums, three floats per layer, an
+/// area.
 pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
 
 /// Sums of both halves of the photons, per texel [bytes].
 const BYTES_PER_PHOTON_TEXEL: u64 = 2 * 24;
 
-/// A texel of the map whose photons are being filtered, with its details at all levels [bytes].
+/// Per texel of the map whose photons are being filtered, with its details at all levels [bytes].
 const BYTES_PER_FILTERED_TEXEL: u64 = 136;
 
-/// Memory that maps take while they are made.
+/// Memory of maps while they are made.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MapMemory {
-    /// Of every texel [bytes].
+    /// Per texel of every map [bytes].
     per_texel: u64,
-    /// Of every texel of the largest map, beside that [bytes].
+    /// In addition, per texel of the largest map [bytes].
     per_texel_of_largest: u64,
 }
 
 impl MapMemory {
-    /// Of maps that are summed and finished.
+    /// Maps that are only summed and finished.
     pub(super) const PLAIN: Self = Self {
         per_texel: BYTES_PER_TEXEL,
         per_texel_of_largest: 0,
@@ -63,7 +64,7 @@ impl MapMemory {
         }
     }
 
-    /// Of maps with so many texels each [bytes].
+    /// Memory of maps with these numbers of texels [bytes].
     pub(super) fn bytes(self, texels: impl Iterator<Item = u64>) -> u64 {
         let (all, largest) = texels.fold((0_u64, 0), |(all, largest), texels| {
             (all.saturating_add(texels), largest.max(texels))
@@ -73,42 +74,41 @@ impl MapMemory {
     }
 }
 
-/// Parametrisations of a scene's surfaces, made on first use.
+/// Parametrisations and charts of a scene's surfaces, made on first use.
 #[derive(Debug)]
 pub struct ChartCache {
     scene: Arc<Scene>,
     parametrisations: Vec<OnceLock<Option<Arc<Parametrisation>>>>,
-    /// Generated ones for maps of other sides than usual, by object and side.
+    /// Generated parametrisations for sides other than the default, by object and side.
     laid_out: Mutex<BTreeMap<(usize, usize), Arc<Parametrisation>>>,
-    /// Whether each object's mesh bounds a solid.
+    /// Whether each object's mesh is closed.
     closed: Vec<OnceLock<bool>>,
-    /// Charts made so far, by object and size.
+    /// Dense charts, by receiver and size.
     charts: Mutex<BTreeMap<ChartKey, KeptChart>>,
-    /// Those in tiles, the latest last.
+    /// Tiled charts, the latest last.
     tiled: Mutex<Vec<Arc<Chart>>>,
-    /// Charts that were asked for.
+    /// Number of requests for charts.
     asked: AtomicU64,
-    /// Where direct light of each light ends within little on each receiver.
+    /// Shadow borders of each light on each receiver.
     borders: Mutex<BTreeMap<(usize, Receiver), Borders>>,
 }
 
-/// Receiver, texels across and down.
+/// Receiver, and width and height of the chart.
 type ChartKey = (Receiver, (usize, usize));
 
-/// A chart, and how many were asked for before it was last.
+/// A chart, and the number of requests before its last use.
 type KeptChart = (Arc<Chart>, u64);
 
-/// Charts of each receiver that are kept, about.
+/// Approximate number of charts kept per receiver.
 const CHARTS_PER_RECEIVER: usize = 4;
 
-/// Charts that are kept however few receivers there are.
+/// Minimum number of charts kept.
 const MIN_CHARTS: usize = 256;
 
-/// Charts in tiles that are kept.
+/// Maximum number of tiled charts kept.
 const MAX_TILED_CHARTS: usize = 64;
 
 impl ChartCache {
-    /// Nothing made yet.
     pub fn new(scene: Arc<Scene>) -> Self {
         let parametrisations = scene.objects.iter().map(|_| OnceLock::new()).collect();
         let closed = scene.objects.iter().map(|_| OnceLock::new()).collect();
@@ -124,7 +124,7 @@ impl ChartCache {
         }
     }
 
-    /// For an edited copy of the scene: what belongs to shapes that stay is kept.
+    /// Moves on to an edited copy of the scene, and keeps what belongs to unchanged shapes.
     pub fn edited(self, scene: Arc<Scene>, changed: &[usize]) -> Self {
         let mut sizes = Self { scene, ..self };
         for &object in changed {
@@ -140,13 +140,13 @@ impl ChartCache {
         sizes
     }
 
-    /// A light is not what it was; without one, none of them throws the shadows that it threw.
+    /// Drops the shadow borders of one light, or of all lights.
     pub fn forget_borders(&mut self, light: Option<usize>) {
         let borders = self.borders.get_mut().unwrap_or_else(PoisonError::into_inner);
         borders.retain(|(of, _), _| light.is_some_and(|light| *of != light));
     }
 
-    /// The parametrisation of an object; `None` where it has no area.
+    /// The parametrisation of an object; `None` if it has no area.
     pub fn parametrisation(&self, object: usize) -> Option<&Arc<Parametrisation>> {
         self.parametrisations[object]
             .get_or_init(|| {
@@ -156,7 +156,7 @@ impl ChartCache {
             .as_ref()
     }
 
-    /// The parametrisation of an object for maps of a side: generated charts keep their gutters at that size.
+    /// The parametrisation of an object for maps of a given side, on which the gutters of generated charts depend.
     fn laid_out(&self, object: usize, side: usize) -> Option<Arc<Parametrisation>> {
         let usual = &self.parametrisations[object];
         let is_for_all = |usual: &Arc<Parametrisation>| usual.uv_set != UvSet::Generated;
@@ -181,8 +181,8 @@ impl ChartCache {
         Some(made)
     }
 
-    /// Whether light straight from a lamp can reach a receiver that is seen: the front of a surface, the back of a
-    /// double-sided one. The inside of a closed body is lit from lamps within its box only.
+    /// Whether direct light can reach a receiver that is visible: the front of a surface, or the back of a double-sided
+    /// one. The inside of a closed body is lit only by lights within its bounding box.
     pub fn may_see_lights(&self, receiver: Receiver) -> bool {
         let object = receiver.object();
         let material = self.scene.material_of(object);
@@ -211,10 +211,10 @@ impl ChartCache {
         })
     }
 
-    /// A chart of the given size.
+    /// A dense chart.
     pub fn chart(&self, receiver: Receiver, (width, height): (usize, usize)) -> Option<Arc<Chart>> {
         let key = (receiver, (width, height));
-        // Whatever panicked under the lock, the charts in the map are whole.
+        // Even after a panic under the lock, the charts in the map are complete.
         let charts = || self.charts.lock().unwrap_or_else(PoisonError::into_inner);
         let now = self.asked.fetch_add(1, Ordering::Relaxed);
         if let Some((chart, last)) = charts().get_mut(&key) {
@@ -236,7 +236,7 @@ impl ChartCache {
         Some(chart)
     }
 
-    /// A chart of a size that may be in tiles.
+    /// A chart of a size, dense or tiled.
     pub fn chart_of(&self, receiver: Receiver, size: &MapSize) -> Option<Arc<Chart>> {
         let Some(layout) = &size.layout else {
             return self.chart(receiver, size.size);
@@ -259,8 +259,9 @@ impl ChartCache {
         Some(chart)
     }
 
-    /// How often the map of a receiver doubles from its first size until texels are no larger than the mean footprint
-    /// (section 3.1.1 of the paper), or a side has so many texels. `None` where no footprint was seen.
+    /// Number of doublings from the first size of a receiver's map until its texels are no larger than the mean
+    /// footprint (section 3.1.1 of the paper), or until its longer side reaches `largest_side`. `None` if no footprint
+    /// was seen.
     pub fn doublings(
         &self,
         receiver: Receiver,
@@ -274,7 +275,7 @@ impl ChartCache {
         (0..).find(|&times| !(coarse(times) && small(times)))
     }
 
-    /// How often the map of an object doubles until direct light on it is no coarser than on one that holds nothing else.
+    /// Number of doublings until direct light on an object's map is no coarser than on a map of its own.
     pub fn doublings_for_direct(&self, object: usize, settings: &BakeSettings) -> u32 {
         let sizes = self
             .direct_size(object, settings)
@@ -286,14 +287,13 @@ impl ChartCache {
         })
     }
 
-    /// The size of an object's map after so many doublings.
+    /// The size of an object's map after a number of doublings.
     pub fn doubled_size(&self, object: usize, times: u32) -> Option<(usize, usize)> {
         let (width, height) = first_size(self.parametrisation(object)?.suggested_aspect);
         Some((width << times, height << times))
     }
 
-    /// How often a map of a size can be halved until direct light on it would be coarser than on one that holds nothing
-    /// else.
+    /// How often a map can be halved before direct light on it is coarser than on a map of its own.
     pub fn direct_halvings(&self, object: usize, size: (usize, usize), settings: &BakeSettings) -> u32 {
         let Some((width, height)) = self.direct_size(object, settings) else {
             return 0;
@@ -301,7 +301,7 @@ impl ChartCache {
         (size.0 / width).min(size.1 / height).checked_ilog2().unwrap_or(0)
     }
 
-    /// The size of a map that holds direct light only: texels of a 400th of the scene's diagonal, or what is asked.
+    /// The size of a map that holds direct light only: texels of 1/400 of the scene's diagonal, or as requested.
     pub fn direct_size(&self, object: usize, settings: &BakeSettings) -> Option<(usize, usize)> {
         if let MapResolution::Fixed { width, height } = settings.map_resolution {
             return Some((width, height));
@@ -315,8 +315,8 @@ impl ChartCache {
         Some((side((texels * aspect).sqrt()), side((texels / aspect).sqrt())))
     }
 
-    /// A map of direct and indirect light only: texels of a 400th of the scene's diagonal, or what is asked; in tiles where
-    /// light ends within little.
+    /// A map of direct and indirect light only: texels of 1/400 of the scene's diagonal, or as requested; tiled if it
+    /// has shadow borders.
     pub fn direct_wish(&self, receiver: Receiver, settings: &BakeSettings) -> Option<SizeRequest> {
         let size = self.direct_size(receiver.object(), settings)?;
         let doublings = self.border_doublings(receiver, settings);
@@ -335,8 +335,7 @@ impl ChartCache {
         })
     }
 
-    /// How often texels of direct light are halved where it ends within little on a receiver; not at all where it does so
-    /// nowhere.
+    /// Number of halvings of direct light's texels at the shadow borders of a receiver; 0 if it has none.
     pub fn border_doublings(&self, receiver: Receiver, settings: &BakeSettings) -> u32 {
         if settings.map_resolution != MapResolution::Auto || !self.has_borders(receiver) {
             return 0;
@@ -359,7 +358,7 @@ impl ChartCache {
         borders.any(|(_, borders)| borders.marked.contains(&true))
     }
 
-    /// Where direct light ends within little on a receiver; `None` where it does so nowhere.
+    /// Shadow borders of all lights on a receiver; `None` if there are none.
     pub fn borders(&self, receiver: Receiver) -> Option<Borders> {
         let known = self.borders.lock().unwrap_or_else(PoisonError::into_inner);
         let of_receiver = known.iter().filter(|((_, of), _)| *of == receiver);
@@ -372,8 +371,7 @@ impl ChartCache {
         all.filter(|borders| borders.marked.contains(&true))
     }
 
-    /// Looks where direct light ends within little, on surfaces whose maps may be in tiles; returns the shadow rays that it
-    /// took.
+    /// Finds shadow borders on surfaces whose maps can be tiled; returns the number of shadow rays traced.
     pub fn find_borders(&self, tracer: &Tracer, settings: &BakeSettings, control: &Control) -> u64 {
         if settings.map_resolution != MapResolution::Auto {
             return 0;
@@ -416,8 +414,8 @@ impl ChartCache {
         shadow_rays
     }
 
-    /// The sizes of the grids that indirect light goes between, by receiver: texels of twice those of direct light or of
-    /// the maps that are asked for, larger where there would be more than `most_texels` of them.
+    /// Sizes of the grids of indirect light, by receiver: texels twice as large as those of direct light, no more of
+    /// them than a requested map has, and larger ones if all grids together would exceed `most_texels`.
     pub fn grid_sizes(&self, settings: &BakeSettings, most_texels: u64) -> Vec<(Receiver, (usize, usize))> {
         let automatic = BakeSettings {
             map_resolution: MapResolution::Auto,
@@ -455,16 +453,16 @@ impl ChartCache {
     }
 }
 
-/// How often texels of direct light are halved where it ends within little: to a 1,600th of the scene's diagonal for a draft,
-/// to half and a quarter of that for better presets.
+/// Number of halvings of direct light's texels at shadow borders: down to 1/1,600 of the scene's diagonal for a draft,
+/// to a half and a quarter of that for better presets.
 fn border_doublings(settings: &BakeSettings) -> u32 {
     2 + settings.detail()
 }
 
-/// Least side of a grid of indirect light, where there is room for it [texels].
+/// Minimum side of a grid of indirect light, if there is room for it [texels].
 const MIN_GRID_SIDE: usize = 8;
 
-/// A map of about FIRST_SIDE² texels whose sides have a power of two between them, at most 8:1.
+/// A size of about FIRST_SIDE² texels whose aspect ratio is a power of two, at most 8:1.
 pub fn first_size(aspect: f64) -> (usize, usize) {
     let steps = aspect.log2().round().clamp(-3.0, 3.0) as i32;
     let stretch = |steps: i32| FIRST_SIDE << steps.max(0);

@@ -23,13 +23,13 @@ use crate::scene::{Light, LightKind};
 use crate::settings::{BakeSettings, CONTINUOUS_BANDS, Estimator, SpectralSampling, Wavelengths};
 use crate::transport::Tracer;
 
-/// Room above a lamp's largest channel for what becomes of it in linear sRGB: the largest coefficient from XYZ.
+/// Margin over a lamp's largest channel for the conversion to linear sRGB: above the largest coefficient from XYZ.
 const CHANNEL_MARGIN: f64 = 8.0;
 
-/// Wavelengths that photons draw from where the whole spectrum is asked for.
+/// Bands that photons sample if the whole spectrum is requested.
 const PHOTON_BANDS: u32 = 256;
 
-/// All that chooses the wavelengths of a light's rays.
+/// Everything that determines the wavelengths of a light's rays.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SpectralKey {
     lamp: Arc<Spectrum>,
@@ -38,14 +38,14 @@ pub(super) struct SpectralKey {
     estimator: Estimator,
 }
 
-/// Wavelengths that one traced wavelength stands for.
+/// A band of the spectrum that one traced wavelength stands for.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SpectralBand {
-    /// From this wavelength on [nm].
+    /// Lower end [nm].
     pub from_nm: f64,
-    /// Up to this one [nm].
+    /// Upper end [nm].
     pub to_nm: f64,
-    /// The median of the eye's share of it [nm]: what the band is named by.
+    /// Median of the eye's response within the band [nm], which names it.
     pub wavelength_nm: f64,
 }
 
@@ -55,38 +55,38 @@ impl SpectralBand {
     }
 }
 
-/// Spectra of lights that are traced by wavelength.
+/// Spectra of the lights that are traced by wavelength.
 #[derive(Debug, Default)]
 pub(super) struct Spectra {
     of_lights: BTreeMap<usize, SpectralLight>,
-    /// Where so many wavelengths stand for all: the same for every light.
+    /// Bands, the same for every light; empty if wavelengths are interpolated.
     bands: Vec<SpectralBand>,
-    /// Rays of the lattice that share one ray's wavelengths out among them.
+    /// Number of lattice rays that the wavelengths are distributed over; 1 if every ray is split into all of them.
     rays_per_split: f64,
     keeps_bands: bool,
 }
 
-/// One light by wavelength.
+/// One light that is traced by wavelength.
 #[derive(Debug)]
 struct SpectralLight {
     key: SpectralKey,
     traced: Traced,
-    /// Where photons may carry it.
+    /// `None` if photons cannot carry the light.
     photons: Option<PhotonSpectrum>,
 }
 
 #[derive(Debug)]
 enum Traced {
     Whole(Box<LightSpectrum>),
-    /// By band, where the lamp has light.
+    /// One node for each band in which the lamp emits.
     Bands(Vec<(usize, SpectralNode)>),
 }
 
 impl Spectra {
-    /// For the lights of a scene.
+    /// The spectra of a scene's lights.
     ///
     /// # Errors
-    /// A light's colour has no spectrum.
+    /// A light whose colour has no spectrum.
     pub(super) fn new(
         tracer: &Tracer,
         aim: &LightVisibility,
@@ -138,7 +138,7 @@ impl Spectra {
         Traced::Bands(nodes(tracer, lamp, &self.bands))
     }
 
-    /// What is traced of a light, one lattice after the other, each with its band where there are any.
+    /// The parts of a light that are traced on lattices of their own, each with its band if there are bands.
     pub(super) fn parts(&self, light: usize) -> Vec<(Option<usize>, LightPart<'_>)> {
         match self.of_lights.get(&light).map(|light| &light.traced) {
             None => vec![(None, LightPart::White)],
@@ -150,7 +150,7 @@ impl Spectra {
         }
     }
 
-    /// Cells across and down of each band's lattice, where the light's lattice is of a size.
+    /// Cells across and down of each part's lattice, given those of the light's lattice.
     pub(super) fn part_size(&self, light: usize, (columns, rows): (usize, usize)) -> (usize, usize) {
         match self.of_lights.get(&light).map(|light| &light.traced) {
             Some(Traced::Bands(_)) => {
@@ -162,19 +162,19 @@ impl Spectra {
         }
     }
 
-    /// A light by wavelength for photons.
+    /// The spectrum of a light for photons.
     pub(super) fn photons(&self, light: usize) -> Option<&PhotonSpectrum> {
         self.of_lights.get(&light)?.photons.as_ref()
     }
 
-    /// Whether patches interpolate a light between a few of its wavelengths, with an error that is alike at every level.
+    /// Whether patches interpolate a light between a few wavelengths, with the same error at every level.
     pub(super) fn is_interpolated(&self, light: usize) -> bool {
         let spectral = self.of_lights.get(&light);
         spectral.is_some_and(|light| matches!(light.traced, Traced::Whole(_)))
     }
 
-    /// Where in its cell a ray of a band starts, [0, 1)²: bands that share rays out start between each other's, evenly
-    /// (M. Roberts' R₂ sequence).
+    /// Position of a band's rays in their cells, [0, 1)². Bands that share rays are spread evenly (M. Roberts' R₂
+    /// sequence).
     pub(super) fn ray_place(&self, light: usize, band: Option<usize>) -> DVec2 {
         let middle = DVec2::splat(0.5);
         match band {
@@ -191,23 +191,23 @@ impl Spectra {
         self.of_lights.contains_key(&light)
     }
 
-    /// What chose the wavelengths of a light's rays.
+    /// What determines the wavelengths of a light's rays.
     pub(super) fn key(&self, light: usize) -> Option<&SpectralKey> {
         self.of_lights.get(&light).map(|light| &light.key)
     }
 
-    /// How many bands' maps are kept beside their sum.
+    /// Number of bands whose maps are kept besides their sum.
     pub(super) fn kept_bands(&self) -> usize {
         if self.keeps_bands { self.bands.len() } else { 0 }
     }
 
-    /// Radiant watts of a light over its luminous-equivalent ones; `None` of light that is not traced by wavelength.
+    /// Radiant over luminous-equivalent power of a light; `None` if it is not traced by wavelength.
     pub(super) fn radiant(&self, light: usize) -> Option<f64> {
         let lamp = &self.of_lights.get(&light)?.key.lamp;
         Some(lamp.radiant() / lamp.xyz().y)
     }
 
-    /// Maps of a light's bands with what they mean; none where the light has no bands.
+    /// Maps of a light's bands with what they mean; empty if the light has no bands.
     pub(super) fn level_bands(&self, light: usize, maps: Vec<ReceiverMaps>) -> Vec<LevelBand> {
         let Some(SpectralLight {
             key,
@@ -235,7 +235,7 @@ impl Spectra {
         bands.collect()
     }
 
-    /// Puts what was summed of a light's XYZ into linear sRGB; nothing of a light without wavelengths.
+    /// Converts a light's sums from XYZ to linear sRGB, if it is traced by wavelength.
     pub(super) fn to_linear_srgb(&self, light: usize, maps: &mut ReceiverMaps, ledger: &mut LedgerSum) {
         if self.has(light) {
             maps.transform(to_linear_srgb);
@@ -243,7 +243,7 @@ impl Spectra {
         }
     }
 
-    /// How many times its luminance a light may have in one channel.
+    /// Upper limit of a light's largest channel relative to its luminance.
     pub(super) fn most_of_a_channel(&self, light: usize) -> f64 {
         self.of_lights.get(&light).map_or(1.0, |light| {
             let xyz = light.key.lamp.xyz();
@@ -251,14 +251,14 @@ impl Spectra {
         })
     }
 
-    /// Whether a light's rays are not those of its lattice as it is.
+    /// Whether the bands of a light have lattices of their own.
     pub(super) fn has_bands(&self, light: &VisibleLight) -> bool {
         let light = self.of_lights.get(&light.light);
         light.is_some_and(|light| matches!(light.traced, Traced::Bands(_)))
     }
 }
 
-/// Wavelengths of a lamp, one for each band in which it has light.
+/// Nodes of a lamp, one for each band in which it emits.
 fn nodes(tracer: &Tracer, lamp: &Spectrum, bands: &[SpectralBand]) -> Vec<(usize, SpectralNode)> {
     let lit = bands.iter().enumerate().filter_map(|(index, band)| {
         let wavelength = middle_of(lamp, band)?;
@@ -273,7 +273,7 @@ fn nodes(tracer: &Tracer, lamp: &Spectrum, bands: &[SpectralBand]) -> Vec<(usize
     lit.collect()
 }
 
-/// Bands of equal importance to the eye, or of the rainbow's colours; none where wavelengths are interpolated.
+/// Bands of equal weight to the eye, or of the rainbow's colours; empty if wavelengths are interpolated.
 fn bands(settings: &BakeSettings) -> Vec<SpectralBand> {
     match (settings.wavelengths, settings.estimator) {
         (Wavelengths::Continuous, estimator) if estimator.refines() => Vec::new(),
@@ -282,12 +282,12 @@ fn bands(settings: &BakeSettings) -> Vec<SpectralBand> {
     }
 }
 
-/// Bands that photons draw theirs from.
+/// Bands that photons sample.
 fn photon_bands(settings: &BakeSettings) -> Vec<SpectralBand> {
     some_bands(settings, PHOTON_BANDS)
 }
 
-/// As the settings say, or so many where they name the whole spectrum.
+/// Bands as the settings say, or `continuous` of them for the whole spectrum.
 fn some_bands(settings: &BakeSettings, continuous: u32) -> Vec<SpectralBand> {
     let sampler = WavelengthSampler::equal_energy();
     let bands = match settings.wavelengths {
@@ -303,7 +303,7 @@ fn some_bands(settings: &BakeSettings, continuous: u32) -> Vec<SpectralBand> {
     bands.collect()
 }
 
-/// Where the light of a lamp within a band lies on average, as the eye weighs it; `None` where it has none.
+/// Mean wavelength of a lamp's light within a band, weighted by the eye's response; `None` if it has none there.
 fn middle_of(lamp: &Spectrum, band: &SpectralBand) -> Option<Nanometres> {
     let [weighted, weights] = lamp.integral_times(band.range(), |wavelength| {
         let [x, y, z] = xyz_bar(wavelength);
@@ -313,8 +313,8 @@ fn middle_of(lamp: &Spectrum, band: &SpectralBand) -> Option<Nanometres> {
     (weights > 0.0).then(|| Nanometres(weighted / weights))
 }
 
-/// A light's own spectrum, or a smooth one of its colour. A sky has a colour in every direction: white, on which those
-/// are factors.
+/// A light's own spectrum, or a smooth one for its colour. A sky gets a white one, which its colours by direction
+/// scale.
 fn lamp_of(light: &Light) -> std::result::Result<Arc<Spectrum>, crate::optics::spectrum::SpectrumError> {
     match (&light.spectrum, &light.kind) {
         (Some(spectrum), _) => Ok(Arc::clone(spectrum)),

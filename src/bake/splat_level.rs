@@ -19,10 +19,10 @@ use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::shard_index::ShardIndex;
 use crate::settings::{BakeSettings, Footprint, Sigma};
 
-/// Strides of the lattice for mean footprints, at most.
+/// Maximum stride of the lattice for mean footprints.
 const COARSENING: usize = 8;
 
-/// Least side of that lattice.
+/// Minimum side of that lattice.
 const MIN_COARSE_SIDE: usize = 64;
 
 /// Stride of the lattice that the blur of splats is estimated from.
@@ -31,13 +31,13 @@ const ERROR_STRIDE: usize = 2;
 /// Input of a splat pass.
 #[derive(Clone, Copy, Debug)]
 struct Worker<'a> {
-    /// Its share of the lattice, of rays that are not kept; `None` for all of it.
+    /// Share of the lattice to trace without keeping its rays; `None` for all of it.
     share: Option<ShardIndex>,
     source: PassInput<'a>,
 }
 
 impl CausticLayer<'_> {
-    /// Traces and deposits a light, or deposits again what arrived for other kernels and maps; `None` where it was
+    /// Traces and deposits a light, or deposits cached arrivals with other kernels or on other maps; `None` if it was
     /// stopped.
     pub(super) fn make_splats(
         &self,
@@ -97,7 +97,7 @@ impl CausticLayer<'_> {
         }))
     }
 
-    /// Every part of a light's spectrum, one after the other. What arrived is given back of light without one.
+    /// Deposits all parts of a light's spectrum. Arrivals are returned for light without parts only.
     fn deposit_parts(
         &self,
         light: &VisibleLight,
@@ -138,7 +138,7 @@ impl CausticLayer<'_> {
         (sums, kept)
     }
 
-    /// One part. Of a share, nothing that arrives is kept.
+    /// Deposits one part. A share keeps no arrivals.
     fn deposit_splats(
         &self,
         lattice: Lattice,
@@ -172,7 +172,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Maps of every second ray across and down, each for four.
+    /// Maps from every second ray across and down, which stands for four; `None` for a level that is thinned itself.
     pub(super) fn thinned_images(
         &self,
         light: &VisibleLight,
@@ -203,7 +203,7 @@ impl CausticLayer<'_> {
         Ok(Some(accuracy::images(&maps, level.unit)))
     }
 
-    /// Maps without light, by band where those are kept.
+    /// Maps without light, per band if bands are kept.
     pub(super) fn part_maps(&self) -> BandMaps {
         BandMaps::new(self.tracer.scene().objects.len(), self.spectra.kept_bands())
     }
@@ -212,7 +212,7 @@ impl CausticLayer<'_> {
         ReceiverMaps::new(self.tracer.scene().objects.len())
     }
 
-    /// Mean footprints at the full density, from a lattice some 64 times thinner.
+    /// Mean footprints at the full density, from a lattice about 64 times thinner.
     pub(super) fn splat_statistics(
         &self,
         light: &VisibleLight,
@@ -249,7 +249,7 @@ impl CausticLayer<'_> {
         };
         let source = source_of(state, &self.trace_key(light, lattice.size, 0, &[]));
         let (mut report, _) = pass::run(&depositor, source, &mut all, &chart_for, &listener);
-        // The kernels of the coarse run are in no map.
+        // Kernels of the coarse run are on no map.
         report.splats = 0;
         course.outcome.count(&report, course.clock);
         let cells = (lattice.strides.0 * lattice.strides.1) as f64;
@@ -257,10 +257,10 @@ impl CausticLayer<'_> {
     }
 }
 
-/// Strides of a light's levels: something soon, then every ray.
+/// Strides of a light's levels: a quick first picture, then every ray.
 pub(super) const LEVEL_STRIDES: [usize; 2] = [8, 1];
 
-/// What arrived before, or rays that are not kept.
+/// Cached arrivals, or rays that are not kept.
 fn source_of<'a>(state: &'a LightState, key: &TraceKey) -> PassInput<'a> {
     match &state.arrivals {
         Some((known, kept)) if known == key => PassInput::Cached(kept),
@@ -268,7 +268,7 @@ fn source_of<'a>(state: &'a LightState, key: &TraceKey) -> PassInput<'a> {
     }
 }
 
-/// The lattice for mean footprints: every so many-th of the same rays, so that kept ones will do.
+/// The lattice for mean footprints: a subset of the same rays, so that cached ones can be used.
 fn thinned(lattice: Lattice) -> Lattice {
     let stride = |side: usize| (side / MIN_COARSE_SIDE).clamp(1, COARSENING);
     Lattice {

@@ -11,39 +11,39 @@ use crate::plan::Effect;
 use crate::progress::{Control, Progress, Stage};
 use crate::settings::{BakeSettings, Preset};
 
-/// A pilot ends after so much of all processors once something is known of its error, and else [CPU s].
+/// CPU time after which a pilot ends, with and without a known error [s].
 const PILOT_CPU_S: (f64, f64) = (1.0, 2.0);
 
 /// Density of a pilot of splats [rays/sr].
 const PILOT_DENSITY_PER_SR: f64 = 10_000.0;
 
-/// Splats cost as much each whatever their density, within this.
+/// Uncertainty of the cost per splat, which hardly depends on the density.
 const SPLAT_FACTOR: f64 = 1.5;
 
-/// What a bake with one of the presets would take.
+/// Predicted cost of a bake with one of the presets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PresetForecast {
-    /// Which.
+    /// The preset.
     pub preset: Preset,
-    /// What it is expected to take; `None` where the pilot could not tell.
+    /// Its cost; `None` if the pilot found no error.
     pub forecast: Option<Forecast>,
 }
 
-/// What is known of a bake before it.
+/// What is known about a bake in advance.
 #[derive(Clone, Debug)]
 pub struct Survey {
-    /// The plan, and bounds.
+    /// The plan, and upper bounds.
     pub estimate: BakeEstimate,
-    /// The pilot bake of the default preset: which maps there are, and what it took.
+    /// Pilot bake of the default preset: its maps and its cost.
     pub pilot: Bake,
-    /// All presets.
+    /// Forecasts of all presets.
     pub presets: Vec<PresetForecast>,
-    /// Wall-clock seconds that the survey took.
+    /// Wall-clock time of the survey [s].
     pub seconds: f64,
 }
 
 impl Baker {
-    /// Finds out what a bake would take: draft, preview and final, everything else as the settings say.
+    /// Predicts the cost of each preset, with all other settings as given.
     ///
     /// # Errors
     /// As [`Self::bake`].
@@ -61,7 +61,7 @@ impl Baker {
         let within_memory = |forecast: Forecast| {
             let held = pilot.course.last().map_or(0, |last| last.bytes);
             Forecast {
-                // What is kept beside the maps is dropped where memory ends.
+                // What is kept besides the maps is dropped at the memory limit.
                 bytes: forecast.bytes.min(settings.memory_bytes.max(held)),
                 ..forecast
             }
@@ -86,12 +86,12 @@ impl Baker {
     }
 }
 
-/// Ends a pilot in time. A bake that knows of a limit would choose what fits into it; this one is cut off.
+/// Ends a pilot in time. A bake with a time limit would choose what fits into it; the pilot is cut off instead.
 struct PilotWatch<'a> {
     taken: Stopwatch,
     /// Whether the error is known.
     is_known: AtomicBool,
-    /// What the user asks.
+    /// Cancellation by the user.
     control: &'a Control,
     own: Control,
 }
@@ -102,7 +102,7 @@ impl Progress for PilotWatch<'_> {
         let is_known = self.is_known.load(Ordering::Relaxed);
         let limit_s = if is_known { known_s } else { unknown_s };
         let taken = self.taken.elapsed();
-        // Nobody waits longer than ten times that for a busy machine, or one without a clock of its processors.
+        // The wall-clock limit, ten times as long, is for busy machines and those without a CPU clock.
         if self.control.is_cancelled() || taken.cpu.max(0.1 * taken.wall) > limit_s {
             self.own.cancel();
         }
@@ -113,7 +113,7 @@ impl Progress for PilotWatch<'_> {
     }
 }
 
-/// Of the default preset, whose course leads past a draft towards a final bake.
+/// The pilot aims at the default preset, whose course leads past a draft's target towards that of a final bake.
 fn pilot_settings(settings: &BakeSettings) -> BakeSettings {
     let target = Preset::Preview.max_error();
     let (max_error, density_per_sr) = if settings.estimator.refines() {
@@ -140,12 +140,12 @@ fn nothing(preset: Preset) -> Forecast {
     }
 }
 
-/// Rays and time grow with the density.
+/// Rays and time are proportional to the density.
 fn splat_forecast(pilot: &Bake, preset: Preset) -> Option<Forecast> {
     let last = pilot.course.last()?;
     let gain = preset.splat_density_per_sr() / PILOT_DENSITY_PER_SR;
     Some(Forecast {
-        // Twice as exact with four times the rays, as a rule.
+        // Four times the rays halve the error, as a rule.
         target: last.error / gain.sqrt(),
         rays: (last.rays as f64 * gain) as u64,
         cpu_s: last.cpu_s * gain,

@@ -28,14 +28,14 @@ use crate::light_pass::wavefront::trace::StrandTracer;
 use crate::progress::Control;
 use crate::settings::Estimator;
 
-/// Relative RMSE up to which automatic maps are as fine as for a preview.
+/// Relative RMSE up to which automatic maps are as fine as in a preview.
 const USUAL_MAP_ERROR: f64 = 0.03;
 
-/// Light that is less than this share of its ray's says nothing of the sizes of maps.
+/// Branches with a smaller share of their ray's light do not influence the sizes of maps.
 const MIN_SIZED_SHARE: f64 = 0.01;
 
 impl CausticLayer<'_> {
-    /// Traces and deposits a level, or deposits again what was traced for other maps; `None` where it was stopped.
+    /// Traces and deposits a level, or deposits cached paths on other maps; `None` if it was stopped.
     pub(super) fn make_wavefront(
         &self,
         light: &VisibleLight,
@@ -51,7 +51,7 @@ impl CausticLayer<'_> {
             rounds: &key.trace.rounds,
         };
         let mut traced = None;
-        // Bands are too many to be kept, and those of a share are others in each pass.
+        // Bands are too many to keep, and a shard has another share of each pass.
         let (mut taken, room) = if self.spectra.has_bands(light) || course.role.is_cut() {
             (
                 None,
@@ -118,7 +118,7 @@ impl CausticLayer<'_> {
         }))
     }
 
-    /// A level of some maps, without what only some levels have.
+    /// A level with these maps; what only some levels have is empty.
     pub(super) fn level(
         &self,
         light: &VisibleLight,
@@ -146,7 +146,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Sizes of lit areas at the density that maps are meant for, from a thinner lattice.
+    /// Footprints at the density that maps are made for, from a thinner lattice.
     pub(super) fn wavefront_statistics(
         &self,
         light: &VisibleLight,
@@ -160,11 +160,11 @@ impl CausticLayer<'_> {
         let none = SubcellFeatures::default();
         let size = self.statistics_size(light);
         let mut lattice = WavefrontLattice {
-            // Light that goes very many ways lies as wide as its cells: pieces of them say nothing of it.
+            // Light that takes very many paths is spread as wide as its cells: splitting them shows nothing of it.
             splits: SubdivisionLimits::NONE,
             ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control)
         };
-        // Rays that patches can go on with are kept; where photons may do the rest, few ways are enough.
+        // Patches reuse these rays. If photons may take over, the strong branches are enough.
         let is_for_patches = self.carrier(light) == Carrier::Patches;
         let mut own = RayCache::default();
         let rays = if is_for_patches { &mut state.rays } else { &mut own };
@@ -191,7 +191,7 @@ impl CausticLayer<'_> {
             ..self.room()
         };
         let (mut report, _) = depositor.run(None, rays, None, &listener, room);
-        // Its patches are in no map.
+        // Patches of this run are on no map.
         (report.cells, report.splats) = (0, 0);
         course.outcome.count(&report, course.clock);
         let cells = |size: (usize, usize)| size.0 as f64 * size.1 as f64;
@@ -201,7 +201,7 @@ impl CausticLayer<'_> {
         report.statistics.refined(cells(meant) / cells(size))
     }
 
-    /// The density that automatic maps are made for [rays/sr]: with a target, the lattice says nothing of it, and texels
+    /// Density that automatic maps are made for [rays/sr]. With a target it does not depend on the lattice, and texels
     /// are as long as the error allows.
     pub(super) fn map_density_per_sr(&self) -> f64 {
         match self.settings.max_error {
@@ -213,7 +213,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// How often cells are split.
+    /// Limits on splitting cells.
     pub(super) fn splits(&self) -> SubdivisionLimits {
         if self.settings.max_error.is_some() {
             SubdivisionLimits::BEFORE_ROUNDS
@@ -238,7 +238,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// Bodies that are small beside the cells of a lattice.
+    /// Bodies that are small compared to the cells of a lattice.
     fn small_bodies(
         &self,
         light: &VisibleLight,
@@ -249,7 +249,7 @@ impl CausticLayer<'_> {
         SubcellFeatures::find(self.tracer, &light.launch, light.visible(), cell, closeness)
     }
 
-    /// A level's lattice, with cells as fine as the detail of normals asks for.
+    /// The lattice of a level, with cells as fine as the detail of normals requires.
     fn bumpy_lattice<'a>(
         &'a self,
         light: &'a VisibleLight,
@@ -266,7 +266,7 @@ impl CausticLayer<'_> {
         lattice
     }
 
-    /// A lattice that is as it is, whatever falls into its cells.
+    /// A lattice that is not refined, neither by rounds nor for the detail of normals.
     fn wavefront_lattice<'a>(
         &'a self,
         light: &'a VisibleLight,
@@ -298,7 +298,7 @@ impl CausticLayer<'_> {
     }
 }
 
-/// Light on maps that next to none of it reaches is none that was traced: it is given up, and booked.
+/// Drops maps that next to no light reaches, and books their flux as unresolved.
 pub(super) fn drop_negligible_maps(maps: &mut ReceiverMaps, ledger: &mut LedgerSum) -> Vec<Receiver> {
     let (receivers, strays) = maps.drop_negligible_maps();
     ledger.book_sum(Account::Deposited, strays.map(|count| -count));
@@ -306,7 +306,7 @@ pub(super) fn drop_negligible_maps(maps: &mut ReceiverMaps, ledger: &mut LedgerS
     receivers
 }
 
-/// Flux that a light of unit strength sends to marked cells [W].
+/// Flux that a light sends to marked cells at unit strength [W].
 fn reference_w(light: &VisibleLight) -> f64 {
     light.launch.power_bound_w() * light.visible().marked_share(&light.launch)
 }

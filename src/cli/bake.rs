@@ -23,7 +23,7 @@ use super::moments::MomentOptions;
 use super::options::{RunOptions, SceneOptions};
 use super::values;
 
-/// Errors that people ask for [1].
+/// Round error targets, for which forecasts are made [1].
 const ROUND_TARGETS: [f64; 9] = [0.2, 0.1, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.001];
 
 #[derive(Debug, Args)]
@@ -50,10 +50,10 @@ pub struct BakeArguments {
 }
 
 impl BakeArguments {
-    /// Loads, bakes, writes and sums up.
+    /// Loads, bakes, writes and prints a summary.
     ///
     /// # Errors
-    /// Bad usage; input, output or a bake that failed; a shard that was stopped.
+    /// Bad usage; input, output or a bake that fails; a cancelled shard.
     pub fn run(&self, console: &Console) -> Result<()> {
         let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads()?)?;
         if self.shard.is_some() {
@@ -181,7 +181,7 @@ impl BakeArguments {
     }
 }
 
-/// What people want to know of a folder of maps.
+/// Summary of a folder of maps as text.
 pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
     let mut lines = Vec::new();
     let mut line = |name, value| lines.push((name, value));
@@ -261,7 +261,7 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
     in_lines(&lines)
 }
 
-/// What was expected when the error was first known, and what it took.
+/// The forecast from when the error was first known, and the actual cost.
 fn told(report: &ForecastReport) -> String {
     let (made_at, actual) = (&report.made_at, &report.actual);
     format!(
@@ -273,7 +273,7 @@ fn told(report: &ForecastReport) -> String {
     )
 }
 
-/// What the next better round target would take.
+/// Forecast for the next smaller round target.
 fn next_target(result: &Bake, estimator: Estimator) -> Option<Forecast> {
     let reached = result.course.last()?.error;
     let target = ROUND_TARGETS.into_iter().find(|target| *target < 0.9 * reached)?;

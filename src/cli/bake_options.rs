@@ -6,17 +6,17 @@ use nephroid::error::{Error, Result};
 use nephroid::settings::options::{OPTIONS, OptionInfo, named};
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MIN_MAX_ERROR, Preset};
 
-/// The options of a bake that are named, with their values as they are written.
+/// The bake options that were given, with their values as text.
 #[derive(Clone, Debug, Default)]
 pub struct BakeOptions(Vec<(&'static OptionInfo, String)>);
 
-/// All of them, in what conflicts with them.
+/// Group of all bake options, for conflicts with them.
 pub const GROUP: &str = "BakeOptions";
 
-/// Their title in `--help`.
+/// Their heading in `--help`.
 pub const HEADING: &str = "Bake options";
 
-/// Those in `-h`, and in `--help` of commands other than `bake`.
+/// Options in `-h`, and in `--help` of commands other than `bake`.
 pub const COMMON: [&str; 8] = [
     "preset",
     "estimator",
@@ -89,7 +89,7 @@ impl FromArgMatches for BakeOptions {
 }
 
 impl BakeOptions {
-    /// Validated settings; `default_layers` where no layer is named, `threads` 0 = one per core.
+    /// Validated settings; `default_layers` if no layers are given, `threads` 0 = one per core.
     ///
     /// # Errors
     /// A value outside its range; an option that does not apply to the others given.
@@ -113,13 +113,13 @@ impl BakeOptions {
         Ok(settings)
     }
 
-    /// Sets the error to refine towards and the density to begin from where they are not named.
+    /// Sets target error and starting density if they were not given.
     fn aim(&self, settings: &mut BakeSettings) {
         let preset = self.value("preset").and_then(|name| named::<Preset>(name).ok());
         let is_exact = self.value("density").is_some() || !settings.estimator.refines();
         if settings.max_error.is_none() && !is_exact {
             settings.max_error = match (preset, settings.max_time_s) {
-                // As far as the time goes.
+                // Refine for as long as the time lasts.
                 (None, Some(_)) => Some(MIN_MAX_ERROR),
                 _ => Some(preset.unwrap_or_default().max_error()),
             };
@@ -133,13 +133,13 @@ impl BakeOptions {
         }
     }
 
-    /// An option's value as it is written.
+    /// Value of an option as text, if it was given.
     fn value(&self, name: &str) -> Option<&str> {
         let given = self.0.iter().find(|(option, _)| option.name == name);
         given.map(|(_, text)| text.as_str())
     }
 
-    /// For the scene that opens by default: all layers, as a draft, unless the options say otherwise.
+    /// For the scene that opens by default: all layers at draft quality, unless the options say otherwise.
     pub fn for_a_first_look(mut self) -> Self {
         let is_draft = !self.names_quality() && self.value("estimator") != Some("splat");
         let added = [
@@ -157,13 +157,13 @@ impl BakeOptions {
         self
     }
 
-    /// Whether any of them is given.
+    /// Whether any bake option was given.
     #[cfg(feature = "viewer")]
     pub fn names_any(&self) -> bool {
         !self.0.is_empty()
     }
 
-    /// Whether an option says how good maps are to be, or how long they may take.
+    /// Whether an option sets the quality of the maps or the time of the bake.
     pub fn names_quality(&self) -> bool {
         let options = ["preset", "density", "max-error", "max-time"];
         options.iter().any(|name| self.value(name).is_some())

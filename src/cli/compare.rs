@@ -14,7 +14,7 @@ use super::options::RunOptions;
 use super::picture::holds_radiance;
 use super::values::{self, Named};
 
-/// Which channels of an EXR map are compared.
+/// Layers of an EXR map that can be compared.
 const LAYERS: &[Named<&str>] = &[("caustic", "caustic"), ("direct", "direct"), ("sum", "sum")];
 
 #[derive(Debug, Args)]
@@ -37,7 +37,7 @@ pub struct CompareArguments {
 }
 
 impl CompareArguments {
-    /// Measures, prints, and fails where the limit is passed.
+    /// Compares, prints the measures, and fails if the limit is exceeded.
     ///
     /// # Errors
     /// Bad usage; files that cannot be read or compared; a relative RMSE above the limit.
@@ -134,12 +134,12 @@ impl CompareArguments {
     }
 }
 
-/// The luminance of the wanted layer; without a wish the caustic layer where there is one, else the sum.
+/// Luminance and name of the wanted layer: by default the caustic layer if there is one, else the sum.
 pub fn read_luminance(path: &Path, wish: Option<&'static str>) -> Result<(Grid, &'static str)> {
     let image = FloatImage::read(path)?;
     let has_layers = image.channels.iter().any(|channel| channel.name.contains('.'));
     let layer = match wish {
-        // References hold one layer without a name: the one that is asked for.
+        // A reference has one layer without a name, which stands for any.
         Some(wish) if has_layers => wish,
         None if image.channel("caustic.R").is_some() => "caustic",
         _ => "sum",
@@ -171,11 +171,11 @@ pub fn read_luminance(path: &Path, wish: Option<&'static str>) -> Result<(Grid, 
     Ok((grid, layer))
 }
 
-/// Standard deviations of the difference at which the picture's colours are full.
+/// Difference of full colour in the picture, relative to the root mean square.
 const FULL_COLOUR_DEVIATIONS: f64 = 3.0;
 
-/// Red where the map is brighter than the reference, blue where it is darker, white where they agree; the difference at
-/// which its colours are full, in units of the maps.
+/// Writes a picture: red where the map is brighter than the reference, blue where it is darker, white where they agree.
+/// Returns the difference of full colour, in the unit of the maps.
 fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<f64> {
     let differences: Vec<f64> = map
         .values
@@ -202,7 +202,7 @@ fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<f64> {
         })
         .collect();
     let location = path.display().to_string();
-    // Sides are at most 16384.
+    // Cannot overflow: sides are at most 16384.
     let bytes = picture::encode(map.width as u32, map.height as u32, rgba, &location)?;
     files::write_atomically(path, |writer| writer.write_all(&bytes))?;
     Ok(full_colour_at)

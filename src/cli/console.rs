@@ -16,25 +16,25 @@ use signal_hook::iterator::Signals;
 use nephroid::error::{Error, Result, Warning};
 use nephroid::progress::{Control, Progress, Stage};
 
-/// Exit codes are 128 + signal, as shells have it.
+/// Exit codes of signals are 128 + signal, as in shells.
 const SIGNAL_BASE: u8 = 128;
 
-/// The streams, and the signals for as long as the process runs.
+/// Output streams and signal handling of the process.
 #[derive(Debug)]
 pub struct Console {
-    /// No progress on stderr; warnings and errors stay.
+    /// Hides progress, but not warnings and errors.
     quiet: bool,
-    /// Results as one JSON document.
+    /// Prints results as one JSON document.
     pub json: bool,
     control: Arc<Control>,
     exit_code: Arc<AtomicU8>,
 }
 
 impl Console {
-    /// Starts listening to signals.
+    /// Installs the signal handlers.
     ///
     /// # Errors
-    /// A system that refuses the handlers.
+    /// Handlers that cannot be installed.
     pub fn open(quiet: bool, json: bool) -> Result<Self> {
         let refused = |error: std::io::Error| {
             Error::failure(
@@ -49,7 +49,8 @@ impl Console {
             control: Arc::default(),
             exit_code: Arc::default(),
         };
-        // Else the system ends the process in the middle of a file; so the write fails, with a sentence.
+        // Without a handler, the file size limit ends the process in the middle of a file; with one, the write fails
+        // with an error.
         #[cfg(unix)]
         signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false))).map_err(refused)?;
         let mut signals = Signals::new([SIGINT, SIGTERM]).map_err(refused)?;
@@ -69,15 +70,15 @@ impl Console {
         Ok(console)
     }
 
-    /// What the first signal cancels.
+    /// Cancelled by the first signal.
     pub fn control(&self) -> &Arc<Control> {
         &self.control
     }
 
-    /// Between two pieces of work: an error where a signal came.
+    /// Fails if a signal has arrived; for use between two steps.
     ///
     /// # Errors
-    /// Cancelled; `location` says during what.
+    /// Cancelled; `location` names the step.
     pub fn check(&self, location: &str) -> Result<()> {
         if self.control.is_cancelled() {
             return Err(Error::cancelled(location));
@@ -85,14 +86,14 @@ impl Console {
         Ok(())
     }
 
-    /// Ends the process, with the code that a signal calls for or 0. What libraries tidy up at an ordinary end is left:
-    /// threads of graphics drivers may be at work on it.
+    /// Ends the process with the exit code of the signal, or 0. Skips the cleanup of libraries at exit, because threads
+    /// of graphics drivers may still be running.
     #[cfg(feature = "viewer")]
     pub fn leave(&self) -> ! {
         signal_hook::low_level::exit(self.exit_code.load(Ordering::SeqCst).into())
     }
 
-    /// The exit code that a signal calls for, if one came.
+    /// Exit code of the signal, if one has arrived.
     pub fn exit_code(&self) -> Option<ExitCode> {
         match self.exit_code.load(Ordering::SeqCst) {
             0 => None,
@@ -100,10 +101,10 @@ impl Console {
         }
     }
 
-    /// Prints the result of a command: text for people, or the JSON document when that was asked for.
+    /// Prints the result of a command as text or, with `--json`, the document.
     ///
     /// # Errors
-    /// A stdout that cannot be written. A reader that went away is no error.
+    /// A stdout that cannot be written; a closed pipe is no error.
     pub fn print_result(&self, text: &str, document: &impl Serialize) -> Result<()> {
         if self.json {
             let json = serde_json::to_string_pretty(document).map_err(|error| {
@@ -126,12 +127,12 @@ impl Console {
         }
     }
 
-    /// Prints a line that people should see, but that is no result, to stderr.
+    /// Prints a notice, which is not part of the result, to stderr.
     pub fn note(&self, note: &str) {
         print_stderr(note);
     }
 
-    /// Shows the stage and how far it is, where a bar is wanted and can be shown.
+    /// A progress bar; hidden if `quiet`, or if stderr is no terminal.
     pub fn bar(&self) -> StageBar {
         let is_shown = !self.quiet && std::io::stderr().is_terminal();
         let target = if is_shown {
@@ -152,10 +153,10 @@ impl Console {
     }
 }
 
-/// Prints to stdout with a newline at the end.
+/// Prints to stdout, with a newline at the end.
 ///
 /// # Errors
-/// A stdout that cannot be written. A reader that went away is no error.
+/// A stdout that cannot be written; a closed pipe is no error.
 pub fn print(text: &str) -> Result<()> {
     let mut stdout = std::io::stdout().lock();
     let written = writeln!(stdout, "{text}").and_then(|()| stdout.flush());
@@ -174,8 +175,8 @@ pub fn print_error(error: &Error) {
     print_stderr(&format!("error: {error}"));
 }
 
-/// One line on stderr, whatever line breaks and control characters came in with names from files. Where stderr cannot
-/// be written there is nobody left to tell.
+/// Prints one line to stderr. Control characters, which names from files may contain, become spaces. A failure is
+/// ignored: there is nowhere to report it.
 fn print_stderr(line: &str) {
     let line: String = line
         .chars()
@@ -184,7 +185,7 @@ fn print_stderr(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
-/// Named values, one a line.
+/// Formats named values, one per line.
 pub fn in_lines(lines: &[(&str, String)]) -> String {
     lines
         .iter()
@@ -192,7 +193,7 @@ pub fn in_lines(lines: &[(&str, String)]) -> String {
         .collect()
 }
 
-/// A size with its unit.
+/// Formats a size with its unit.
 pub fn bytes(count: u64) -> String {
     match count {
         0..1_000 => format!("{count} B"),
@@ -205,7 +206,7 @@ pub fn bytes(count: u64) -> String {
 /// Redraws per second.
 const REFRESH_HZ: u8 = 10;
 
-/// A progress bar, cleared when it is dropped.
+/// A progress bar that is cleared on drop.
 pub struct StageBar {
     bar: ProgressBar,
     stage: Mutex<Option<Stage>>,

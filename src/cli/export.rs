@@ -22,13 +22,13 @@ use super::console::Console;
 use super::options::RunOptions;
 use super::values::{self, Named};
 
-/// Exposures beyond that many stops are a slip.
+/// Exposures beyond this are mistakes [stops].
 const MAX_STOPS: f64 = 64.0;
 
-/// Share of texels that are white in an unlit picture where no exposure was asked for.
+/// Share of lit texels that are white in an unlit picture, if no exposure is given.
 const WHITE_SHARE: f64 = 0.01;
 
-/// Below, gutters take most of an atlas [texels].
+/// Smallest side of an atlas [texels]: in smaller ones, gutters take most of the space.
 const MIN_ATLAS_SIDE: usize = 16;
 
 const FORMATS: &[Named<&str>] = &[
@@ -127,7 +127,7 @@ pub struct ExportArguments {
     pub run: RunOptions,
 }
 
-/// What was written, as `--json` prints it.
+/// Result of a .glb for `--json`.
 #[derive(Serialize)]
 struct WrittenFile<'a> {
     file: &'a str,
@@ -135,7 +135,7 @@ struct WrittenFile<'a> {
     report: &'a GlbReport,
 }
 
-/// What was written, as `--json` prints it.
+/// Result of textures for `--json`.
 #[derive(Serialize)]
 struct WrittenFolder<'a> {
     folder: &'a str,
@@ -144,10 +144,10 @@ struct WrittenFolder<'a> {
 }
 
 impl ExportArguments {
-    /// Reads, writes, says what there is now.
+    /// Reads maps and scene, writes, and prints a report.
     ///
     /// # Errors
-    /// Bad usage; maps or a scene that cannot be read or do not belong together; a place that cannot be written.
+    /// Bad usage; maps or a scene that cannot be read or do not belong together; output that cannot be written.
     pub fn run(&self, console: &Console) -> Result<()> {
         self.validate()?;
         match self.format {
@@ -206,7 +206,7 @@ impl ExportArguments {
         let takes_exposure = !is("glb") || self.carrier == Some(Carrier::Unlit);
         let multiplied = "light that materials multiply: it is for --as unlit only";
         let mixed = "--atlas, as smaller sizes mix the maps in it";
-        // Option, whether it is given and applies, and what else it would be for.
+        // Option, whether it is given, whether it applies, and what it does not apply to.
         let options = [
             ("--as", self.carrier.is_some(), is("glb"), &*kind),
             ("--lights", self.lights.is_some(), is("glb"), &kind),
@@ -233,7 +233,7 @@ impl ExportArguments {
         }
     }
 
-    /// The scene that the maps are of.
+    /// The scene of the maps.
     fn load(&self) -> Result<Scene> {
         let options = LoadOptions::default();
         match &self.scene {
@@ -335,7 +335,7 @@ impl ExportArguments {
     }
 }
 
-/// A file must not be written over the scene that it is made from.
+/// Refuses to overwrite the scene that is exported.
 fn check_target(output: &Path, scene: &Scene) -> Result<()> {
     files::check_output_file(output)?;
     let same = |a: &Path, b: &Path| {
@@ -352,7 +352,7 @@ fn check_target(output: &Path, scene: &Scene) -> Result<()> {
     Ok(())
 }
 
-/// The exposure at which the brightest hundredth of all lit texels is white.
+/// The exposure at which the brightest 1 % of the lit texels are white.
 fn exposure_of(scene: &Scene, maps: &[IlluminationMap]) -> f64 {
     let mut sent: Vec<f64> = Vec::new();
     for map in maps {

@@ -7,7 +7,7 @@ use super::bake_options::{COMMON, HEADING};
 
 const TEMPLATE: &str = "{about-with-newline}\n{before-help}{usage-heading} {usage}\n\n{all-args}{after-help}";
 
-/// What the help of `bake` only names, so that it fits a screen.
+/// Options that the help of `bake` only mentions, so that it fits a screen.
 const ONLY_NAMED: [&str; 8] = [
     "scene",
     "rays",

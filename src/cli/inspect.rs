@@ -40,10 +40,10 @@ const PICTURE_ASPECT: f64 = 16.0 / 9.0;
 type Lines = Vec<(&'static str, String)>;
 
 impl InspectArguments {
-    /// Loads, plans, bakes a pilot, and prints.
+    /// Loads the scene, plans, bakes a pilot, and prints.
     ///
     /// # Errors
-    /// Bad usage; a scene that cannot be read, settings that do not fit it.
+    /// Bad usage; a scene that cannot be read; settings that do not fit it.
     pub fn run(&self, console: &Console) -> Result<()> {
         let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads()?)?;
         let options = self.scene_options.load_options(true);
@@ -63,7 +63,7 @@ impl InspectArguments {
     }
 }
 
-/// The result as `--json` prints it, and as text.
+/// The result as JSON and as text.
 fn told(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
     let mut lines = vec![("scene", scene.source.clone())];
     let bounds = scene.bounds();
@@ -145,9 +145,9 @@ fn told(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
         // Upper bound of the light rays of the caustic layer's lattice at these settings.
         "estimated_rays": survey.estimate.rays,
         "maps": maps,
-        // What each preset is expected to take.
+        // Forecast of each preset.
         "presets": presets,
-        // What that was learnt from; of the whole survey, on the wall.
+        // What the forecasts are based on; wall-clock time is that of the whole survey.
         "pilot": {
             "seconds": survey.seconds,
             "counts": counts,
@@ -207,11 +207,11 @@ fn material_report(material: &Material, objects: usize, lines: &mut Lines) -> Va
     })
 }
 
-/// Strengths are luminous-equivalent; what a light has not is null.
+/// Strengths are luminous-equivalent; what a light does not have is null.
 fn light_report(light: &Light, scene: &Scene, lines: &mut Lines) -> Value {
     let strength = light.strength().luminance();
     let beam_w = strength * full_beam_sr(&light.kind);
-    // A facet's intensity on its axis is L·A: the whole lamp sends πLA.
+    // A facet's axial intensity is L·A, its power πLA.
     let glowing = || Emitter::middle(light, scene).map(|middle| middle.strength.luminance());
     let (mut power_w, mut area_m2, mut across_beam, mut from_all_around) = (None, None, None, None);
     let kind = match light.kind {
@@ -273,7 +273,8 @@ fn light_report(light: &Light, scene: &Scene, lines: &mut Lines) -> Value {
     })
 }
 
-/// Integral of the fall-off over all directions [sr]: that of a linear ramp's square in the cosine is a third.
+/// Integral of the falloff over all directions [sr]. It is the square of a linear ramp in the cosine, which has the
+/// mean 1/3.
 fn full_beam_sr(light: &LightKind) -> f64 {
     let cap = match *light {
         LightKind::Spot {
@@ -300,10 +301,10 @@ fn surface_name(surface: SurfaceKind) -> &'static str {
     }
 }
 
-/// A glass, and as text: "N-SF11 (V_d 25.8, measured from 370 to 2500 nm)".
+/// A glass as JSON and as text: "N-SF11 (V_d 25.8, measured from 370 to 2500 nm)".
 fn glass_report(glass: &Glass) -> (Value, String) {
     let abbe_number = Some(glass.dispersion.abbe_number()).filter(|number| number.is_finite());
-    // The range that its formula was fitted to, where known.
+    // The range that its formula was fitted to, if known.
     let range_nm = glass.range.as_ref().map(|range| [range.start().0, range.end().0]);
     let covers_the_visible = glass.is_within(*VISIBLE.start()) && glass.is_within(*VISIBLE.end());
     let dispersion = abbe_number.map_or("no dispersion".into(), |number| format!("V_d {number:.1}"));
@@ -321,12 +322,12 @@ fn glass_report(glass: &Glass) -> (Value, String) {
     (report, format!("{} ({dispersion}{measured})", glass.name))
 }
 
-/// The spectrum of a lamp, and as text: "spectrum `D65` of 6504 K, 360 to 830 nm, 204 lm/W".
+/// A lamp's spectrum as JSON and as text: "spectrum `D65` of 6504 K, 360 to 830 nm, 204 lm/W".
 fn spectrum_report(spectrum: &Spectrum) -> (Value, String) {
     let (name, range) = (spectrum.name(), spectrum.range());
     let (first, last) = (range.start().0, range.end().0);
     let kelvin = correlated_temperature(spectrum.xyz()).map(|nearest| nearest.kelvin);
-    // Luminous flux by radiant flux between 360 and 830 nm.
+    // Luminous over radiant flux between 360 and 830 nm.
     let efficacy = spectrum.luminous_flux_lm() / spectrum.radiant();
     let called = name.map_or_else(String::new, |name| format!(" `{name}`"));
     let colour = kelvin.map_or("far from any black body".into(), |kelvin| {
@@ -342,15 +343,15 @@ fn spectrum_report(spectrum: &Spectrum) -> (Value, String) {
     (report, line)
 }
 
-/// A map, and as text: "floor, front: 512 x 512, 4.2 MB, generated (TEXCOORD_0: it overlaps itself)".
+/// A map as JSON and as text: "floor, front: 512 x 512, 4.2 MB, generated (TEXCOORD_0: it overlaps itself)".
 fn map_report(map: &IlluminationMap, scene: &Scene, lines: &mut Lines) -> Value {
     let object = &scene.objects[map.chart.object()];
-    // Sets of the file that cannot serve, and why.
+    // UV sets of the file that cannot be used, and why.
     let refused = refused_sets(object.mesh_in_scene()).into_iter();
     let refused: Vec<String> = refused
         .map(|(set, refusal)| format!("{set}: {refusal}"))
         .collect();
-    // While it is baked.
+    // Memory during the bake.
     let size = map.chart.texel_count() as u64 * BYTES_PER_TEXEL;
     let report = json!({
         "surface": object.name,

@@ -17,7 +17,7 @@ use nephroid::settings::BakeSettings;
 use super::console::{Console, StageBar, bytes};
 use super::moments::MomentOptions;
 
-/// A scene, with clocks from the start of the run on and what they showed when it was loaded.
+/// A scene, with clocks that started with the run, and their times when it was loaded.
 pub struct LoadedScene {
     pub scene: Arc<Scene>,
     started: (Instant, ProcessTime),
@@ -28,16 +28,16 @@ impl LoadedScene {
     /// Loads a scene and prints its warnings.
     ///
     /// # Errors
-    /// A scene that cannot be read, or has no light where it needs one.
+    /// A scene that cannot be read, or has no light although it needs one.
     pub fn load(source: &str, options: &LoadOptions, needs_light: bool, console: &Console) -> Result<Self> {
         let rest = (&MomentOptions::default(), &EffectSwitches::default());
         Self::load_at(source, options, needs_light, rest, console)
     }
 
-    /// Loads a scene as it is at a moment.
+    /// Loads a scene at a moment.
     ///
     /// # Errors
-    /// As [`Self::load`]; a scene that does not move as it is asked to.
+    /// As [`Self::load`]; a moment of a scene that does not move.
     pub fn load_at(
         source: &str,
         options: &LoadOptions,
@@ -72,10 +72,10 @@ impl LoadedScene {
         )
     }
 
-    /// Works with the scene and a progress bar.
+    /// Runs work on a baker of the scene, with a progress bar.
     ///
     /// # Errors
-    /// Those of the work; stopped before.
+    /// Those of the work; a signal before it.
     pub fn session<T>(
         &self,
         console: &Console,
@@ -86,7 +86,7 @@ impl LoadedScene {
         work(&mut session, &console.bar(), console.control())
     }
 
-    /// Bakes with no more memory for maps than there is room for, and prints the bake's warnings.
+    /// Bakes within the available memory, and prints the bake's warnings.
     ///
     /// # Errors
     /// Those of [`Baker::bake`].
@@ -100,20 +100,20 @@ impl LoadedScene {
         Ok(result)
     }
 
-    /// Loading and all until now, on the wall and of the CPU.
+    /// Sets the time of loading, and the total time until now.
     pub fn book(&self, wall: &mut Timings, cpu: &mut Timings) {
         (wall.load, cpu.load) = self.load_s;
         (wall.total, cpu.total) = self.seconds();
     }
 }
 
-/// More than the system says about a process [bytes].
+/// Maximum size of a system file that is read [bytes].
 const MAX_BYTES: u64 = 1 << 16;
 
-/// Share of what is left that maps may take: as much again for rays, files and the system's own tables.
+/// Divisor of the remaining address space for maps: the rest is for rays, files and tables of the system.
 const SHARE_OF_MAPS: u64 = 2;
 
-/// The settings with no more memory for maps than there is room for, with a warning where that is less than they ask.
+/// The settings with no more memory for maps than is available; warns if that is less than requested.
 pub fn within_reach<'a>(settings: &'a BakeSettings, console: &Console) -> Cow<'a, BakeSettings> {
     let most = left_bytes().map_or(u64::MAX, |left| left / SHARE_OF_MAPS);
     if settings.memory_bytes <= most {
@@ -134,7 +134,7 @@ pub fn within_reach<'a>(settings: &'a BakeSettings, console: &Console) -> Cow<'a
     })
 }
 
-/// Address space that is granted and not taken yet [bytes]; `None` where it is not limited or the system does not tell.
+/// Remaining address space [bytes]; `None` if it is unlimited or unknown.
 fn left_bytes() -> Option<u64> {
     let read = |name: &str| {
         let bytes = files::read_file(&Path::new("/proc/self").join(name), MAX_BYTES).ok()?;
@@ -144,7 +144,7 @@ fn left_bytes() -> Option<u64> {
     Some(limit.saturating_sub(taken_bytes(&read("status")?)?))
 }
 
-/// The limit in the text of `/proc/PID/limits`; `None` where there is none.
+/// The limit in the text of `/proc/PID/limits` [bytes]; `None` if there is none.
 fn granted_bytes(limits: &str) -> Option<u64> {
     let line = limits
         .lines()
@@ -152,7 +152,7 @@ fn granted_bytes(limits: &str) -> Option<u64> {
     line.split_whitespace().next()?.parse().ok()
 }
 
-/// What is taken by the text of `/proc/PID/status`, in which it stands in KiB.
+/// Address space in use [bytes], by the text of `/proc/PID/status`, which states it in KiB.
 fn taken_bytes(status: &str) -> Option<u64> {
     let line = status.lines().find_map(|line| line.strip_prefix("VmSize:"))?;
     let kibibytes: u64 = line.split_whitespace().next()?.parse().ok()?;

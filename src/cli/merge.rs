@@ -36,10 +36,10 @@ pub struct MergeArguments {
 }
 
 impl MergeArguments {
-    /// Reads, adds up and writes.
+    /// Reads the shards, merges them and writes the maps.
     ///
     /// # Errors
-    /// Shards that are torn, missing or of different bakes; another scene; output that cannot be written.
+    /// Shards that are damaged, missing or of different bakes; another scene; output that cannot be written.
     pub fn run(&self, console: &Console) -> Result<()> {
         let threads = self.run.threads()?;
         let shards = ShardSet::open(&self.shards)?;
@@ -64,7 +64,7 @@ impl MergeArguments {
         })?;
         console.warn(&result.warnings);
         loaded.book(&mut result.timings_s, &mut result.cpu_s);
-        // What the maps took: shards run side by side, then this.
+        // Total cost of the maps: the shards, side by side, then this merge.
         result.timings_s.total += shards_wall_s;
         result.cpu_s.total += shards_cpu_s;
         let manifest = folder.write(&loaded.scene, &settings, &result)?;

@@ -76,7 +76,7 @@ enum Command {
 type Run<'a> = Box<dyn Fn(&Console) -> Result<()> + 'a>;
 
 impl Arguments {
-    /// The options of the run, and the run.
+    /// The options and the action of the command.
     fn command(&self) -> (&RunOptions, Run<'_>) {
         match &self.command {
             None => (&self.view.run, Box::new(|console| self.view.run(console))),
@@ -92,11 +92,11 @@ impl Arguments {
     }
 }
 
-/// Parses, runs, and says how it went: 0 done, 1 failed, 2 bad usage, 128 + signal when a signal stopped it.
+/// Parses, runs and reports. Exit codes: 0 done, 1 failed, 2 bad usage, 128 + signal if a signal ended it.
 pub fn run() -> ExitCode {
     let usual = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {
-        // Those of damaged files become errors, that of a lost window its end.
+        // Panics over damaged files become errors, and one over a lost window ends the program: neither is printed.
         if !nephroid::scene::is_guarded() && !is_of_lost_window(info) {
             usual(info);
         }
@@ -109,7 +109,7 @@ fn is_of_lost_window(_: &std::panic::PanicHookInfo<'_>) -> bool {
     false
 }
 
-/// A signal decides the exit code even where what there was could still be written.
+/// A signal decides the exit code even if results could still be written.
 fn parse_and_run() -> Result<ExitCode> {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
@@ -154,7 +154,7 @@ fn report(error: &Error) -> ExitCode {
     }
 }
 
-/// Clap's report without its usage block, tips joined.
+/// Clap's report as one line, without its usage block.
 fn in_one_sentence(error: &clap::Error) -> Error {
     let report = error.render().to_string();
     let what: Vec<&str> = report

@@ -33,7 +33,7 @@ pub struct MomentOptions {
 }
 
 impl MomentOptions {
-    /// The frames that are asked for, unless one moment of them is.
+    /// The requested frames; `None` if a single moment is requested.
     pub fn sequence(&self) -> Option<FrameTimes> {
         self.times().filter(|_| self.time.is_none())
     }
@@ -46,10 +46,10 @@ impl MomentOptions {
         })
     }
 
-    /// The scene at the moment that is asked for, or with the waves of a loop.
+    /// The scene at the requested moment, or with the waves of a loop.
     ///
     /// # Errors
-    /// A scene in which nothing moves, or nothing is to.
+    /// A scene that does not move, or whose motion is switched off.
     pub fn apply(&self, scene: Scene, effects: &EffectSwitches) -> Result<Scene> {
         if self.time.is_none() && self.frames.is_none() {
             return Ok(scene);

@@ -9,7 +9,7 @@ use nephroid::scene::LoadOptions;
 use super::bake_options;
 use super::values::{self, Exposure};
 
-/// Most worker threads.
+/// Maximum number of worker threads.
 const MAX_THREADS: usize = 1024;
 
 /// A choice that is on unless it is turned off.
@@ -42,7 +42,7 @@ pub struct SceneOptions {
 }
 
 impl SceneOptions {
-    /// How the scene is read; a command may light a dark scene unasked.
+    /// How to load the scene; `adds_light` lights a dark scene unasked.
     pub fn load_options(&self, adds_light: bool) -> LoadOptions {
         LoadOptions {
             solid_glass: self.solid_glass == Switch::On,
@@ -73,10 +73,10 @@ pub struct RunOptions {
 }
 
 impl RunOptions {
-    /// Threads asked for; 0 = one per core.
+    /// Requested threads; 0 = one per core.
     ///
     /// # Errors
-    /// None, or too many.
+    /// Zero threads, or too many.
     pub fn threads(&self) -> Result<usize> {
         match self.threads {
             None => Ok(0),

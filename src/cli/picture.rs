@@ -20,10 +20,10 @@ use super::loaded::LoadedScene;
 use super::options::PictureOptions;
 use super::values::{self, Exposure};
 
-/// What makes a picture.
+/// Renderer of pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Backend {
-    /// Raster on the graphics card.
+    /// Rasteriser on the graphics card.
     Gpu,
     /// The reference ray tracer.
     Cpu,
@@ -45,7 +45,7 @@ pub struct EyeOptions {
     pub backend: Option<Backend>,
 }
 
-/// Maps that were baked before, or those of a bake that ran to its end: half-lit pictures are not made.
+/// Maps from a folder, or from a bake that ran to its end: incomplete light makes no picture.
 ///
 /// # Errors
 /// Those of a bake, or of [`MapSet::read_all`].
@@ -66,10 +66,10 @@ pub fn maps(
     Ok(maps)
 }
 
-/// Samples across and down each pixel.
+/// Samples across and down per pixel.
 const SAMPLES_PER_SIDE: u32 = 2;
 
-/// A picture that is written, and how it was made.
+/// A picture that was written, and how it was made.
 pub struct MadePicture {
     /// With the exposure that was used.
     pub view: View,
@@ -77,7 +77,7 @@ pub struct MadePicture {
     pub made_by: String,
 }
 
-/// What is seen by the camera that is asked for.
+/// The view of the requested camera.
 ///
 /// # Errors
 /// No such camera.
@@ -85,7 +85,7 @@ pub fn view(scene: &Scene, options: &PictureOptions, eye: &EyeOptions) -> Result
     Ok(view_of(choose_camera(scene, options)?, options, eye))
 }
 
-/// What is seen by a camera, at no exposure yet.
+/// The view of a camera, without an exposure.
 pub fn view_of(camera: Camera, options: &PictureOptions, eye: &EyeOptions) -> View {
     View {
         tone_map: eye.tone_map.unwrap_or_default(),
@@ -93,11 +93,11 @@ pub fn view_of(camera: Camera, options: &PictureOptions, eye: &EyeOptions) -> Vi
     }
 }
 
-/// Makes the picture, by the card where there is one and no other wish, and writes it; `effects` switch what the eye
-/// sees in mirrors and glass.
+/// Renders and writes a picture: on the graphics card, unless there is none or the CPU is requested. `effects` switch
+/// what the eye sees in mirrors and glass.
 ///
 /// # Errors
-/// No such camera; a card that was asked for and is not there; a place that cannot be written; a signal.
+/// No such camera; no graphics card although one is requested; output that cannot be written; a signal.
 pub fn make(
     scene: &Arc<Scene>,
     maps: &[IlluminationMap],
@@ -172,7 +172,7 @@ fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: &EffectSwitches) -> Res
     ))
 }
 
-/// The camera of that name or index; without a wish the first, or one that frames the scene.
+/// The camera of a name or index; by default the first one, or one that frames the scene.
 pub fn choose_camera(scene: &Scene, options: &PictureOptions) -> Result<Camera> {
     let Some(wish) = &options.camera else {
         return Ok(scene

@@ -63,10 +63,10 @@ pub struct RenderArguments {
 }
 
 impl RenderArguments {
-    /// Loads, bakes or reads maps, makes the picture or the frames and writes them.
+    /// Loads, bakes or reads maps, renders the picture or the frames, and writes them.
     ///
     /// # Errors
-    /// Bad usage; input, output, a bake or a picture that failed.
+    /// Bad usage; input, output, a bake or a picture that fails.
     pub fn run(&self, console: &Console) -> Result<()> {
         let layers = [LayerKind::Caustic, LayerKind::Direct];
         let settings = self.bake.settings(&layers, self.run.threads()?)?;
@@ -108,7 +108,7 @@ impl RenderArguments {
         console.print_result(&text, &report)
     }
 
-    /// Draws the frames of a scene that moves, all at the exposure of the first.
+    /// Renders the frames of a moving scene, all at the exposure of the first.
     fn draw_moments(
         &self,
         output: &Path,
@@ -193,7 +193,7 @@ impl RenderArguments {
             );
         }
         let film = Film {
-            // Read before the bake, so that a damaged file costs nothing.
+            // Read before the bake, so that a damaged file fails early.
             path: self.path.as_deref().map(CameraPath::read).transpose()?,
             turntable: self.turntable.unwrap_or(1),
             stats: self.stats,

@@ -18,27 +18,27 @@ use super::options::PictureOptions;
 use super::picture::{self, EyeOptions};
 use super::values::Exposure;
 
-/// Frames that are wanted.
+/// A film along a camera path or around the scene.
 pub struct Film<'a> {
-    /// How the camera moves; else it goes around the scene.
+    /// Camera path; without one, the camera orbits the scene.
     pub path: Option<CameraPath>,
-    /// Frames of that.
+    /// Frames of the orbit.
     pub turntable: usize,
-    /// Whether frames are timed with and without chains.
+    /// Whether to time frames with and without chains.
     pub stats: bool,
     /// Folder for the frames.
     pub output: Option<&'a Path>,
-    /// Folder of maps that were baked before.
+    /// Folder of existing maps.
     pub maps: Option<&'a Path>,
-    /// Of every frame; its camera is where a turntable begins.
+    /// Look of every frame; its camera is where an orbit begins.
     pub look: (&'a PictureOptions, &'a EyeOptions),
 }
 
 impl Film<'_> {
-    /// Bakes or reads maps, draws every frame, keeps and times them as asked; `name` is that of the path.
+    /// Bakes or reads maps and draws every frame; writes and times them as requested. `name` is that of the path.
     ///
     /// # Errors
-    /// Input, output, a bake or a frame that failed; no graphics card; a signal.
+    /// Input, output, a bake or a frame that fails; no graphics card; a signal.
     pub fn draw(
         self,
         name: &str,
@@ -105,7 +105,7 @@ impl Film<'_> {
         console.print_result(&text, &report)
     }
 
-    /// Draws and keeps every frame; its times, without chains first where that is asked for.
+    /// Draws and writes every frame. Returns frame times: with chains, and before that without if both are requested.
     fn times(
         &self,
         gpu: &Gpu,
@@ -124,7 +124,7 @@ impl Film<'_> {
     }
 }
 
-/// The times of both manners as JSON and, added, as text.
+/// Frame times without and with chains as JSON; also appended to `text`.
 fn stats(raster_alone: &MannerTimes, with_chains: &MannerTimes, text: &mut String) -> Value {
     let _ = writeln!(
         text,
@@ -144,7 +144,7 @@ fn stats(raster_alone: &MannerTimes, with_chains: &MannerTimes, text: &mut Strin
     json!({
         "raster_alone": raster_alone,
         "with_chains": with_chains,
-        // Of the medians.
+        // Ratio of the medians.
         "with_chains_over_raster_alone": ratio,
     })
 }

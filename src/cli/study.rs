@@ -31,18 +31,18 @@ const REFERENCE: (&str, &str) = (
 );
 const ALL: (&str, &str) = ("pages", "all that follow, each in a folder of its name");
 
-/// Texels across and down where none are asked for.
+/// Default width and height of maps [texels].
 const SIDE: usize = 256;
 const SPECTRUM_SIDE: usize = 1024;
 
-/// Bakes of each kind where no number is asked for.
+/// Default number of bakes of each kind.
 const REPEATS: usize = 5;
 
 /// Densities of `convergence` [1/sr]; `--quick` leaves out the last.
 const DENSITIES: [f64; 9] = [1e2, 3e2, 1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6];
 const QUICK_DENSITIES: usize = 7;
 
-/// Of thin beams [1/sr].
+/// Default density for thin beams [1/sr].
 const BEAM_DENSITY_PER_SR: f64 = 1e8;
 
 #[derive(Debug, Args)]
@@ -57,7 +57,7 @@ pub struct StudyArguments {
     run: RunOptions,
 }
 
-/// A study that is named, with what every study takes.
+/// The named study, with the options that all studies share.
 #[derive(Debug)]
 struct Study {
     kind: Kind,
@@ -70,7 +70,7 @@ enum Kind {
     Reference(ReferenceArguments),
     Effects(EffectsArguments),
     Spectrum(SpectrumArguments),
-    /// Of built-in scenes, by name.
+    /// A study of built-in scenes, by name.
     Built(String),
 }
 
@@ -195,7 +195,7 @@ impl SizeOption {
     }
 }
 
-/// `N` (square) or `WxH` [texels].
+/// Parses `N` (square) or `WxH` [texels].
 fn fixed_map_resolution(text: &str) -> std::result::Result<MapResolution, String> {
     match text.parse() {
         Ok(fixed @ MapResolution::Fixed { .. }) => Ok(fixed),
@@ -203,7 +203,7 @@ fn fixed_map_resolution(text: &str) -> std::result::Result<MapResolution, String
     }
 }
 
-/// A number of rays, `250000` or `2.5e5`.
+/// Parses a number of rays, `250000` or `2.5e5`.
 fn ray_count(text: &str) -> std::result::Result<u64, String> {
     let rays = text.parse().ok().map(|rays: f64| rays as u64);
     let (least, most) = (RAYS.start(), *RAYS.end() as f64);
@@ -262,7 +262,7 @@ impl FromArgMatches for Study {
     }
 }
 
-/// Names, and what they find out.
+/// Name and description of every study.
 fn all_studies() -> impl Iterator<Item = (&'static str, &'static str)> {
     let built = STUDIES.iter().map(|study| (study.name, study.what));
     [CONVERGENCE, REFERENCE, EFFECTS, SPECTRUM, ALL]
@@ -275,11 +275,11 @@ impl StudyArguments {
         self.study.as_ref().map_or(&self.run, |study| &study.common.run)
     }
 
-    /// Checks the arguments, measures, writes, and prints what was found.
+    /// Checks the arguments, measures, writes, and prints the results.
     ///
     /// # Errors
-    /// No study is named; a value outside its range; input, output or a bake that failed; stopped before the end, which
-    /// writes nothing of the study that it was at.
+    /// No study is named; a value outside its range; input, output or a bake that fails; cancellation, which discards
+    /// the study in progress.
     pub fn run(&self, console: &Console) -> Result<()> {
         let Some(Study { kind, common }) = &self.study else {
             return match self.list {
@@ -312,7 +312,7 @@ fn list(console: &Console) -> Result<()> {
     console.print_result(&lines.join("\n"), &studies)
 }
 
-/// A study that is done: the result as text and as `--json` prints it, and the files.
+/// Result of a study: text, the document for `--json`, and names of files.
 struct FinishedStudy {
     text: String,
     report: Value,
@@ -380,7 +380,7 @@ impl StudyRun<'_> {
         for effect in Effect::ALL {
             let picture = format!("difference_{}.png", effect.name());
             if !written.contains(&picture) {
-                // An earlier study of this folder may have had the effect.
+                // An earlier study in this folder may have had the effect.
                 files::remove_file(&self.common.output.join(picture))?;
             }
         }
@@ -406,7 +406,7 @@ impl StudyRun<'_> {
         Ok(())
     }
 
-    /// One, or all: each is printed as soon as it is done; JSON is one document at the end.
+    /// Runs one study or all. Each is printed as soon as it is done; JSON is one document at the end.
     fn built(self, name: &str) -> Result<()> {
         let is_all = name == ALL.0;
         let mut reports = Vec::new();
@@ -427,7 +427,7 @@ impl StudyRun<'_> {
         }
     }
 
-    /// Runs it, writes and tells; the files that it wrote.
+    /// Runs a study, writes and prints it; returns the names of its files.
     fn one_scene(
         self,
         name: &'static str,
@@ -442,7 +442,7 @@ impl StudyRun<'_> {
         Ok(study.files)
     }
 
-    /// Runs it and writes its files.
+    /// Runs a study and writes its files.
     fn study(
         self,
         name: &'static str,
@@ -476,7 +476,7 @@ impl StudyRun<'_> {
         Ok(FinishedStudy { text, report, files })
     }
 
-    /// Traces, writes the maps, and says how noisy they are.
+    /// Traces by brute force, writes the maps, and prints their noise.
     fn reference(self, study: &ReferenceArguments) -> Result<()> {
         let settings = BakeSettings {
             seed: study.seed,
@@ -560,7 +560,7 @@ fn check_ladder(densities: &[f64], settings: &BakeSettings) -> Result<()> {
     Ok(())
 }
 
-/// A folder that is empty, holds the `table` of an earlier study, or is taken by force.
+/// Opens a folder that is empty or holds the `table` of an earlier study; any folder with `force`.
 fn open_folder(path: &Path, force: bool, table: &str) -> Result<OutputFolder> {
     let folder = OutputFolder::open(path)?;
     if force || path.join(table).is_file() || folder.is_empty()? {

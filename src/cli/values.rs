@@ -7,7 +7,7 @@ use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::settings::options;
 use strum::VariantArray;
 
-/// A whole number in a range.
+/// Parser of a whole number in a range.
 pub fn within(
     range: RangeInclusive<usize>,
     things: &'static str,
@@ -18,10 +18,10 @@ pub fn within(
     }
 }
 
-/// Most parts of a bake.
+/// Maximum number of shards.
 const MAX_SHARDS: u32 = 100_000;
 
-/// `I/N`: one part of several.
+/// Parses `I/N`, one shard of several.
 pub fn share_of_bake(text: &str) -> Result<ShardIndex, String> {
     let numbers = text.split_once('/').and_then(|(number, count)| {
         let count = count.parse().ok().filter(|count| *count <= MAX_SHARDS)?;
@@ -30,10 +30,10 @@ pub fn share_of_bake(text: &str) -> Result<ShardIndex, String> {
     numbers.ok_or_else(|| format!("give one of several, such as 3/8, of up to {MAX_SHARDS}"))
 }
 
-/// Largest side of a picture [pixels].
+/// Maximum side of a picture [pixels].
 const MAX_PICTURE_SIDE: u32 = 16384;
 
-/// `WxH` [pixels].
+/// Parses `WxH` [pixels].
 pub fn picture_size(text: &str) -> Result<(u32, u32), String> {
     let sides = 1..=MAX_PICTURE_SIDE;
     text.split_once('x')
@@ -42,7 +42,7 @@ pub fn picture_size(text: &str) -> Result<(u32, u32), String> {
         .ok_or_else(|| format!("give WxH with 1 to {MAX_PICTURE_SIDE} pixels a side, such as 1280x720"))
 }
 
-/// `off`, `error` and so on.
+/// Parser of a log level: `off`, `error` and so on.
 pub fn log_level() -> impl TypedValueParser<Value = log::LevelFilter> {
     let names = ["off", "error", "warn", "info", "debug", "trace"];
     PossibleValuesParser::new(names).try_map(|name| name.parse::<log::LevelFilter>())
@@ -51,7 +51,7 @@ pub fn log_level() -> impl TypedValueParser<Value = log::LevelFilter> {
 /// A name and its value.
 pub type Named<T> = (&'static str, T);
 
-/// Reads one of the names of a table.
+/// Parser of the names in a table.
 pub fn named<T: Copy + Send + Sync + 'static>(
     table: &'static [Named<T>],
 ) -> impl TypedValueParser<Value = T> {
@@ -61,7 +61,7 @@ pub fn named<T: Copy + Send + Sync + 'static>(
     })
 }
 
-/// Reads one of the names of an enumeration.
+/// Parser of the names of an enumeration.
 pub fn one_of<T>() -> impl TypedValueParser<Value = T>
 where
     T: VariantArray + Into<&'static str> + Copy + Send + Sync,
@@ -70,22 +70,22 @@ where
     PossibleValuesParser::new(names.collect::<Vec<&'static str>>()).try_map(|name| options::named(&name))
 }
 
-/// Latest moment of a scene that moves [s]: a day.
+/// Latest moment of a moving scene [s]: a day.
 const MAX_TIME_S: f64 = 86_400.0;
 
-/// A moment [s].
+/// Parses a moment [s].
 pub fn time_s(text: &str) -> Result<f64, String> {
     let time_s = text.parse().ok().filter(|time| (0.0..=MAX_TIME_S).contains(time));
     time_s.ok_or_else(|| format!("give 0 to {MAX_TIME_S} seconds"))
 }
 
-/// Frames per second.
+/// Parses frames per second.
 pub fn fps(text: &str) -> Result<f64, String> {
     let fps = text.parse().ok().filter(|fps| (0.01..=1000.0).contains(fps));
     fps.ok_or_else(|| "give 0.01 to 1000 frames a second".to_string())
 }
 
-/// `auto` (none) or a number of stops, −64 to 64.
+/// Parses `auto` or a number of stops, −64 to 64.
 pub fn exposure(text: &str) -> Result<Exposure, String> {
     if text == "auto" {
         return Ok(Exposure::Auto);
@@ -97,7 +97,7 @@ pub fn exposure(text: &str) -> Result<Exposure, String> {
         .ok_or_else(|| "give `auto` or a number of stops from -64 to 64".to_string())
 }
 
-/// How bright a picture is shown.
+/// Exposure of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exposure {
     /// Chosen from the picture.

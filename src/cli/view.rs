@@ -14,16 +14,15 @@ use super::loaded::LoadedScene;
 use super::options::{MapsOption, PictureOptions, RunOptions, SceneOptions};
 use super::picture::{self, EyeOptions};
 
-/// Scene where none is named.
 const DEFAULT_SCENE: &str = "builtin:gallery";
 
-/// Time of the light pass where neither quality nor time is asked for [s].
+/// Time limit of the light pass without a display, if neither quality nor time is given [s].
 const HURRIED_S: f64 = 5.0;
 
-/// Where files go when there is no display.
+/// Output folder without a display.
 const HEADLESS_FOLDER: &str = "nephroid-out";
 
-/// The picture's name in it.
+/// Name of the picture in that folder.
 const HEADLESS_PICTURE: &str = "picture.png";
 
 #[derive(Debug, Args)]
@@ -58,10 +57,10 @@ pub struct ViewArguments {
 }
 
 impl ViewArguments {
-    /// Opens the window on the scene; where there is no display, bakes and makes a picture instead.
+    /// Opens a window on the scene; without a display, bakes and renders a picture instead.
     ///
     /// # Errors
-    /// Bad usage; input that cannot be read; a window or files that failed.
+    /// Bad usage; input that cannot be read; a window or output that fails.
     pub fn run(&self, console: &Console) -> Result<()> {
         if console.json {
             return Err(Error::usage(
@@ -85,7 +84,7 @@ impl ViewArguments {
         self.headless(settings, &loaded, console)
     }
 
-    /// Shows the window, and ends the process when that is closed; returns why it could not be opened.
+    /// Shows the window and ends the process when it is closed; returns the reason if it cannot be opened.
     #[cfg(feature = "viewer")]
     fn window(
         &self,

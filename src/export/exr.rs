@@ -15,23 +15,23 @@ use super::float_image::{Channel, FloatImage, check_size, rgb_names};
 use crate::error::{Error, Result};
 use crate::illumination::{Chart, IlluminationMap};
 
-/// Most channels that a file is read with: a map has at most 13, and 9 for each light.
+/// Maximum number of channels of a file; a map has at most 13, and 9 for each light.
 const MAX_CHANNELS: usize = 4096;
 
-/// Whether a file starts as an OpenEXR file does.
+/// Whether the bytes begin like an OpenEXR file.
 pub fn is_exr(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01])
 }
 
-/// One channel of a map's file: the chart's size, or a larger one where the map had to be made coarser.
+/// One channel of a map's file, which is larger than the chart if the map had to be made coarser.
 struct MapChannel<'a> {
     chart: &'a Chart,
-    /// Texels across and down the file.
+    /// Width and height of the file [texels].
     size: (usize, usize),
     value: MapValue<'a>,
 }
 
-/// Gives the value of a texel of a map.
+/// Value of a map by texel.
 pub type MapValue<'a> = Box<dyn Fn(usize) -> f32 + Sync + 'a>;
 
 /// The channels `PREFIX.R/G/B` of a map's texels.
@@ -44,9 +44,9 @@ pub fn rgb_values<'a>(
     names.map(move |(channel, name)| (name, value(channel)))
 }
 
-/// The bytes of a map's OpenEXR file: `LAYER.R/G/B` for each layer, `error.Y` where it was estimated, `R/G/B` = the sum of
-/// the layers [W/m²], and `others`. Row by row: the dense map is never made. The same map always gives the same bytes;
-/// `comment` and `location` as for [`encode`].
+/// Encodes a map as OpenEXR: `LAYER.R/G/B` for each layer, `error.Y` if it was estimated, `R/G/B` = the sum of the
+/// layers [W/m²], and `others`. Works row by row, without a dense copy of the map. The same map always gives the same
+/// bytes; `comment` and `location` as for [`encode`].
 ///
 /// # Errors
 /// An image that the format cannot hold.
@@ -102,13 +102,13 @@ impl SamplesWriter for &MapChannel<'_> {
         let row = self.row(line.location.position.y());
         let begin = line.location.position.x();
         let samples = &row[begin..begin + line.location.sample_count];
-        // Into memory of the line's own length: this cannot fail.
+        // The buffer has the length of the line: this cannot fail.
         drop(line.write_samples_from_slice(samples));
     }
 }
 
-/// The bytes of an OpenEXR file; the same image always gives the same bytes. `comment` states what the values are and
-/// in which unit; `location` is named in errors.
+/// Encodes an image as OpenEXR. The same image always gives the same bytes. `comment` states what the values are and in
+/// which unit; `location` is named in errors.
 ///
 /// # Errors
 /// An image that the format cannot hold.
@@ -119,7 +119,7 @@ pub fn encode(image: FloatImage, comment: &str, location: &str) -> Result<Vec<u8
     encode_samples(channels, size, comment, location)
 }
 
-/// The same of halves, as `R/G/B`.
+/// The same with half floats, as `R/G/B`.
 ///
 /// # Errors
 /// An image that the format cannot hold.
@@ -187,7 +187,7 @@ pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
             "write the file again",
         )
     };
-    // Sizes are checked before memory is taken for them.
+    // Sizes are checked before memory is allocated.
     let headers = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false)
         .map_err(|error| damaged(error.to_string()))?
         .headers;
@@ -227,8 +227,8 @@ pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
     })
 }
 
-/// Most bytes of samples for each byte of a file: more than any compression makes of a constant image. That is about 1000
-/// where deflate has the last word (1400 for PXR24); DWA keeps one number of 64 first.
+/// Maximum bytes of samples per byte of a file, above what any compression achieves on a constant image: about 1000
+/// where deflate comes last (1400 for PXR24); DWA first keeps one number of 64.
 fn most_expansion(header: &Header) -> u64 {
     match header.compression {
         oxr::Compression::DWAA(_) | oxr::Compression::DWAB(_) => 1 << 18,
@@ -236,7 +236,7 @@ fn most_expansion(header: &Header) -> u64 {
     }
 }
 
-/// What the samples of a part take in memory [bytes].
+/// Memory of a part's samples [bytes].
 fn sample_bytes(header: &Header) -> u64 {
     let texels = header.layer_size.area() as u64;
     let channels = header.channels.list.iter();
@@ -246,8 +246,8 @@ fn sample_bytes(header: &Header) -> u64 {
 }
 
 impl MapChannel<'_> {
-    /// One row. A texel of the file gets the mean over what it covers, so that all of them together hold the flux of the
-    /// map.
+    /// Values of a row of the file. Each texel gets the mean over what it covers, so that the file holds the flux of
+    /// the map.
     fn row(&self, row: usize) -> Vec<f32> {
         let value = &self.value;
         let (width, height) = (self.chart.width, self.chart.height);
@@ -271,9 +271,9 @@ impl MapChannel<'_> {
     }
 }
 
-/// Which of `coarse` cells of a line one of `fine` cells covers, and with which part of itself.
+/// The `coarse` cells of a line that one of `fine` cells overlaps, each with its share of that one.
 pub(super) fn shares(index: usize, fine: usize, coarse: usize) -> Vec<(usize, f64)> {
-    // In units that are a whole number of both.
+    // Both kinds of cells have whole lengths in these units.
     let (begin, end) = (index * coarse, (index + 1) * coarse);
     let part = |cell: usize| end.min((cell + 1) * fine) - begin.max(cell * fine);
     (begin / fine..end.div_ceil(fine).min(coarse))

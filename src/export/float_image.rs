@@ -9,7 +9,7 @@ use crate::illumination::compare::Grid;
 use crate::optics::luminance;
 use crate::settings::MAX_MAP_SIDE;
 
-/// Largest file that is read [bytes].
+/// Maximum size of a file that is read [bytes].
 const MAX_FILE_BYTES: u64 = 8 << 30;
 
 /// One channel of an image.
@@ -28,12 +28,12 @@ pub struct FloatImage {
     pub width: usize,
     /// Texels down, 1 to [`MAX_MAP_SIDE`].
     pub height: usize,
-    /// No two have the same name.
+    /// Their names are distinct.
     pub channels: Vec<Channel>,
 }
 
 impl FloatImage {
-    /// `R/G/B` of so many texels across and down.
+    /// An image of channels `R/G/B`, of a width and height.
     pub fn of_rgb((width, height): (usize, usize), values: &[[f32; 3]]) -> Self {
         let channels = rgb_names("")
             .into_iter()
@@ -69,7 +69,7 @@ impl FloatImage {
         }
     }
 
-    /// The values of a channel.
+    /// Values of a channel, if it exists.
     pub fn channel(&self, name: &str) -> Option<&[f32]> {
         self.channels
             .iter()
@@ -77,14 +77,14 @@ impl FloatImage {
             .map(|channel| channel.values.as_slice())
     }
 
-    /// The triple of channels `PREFIX.R/G/B` (`R/G/B` for an empty prefix), where all three are there.
+    /// Texels of the channels `PREFIX.R/G/B` (`R/G/B` for an empty prefix), if all three exist.
     pub fn rgb(&self, prefix: &str) -> Option<Vec<[f32; 3]>> {
         let [r, g, b] = rgb_names(prefix).map(|name| self.channel(&name));
         let (r, g, b) = (r?, g?, b?);
         Some((0..r.len()).map(|i| [r[i], g[i], b[i]]).collect())
     }
 
-    /// Luminance of the channels `PREFIX.R/G/B`; for an empty prefix a lone `Y` serves as well.
+    /// Luminance of the channels `PREFIX.R/G/B`, or of a lone `Y` for an empty prefix.
     pub fn luminance(&self, prefix: &str) -> Option<Grid> {
         let values = match self.rgb(prefix) {
             Some(rgb) => rgb.iter().map(luminance).collect(),
@@ -110,7 +110,7 @@ pub fn rgb_names(prefix: &str) -> [String; 3] {
     })
 }
 
-/// Refuses sizes that no map or picture of ours has, before memory is taken for them.
+/// Refuses sizes that neither maps nor pictures have, before memory is allocated.
 pub(super) fn check_size(width: usize, height: usize, location: &str) -> Result<()> {
     let sides = 1..=MAX_MAP_SIDE;
     if sides.contains(&width) && sides.contains(&height) {

@@ -6,15 +6,16 @@ use super::picture::encode;
 use crate::error::{Error, Result};
 use crate::files::{self, OutputFolder};
 
-/// A folder that holds nothing but frames, `frame-00001.png` and on.
+/// A folder that holds only frames, `frame-00001.png` and on.
 #[derive(Debug)]
 pub struct FrameFolder(OutputFolder);
 
 impl FrameFolder {
-    /// Makes the folder where there is none.
+    /// Opens the folder, or creates it.
     ///
     /// # Errors
-    /// It cannot be made or read; it holds files and no first frame of an earlier time, which would be replaced.
+    /// A folder that cannot be created or read; one that holds files but no first frame of an earlier film, which would
+    /// be replaced.
     pub fn open(path: &Path) -> Result<Self> {
         let folder = OutputFolder::open(path)?;
         if path.join(file_name(0)).is_file() || folder.is_empty()? {
@@ -27,15 +28,15 @@ impl FrameFolder {
         ))
     }
 
-    /// Where a frame, counted from 0 on, is written.
+    /// Path of a frame, counted from 0.
     pub fn file(&self, frame: usize) -> PathBuf {
         self.0.path().join(file_name(frame))
     }
 
-    /// Writes a frame, counted from 0 on: encoded RGBA, row 0 at the top.
+    /// Writes a frame, counted from 0: encoded RGBA, row 0 at the top.
     ///
     /// # Errors
-    /// The file cannot be written.
+    /// A file that cannot be written.
     pub fn write(&self, frame: usize, (width, height): (u32, u32), rgba: Vec<u8>) -> Result<()> {
         let file = self.file(frame);
         let bytes = encode(width, height, rgba, &file.display().to_string())?;
@@ -43,7 +44,7 @@ impl FrameFolder {
     }
 }
 
-/// From 1 on, as people count.
+/// Files are numbered from 1.
 fn file_name(frame: usize) -> String {
     format!("frame-{:05}.png", frame + 1)
 }

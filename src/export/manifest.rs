@@ -28,39 +28,39 @@ pub struct Manifest {
     pub schema: u32,
     /// Version of the program that wrote it.
     pub program_version: &'static str,
-    /// What the user set.
+    /// Settings of the bake.
     pub settings: BakeSettings,
-    /// What was baked.
+    /// Scene of the maps.
     pub scene: SceneSummary,
-    /// Stopped before it was done.
+    /// Whether the bake was cancelled before it was done.
     pub partial: bool,
-    /// Why it ended.
+    /// Why the bake ended.
     pub stop_reason: StopReason,
-    /// Of loading and of the bake.
+    /// Warnings of loading and of the bake.
     pub warnings: Vec<Warning>,
     /// Wall-clock seconds.
     pub timings_s: Timings,
-    /// Seconds of the process's CPU clock.
+    /// CPU seconds of the process.
     pub cpu_s: Timings,
-    /// What it took.
+    /// Counters of the bake.
     pub counts: BakeCounts,
-    /// Why each effect was on or off, and how the user switched it.
+    /// Why each effect was on or off, and how the user set it.
     pub effects: Vec<EffectLine>,
-    /// What looking around from each light took.
+    /// Cost of each light's item buffers.
     pub item_buffers: Vec<ItemBufferReport>,
-    /// What the target was expected to cost, and what it cost.
+    /// Forecast and actual cost of the target.
     pub forecast: Option<ForecastReport>,
-    /// Where the bake stood after each level whose error was known.
+    /// Cost and error after each level whose error was known.
     pub course: Vec<CostPoint>,
-    /// Of the caustic layer, over all lights.
+    /// Energy of the caustic layer over all lights.
     pub energy_w: EnergyLedger,
     /// One per light and layer.
     pub ledgers: Vec<LedgerEntry>,
-    /// How exact the whole bake is.
+    /// Estimated error of the whole bake.
     pub error: ErrorEstimate,
     /// One per surface that received flux.
     pub maps: Vec<MapEntry>,
-    /// The frames of a moving scene. What stands above is of the first of them.
+    /// Frames of a moving scene; all other fields are then those of the first frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sequence: Option<Sequence>,
 }
@@ -89,22 +89,22 @@ impl Sequence {
     }
 }
 
-/// One moment of a sequence.
+/// One frame of a sequence.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct FrameEntry {
     /// Counted from 1.
     pub frame: usize,
-    /// Since the scene began [s].
+    /// Time since the start of the scene [s].
     pub time_s: f64,
-    /// Of the scene at that moment.
+    /// Hash of the scene's geometry at that time.
     pub geometry_hash: String,
     /// Why its bake ended.
     pub stop_reason: StopReason,
-    /// How exact it is.
+    /// Estimated error.
     pub error: ErrorEstimate,
     /// Light rays of its caustic layer.
     pub rays: u64,
-    /// Of its caustic layer, over all lights.
+    /// Energy of its caustic layer over all lights.
     #[serde(skip_deserializing)]
     pub energy_w: EnergyLedger,
     /// CPU seconds of its bake.
@@ -116,49 +116,49 @@ pub struct FrameEntry {
 /// The scene that maps belong to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneSummary {
-    /// What the user named: a path as given or `builtin:NAME`.
+    /// Path as the user gave it, or `builtin:NAME`.
     pub source: String,
     /// A short name.
     pub name: String,
-    /// Primitives.
+    /// Number of primitives.
     pub objects: usize,
-    /// Triangles over all objects.
+    /// Number of triangles over all objects.
     pub triangles: usize,
     /// Names of the lights.
     pub lights: Vec<String>,
-    /// Of all geometry: maps fit a scene with the same one only.
+    /// Hash of all geometry; maps fit only a scene with the same one.
     pub geometry_hash: String,
 }
 
 /// Energy of one light in one layer.
 #[derive(Clone, Debug, Serialize)]
 pub struct LedgerEntry {
-    /// Which layer.
+    /// Layer of the light.
     pub layer: LayerKind,
-    /// Its light's.
+    /// Energy by account.
     #[serde(flatten)]
     pub ledger: LightLedger,
 }
 
-/// An estimate without a reference.
+/// Error estimated without a reference.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct ErrorEstimate {
-    /// Of the whole bake; `None` where it was not estimated.
+    /// Relative RMSE; `None` if it was not estimated.
     pub estimated_relative_rmse: Option<f64>,
-    /// The same as an eye sees it.
+    /// Visible error; `None` if it was not estimated.
     pub estimated_visible: Option<f64>,
 }
 
 /// One map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MapEntry {
-    /// The node's name in the scene's file.
+    /// Name of the node in the scene's file.
     pub surface: String,
     /// glTF index of the node.
     pub node: usize,
     /// Index of the primitive within the node's mesh.
     pub primitive: usize,
-    /// Which side's light it holds.
+    /// Side of the surface.
     pub side: Side,
     /// Path of the EXR file, relative to the manifest.
     pub file: String,
@@ -166,31 +166,31 @@ pub struct MapEntry {
     pub width: usize,
     /// Texels down.
     pub height: usize,
-    /// Which texture coordinates it follows.
+    /// Texture coordinates of the map.
     pub uv_set: UvSet,
     /// Path of the generated coordinates, relative to the manifest.
     pub uv_file: Option<String>,
     /// Layers in the file.
     pub layers: Vec<LayerKind>,
-    /// Each light's part of them, where it was asked for.
+    /// Each light's part of them, if requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub lights: Vec<LightChannels>,
-    /// Each band of the caustic layer's spectrum, where it was asked for.
+    /// Each band of the caustic layer's spectrum, if requested.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub bands: Vec<BandChannel>,
-    /// Mean area of the texels that the surface covers [m²].
+    /// Mean area of the covered texels [m²].
     pub texel_area_m2: f64,
-    /// Of the file's values.
+    /// Unit of the file's values.
     pub units: String,
-    /// Of this map; `None` where it was not estimated.
+    /// Relative RMSE of this map; `None` if it was not estimated.
     pub estimated_relative_rmse: Option<f64>,
-    /// The same as an eye sees it.
+    /// Visible error of this map; `None` if it was not estimated.
     #[serde(default)]
     pub estimated_visible: Option<f64>,
     /// Memory that the map took in the bake [bytes].
     #[serde(default)]
     pub memory_bytes: u64,
-    /// Memory that it would take with all texels as fine as the file's [bytes].
+    /// Memory of the map if all texels were as fine as the file's [bytes].
     #[serde(default)]
     pub dense_bytes: u64,
 }
@@ -200,26 +200,26 @@ pub struct MapEntry {
 pub struct LightChannels {
     /// The light's name.
     pub light: String,
-    /// Which layer it is a part of.
+    /// Layer of the light.
     pub layer: LayerKind,
-    /// Its channels are this and `.R`, `.G`, `.B`.
+    /// Prefix of its channels, before `.R`, `.G`, `.B`.
     pub channels: String,
 }
 
 /// Where a file holds one band of the caustic layer's spectrum.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BandChannel {
-    /// The wavelengths.
+    /// Range of wavelengths.
     #[serde(flatten)]
     pub band: SpectralBand,
     pub channel: String,
-    /// Of its values: radiant, and by nanometre.
+    /// Unit of its values: radiant, per nanometre.
     pub units: String,
 }
 
 impl BandChannel {
-    /// Named as Fichet, Pacanowski and Wilkie propose (An OpenEXR layout for spectral images, JCGT 10(3), 2021): the
-    /// wavelength with a comma.
+    /// Channel names follow Fichet, Pacanowski and Wilkie (An OpenEXR layout for spectral images, JCGT 10(3), 2021):
+    /// the wavelength has a decimal comma.
     pub fn new(band: &SpectralBand) -> Self {
         let wavelength = format!("{:.3}", band.wavelength_nm).replace('.', ",");
         Self {
@@ -234,7 +234,7 @@ impl BandChannel {
 pub const UNITS: &str = "W/m^2";
 
 impl Manifest {
-    /// The manifest of a bake whose maps are stored as `maps` say; `settings` are those it was run with.
+    /// Manifest of a bake that ran with `settings` and whose maps are stored as `maps` state.
     pub fn new(scene: &Scene, settings: &BakeSettings, result: &Bake, maps: Vec<MapEntry>) -> Self {
         let ledger = |ledger: &LightLedger| LedgerEntry {
             layer: LayerKind::Caustic,
@@ -275,7 +275,7 @@ impl Manifest {
 }
 
 impl SceneSummary {
-    /// What identifies a scene.
+    /// Summary that identifies a scene.
     pub fn of(scene: &Scene) -> Self {
         Self {
             source: scene.source.clone(),
@@ -295,7 +295,7 @@ impl MapEntry {
         std::iter::once(self.file.as_str()).chain(coordinates)
     }
 
-    /// The entry of a map that is stored in `file`, of a size [texels].
+    /// Entry of a map that is stored in `file`, of a size [texels].
     pub fn new(
         scene: &Scene,
         map: &IlluminationMap,
@@ -328,7 +328,7 @@ impl MapEntry {
     }
 }
 
-/// Of the texels of a file with so many, whose map may have fewer.
+/// Mean area of covered texels in a file of `texels`; the map may have fewer.
 fn mean_texel_area_m2(map: &IlluminationMap, texels: usize) -> f64 {
     let chart = &map.chart;
     if chart.layout.is_some() {

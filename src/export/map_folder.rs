@@ -12,25 +12,25 @@ use crate::illumination::{IlluminationMap, Side, UvSet};
 use crate::scene::{Light, Scene};
 use crate::settings::{BakeSettings, MapResolution};
 
-/// Folder of the map files within ours.
+/// Subfolder of the map files.
 const MAPS: &str = "maps";
 
-/// A folder that a bake may write to.
+/// An output folder for maps.
 #[derive(Debug)]
 pub struct MapFolder {
-    /// Within `root`; it goes first, so that an unused one leaves `root` empty.
+    /// Within `root`. It is dropped first, so that an unused one leaves `root` empty.
     maps: OutputFolder,
     root: OutputFolder,
-    /// Files of the bake that is replaced, relative to the folder.
+    /// Files of the previous bake, relative to the folder.
     previous: Vec<String>,
 }
 
 impl MapFolder {
-    /// Opens, or makes, the folder and tries to write there. One of ours is replaced file by file; another one that
-    /// is not empty is taken only with `force`.
+    /// Opens or creates the folder, and checks that it can be written. Maps of an earlier bake are replaced file by
+    /// file; a folder with other files is taken only with `force`.
     ///
     /// # Errors
-    /// A place that cannot be written; other people's files in it.
+    /// A place that cannot be written; a folder with other files.
     pub fn open(path: impl AsRef<Path>, force: bool) -> Result<Self> {
         let path = path.as_ref();
         let previous = map_set::files_of(path);
@@ -43,21 +43,21 @@ impl MapFolder {
         })
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         self.root.path()
     }
 
-    /// Writes the maps, then the manifest, then removes what the previous bake had more.
+    /// Writes the maps, then the manifest, then removes leftover files of the previous bake.
     ///
     /// # Errors
-    /// A disk that is full, a place that cannot be written any more.
+    /// A full disk; a place that can no longer be written.
     pub fn write(self, scene: &Scene, settings: &BakeSettings, result: &Bake) -> Result<Manifest> {
         let maps = self.write_maps(scene, settings, result, None)?;
         self.finish(Manifest::new(scene, settings, result, maps))
     }
 
-    /// Writes maps, those of a frame (counted from 1) into a folder for each map.
+    /// Writes maps; those of a frame (counted from 1) go into one folder per map.
     pub(super) fn write_maps(
         &self,
         scene: &Scene,
@@ -70,7 +70,7 @@ impl MapFolder {
             .collect()
     }
 
-    /// Writes the manifest and removes what the previous bake had more.
+    /// Writes the manifest and removes leftover files of the previous bake.
     pub(super) fn finish(self, manifest: Manifest) -> Result<Manifest> {
         let path = self.path().join(manifest::FILE_NAME);
         let json = files::to_json(&manifest, &path.display().to_string())?;
@@ -114,7 +114,7 @@ impl MapFolder {
     }
 }
 
-/// Parts of lights and bands of the spectrum that a map's file holds.
+/// Parts of lights and bands of the spectrum in a map's file.
 pub type Parts = (Vec<LightChannels>, Vec<BandChannel>);
 
 /// The name of a map's file without its extension.
@@ -128,7 +128,7 @@ pub fn stem(scene: &Scene, map: &IlluminationMap) -> String {
     format!("{object:04}_{name}{back}")
 }
 
-/// As it was asked for, though memory may have made the map coarser [texels].
+/// The requested size [texels]; the memory limit may have made the map coarser.
 fn size(settings: &BakeSettings, map: &IlluminationMap) -> (usize, usize) {
     match settings.map_resolution {
         MapResolution::Fixed { width, height } => (width, height),
@@ -136,11 +136,11 @@ fn size(settings: &BakeSettings, map: &IlluminationMap) -> (usize, usize) {
     }
 }
 
-/// Writes one map of a bake to an OpenEXR file and, where its coordinates were made here, those to a `.uv` file beside it.
-/// Returns which parts of lights and which bands the file holds, and where the coordinates are.
+/// Writes one map of a bake as OpenEXR and, if its coordinates were generated, those to a `.uv` file beside it. Returns
+/// which parts of lights and which bands the file holds, and the path of the coordinates.
 ///
 /// # Errors
-/// A disk that is full, a place that cannot be written.
+/// A full disk; a place that cannot be written.
 pub fn write_map(
     path: &Path,
     scene: &Scene,
@@ -185,7 +185,7 @@ pub fn write_map(
     Ok(((lights, bands), uv_path))
 }
 
-/// A light's name as part of a channel's; with its number where others have the same, or none.
+/// A light's name within channel names; with its index unless it is unique.
 fn light_slug(scene: &Scene, light: usize) -> String {
     let slug_of = |light: &Light| files::slug(&light.name, "light");
     let own = slug_of(&scene.lights[light]);
@@ -193,8 +193,8 @@ fn light_slug(scene: &Scene, light: usize) -> String {
     if is_alone { own } else { format!("{own}-{light}") }
 }
 
-/// Whether a path in a manifest is one that a bake writes: `maps/NAME`, or `maps/NAME/NAME` of a frame, with nothing that
-/// leads elsewhere.
+/// Whether a path in a manifest is one that a bake writes: `maps/NAME`, or `maps/NAME/NAME` for a frame, with no way
+/// out of the folder.
 pub(super) fn is_map_file(file: &str) -> bool {
     let is_name = |name: &str| {
         let mut bytes = name.bytes();

@@ -15,7 +15,7 @@ use crate::illumination::{Chart, IlluminationMap, Layer, Parametrisation, UvSet,
 use crate::optics::LinearSrgb;
 use crate::scene::{Object, Scene};
 
-/// The parts of a manifest that maps are read by.
+/// The parts of a manifest that are needed to read maps.
 #[derive(Debug, Deserialize)]
 struct StoredMaps {
     schema: u32,
@@ -27,7 +27,7 @@ struct StoredMaps {
     sequence: Option<Sequence>,
 }
 
-/// What the bake's light comes to.
+/// Energy of the bake [W].
 #[derive(Clone, Copy, Debug, Default, Deserialize)]
 struct StoredEnergy {
     #[serde(default)]
@@ -35,8 +35,8 @@ struct StoredEnergy {
 }
 
 impl StoredEnergy {
-    /// Watts by which rounding may take a texel's light below 0. Sums count in steps of 2⁻⁶⁰ of the power at least, and
-    /// colours outside of sRGB are rounded channel by channel: this is room for a million roundings.
+    /// Flux by which rounding may take a texel below 0 [W]. Sums have steps of 2⁻⁶⁰ of the power or finer, and colours
+    /// outside of sRGB are rounded channel by channel: this is room for a million roundings.
     fn rounding_w(self) -> f64 {
         let is_power = self.emitted.is_finite() && self.emitted > 0.0;
         if is_power {
@@ -47,39 +47,39 @@ impl StoredEnergy {
     }
 }
 
-/// What does not fit together.
+/// The error for a folder whose contents do not fit together.
 fn unusable(location: impl Into<String>, what: impl Into<String>) -> Error {
     Error::failure(location, what, "bake the scene again")
 }
 
-/// A map as its folder has it.
+/// A map as read from its folder.
 #[derive(Clone, Debug)]
 pub struct StoredMap {
-    /// What the manifest says of it.
+    /// Its entry in the manifest.
     pub entry: MapEntry,
     /// The map.
     pub map: IlluminationMap,
-    /// What lights give to it, where that was baked.
+    /// Each light's part, if it was baked.
     pub lights: Vec<StoredLight>,
 }
 
-/// What one light gives to one layer of a map.
+/// One light's part of one layer of a map.
 #[derive(Clone, Debug)]
 pub struct StoredLight {
-    /// Which light and layer.
+    /// Light and layer.
     pub channels: LightChannels,
     /// E per texel [W/m²], linear sRGB.
     pub irradiance: Vec<[f32; 3]>,
 }
 
-/// A folder of maps beside their scene; maps are read one at a time.
+/// A folder of maps and their scene; maps are read one at a time.
 #[derive(Debug)]
 pub struct MapSet<'a> {
     folder: PathBuf,
     scene: &'a Scene,
     stored: StoredMaps,
     location: String,
-    /// Of a sequence, counted from 0.
+    /// Frame of a sequence, counted from 0.
     frame: Option<usize>,
 }
 
@@ -87,17 +87,17 @@ impl<'a> MapSet<'a> {
     /// Reads the manifest.
     ///
     /// # Errors
-    /// No manifest, one of another format or scene.
+    /// No manifest, or one of another format or scene.
     pub fn open(folder: impl Into<PathBuf>, scene: &'a Scene) -> Result<Self> {
         let folder = folder.into();
         let manifest = read_manifest(&folder)?;
         Self::of(folder, scene, manifest, None)
     }
 
-    /// The maps of a frame of a sequence, counted from 0; `scene` is that at its time.
+    /// Opens a frame of a sequence, counted from 0; `scene` is the scene at its time.
     ///
     /// # Errors
-    /// As [`Self::open`]; a frame that is not there.
+    /// As [`Self::open`]; no such frame.
     pub fn open_frame(folder: impl Into<PathBuf>, scene: &'a Scene, frame: usize) -> Result<Self> {
         let folder = folder.into();
         let (mut stored, location) = read_manifest(&folder)?;
@@ -139,7 +139,7 @@ impl<'a> MapSet<'a> {
         })
     }
 
-    /// Which frame of a sequence it reads, counted from 0.
+    /// Frame of the sequence, counted from 0.
     pub fn frame(&self) -> Option<usize> {
         self.frame
     }
@@ -149,22 +149,22 @@ impl<'a> MapSet<'a> {
         self.stored.sequence.as_ref().map(|sequence| sequence.fps)
     }
 
-    /// The folder that the maps lie in.
+    /// Folder of the maps.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
 
-    /// What there is.
+    /// Entries of all maps.
     pub fn entries(&self) -> &[MapEntry] {
         &self.stored.maps
     }
 
-    /// The scene, as the maps' bake knew it.
+    /// The scene as the bake knew it.
     pub fn scene_summary(&self) -> &SceneSummary {
         &self.stored.scene
     }
 
-    /// What the user should know of the maps' state.
+    /// Warnings about the state of the maps.
     pub fn warnings(&self) -> Vec<Warning> {
         let partial = self.stored.partial.then(|| {
             Warning::new(
@@ -176,7 +176,7 @@ impl<'a> MapSet<'a> {
         partial.into_iter().collect()
     }
 
-    /// What the user named as the scene of the maps in a folder: a path as given, or `builtin:NAME`.
+    /// The scene of the maps in a folder as the user named it: a path, or `builtin:NAME`.
     ///
     /// # Errors
     /// No manifest, or one of another format.
@@ -184,7 +184,7 @@ impl<'a> MapSet<'a> {
         read_manifest(folder).map(|(stored, _)| stored.scene.source)
     }
 
-    /// The frames in a folder; `None` where it holds one moment.
+    /// The sequence in a folder; `None` if it holds a single moment.
     ///
     /// # Errors
     /// As [`Self::source_of`].
@@ -192,10 +192,10 @@ impl<'a> MapSet<'a> {
         read_manifest(folder).map(|(stored, _)| stored.sequence)
     }
 
-    /// Reads all maps, without each light's part of them.
+    /// Reads all maps, without the parts of lights.
     ///
     /// # Errors
-    /// As [`Self::read`]; two maps of one side of a surface.
+    /// As [`Self::read`]; two maps of the same side of a surface.
     pub fn read_all(&self) -> Result<Vec<IlluminationMap>> {
         let mut maps: Vec<IlluminationMap> = Vec::new();
         for entry in self.entries() {
@@ -211,7 +211,7 @@ impl<'a> MapSet<'a> {
         Ok(maps)
     }
 
-    /// Reads one of the maps.
+    /// Reads one map.
     ///
     /// # Errors
     /// Files that are missing, damaged or do not fit the manifest.
@@ -219,7 +219,7 @@ impl<'a> MapSet<'a> {
         self.read_with(entry, &entry.lights)
     }
 
-    /// The same with some lights alone.
+    /// Reads one map with the parts of some lights.
     fn read_with(&self, entry: &MapEntry, lights: &[LightChannels]) -> Result<StoredMap> {
         let object = self.object_of(entry)?;
         let path = self.inside(&entry.file)?;
@@ -274,7 +274,7 @@ impl<'a> MapSet<'a> {
         })
     }
 
-    /// The file of generated coordinates that a map follows, whole; `None` where it follows the scene's own.
+    /// Contents of the file of generated coordinates of a map; `None` if it uses the scene's own.
     ///
     /// # Errors
     /// A file that cannot be read.
@@ -286,7 +286,7 @@ impl<'a> MapSet<'a> {
         files::read_file(&self.inside(file)?, uv_file::size_bytes(triangles)).map(Some)
     }
 
-    /// The object that a map is of, with its index.
+    /// The object of a map, with its index.
     fn object_of(&self, entry: &MapEntry) -> Result<(usize, &'a Object)> {
         let mut objects = self.scene.objects.iter().enumerate();
         let found =
@@ -309,7 +309,7 @@ impl<'a> MapSet<'a> {
                 Some(Parametrisation::new(index, mesh, UvSet::Generated, corner_uvs))
             }
             (UvSet::Generated, None) => None,
-            // The file's own sets are taken up the same way as in the bake.
+            // The scene's own UV sets are processed as in the bake.
             (set, _) => parametrise(index, mesh, DEFAULT_NOMINAL_SIDE).filter(|own| own.uv_set == set),
         };
         let missing = || format!("the texture coordinates of {} are not there", entry.surface);
@@ -318,7 +318,7 @@ impl<'a> MapSet<'a> {
         Ok(chart.of_side(entry.side))
     }
 
-    /// A file of the folder; names that lead out of it are refused.
+    /// Path of a file in the folder; refuses names that lead out of it.
     fn inside(&self, file: &str) -> Result<PathBuf> {
         if is_map_file(file) {
             return Ok(self.folder.join(file));
@@ -328,7 +328,7 @@ impl<'a> MapSet<'a> {
     }
 }
 
-/// Files of the maps in a folder, relative to it; `None` where none are.
+/// Files of the maps in a folder, relative to it; `None` without a manifest.
 pub(super) fn files_of(folder: &Path) -> Option<Vec<String>> {
     let (stored, _) = read_manifest(folder).ok()?;
     let frames = stored.sequence.iter().flat_map(|sequence| &sequence.frames);
@@ -342,10 +342,10 @@ pub(super) fn files_of(folder: &Path) -> Option<Vec<String>> {
     )
 }
 
-/// Largest manifest that is read [bytes].
+/// Maximum size of a manifest [bytes].
 const MAX_MANIFEST_BYTES: u64 = 64 << 20;
 
-/// The manifest of a folder, and where it is for errors.
+/// The manifest of a folder, and its path for errors.
 fn read_manifest(folder: &Path) -> Result<(StoredMaps, String)> {
     let path = folder.join(manifest::FILE_NAME);
     let location = path.display().to_string();
@@ -364,8 +364,8 @@ fn read_manifest(folder: &Path) -> Result<(StoredMaps, String)> {
     Ok((stored, location))
 }
 
-/// Whether a texel holds finite light of no negative luminance, but for rounding: of its numbers, and of the counts that
-/// they come from [W/m²]. A channel below 0 is a colour outside of sRGB, as dispersion makes it.
+/// Whether a texel is finite and its luminance not negative, except for rounding of its numbers and of the counts
+/// behind them [W/m²]. A channel below 0 is a colour outside of sRGB, as dispersion makes it.
 fn is_light(texel: &[f32; 3], rounding: f64) -> bool {
     let channels = texel.map(f64::from);
     let largest = channels
@@ -373,7 +373,7 @@ fn is_light(texel: &[f32; 3], rounding: f64) -> bool {
         .fold(0.0_f64, |largest, value| largest.max(value.abs()));
     let luminance = LinearSrgb::from(channels).luminance();
     let lost = f64::from(f32::EPSILON) * largest + rounding;
-    // A texel without an area of its own has its neighbours' light, and no bound.
+    // A texel without area has its neighbours' light, and no bound.
     largest.is_finite() && (lost.is_nan() || luminance >= -lost)
 }
 

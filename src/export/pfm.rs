@@ -4,7 +4,7 @@
 use super::float_image::{Channel, FloatImage, check_size};
 use crate::error::{Error, Result};
 
-/// Whether a file starts as a PFM does.
+/// Whether the bytes begin like a PFM file.
 pub fn is_pfm(bytes: &[u8]) -> bool {
     matches!(bytes, [b'P', b'f' | b'F', space, ..] if space.is_ascii_whitespace())
 }
@@ -12,7 +12,7 @@ pub fn is_pfm(bytes: &[u8]) -> bool {
 /// Decodes one (`Y`) or three (`R`, `G`, `B`) channels; `location` is named in errors.
 ///
 /// # Errors
-/// A damaged header, an unusable size, a file shorter or longer than its size says.
+/// A damaged header, an unusable size, a file that is too short or too long for it.
 pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
     let (header, samples) = Header::parse(bytes).ok_or_else(|| {
         Error::failure(
@@ -75,7 +75,7 @@ struct Header {
 }
 
 impl Header {
-    /// The header and the bytes after it: four words, each ended by one white space.
+    /// The header, four words that each end with one white space, and the bytes after it.
     fn parse(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let mut rest = bytes;
         let mut word = || -> Option<&str> {

@@ -8,10 +8,10 @@ use crate::eye_pass::{Picture, View, tone_mapping};
 use crate::files;
 
 impl Picture {
-    /// Writes a `.png` of what a display shows of it, at the view's exposure and by its tone map, or an `.exr` of radiance.
+    /// Writes a `.png` with the view's exposure and tone map, or an `.exr` of radiance.
     ///
     /// # Errors
-    /// A name that ends in neither; a size that the format cannot hold; a place that cannot be written.
+    /// A name that ends in neither; a size that the format cannot hold; output that cannot be written.
     pub fn save(&self, path: impl AsRef<Path>, view: &View) -> Result<()> {
         let path = path.as_ref();
         let location = path.display().to_string();
@@ -24,7 +24,7 @@ impl Picture {
     }
 }
 
-/// Whether a picture file holds radiance [W/(m² sr)]; else display colours.
+/// Whether a picture file holds radiance [W/(m² sr)] rather than display colours.
 ///
 /// # Errors
 /// A name that ends neither in .png nor in .exr.
@@ -41,7 +41,7 @@ pub fn holds_radiance(path: &Path) -> Result<bool> {
     }
 }
 
-/// The bytes of a PNG file: radiance at the view's exposure, tone-mapped and sRGB-encoded; `location` is named in errors.
+/// Encodes as PNG: radiance at the view's exposure, tone-mapped and sRGB-encoded; `location` is named in errors.
 ///
 /// # Errors
 /// A size that the format cannot hold.
@@ -50,7 +50,7 @@ pub fn display_png(picture: &Picture, view: &View, location: &str) -> Result<Vec
     encode(picture.width, picture.height, rgba, location)
 }
 
-/// The bytes of an EXR file: radiance [W/(m² sr)], without exposure and tone mapping; `location` is named in errors.
+/// Encodes as EXR: radiance [W/(m² sr)], without exposure and tone mapping; `location` is named in errors.
 ///
 /// # Errors
 /// A size that the format cannot hold.
@@ -63,10 +63,10 @@ pub fn radiance_exr(picture: &Picture, location: &str) -> Result<Vec<u8>> {
     )
 }
 
-/// The bytes of a PNG file of `width × height` sRGB-encoded pixels, row 0 at the top; `location` is named in errors.
+/// Encodes `width × height` sRGB-encoded pixels as PNG, row 0 at the top; `location` is named in errors.
 ///
 /// # Errors
-/// A size that does not agree with the pixels or that the format cannot hold.
+/// A size that does not match the pixels, or that the format cannot hold.
 pub fn encode(width: u32, height: u32, rgba: Vec<u8>, location: &str) -> Result<Vec<u8>> {
     files::png::<image::Rgba<u8>>(width, height, rgba).map_err(|reason| {
         Error::failure(

@@ -4,25 +4,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::units::LUMENS_PER_WATT;
 
-/// What the numbers of a map mean where it is written.
+/// Meaning of the numbers in a written map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Quantity {
     /// Irradiance [W/m²].
     #[serde(rename = "E")]
     Irradiance,
-    /// The radiance that a white Lambertian surface sends on [W/(m² sr)].
+    /// Radiance that a white Lambertian surface reflects [W/(m² sr)].
     #[serde(rename = "E/pi")]
     IrradianceByPi,
     /// Illuminance [lx].
     #[serde(rename = "lux")]
     Illuminance,
-    /// The luminance that a white Lambertian surface sends on [cd/m²].
+    /// Luminance that a white Lambertian surface reflects [cd/m²].
     #[serde(rename = "lux/pi")]
     IlluminanceByPi,
 }
 
 impl Quantity {
-    /// What irradiance [W/m²] is multiplied by.
+    /// Factor from irradiance [W/m²].
     pub fn factor(self) -> f64 {
         use std::f64::consts::FRAC_1_PI;
         match self {
@@ -33,7 +33,7 @@ impl Quantity {
         }
     }
 
-    /// As the manifest names its unit.
+    /// Name of the unit in files.
     pub fn unit(self) -> &'static str {
         match self {
             Self::Irradiance => "W/m^2",
@@ -44,11 +44,11 @@ impl Quantity {
     }
 }
 
-/// Share of a map's light that may be cut where nothing else is asked for.
+/// Default share of a map's light that may clip.
 pub const DEFAULT_CUT: f64 = 0.005;
 
-/// The least value above which there is no more than that share of all light, so that dim light has finer steps; `None`
-/// where no value is above 0.
+/// The smallest white that clips no more than a share `cut` of all light, for finer steps in dim light; `None` if no
+/// value is above 0.
 pub fn white(values: impl Iterator<Item = f64>, cut: f64) -> Option<f64> {
     let mut values: Vec<f64> = values.filter(|value| *value > 0.0).collect();
     values.sort_unstable_by(|a, b| b.total_cmp(a));
@@ -56,7 +56,7 @@ pub fn white(values: impl Iterator<Item = f64>, cut: f64) -> Option<f64> {
     let most = *values.first()?;
     let mut above = 0.0;
     for (count, pair) in values.windows(2).enumerate() {
-        // Between two neighbours what is cut grows evenly.
+        // Between two neighbouring values, clipped light grows linearly.
         let wider = above + (pair[0] - pair[1]) * (count + 1) as f64;
         if wider > cut * all {
             return Some((pair[0] - (cut * all - above) / (count + 1) as f64).min(most));

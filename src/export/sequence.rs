@@ -9,10 +9,10 @@ use crate::error::Result;
 use crate::scene::Scene;
 use crate::settings::BakeSettings;
 
-/// Moments at equal distances.
+/// Equally spaced moments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrameTimes {
-    /// How many; at least 1.
+    /// Number of frames, at least 1.
     pub frames: usize,
     /// Frames per second, > 0.
     pub fps: f64,
@@ -21,17 +21,17 @@ pub struct FrameTimes {
 }
 
 impl FrameTimes {
-    /// From the first frame to the one behind the last [s].
+    /// Time from the first frame to the one after the last [s].
     pub fn duration_s(&self) -> f64 {
         self.frames as f64 / self.fps
     }
 
-    /// When a frame is, counted from 0 [s].
+    /// Time of a frame, counted from 0 [s].
     pub fn time_s(&self, frame: usize) -> f64 {
         frame as f64 / self.fps
     }
 
-    /// The scene whose moments the frames show: one that repeats itself where they do.
+    /// The scene that the frames show; for a loop, one that repeats with them.
     pub fn scene(&self, scene: &Scene) -> Scene {
         if self.is_loop {
             scene.looped(self.duration_s())
@@ -40,7 +40,7 @@ impl FrameTimes {
         }
     }
 
-    /// A moment [s] as it is shown: in a loop within its duration.
+    /// A moment [s] as it is shown; wrapped into the duration of a loop.
     pub fn within(&self, time_s: f64) -> f64 {
         if self.is_loop {
             time_s % self.duration_s()
@@ -50,7 +50,7 @@ impl FrameTimes {
     }
 }
 
-/// A folder that takes one frame after the other.
+/// An output folder that takes one frame after another.
 #[derive(Debug)]
 pub struct SequenceFolder {
     folder: MapFolder,
@@ -63,7 +63,7 @@ impl SequenceFolder {
     /// As [`MapFolder::open`].
     ///
     /// # Errors
-    /// As there.
+    /// As [`MapFolder::open`].
     pub fn open(path: &Path, force: bool, times: FrameTimes) -> Result<Self> {
         Ok(Self {
             folder: MapFolder::open(path, force)?,
@@ -76,7 +76,7 @@ impl SequenceFolder {
     /// Writes the maps of the scene at the time of a frame, counted from 0.
     ///
     /// # Errors
-    /// A disk that is full, a place that cannot be written any more.
+    /// A full disk; a place that can no longer be written.
     pub fn write(
         &mut self,
         frame: usize,
@@ -104,7 +104,7 @@ impl SequenceFolder {
         Ok(&self.frames[self.frames.len() - 1])
     }
 
-    /// Writes the manifest; `None` where there was no frame.
+    /// Writes the manifest; `None` if there were no frames.
     ///
     /// # Errors
     /// As [`Self::write`].

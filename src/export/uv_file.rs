@@ -10,12 +10,12 @@ const MAGIC: &[u8; 8] = b"NEPHUV01";
 const HEADER_BYTES: usize = 16;
 const TRIANGLE_BYTES: usize = 48;
 
-/// Size of a file for that many triangles [bytes].
+/// Size of a file for a number of triangles [bytes].
 pub fn size_bytes(triangles: usize) -> u64 {
     (HEADER_BYTES + TRIANGLE_BYTES * triangles) as u64
 }
 
-/// The bytes of a file.
+/// Encodes coordinates as a file.
 pub fn encode(corner_uvs: &[[DVec2; 3]]) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(HEADER_BYTES + TRIANGLE_BYTES * corner_uvs.len());
     bytes.extend(MAGIC);
@@ -27,7 +27,7 @@ pub fn encode(corner_uvs: &[[DVec2; 3]]) -> Vec<u8> {
     bytes
 }
 
-/// The coordinates of a file that should have `triangles` of them; `location` is named in errors.
+/// Decodes a file that should hold `triangles` triangles; `location` is named in errors.
 ///
 /// # Errors
 /// Another kind of file, another number of triangles, coordinates outside [0, 1].

@@ -1,9 +1,9 @@
 //! Bakes in shards. Each shard traces and deposits its share of every pass and writes raw sums. The merge runs the same
 //! passes on the sums of all shards without tracing a ray, and ends with the maps of the whole bake, bit for bit.
 //!
-//! What goes on from the sums (smoothing, gutters, errors, maps) and what is no light pass (direct and indirect light) is
-//! done there, once. All decisions on the way have to be the same in every shard: what depends on what the light did is
-//! refused.
+//! What follows from the sums (smoothing, gutters, errors, maps) and what is not part of the light pass (direct and
+//! indirect light) is done once, by the merge. All shards have to make the same decisions: settings under which
+//! decisions depend on the traced light are refused.
 
 mod pass_sums;
 mod shard_role;
@@ -22,10 +22,10 @@ use crate::settings::{BakeSettings, MapResolution};
 pub(super) use pass_sums::PassSums;
 pub(super) use shard_role::ShardRole;
 
-/// What a shard gives.
+/// Output of a shard.
 #[derive(Clone, Debug)]
 pub struct ShardSums {
-    /// Of every pass, compressed.
+    /// Compressed sums of each pass.
     pub passes: Vec<Vec<u8>>,
     /// Wall-clock seconds.
     pub timings_s: Timings,
@@ -33,28 +33,28 @@ pub struct ShardSums {
     pub cpu_s: Timings,
 }
 
-/// Has the sums of all shards of a bake.
+/// Access to the sums of all shards of a bake.
 pub trait ShardSource: Send + Sync {
-    /// How many shards there are.
+    /// Number of shards.
     fn shard_count(&self) -> usize;
 
-    /// How many passes a shard has sums of.
+    /// Number of passes that a shard has sums of.
     fn pass_count(&self, shard: usize) -> usize;
 
-    /// Sums of one pass of a shard, as [`ShardSums::passes`] has them.
+    /// Sums of one pass of a shard, in the form of [`ShardSums::passes`].
     ///
     /// # Errors
-    /// What cannot be read.
+    /// Sums that cannot be read.
     fn pass(&self, shard: usize, pass: usize) -> Result<Vec<u8>>;
 
-    /// What the user knows a shard by: its folder.
+    /// The shard's name in messages: its folder.
     fn name(&self, shard: usize) -> String;
 }
 
-/// Refuses settings whose bake cannot be cut: those under which the light itself decides how far it is traced.
+/// Refuses settings that cannot be split: those under which the traced light decides how far the bake goes.
 ///
 /// # Errors
-/// A usage error that names the option and what to give instead.
+/// A usage error that names the option and its replacement.
 pub fn check(settings: &BakeSettings) -> Result<()> {
     settings.validate()?;
     if let Some(target) = settings.max_error {
@@ -92,11 +92,10 @@ pub fn check(settings: &BakeSettings) -> Result<()> {
 }
 
 impl Baker {
-    /// Bakes one share of the caustic layer, as sums that [`Self::merge`] puts together.
+    /// Bakes one shard of the caustic layer, as sums for [`Self::merge`].
     ///
     /// # Errors
-    /// Settings outside their ranges or that [`check`] refuses; maps that may not fit into memory; a bake that was
-    /// cancelled.
+    /// Settings outside their ranges or refused by [`check`]; maps that may exceed the memory limit; cancellation.
     pub fn bake_shard(
         &mut self,
         settings: &BakeSettings,
@@ -124,10 +123,10 @@ impl Baker {
         })
     }
 
-    /// The bake that shards are the parts of.
+    /// Merges the shards of a bake.
     ///
     /// # Errors
-    /// As [`Self::bake_shard`]; sums that cannot be read, or are not those of this bake.
+    /// As [`Self::bake_shard`]; sums that cannot be read or belong to another bake.
     pub fn merge(
         &mut self,
         settings: &BakeSettings,
@@ -136,7 +135,7 @@ impl Baker {
         control: &Control,
     ) -> Result<Bake> {
         check(settings)?;
-        // What was kept of other bakes is not what the shards began from.
+        // Shards start without anything cached.
         self.lights = LightStates::default();
         let mut role = ShardRole::merge(shards);
         let threads = self.threads.of(settings)?;

@@ -10,31 +10,30 @@ use crate::light_pass::caustic::pass::{PassReport, Seconds};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::shard_index::ShardIndex;
 
-/// No texel counts more: units are chosen so that all flux of a light stays below 2⁶⁰.
+/// Upper limit of a texel's count; units are chosen so that all flux of a light stays below 2⁶⁰.
 const MOST_OF_A_TEXEL: i64 = 1 << 61;
 
-/// No account counts more, over all wavefronts and shards.
+/// Upper limit of an account, over all wavefronts and shards.
 const MOST_OF_AN_ACCOUNT: i128 = 1 << 100;
 
-/// Nothing is counted more often than this.
+/// Upper limit of a counter.
 const MOST_OF_A_COUNT: u64 = 1 << 56;
 
-/// No time is longer [s].
+/// Upper limit of a time [s].
 const MAX_SECONDS: f64 = 1e12;
 
-/// Effort of the compression: more is much slower and hardly smaller.
+/// Compression level; higher ones are much slower and save hardly anything.
 const COMPRESSION: i32 = 1;
 
 #[derive(Debug)]
 pub(in crate::bake) struct PassSums {
-    /// One, or those of two half sets.
+    /// Maps of the pass, or of its two half sets.
     pub(in crate::bake) maps: Vec<BandMaps>,
     /// Accounts, counts and times.
     pub(in crate::bake) report: PassReport,
 }
 
 impl PassSums {
-    /// Nothing yet.
     pub(in crate::bake) fn new(maps: Vec<BandMaps>) -> Self {
         Self {
             maps,
@@ -42,7 +41,7 @@ impl PassSums {
         }
     }
 
-    /// As a shard's file holds them, with the number of the pass: numbers with their least byte first, compressed.
+    /// Encodes the sums and the number of the pass for a shard's file: little-endian, compressed.
     pub(super) fn encode(&self, share: ShardIndex, number: usize) -> io::Result<Vec<u8>> {
         let mut bytes = Vec::new();
         write_whole(&mut bytes, [number as u64]);
@@ -57,8 +56,8 @@ impl PassSums {
         encoder.finish()
     }
 
-    /// Adds what a shard's file holds, and gives the shard's number and how many there are. Sizes of maps are those of
-    /// the charts here and nothing that the file says.
+    /// Adds the sums in a shard's file; returns the shard's number and the number of shards. Sizes of maps are those of
+    /// the charts, never those in the file.
     pub(super) fn add_encoded(
         &mut self,
         number: usize,
@@ -82,7 +81,7 @@ impl PassSums {
     }
 }
 
-/// Something that no shard writes.
+/// The error for data that no shard writes.
 fn damaged(what: &str) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidData, what)
 }
@@ -113,7 +112,7 @@ fn seconds(reader: &mut impl Read) -> io::Result<f64> {
     is_time.then_some(value).ok_or_else(|| damaged("a time is none"))
 }
 
-/// Counts of a report, in the order in which they are written.
+/// Counters of a report, in the order of the file.
 fn counts_of(report: &mut PassReport) -> [&mut u64; 5] {
     [
         &mut report.rays,
@@ -134,7 +133,7 @@ fn write_report(bytes: &mut Vec<u8>, report: &PassReport) {
     }
 }
 
-/// CPU time adds up; shards run side by side, so that the slowest one's time on the wall counts.
+/// CPU times add up. Wall-clock times are maxima, because shards run side by side.
 fn read_report(reader: &mut impl Read, report: &mut PassReport) -> io::Result<()> {
     for count in counts_of(report) {
         *count = checked(count.checked_add(whole(reader)?))?;
@@ -164,7 +163,7 @@ fn write_maps(bytes: &mut Vec<u8>, maps: &ReceiverMaps) {
         write_whole(bytes, [receiver.index() as u64, map.levels().len() as u64]);
         for level in map.levels() {
             write_whole(bytes, [level.width() as u64, level.height() as u64]);
-            // Channel by channel, green and blue as what they differ from red by: of grey light that is nothing.
+            // Channel by channel; green and blue as differences from red, which are 0 for grey light.
             for channel in 0..3 {
                 let base = |texel: &[i64; 3]| if channel > 0 { texel[0] } else { 0 };
                 let differences = level

@@ -10,11 +10,11 @@ use crate::light_pass::shard_index::ShardIndex;
 
 /// Where a pass is computed.
 pub(in crate::bake) enum ShardRole {
-    /// This bake alone.
+    /// This bake computes it.
     Alone,
-    /// This bake, its share.
+    /// This bake computes its share of it.
     Shard { share: ShardIndex, passes: Vec<Vec<u8>> },
-    /// Others have done it.
+    /// Shards have computed it.
     Merge(Merging),
 }
 
@@ -37,17 +37,17 @@ impl ShardRole {
         Self::Merge(Merging { shards, next: 0 })
     }
 
-    /// Whether a bake is cut.
+    /// Whether the bake is split into shards.
     pub(in crate::bake) fn is_cut(&self) -> bool {
         !matches!(self, Self::Alone)
     }
 
-    /// Whether maps are only a part of what they will be.
+    /// Whether maps hold only this shard's part of the light.
     pub(in crate::bake) fn is_shard(&self) -> bool {
         matches!(self, Self::Shard { .. })
     }
 
-    /// The shard of the next pass; `None` if it is not divided.
+    /// This shard's share of the next pass; `None` if the pass is not split.
     pub(in crate::bake) fn share(&self) -> Option<ShardIndex> {
         match self {
             Self::Shard { share, passes } => Some(share.shifted(passes.len() as u64)),
@@ -55,7 +55,7 @@ impl ShardRole {
         }
     }
 
-    /// Writes down what a shard did.
+    /// Records the sums of a shard's pass.
     pub(in crate::bake) fn note(&mut self, sums: &PassSums) -> Result<()> {
         if let Self::Shard { share, passes } = self
             && !sums.report.cancelled
@@ -72,7 +72,7 @@ impl ShardRole {
         Ok(())
     }
 
-    /// What a shard did.
+    /// The recorded passes of a shard.
     pub(super) fn into_passes(self) -> Vec<Vec<u8>> {
         match self {
             Self::Shard { passes, .. } => passes,
@@ -80,7 +80,7 @@ impl ShardRole {
         }
     }
 
-    /// Whether shards have sums of no other passes than those that were asked for.
+    /// Checks that no shard has passes that the bake did not ask for.
     pub(super) fn finish(&self) -> Result<()> {
         let Self::Merge(merging) = self else {
             return Ok(());
@@ -98,7 +98,7 @@ impl Merging {
     /// The sum of the next pass over all shards.
     ///
     /// # Errors
-    /// A shard that has no such pass, or whose sums are damaged.
+    /// A shard without such a pass or with damaged sums; shards that are missing or given twice.
     pub(in crate::bake) fn pass(&mut self, chart_for: &ChartFor, mut sums: PassSums) -> Result<PassSums> {
         let number = self.next;
         self.next += 1;

@@ -9,8 +9,8 @@ use crate::error::Warning;
 use crate::illumination::{Chart, UvSet};
 use crate::scene::{Glb, Mesh, Scene};
 
-/// Gives the primitive of a chart's surface the coordinates of its map, where they are not its own. Vertices are doubled
-/// where charts part. The n of their TEXCOORD_n; `None` where the node's transform cannot be undone.
+/// Adds a map's coordinates to the primitive of its surface, unless it uses the primitive's own. Vertices are split at
+/// chart borders. Returns the n of their TEXCOORD_n; `None` if the node's transform cannot be inverted.
 pub fn write(
     glb: &mut Glb,
     scene: &Scene,
@@ -73,7 +73,7 @@ pub fn write(
     );
     let skin = format!("/nodes/{}/skin", object.node);
     if glb.json.pointer(&skin).is_some() {
-        // Its joints would bend once more what is written as they bent it.
+        // Positions are written as the joints deformed them: a skin would do so again.
         glb.remove(&skin);
         warnings.push(Warning::new(
             format!("surface `{}`", object.name),
@@ -89,18 +89,18 @@ pub fn write(
         fields.shift_remove("mode");
         fields.shift_remove("targets");
         if let Some(extensions) = fields.get_mut("extensions").and_then(Value::as_object_mut) {
-            // Its data is written out now.
+            // Its data is now written uncompressed.
             extensions.shift_remove("KHR_draco_mesh_compression");
         }
     }
     Some(tex_coord)
 }
 
-/// A mesh whose vertices have one map coordinate each.
+/// A mesh with one map coordinate per vertex.
 struct SplitMesh {
-    /// Which vertex of the mesh each one is, and its coordinate.
+    /// Original vertex and map coordinate of each vertex.
     vertices: Vec<(usize, DVec2)>,
-    /// Three per triangle.
+    /// Vertices of the triangles, three each.
     corners: Vec<u32>,
 }
 
@@ -112,7 +112,7 @@ impl SplitMesh {
             corners: Vec::new(),
         };
         for (triangle, uvs) in mesh.triangles.iter().zip(&chart.corner_uvs) {
-            // A node that mirrors turns triangles around; the file has them as they were before.
+            // A mirroring node reversed the triangles; the file has their original order.
             let order = if is_mirrored { [0, 2, 1] } else { [0, 1, 2] };
             for corner in order {
                 let (vertex, uv) = (triangle[corner], uvs[corner]);
@@ -129,8 +129,8 @@ impl SplitMesh {
     }
 }
 
-/// Adds the mesh's own sets as far as its material uses them, and the generated one, as TEXCOORD_1 where that is free.
-/// Sets have to be numbered without a gap; a mesh without any has the generated one as its first too.
+/// Adds the UV sets of the mesh that its material uses, and the generated one, as TEXCOORD_1 if that is free. Sets have
+/// to be numbered without gaps, so a mesh without any gets the generated one as TEXCOORD_0 too.
 fn add_sets(
     glb: &mut Glb,
     mesh: &Mesh,
@@ -161,7 +161,7 @@ fn add_sets(
     tex_coord
 }
 
-/// The highest set of texture coordinates that anything in a material names.
+/// The highest UV set that a material refers to.
 fn highest_set(material: &Value) -> u64 {
     match material {
         Value::Object(fields) => {
@@ -173,7 +173,7 @@ fn highest_set(material: &Value) -> u64 {
     }
 }
 
-/// Takes over what else the vertices have: tangents, colours. Those of a mesh that was repaired on loading are lost.
+/// Copies the other vertex attributes: tangents, colours. Those of a mesh that was repaired on loading are lost.
 fn keep_others(
     glb: &mut Glb,
     name: &str,
@@ -208,7 +208,7 @@ fn keep_others(
     }
 }
 
-/// An accessor with its elements in the order of the new vertices; `None` if it cannot be read.
+/// Copies an accessor in the order of the new vertices; `None` if it cannot be read.
 fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &SplitMesh) -> Option<usize> {
     let stated = glb.json["accessors"].get(accessor)?.clone();
     if stated.get("sparse").is_some() || stated["count"].as_u64()? != vertices as u64 {
@@ -228,7 +228,7 @@ fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &SplitMesh)
     for &(vertex, _) in &parted.vertices {
         let from = start.checked_add(vertex.checked_mul(stride)?)?;
         bytes.extend(glb.binary().get(from..from.checked_add(element)?)?);
-        // Elements of vertices begin at multiples of four bytes.
+        // Vertex elements are aligned to four bytes.
         bytes.resize(bytes.len().next_multiple_of(4), 0);
     }
     let view = glb.push_view(&bytes);

@@ -12,24 +12,24 @@ use crate::scene::Scene;
 use crate::settings::LayerKind;
 use crate::units::LUMENS_PER_WATT;
 
-/// Texels around a triangle that take its colours.
+/// Distance from a triangle within which texels take its colours [texels].
 const MARGIN_TEXELS: f64 = 2.0;
 
-/// An image of a map.
+/// A map as an image.
 pub struct LightImage {
-    /// The file's bytes.
+    /// The encoded file.
     pub png: Vec<u8>,
-    /// What its white stands for, > 0.
+    /// Value of the image's white, > 0.
     pub white: f64,
     /// Texels with a channel above white.
     pub cut_texels: usize,
-    /// Share of all light that was above white.
+    /// Share of the light above white.
     pub cut_share: f64,
     /// Texels with a channel below 0.
     pub negative_texels: usize,
 }
 
-/// What an image of a map holds, texel by texel of a dense map, in the unit of the export.
+/// The light in a map's image, per texel of a dense map, in the unit of the export.
 pub fn light_of(
     map: &IlluminationMap,
     layers: &[LayerKind],
@@ -60,7 +60,7 @@ pub fn light_of(
     sent.map(|(light, albedo)| light * albedo * factor).collect()
 }
 
-/// Albedo of the surface under each texel and those beside it.
+/// Albedo of the surface at each texel, extended beyond its borders.
 fn albedo(scene: &Scene, chart: &Chart) -> Vec<LinearSrgb> {
     let object = &scene.objects[chart.object()];
     let material = scene.material_of(chart.object());
@@ -85,12 +85,12 @@ fn albedo(scene: &Scene, chart: &Chart) -> Vec<LinearSrgb> {
     nearest.iter().map(of_texel).collect()
 }
 
-/// The triangle that is nearest to a texel's centre.
+/// The triangle nearest to a texel's centre.
 #[derive(Clone, Copy)]
 struct Nearest {
-    /// How far outside the centre lies [texels].
+    /// Distance of the centre from the triangle [texels]; 0 inside.
     outside: f64,
-    /// Which, and the centre's barycentric coordinates.
+    /// The triangle, and barycentric coordinates of the centre.
     place: Option<(usize, [f64; 3])>,
 }
 
@@ -103,7 +103,7 @@ impl Default for Nearest {
     }
 }
 
-/// Gives the texels in and around a triangle their places on it, where none is nearer.
+/// Assigns a triangle to the texels in and around it that have no nearer one.
 fn spread(chart: &Chart, corners: [DVec2; 3], triangle: usize, nearest: &mut [Nearest]) {
     let size = DVec2::new(chart.width as f64, chart.height as f64);
     let [a, b, c] = corners.map(|corner| corner * size);
@@ -121,7 +121,7 @@ fn spread(chart: &Chart, corners: [DVec2; 3], triangle: usize, nearest: &mut [Ne
                 (a - c).perp_dot(centre - c) / doubled,
                 (b - a).perp_dot(centre - a) / doubled,
             ];
-            // Each share falls to 0 at a side, over the height above it.
+            // A barycentric coordinate times the height of its corner is the distance from the opposite side.
             let heights = [(b, c), (c, a), (a, b)].map(|(from, to)| doubled.abs() / from.distance(to));
             let depths = shares
                 .into_iter()
@@ -137,10 +137,10 @@ fn spread(chart: &Chart, corners: [DVec2; 3], triangle: usize, nearest: &mut [Ne
     }
 }
 
-/// Encodes what [`light_of`] gave for a map of a size [texels].
+/// Encodes the texels of [`light_of`] as an image of a size [texels].
 ///
 /// # Errors
-/// Sizes that the format cannot hold; `name` is named.
+/// A size that the format cannot hold; `name` is named in the error.
 pub fn encode(
     light: &[LinearSrgb],
     (width, height): (usize, usize),
@@ -194,11 +194,11 @@ where
     })
 }
 
-/// Codes of eight bits for values in [0, 1], row by row. What a code is off is made up for by those beside and below
-/// (Floyd and Steinberg 1976), in linear light, so that means over a few texels are right however dark they are.
+/// Encodes values in [0, 1] with eight bits, row by row. The error of each code is diffused to its neighbours (Floyd
+/// and Steinberg 1976) in linear light, so that means over a few texels are right however dark they are.
 fn diffused(values: &[[f64; 3]], width: usize) -> Vec<u8> {
     let mut codes = Vec::with_capacity(3 * values.len());
-    // One more at each side takes what goes over the border.
+    // One entry more on each side takes what is diffused across the border.
     let mut below = vec![[0.0; 3]; width + 2];
     for row in values.chunks(width) {
         let here = std::mem::replace(&mut below, vec![[0.0; 3]; width + 2]);

@@ -22,54 +22,55 @@ mod images;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Carrier {
-    /// MOZ_lightmap: the irradiance, which the program multiplies by the albedo.
+    /// MOZ_lightmap: irradiance, which the program multiplies by the albedo.
     LightMap,
-    /// The light that the surface sends on, as its emission.
+    /// Light that the surface reflects, as its emission.
     Emissive,
-    /// The picture of that light, as the colour of a KHR_materials_unlit material.
+    /// Light that the surface reflects, as the colour of a KHR_materials_unlit material.
     Unlit,
 }
 
-/// What becomes of the scene's own lights. A file that had both them and their light in its maps would be lit twice.
+/// What becomes of the scene's own lights. With lights in the file and their direct light in the maps, it would be lit
+/// twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum SceneLights {
-    /// They stay; maps hold what they cannot give, the caustic layer alone.
+    /// Lights stay; maps hold only the caustic layer, which programs cannot compute.
     Keep,
-    /// They go; maps hold every layer that was baked.
+    /// Lights are removed; maps hold every layer that was baked.
     Remove,
 }
 
-/// How many bits a channel of an image has.
+/// Bits per channel of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Bits {
-    /// What browsers read: with errors diffused, so that means over some texels are right.
+    /// What browsers read. Errors are diffused, so that means over some texels are right.
     #[serde(rename = "8")]
     Eight,
-    /// Steps of 1/65535, for programs that read all of them.
+    /// Steps of 1/65535, for programs that read all 16 bits.
     #[serde(rename = "16")]
     Sixteen,
 }
 
-/// How a scene is written.
+/// Options of the export.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct GlbOptions {
     /// How materials carry the light.
     pub carrier: Carrier,
-    /// What the maps' numbers mean. An emission is never E or lux: it is the same by π.
+    /// Meaning of the maps' values. Emission is never E or lux, but either of them divided by π.
     pub quantity: Quantity,
     /// What becomes of the lights.
     pub lights: SceneLights,
-    /// How many bits a channel has.
+    /// Bits per channel.
     pub bits: Bits,
-    /// Share of a map's light that its brightest texels may lose so that dim ones have finer steps, [0, 1).
+    /// Share of a map's light that may clip in its brightest texels, for finer steps in dim ones, [0, 1).
     pub cut: f64,
-    /// Of unlit pictures: what is multiplied by 2 to this power before it is shown [stops].
+    /// Unlit pictures are multiplied by 2 to this power [stops].
     pub exposure_stops: f64,
 }
 
 impl Default for GlbOptions {
-    /// Light maps in lux that browsers read, in place of the scene's lights.
+    /// Light maps in lux, readable by browsers, instead of the scene's lights.
     fn default() -> Self {
         Self {
             carrier: Carrier::LightMap,
@@ -91,28 +92,28 @@ pub struct ExportedMap {
     pub node: usize,
     /// Index of the primitive within the node's mesh.
     pub primitive: usize,
-    /// Which coordinates the map follows.
+    /// UV set of the map.
     pub tex_coord: usize,
-    /// The value of the image's white, in the export's unit.
+    /// Value of the image's white, in the export's unit.
     pub intensity: f64,
-    /// Texels of which some channel was above that.
+    /// Texels with a channel above white.
     pub cut_texels: usize,
-    /// Share of the map's light that was above that.
+    /// Share of the map's light above white.
     pub cut_share: f64,
     /// Texels with a channel below 0 (colours outside of sRGB), which became 0.
     pub negative_texels: usize,
 }
 
-/// What was written, beside the file's bytes.
+/// Report of an export.
 #[derive(Clone, Debug, Serialize)]
 pub struct GlbReport {
-    /// Of the file [bytes].
+    /// Size of the file [bytes].
     pub bytes: usize,
-    /// How.
+    /// Options of the export.
     pub options: GlbOptions,
     /// Unit of the maps' values.
     pub unit: &'static str,
-    /// The layers in the maps.
+    /// Layers in the maps.
     pub layers: Vec<LayerKind>,
     /// One per surface.
     pub maps: Vec<ExportedMap>,
@@ -120,10 +121,10 @@ pub struct GlbReport {
     pub warnings: Vec<Warning>,
 }
 
-/// Writes a scene with its maps as one `.glb` that needs no other file.
+/// Writes a scene with its maps as one self-contained `.glb`.
 ///
 /// # Errors
-/// As [`encode`]; a scene's file that cannot be read again; a place that cannot be written.
+/// As [`encode`]; a scene whose file cannot be read again; output that cannot be written.
 pub fn write(
     scene: &Scene,
     maps: &[IlluminationMap],
@@ -136,10 +137,10 @@ pub fn write(
     Ok(report)
 }
 
-/// The bytes of a `.glb` of a scene with its maps, and a report.
+/// Encodes a scene with its maps as `.glb`, with a report.
 ///
 /// # Errors
-/// Maps that lack the layer which the lights leave to them; a scene whose file cannot be taken up; more than 4 GiB.
+/// Maps without any layer to write; a scene whose file cannot be extended; more than 4 GiB.
 pub fn encode(
     scene: &Scene,
     opened: Opened,
@@ -194,7 +195,7 @@ pub fn encode(
     Ok((bytes, report))
 }
 
-/// The layers that are written, in their order.
+/// The layers to write, in order.
 fn layers_of(scene: &Scene, maps: &[IlluminationMap], options: GlbOptions) -> Result<Vec<LayerKind>> {
     let mut kinds: Vec<LayerKind> = maps
         .iter()
@@ -215,7 +216,7 @@ fn layers_of(scene: &Scene, maps: &[IlluminationMap], options: GlbOptions) -> Re
     Ok(kinds)
 }
 
-/// The maps that materials can carry: those of the side that is drawn.
+/// The maps that materials can carry, those of front sides; warns about the others.
 fn front_maps<'a>(
     maps: &'a [IlluminationMap],
     scene: &Scene,
@@ -272,7 +273,7 @@ fn add_map(
 }
 
 impl Glb {
-    /// Gives each of these nodes a mesh of its own where others share it: their light differs.
+    /// Gives each of these nodes a mesh of its own if others share it, because their light differs.
     fn push_own_meshes(&mut self, nodes: BTreeSet<usize>) {
         let mut users: BTreeMap<u64, usize> = BTreeMap::new();
         for node in self.json["nodes"].as_array().into_iter().flatten() {
@@ -303,7 +304,7 @@ impl Glb {
 
 const LISTS: [&str; 2] = ["KHR_lights_punctual", "EXT_lights_area"];
 
-/// Removes every light that stands at a node, and their lists. What glows stays: it is seen.
+/// Removes all lights at nodes, and their lists. Emissive surfaces stay, because they are visible.
 fn remove_lights(glb: &mut Glb) {
     let nodes = glb.json["nodes"].as_array().map_or(0, Vec::len);
     let nodes = (0..nodes).map(|node| format!("/nodes/{node}/extensions"));
@@ -321,7 +322,7 @@ fn remove_lights(glb: &mut Glb) {
     }
 }
 
-/// glTF has no empty lists and objects.
+/// Removes an empty list or object, which glTF does not allow.
 fn remove_empty(glb: &mut Glb, pointer: &str) {
     let found = glb.json.pointer(pointer);
     if found.is_some_and(|found| *found == json!({}) || *found == json!([])) {
@@ -333,8 +334,8 @@ const LIGHT_MAP: &str = "MOZ_lightmap";
 const STRENGTH: &str = "KHR_materials_emissive_strength";
 const UNLIT: &str = "KHR_materials_unlit";
 
-/// Gives a primitive a material of its own that carries the light of a texture. Colours and textures of the one that it
-/// had stay, but for those that are part of the texture. `intensity`: the value of the texture's white, in the export's unit.
+/// Gives a primitive a material of its own that carries the light of a texture. Colours and textures of its old
+/// material stay, unless they are part of the texture. `intensity`: value of the texture's white, in the export's unit.
 fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64, options: GlbOptions) {
     let index = glb.primitive(place)["material"].as_u64();
     let mut material = index.map_or(json!({}), |index| glb.json["materials"][index as usize].clone());
@@ -352,7 +353,7 @@ fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64
             material["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
             material["extensions"][STRENGTH] = json!({ "emissiveStrength": intensity });
             if options.lights == SceneLights::Remove {
-                // Any light that a program adds would be light twice.
+                // Lights that a program adds would light it twice.
                 material["pbrMetallicRoughness"] =
                     json!({ "baseColorFactor": black, "metallicFactor": 0.0, "roughnessFactor": 1.0 });
             }
@@ -361,7 +362,7 @@ fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64
             material["pbrMetallicRoughness"] =
                 json!({ "baseColorTexture": texture, "metallicFactor": 0.0, "roughnessFactor": 1.0 });
             material["extensions"] = json!({ UNLIT: {} });
-            // They are in the texture already.
+            // Vertex colours are part of the texture already.
             if let Some(attributes) = glb.primitive(place)["attributes"].as_object_mut() {
                 attributes.remove("COLOR_0");
             }

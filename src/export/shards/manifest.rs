@@ -1,4 +1,4 @@
-//! `shard.json`.
+//! `shard.json`: identifies a shard and its bake, and describes the sums beside it.
 
 use std::path::{Path, PathBuf};
 
@@ -18,28 +18,28 @@ const SCHEMA: u32 = 4;
 /// Name of the file in its folder.
 pub(super) const FILE_NAME: &str = "shard.json";
 
-/// Largest one that is read [bytes].
+/// Maximum size of the file [bytes].
 const MAX_BYTES: u64 = 64 << 20;
 
-/// What the user named as the scene, and how it was read.
+/// The scene as the user named it, and how it was loaded.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneOrigin {
-    /// A path as given or `builtin:NAME`.
+    /// Path as the user gave it, or `builtin:NAME`.
     pub source: String,
-    /// Whether a sun was to be added to a scene without light.
+    /// Whether a scene without light gets a sun.
     pub default_light: bool,
-    /// Whether transmissive materials without a volume were taken for solid glass.
+    /// Whether closed transmissive meshes without a volume count as solid glass.
     pub solid_glass: bool,
-    /// Image around the scene.
+    /// Environment image.
     pub environment: Option<PathBuf>,
 }
 
-/// Which shard it is.
+/// Number of a shard among all.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ShardNumber {
-    /// From 1 on.
+    /// Counted from 1.
     pub number: u32,
-    /// How many there are.
+    /// Number of shards.
     pub count: u32,
 }
 
@@ -48,12 +48,12 @@ pub struct ShardNumber {
 pub struct StoredPass {
     /// Length [bytes].
     pub bytes: u64,
-    /// Of these bytes.
+    /// Hash of these bytes.
     pub hash: String,
 }
 
 impl StoredPass {
-    /// What is said of some sums.
+    /// Length and hash of some sums.
     pub(super) fn of(sums: &[u8]) -> Self {
         let mut hash = ContentHash::default();
         sums.iter().for_each(|&byte| hash.take(u64::from(byte)));
@@ -73,22 +73,22 @@ pub struct ShardManifest {
     pub program_version: String,
     /// Which shard it is.
     pub shard: ShardNumber,
-    /// Of the whole bake.
+    /// Settings of the whole bake.
     pub settings: BakeSettings,
-    /// What was baked.
+    /// Scene of the bake.
     pub scene: SceneOrigin,
-    /// Of all that light meets there.
+    /// Hash of everything in the scene that light depends on.
     pub scene_hash: String,
-    /// One after the other.
+    /// In the order of the bake.
     pub passes: Vec<StoredPass>,
     /// Wall-clock seconds.
     pub timings_s: Timings,
-    /// Seconds of the process's CPU clock.
+    /// CPU seconds of the process.
     pub cpu_s: Timings,
 }
 
 impl ShardManifest {
-    /// Of the shard of a bake.
+    /// Manifest of a shard of a bake.
     pub fn new(
         scene: &Scene,
         origin: SceneOrigin,
@@ -112,10 +112,10 @@ impl ShardManifest {
         }
     }
 
-    /// Reads that of a folder.
+    /// Reads the manifest in a folder.
     ///
     /// # Errors
-    /// No such file, one of another kind or version.
+    /// No such file; one of another kind or version.
     pub(super) fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(FILE_NAME);
         if folder.is_dir() && !path.exists() {
@@ -142,7 +142,7 @@ impl ShardManifest {
         serde_json::from_value(document).map_err(|error| refused(format!("is damaged ({error})")))
     }
 
-    /// What tells this shard's bake from that of another one; `None` where they are of the same.
+    /// How this shard's bake differs from another one's; `None` if both are of the same bake.
     pub(super) fn difference(&self, other: &Self) -> Option<String> {
         let differs = |what: &str, own: &str, others: &str| Some(format!("{what} {own} and not {others}"));
         if self.program_version != other.program_version {
@@ -169,17 +169,17 @@ impl ShardManifest {
     }
 }
 
-/// The hash of a scene, as text.
+/// Hash of a scene as text.
 pub(super) fn hash_of(scene: &Scene) -> String {
     format!("{:016x}", scene.content_hash())
 }
 
-/// Settings without what each shard may have of its own.
+/// The settings that all shards have to share.
 fn common_settings(settings: &BakeSettings) -> serde_json::Value {
     let common = BakeSettings {
         threads: 0,
         ..settings.clone()
     };
-    // Settings are numbers, names and lists: all of them are JSON.
+    // Cannot fail: settings are numbers, names and lists.
     serde_json::to_value(common).unwrap_or_default()
 }

@@ -10,7 +10,7 @@ use crate::files::{self, OutputFolder, StagedFolder};
 use crate::light_pass::shard_index::ShardIndex;
 use crate::scene::Scene;
 
-/// Shards that are named one by one where they are missing.
+/// Maximum number of missing shards that are named one by one.
 const MAX_NAMED: usize = 8;
 
 /// The folders of all shards of one bake.
@@ -29,7 +29,7 @@ struct Shard {
 }
 
 impl Shard {
-    /// Nothing is taken on trust of the sums' lengths.
+    /// Opens a shard whose file is as long as its manifest states.
     fn open(folder: &Path) -> Result<Self> {
         let manifest = ShardManifest::read(folder)?;
         let path = folder.join(SUMS);
@@ -58,10 +58,11 @@ impl Shard {
 }
 
 impl ShardSet {
-    /// Reads what the shards in some folders are, and that they are all shards of one bake.
+    /// Reads the manifests of the shards, and checks that they are all the shards of one bake.
     ///
     /// # Errors
-    /// A folder without a shard, a torn one; shards of different bakes or program versions, one twice, one missing.
+    /// A folder without a shard; a damaged shard; shards of different bakes or program versions, given twice, or
+    /// missing.
     pub fn open(folders: &[PathBuf]) -> Result<Self> {
         let shards: Vec<Shard> = folders
             .iter()
@@ -100,7 +101,7 @@ impl ShardSet {
         Ok(set)
     }
 
-    /// There is at least one.
+    /// The first shard; there is at least one.
     fn first(&self) -> &Shard {
         &self.shards[0]
     }
@@ -141,12 +142,12 @@ impl ShardSet {
         ))
     }
 
-    /// What the shards have in common: that of the first one.
+    /// What the shards have in common: the manifest of the first.
     pub fn manifest(&self) -> &ShardManifest {
         &self.first().manifest
     }
 
-    /// Refuses a scene that the shards are not of.
+    /// Refuses a scene other than that of the shards.
     ///
     /// # Errors
     /// Another scene.
@@ -202,7 +203,7 @@ impl ShardSource for ShardSet {
     }
 }
 
-/// A folder that a shard may be written to.
+/// An output folder for a shard.
 #[derive(Debug)]
 pub struct ShardFolder {
     root: OutputFolder,
@@ -211,8 +212,8 @@ pub struct ShardFolder {
 }
 
 impl ShardFolder {
-    /// Opens, or makes, the folder and tries to write there. The same shard's folder is written anew; any other one that
-    /// is not empty is taken only with `force`.
+    /// Opens or creates the folder, and checks that it can be written. The same shard is replaced; a folder with other
+    /// files is taken only with `force`.
     ///
     /// # Errors
     /// A place that cannot be written; other files or another shard in it.
@@ -226,10 +227,10 @@ impl ShardFolder {
         Ok(Self { root, force, number })
     }
 
-    /// Writes both files, or neither.
+    /// Writes both files or neither.
     ///
     /// # Errors
-    /// A disk that is full, a place that cannot be written any more; another shard that was written there meanwhile.
+    /// A full disk; a place that can no longer be written; another shard that was written there in the meantime.
     pub fn write(self, manifest: &ShardManifest, sums: &ShardSums) -> Result<()> {
         holds(self.root.path(), self.number, self.force)?;
         let json = files::to_json(manifest, &self.root.path().display().to_string())?;
@@ -240,7 +241,7 @@ impl ShardFolder {
     }
 }
 
-/// Whether this very shard lies there; an error where another one does, unless by force.
+/// Whether the folder holds this shard; an error if it holds another one, unless `force` is set.
 fn holds(path: &Path, number: ShardNumber, force: bool) -> Result<bool> {
     match ShardManifest::read(path).map(|found| found.shard) {
         Ok(other) if other != number && !force => Err(Error::failure(

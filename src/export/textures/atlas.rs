@@ -5,14 +5,14 @@ use crunch::{Item, PackedItem, Rect, Rotation};
 use super::index::Rectangle;
 use crate::error::{Error, Result};
 
-/// How an atlas is laid out.
+/// Layout of an atlas.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct AtlasOptions {
-    /// Longest side of a texture [texels], > 0.
+    /// Maximum side of a texture [texels], > 0.
     pub most_side: usize,
-    /// Texels around each map that go on with those at its border.
+    /// Texels around each map that repeat its border.
     pub gutter: usize,
-    /// Rectangles begin at multiples of this [texels].
+    /// Rectangles are aligned to multiples of this [texels].
     pub grid: usize,
 }
 
@@ -23,14 +23,14 @@ pub struct Page {
     pub width: usize,
     /// Texels down.
     pub height: usize,
-    /// Which maps are in it, and where their texels are, without the gutter.
+    /// Maps in it by index, and where their texels are, without the gutter.
     pub places: Vec<(usize, Rectangle)>,
 }
 
-/// Places maps of some sizes, each with its gutter, in as few textures as were found, with sides of powers of two.
+/// Packs maps of some sizes, each with its gutter, into few textures with sides of powers of two.
 ///
 /// # Errors
-/// A map that is larger than a texture may be; `name` gives what it is called.
+/// A map that is larger than the maximum texture; `name` gives its name.
 pub fn pack(
     sizes: &[(usize, usize)],
     options: AtlasOptions,
@@ -84,7 +84,7 @@ pub fn pack(
     Ok(pages)
 }
 
-/// Squares and halves of squares with sides of powers of two, the smallest first.
+/// Squares and half squares with sides of powers of two, smallest first.
 fn shapes(most_side: usize) -> Vec<(usize, usize)> {
     let sides = (0..usize::BITS).map(|power| 1 << power);
     let sides = sides.take_while(|side| *side <= most_side);

@@ -8,15 +8,15 @@ use rayon::prelude::*;
 
 use super::texels::Texels;
 
-/// Texels along the side of a block, and its bytes.
+/// Side of a block [texels], and its size [bytes].
 const SIDE: usize = 4;
 const BLOCK_BYTES: usize = 16;
 
-/// The largest value: the largest half.
+/// Largest value: that of a half.
 pub const MOST: f32 = 65504.0;
 
-/// Blocks, row by row, and the values that they stand for. Where a size is no multiple of four, the last blocks go on with
-/// the last texels.
+/// Encodes blocks row by row, and returns the values that they decode to. If a side is no multiple of four, its last
+/// texels are repeated.
 pub fn pack(texels: &Texels) -> (Vec<u8>, Vec<[f32; 3]>) {
     let (width, height) = texels.size();
     let across = width.div_ceil(SIDE);
@@ -36,7 +36,7 @@ pub fn pack(texels: &Texels) -> (Vec<u8>, Vec<[f32; 3]>) {
     (bytes, stored)
 }
 
-/// The values of a block that begins at a column, in four rows or fewer of a width.
+/// Decodes a block that begins at a column, into four rows or fewer of a width.
 fn unpack(block: &[u8; BLOCK_BYTES], first: usize, rows: &mut [[f32; 3]], width: usize) {
     let mut values = [f16::ZERO; 3 * SIDE * SIDE];
     decode_block_bc6h(block, &mut values, 3 * SIDE, false);
@@ -48,7 +48,7 @@ fn unpack(block: &[u8; BLOCK_BYTES], first: usize, rows: &mut [[f32; 3]], width:
     }
 }
 
-/// Four rows from one on as halves with alpha, of a width of whole blocks.
+/// Four rows, from `first` on, as halves with alpha, padded to whole blocks.
 fn padded_rows(texels: &Texels, first: usize, padded: usize) -> Vec<f16> {
     let (width, height) = texels.size();
     let mut halves = Vec::with_capacity(4 * SIDE * padded);

@@ -7,37 +7,37 @@ use crate::settings::LayerKind;
 
 use super::index::PlacedMap;
 
-/// Share of a layer's light that rounding may leave out of the parts of lights.
+/// Share of a map's light by which rounding may change the sum of the lights' parts.
 const ROUNDING: f64 = 1e-4;
 
-/// Which light textures hold.
+/// Light that textures hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
-    /// All layers that were baked, summed.
+    /// Sum of all layers that were baked.
     Sum,
     /// One layer.
     Layer(LayerKind),
-    /// Each layer in a texture of its own.
+    /// Each layer in its own texture.
     EachLayer,
-    /// Each light in a texture of its own, its parts of all layers summed.
+    /// Each light in its own texture, summed over its layers.
     EachLight,
 }
 
 /// The light of one texture.
 #[derive(Clone, Debug)]
 pub struct TextureLight {
-    /// Layers whose sum it is.
+    /// Layers in the sum.
     pub layers: Vec<LayerKind>,
-    /// Of one light alone.
+    /// Name of the light, if it is one alone.
     pub light: Option<String>,
-    /// Part of the file's name; empty for the sum.
+    /// Part of the file name; empty for the sum.
     pub key: String,
     /// E per texel [W/m²].
     pub irradiance: Vec<[f32; 3]>,
 }
 
 impl TextureLight {
-    /// What it is of, with no light and no layer yet.
+    /// A copy without layers and irradiance.
     pub fn without_light(&self) -> Self {
         Self {
             layers: Vec::new(),
@@ -47,7 +47,7 @@ impl TextureLight {
         }
     }
 
-    /// What the file's name ends in.
+    /// End of the file name.
     pub fn suffix(&self) -> String {
         match self.key.as_str() {
             "" => String::new(),
@@ -55,7 +55,7 @@ impl TextureLight {
         }
     }
 
-    /// In words, for the file.
+    /// Description for the file.
     pub fn what(&self, maps: &[PlacedMap]) -> String {
         let layers: Vec<&str> = self.layers.iter().map(|layer| layer.name()).collect();
         let surfaces: Vec<&str> = maps.iter().map(|map| map.surface.as_str()).collect();
@@ -86,11 +86,11 @@ impl Content {
         ))
     }
 
-    /// The textures of a map, with a warning of light that is in none of them; none where the map lacks a layer that others
-    /// have, such as the back of a surface.
+    /// The textures of a map, and a warning about light that is in none of them. Empty if the map lacks a layer that
+    /// others have, such as the back of a surface.
     ///
     /// # Errors
-    /// A map that lacks the parts of lights that are asked for.
+    /// A map without the requested parts of lights.
     pub fn parts(self, stored: &StoredMap) -> Result<(Vec<TextureLight>, Option<Warning>)> {
         let map = &stored.map;
         let kinds: Vec<LayerKind> = map.layers.iter().map(|layer| layer.kind).collect();
@@ -134,7 +134,7 @@ fn lacking(stored: &StoredMap, what: impl Into<String>, remedy: &str) -> Error {
     Error::failure(format!("the map of {}", stored.entry.surface), what, remedy)
 }
 
-/// One for each light, in the order of the file.
+/// One texture for each light, in the order of the file.
 fn parts_of_lights(stored: &StoredMap) -> Vec<TextureLight> {
     let mut parts: Vec<TextureLight> = Vec::new();
     for StoredLight { channels, irradiance } in &stored.lights {
@@ -161,7 +161,7 @@ fn parts_of_lights(stored: &StoredMap) -> Vec<TextureLight> {
     parts
 }
 
-/// Says where light is in no light's texture.
+/// The warning about light that is in no light's texture.
 fn rest(stored: &StoredMap, parts: &[TextureLight]) -> Option<Warning> {
     let sum = |values: &[[f32; 3]]| {
         let values = values.as_flattened().iter();

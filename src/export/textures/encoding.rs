@@ -11,17 +11,17 @@ use super::{png16, radiance};
 use crate::error::{Error, Result};
 use crate::export::{FloatImage, Quantity, exr};
 
-/// How numbers between black and white are coded.
+/// Transfer function of integers between black and white.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Transfer {
-    /// IEC 61966-2-1: finer steps where it is dark.
+    /// IEC 61966-2-1, with finer steps in the dark.
     Srgb,
     /// Proportional to light.
     Linear,
 }
 
-/// A kind of file and its variants.
+/// File format and its variant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(tag = "format", rename_all = "lowercase")]
 pub enum Encoding {
@@ -34,36 +34,36 @@ pub enum Encoding {
     /// PNG of 16-bit integers, 0 to 1.
     #[serde(rename = "png 16")]
     Png16 {
-        /// How they are coded.
+        /// Transfer function of the integers.
         transfer: Transfer,
     },
-    /// Radiance: three bytes and an exponent in common.
+    /// Radiance: three bytes and a shared exponent.
     #[serde(rename = "hdr rgbe")]
     Radiance,
-    /// KTX 2.0 for graphics cards, with zstd.
+    /// KTX 2.0 with Zstandard, for graphics cards.
     Ktx2 {
-        /// How texels are packed.
+        /// Texel format.
         packing: Packing,
-        /// Whether it holds all sizes down to one texel, or the image alone.
+        /// Whether to add the mip levels, down to one texel.
         mips: bool,
     },
 }
 
-/// What a file says of itself.
+/// Metadata of a file.
 #[derive(Clone, Debug)]
 pub struct FileMetadata<'a> {
-    /// What its numbers mean.
+    /// Meaning of its numbers.
     pub quantity: Quantity,
-    /// What light was multiplied by: 2 to this power.
+    /// Light was multiplied by 2 to this power [stops].
     pub exposure_stops: f64,
-    /// Which light, on which surfaces.
+    /// Which light, and on which surfaces.
     pub what: String,
-    /// Where it will be, for errors.
+    /// Path of the file, for errors.
     pub location: &'a str,
 }
 
 impl FileMetadata<'_> {
-    /// One sentence.
+    /// All of it in one sentence.
     pub fn comment(&self) -> String {
         format!(
             "{} in {} x 2^{}, linear sRGB primaries; row 0 is v = 0",
@@ -74,19 +74,19 @@ impl FileMetadata<'_> {
     }
 }
 
-/// A file and what is read of it.
+/// A file, and the values that it decodes to.
 #[derive(Clone, Debug)]
 pub struct Encoded {
     /// The whole file.
     pub bytes: Vec<u8>,
-    /// The values that a reader gets, row by row.
+    /// Values that a reader gets, row by row.
     pub stored: Vec<[f32; 3]>,
-    /// How many sizes of the image it holds.
+    /// Number of mip levels.
     pub levels: usize,
 }
 
 impl Encoding {
-    /// Of its files' names.
+    /// Extension of file names.
     pub fn extension(self) -> &'static str {
         match self {
             Self::Half | Self::Float => "exr",
@@ -96,7 +96,7 @@ impl Encoding {
         }
     }
 
-    /// The largest value that it holds.
+    /// Largest value that the format holds.
     pub fn most(self) -> f32 {
         match self {
             Self::Half => f16::MAX.to_f32(),
@@ -107,7 +107,7 @@ impl Encoding {
         }
     }
 
-    /// How maps lie side by side: the borders of blocks are theirs, too.
+    /// Layout of an atlas; no two maps share a compression block.
     pub fn atlas_options(self, most_side: usize) -> AtlasOptions {
         let (gutter, grid) = match self {
             Self::Ktx2 {
@@ -123,7 +123,7 @@ impl Encoding {
         }
     }
 
-    /// As people call it.
+    /// Name in messages.
     fn name(self) -> &'static str {
         match self {
             Self::Half => "a half float",
@@ -141,10 +141,10 @@ impl Encoding {
         }
     }
 
-    /// The bytes of a file of a texture.
+    /// Encodes a texture as a file.
     ///
     /// # Errors
-    /// Light beyond what the format holds, unless it ends at white; sizes that it cannot have.
+    /// Light beyond the range of the format, unless white is chosen to clip; a size that the format cannot hold.
     pub fn encode(self, texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
         self.check_range(texels, notes)?;
         match self {
@@ -175,7 +175,7 @@ impl Encoding {
         }
     }
 
-    /// Nothing is clamped but at a white that was chosen.
+    /// Refuses values that would be clamped, except above a chosen white.
     fn check_range(self, texels: &Texels, notes: &FileMetadata<'_>) -> Result<()> {
         let (most, peak) = (self.most(), texels.peak());
         if matches!(self, Self::Png16 { .. }) || peak <= most {

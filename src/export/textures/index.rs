@@ -15,7 +15,7 @@ pub const SCHEMA: u32 = 1;
 /// Name of the file in its folder.
 pub const FILE_NAME: &str = "index.json";
 
-/// What marks an index of ours.
+/// Marks an index of this program.
 pub const KIND: &str = "nephroid textures";
 
 /// Everything in `index.json`.
@@ -27,19 +27,19 @@ pub struct TextureIndex {
     pub schema: u32,
     /// Version of the program that wrote it.
     pub program_version: &'static str,
-    /// Kind of the files.
+    /// Format of the files.
     pub encoding: Encoding,
     /// `E`, `E/pi`, `lux` or `lux/pi`.
     pub quantity: super::Quantity,
-    /// Its unit; a value of a file is the quantity in that unit times 2^`exposure_stops`.
+    /// Unit of the quantity; a value in a file is the quantity in that unit times 2^`exposure_stops`.
     pub unit: &'static str,
-    /// What values were multiplied by: 2 to this power.
+    /// Values were multiplied by 2 to this power.
     pub exposure_stops: f64,
-    /// Of all values.
+    /// Primaries of all values.
     pub primaries: &'static str,
-    /// Which edge of the images comes first.
+    /// Edge of the images that comes first.
     pub row_0: &'static str,
-    /// The scene that was baked.
+    /// Scene of the maps.
     pub scene: SceneSummary,
     /// Frames per second of a sequence.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -48,20 +48,20 @@ pub struct TextureIndex {
     pub textures: Vec<TextureEntry>,
 }
 
-/// One file.
+/// One texture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TextureEntry {
-    /// Its name, beside the index.
+    /// File name, beside the index.
     pub file: String,
     /// Texels across.
     pub width: usize,
     /// Texels down.
     pub height: usize,
-    /// Sizes of the image in the file, each half of the one before; 1 is the image alone.
+    /// Number of mip levels in the file; 1 is the image alone.
     pub levels: usize,
     /// Layers whose sum it holds.
     pub layers: Vec<LayerKind>,
-    /// The light whose part of them it is; `None`: of all lights.
+    /// The light whose part of them it holds; `None` for all lights.
     pub light: Option<String>,
     /// What the file does not hold.
     pub lost: Loss,
@@ -71,26 +71,26 @@ pub struct TextureEntry {
 /// Where a map lies in a texture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlacedMap {
-    /// The node's name in the scene's file.
+    /// Name of the node in the scene's file.
     pub surface: String,
     /// glTF index of the node.
     pub node: usize,
     /// Index of the primitive within the node's mesh.
     pub primitive: usize,
-    /// Which side's light it holds.
+    /// Side of the surface.
     pub side: Side,
-    /// Which texture coordinates it follows, before [`Rectangle`] places them.
+    /// Texture coordinates of the map, before [`Rectangle`] places them.
     pub uv_set: UvSet,
-    /// The generated ones, beside the index.
+    /// File of generated coordinates, beside the index.
     pub uv_file: Option<String>,
     /// Where its texels are.
     pub rectangle: Rectangle,
-    /// Of a sequence: which frame it is, counted from 1.
+    /// Frame of a sequence, counted from 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame: Option<usize>,
 }
 
-/// A part of a texture. Coordinates (u, v) of a map are (x + u·width, y + v·height) [texels] there.
+/// A part of a texture. Map coordinates (u, v) lie at (x + u·width, y + v·height) [texels].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Rectangle {
     /// Texels from the left.
@@ -104,7 +104,7 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
-    /// All of a texture of a size.
+    /// The whole of a texture.
     pub fn whole((width, height): (usize, usize)) -> Self {
         Self {
             x: 0,
@@ -116,7 +116,7 @@ impl Rectangle {
 }
 
 impl PlacedMap {
-    /// The map of a folder's entry, whose generated coordinates are in a file here.
+    /// Place of a map from a folder; `uv_file` has its generated coordinates.
     pub(super) fn new(
         (reader, entry): (&MapSet<'_>, &MapEntry),
         uv_file: Option<String>,
@@ -136,7 +136,7 @@ impl PlacedMap {
 }
 
 impl TextureIndex {
-    /// Of textures that were made of a folder of maps.
+    /// Index of textures that were made from a folder of maps.
     pub(super) fn new(
         reader: &MapSet<'_>,
         options: TextureOptions,
@@ -161,30 +161,30 @@ impl TextureIndex {
 }
 
 impl TextureEntry {
-    /// Names of its file and of those of its maps' coordinates.
+    /// Names of its file and of its maps' coordinate files.
     pub fn files(&self) -> impl Iterator<Item = &str> {
         let uvs = self.maps.iter().filter_map(|map| map.uv_file.as_deref());
         std::iter::once(self.file.as_str()).chain(uvs)
     }
 }
 
-/// Differences between light and what a reader of its file gets. Texels count once, whichever channel is concerned.
+/// Differences between light and what a reader of its file gets. A texel counts once, whichever channels differ.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Loss {
-    /// Texels above the most that the file holds.
+    /// Texels above the largest value of the file.
     pub above_texels: usize,
-    /// Share of all light that was above it, [0, 1].
+    /// Share of all light above that value, [0, 1].
     pub above_share: f64,
     /// Texels below 0 (colours outside of sRGB) that became 0.
     pub negative_texels: usize,
-    /// Texels with light that was too little for a step and became 0.
+    /// Texels whose light was below the smallest step and became 0.
     pub vanished_texels: usize,
     /// √(mean((stored − light)²)) / mean(light) of luminance, over all texels of the file; 0 without light.
     pub relative_rmse: f64,
 }
 
 impl Loss {
-    /// Compares light with what is read of it, texel by texel; `most` is the largest value that the file holds.
+    /// Compares light with what a reader gets, texel by texel; `most` is the largest value of the file.
     pub fn measure(light: &[[f32; 3]], stored: &[[f32; 3]], most: f32) -> Self {
         let (mut above, mut negative, mut vanished) = (0, 0, 0);
         let (mut all, mut cut, mut squares, mut mean) = (0.0, 0.0, 0.0, 0.0);

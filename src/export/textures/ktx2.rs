@@ -13,21 +13,21 @@ use super::shared_exponent::RGB9E5;
 use super::texels::Texels;
 use crate::error::{Error, Result};
 
-/// How hard zstd tries, 1 to 22: beyond, it gains little on floats.
+/// Compression level, 1 to 22; higher ones gain little on floats.
 const ZSTD_LEVEL: i32 = 12;
 
-/// How texels are packed.
+/// Texel format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Packing {
-    /// Nine bits a channel and one exponent, 32 bits a texel.
+    /// Nine bits per channel and a shared exponent, 32 bits per texel.
     Rgb9e5,
-    /// Blocks of 4 × 4 texels, 8 bits a texel.
+    /// Blocks of 4 × 4 texels, 8 bits per texel.
     Bc6h,
 }
 
 impl Packing {
-    /// The largest value that it holds.
+    /// Largest value that the format holds.
     pub fn most(self) -> f32 {
         match self {
             Self::Rgb9e5 => RGB9E5.most,
@@ -42,7 +42,7 @@ impl Packing {
         }
     }
 
-    /// The bytes of one size of an image, and the values that are read of them.
+    /// Encodes one mip level, and returns the values that it decodes to.
     fn pack(self, texels: &Texels) -> (Vec<u8>, Vec<[f32; 3]>) {
         match self {
             Self::Rgb9e5 => {
@@ -60,10 +60,10 @@ impl Packing {
     }
 }
 
-/// The file: all sizes down to one texel where `mips`, or the image alone. Values below 0 become 0.
+/// Encodes a texture, with all mip levels down to one texel if `mips`. Values below 0 become 0.
 ///
 /// # Errors
-/// Memory that zstd does not get.
+/// Too little memory for zstd.
 pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadata<'_>) -> Result<Encoded> {
     let (packed, stored) = packing.pack(texels);
     let mut images = vec![packed];
@@ -84,7 +84,7 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadat
     let (descriptor, type_size) =
         Basic::from_format(packing.format()).map_err(|error| refused(error.to_string()))?;
     let descriptor = Block::Basic(descriptor);
-    // Its length stands before it.
+    // The descriptor is preceded by its length.
     let mut described = vec![0; 4 + descriptor.serialized_length()];
     let length = described.len() as u32;
     described[..4].copy_from_slice(&length.to_le_bytes());
@@ -114,7 +114,7 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadat
         },
     };
     let mut bytes = header.as_bytes().to_vec();
-    // The index begins with the largest size, the data with the smallest.
+    // The index begins with the largest level, the data with the smallest.
     let mut end = about_at + about.len() + compressed.iter().map(Vec::len).sum::<usize>();
     for (packed, compressed) in images.iter().zip(&compressed) {
         end -= compressed.len();
@@ -135,11 +135,11 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadat
     })
 }
 
-/// Keys and values, by the keys' order.
+/// Key/value data, sorted by key.
 fn about(notes: &FileMetadata<'_>) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (key, value) in [
-        // Columns go right, rows down: (0, 0) is glTF's origin of coordinates.
+        // Columns go right, rows down: (0, 0) is the origin of glTF's texture coordinates.
         ("KTXorientation", "rd".to_owned()),
         (
             "KTXwriter",
@@ -161,7 +161,7 @@ fn about(notes: &FileMetadata<'_>) -> Vec<u8> {
 mod tests {
     use super::*;
 
-    /// Words that Khronos' own dfdutils (`vk2dfd`) make of both formats.
+    /// Expected words as Khronos' own dfdutils (`vk2dfd`) make them for both formats.
     #[test]
     fn descriptors_are_those_of_the_formats() {
         let texels = Texels::black((1, 1));

@@ -33,33 +33,33 @@ pub use self::encoding::{Encoding, Transfer};
 pub use self::index::Loss;
 pub use self::ktx2::Packing;
 
-/// What stored values are multiplied by.
+/// Factor of stored values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exposure {
-    /// 2 to this power [stops], 0 for light as it is.
+    /// 2 to this power [stops]; 0 keeps light as it is.
     Stops(f64),
-    /// The same whole number of stops for all textures, so that none loses more than this share of its light, [0, 1), to
-    /// white = 1.
+    /// The same whole number of stops for all textures, chosen so that none clips more than this share of its light,
+    /// [0, 1), above white = 1.
     Cut(f64),
 }
 
-/// How textures are written.
+/// Options of the export.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TextureOptions {
     /// Kind of file.
     pub encoding: Encoding,
-    /// What the numbers mean.
+    /// Meaning of the numbers.
     pub quantity: Quantity,
-    /// Which light is in them.
+    /// Light in the textures.
     pub content: Content,
-    /// How bright.
+    /// Factor of stored values.
     pub exposure: Exposure,
-    /// Many maps in one texture, whose sides are at most so many texels long; `None`: one file for each.
+    /// Packs many maps into textures with sides of up to so many texels; `None`: one file per map.
     pub atlas_side: Option<usize>,
 }
 
 impl Default for TextureOptions {
-    /// OpenEXR files of half floats, one for each map: all light, in W/m².
+    /// OpenEXR files of half floats, one per map: all light, in W/m².
     fn default() -> Self {
         Self {
             encoding: Encoding::Half,
@@ -71,24 +71,24 @@ impl Default for TextureOptions {
     }
 }
 
-/// What was written.
+/// Report of an export.
 #[derive(Clone, Debug, Serialize)]
 pub struct TextureReport {
-    /// As in the folder.
+    /// The index as written.
     #[serde(flatten)]
     pub index: TextureIndex,
-    /// Of the files, with the index [bytes].
+    /// Size of all files, including the index [bytes].
     pub bytes: u64,
     /// What the textures cannot hold.
     #[serde(skip)]
     pub warnings: Vec<Warning>,
 }
 
-/// Writes all maps of a folder as textures, those of a sequence frame by frame: whole, or nothing at all.
+/// Writes all maps of a folder as textures, those of a sequence frame by frame: all files or none.
 ///
 /// # Errors
-/// Maps that cannot be read or lack the light that was asked for; light that the format cannot hold; a place that cannot
-/// be written; [`Error::cancelled`].
+/// Maps that cannot be read or lack the requested light; light that the format cannot hold; output that cannot be
+/// written; [`Error::cancelled`].
 pub fn write(
     readers: &[MapSet<'_>],
     options: TextureOptions,
@@ -128,10 +128,10 @@ pub fn write(
     })
 }
 
-/// A map with what reads it.
+/// A map and the set that reads it.
 type MapOf<'a> = (&'a MapSet<'a>, &'a MapEntry);
 
-/// What the files of one export have in common.
+/// State that the files of one export share.
 struct Writer<'a> {
     options: TextureOptions,
     exposure_stops: f64,
@@ -164,7 +164,7 @@ impl Writer<'_> {
         Ok(if white > 0.0 { -white.log2().ceil() } else { 0.0 })
     }
 
-    /// One file for each map.
+    /// Writes one file per map.
     fn write_each(&mut self, maps: &[MapOf]) -> Result<Vec<TextureEntry>> {
         let mut textures = Vec::new();
         for &(reader, entry) in maps {
@@ -180,7 +180,7 @@ impl Writer<'_> {
         Ok(textures)
     }
 
-    /// As few files as hold all maps.
+    /// Writes as few files as hold all maps.
     fn write_atlas(&mut self, maps: &[MapOf], most_side: usize) -> Result<Vec<TextureEntry>> {
         let sizes: Vec<(usize, usize)> = maps
             .iter()
@@ -190,7 +190,7 @@ impl Writer<'_> {
         let name = |map: usize| format!("the map of {}", maps[map].1.surface);
         let mut textures = Vec::new();
         for (number, page) in atlas::pack(&sizes, options, name)?.into_iter().enumerate() {
-            // By what they hold.
+            // By the light that they hold.
             let mut sheets: BTreeMap<String, Sheet> = BTreeMap::new();
             for &(map, place) in &page.places {
                 let (reader, entry) = maps[map];
@@ -221,7 +221,7 @@ impl Writer<'_> {
         Ok(textures)
     }
 
-    /// Copies the coordinates that were made for a map; `None` where it follows the scene's own.
+    /// Copies a map's generated coordinates; `None` if it uses the scene's own.
     fn put_coordinates(&mut self, reader: &MapSet<'_>, entry: &MapEntry) -> Result<Option<String>> {
         let bytes = reader.read_coordinates(entry)?;
         bytes
@@ -235,13 +235,13 @@ impl Writer<'_> {
         Ok(parts)
     }
 
-    /// The values of a part of a map as they are written.
+    /// Values of a part of a map as they will be stored.
     fn texels(&self, stored: &StoredMap, part: &TextureLight) -> Texels {
         let factor = self.options.quantity.factor() * self.exposure_stops.exp2();
         Texels::new(&stored.map.chart, &part.irradiance, factor)
     }
 
-    /// One texture of maps that lie in it.
+    /// Writes one texture with the maps that it holds.
     fn write_texels(
         &mut self,
         name: &str,
@@ -287,23 +287,23 @@ impl Writer<'_> {
     }
 }
 
-/// A texture of an atlas that is being filled.
+/// An atlas texture that is being filled.
 struct Sheet {
     texels: Texels,
     part: TextureLight,
     maps: Vec<PlacedMap>,
 }
 
-/// The name of a map's files without what they hold; that of a frame ends with its number.
+/// Name of a map's files without the suffix of their content; that of a frame ends with its number.
 fn stem(entry: &MapEntry) -> String {
     let file = entry.file.strip_prefix("maps/").unwrap_or(&entry.file);
     file.strip_suffix(".exr").unwrap_or(file).replace('/', "_")
 }
 
-/// Largest index that is read [bytes].
+/// Maximum size of an index [bytes].
 const MAX_INDEX_BYTES: u64 = 64 << 20;
 
-/// A folder that textures may be written to.
+/// An output folder for textures.
 #[derive(Debug)]
 pub struct TextureFolder {
     staged: StagedFolder,
@@ -312,11 +312,11 @@ pub struct TextureFolder {
 }
 
 impl TextureFolder {
-    /// Opens, or makes, the folder and tries to write there. One of ours is replaced; another one that is not empty is
-    /// taken only with `force`.
+    /// Opens or creates the folder, and checks that it can be written. An earlier export is replaced; a folder with
+    /// other files is taken only with `force`.
     ///
     /// # Errors
-    /// A place that cannot be written; other people's files in it.
+    /// A place that cannot be written; a folder with other files.
     pub fn open(path: &Path, force: bool) -> Result<Self> {
         let previous = files_of_ours(path);
         let root = OutputFolder::open_own(path, previous.is_some(), force, "an export of textures")?;
@@ -326,12 +326,12 @@ impl TextureFolder {
         })
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn path(&self) -> &Path {
         self.staged.path()
     }
 
-    /// Gives all files their places and removes what the previous export had more.
+    /// Moves all files to their places and removes leftover files of the previous export.
     ///
     /// # Errors
     /// As [`StagedFolder::commit`]; outdated files that cannot be removed.
@@ -350,14 +350,14 @@ impl TextureFolder {
     }
 }
 
-/// The parts of an index that tell what belongs to it.
+/// The parts of an index that identify it and its files.
 #[derive(Deserialize)]
 struct KnownIndex {
     kind: String,
     textures: Vec<TextureEntry>,
 }
 
-/// Files of the export that lies in a folder; `None` where none of ours does.
+/// Files of the export in a folder; `None` if there is none.
 fn files_of_ours(path: &Path) -> Option<Vec<String>> {
     let bytes = files::read_file(&path.join(index::FILE_NAME), MAX_INDEX_BYTES).ok()?;
     let known: KnownIndex = serde_json::from_slice(&bytes).ok()?;
@@ -373,7 +373,7 @@ fn files_of_ours(path: &Path) -> Option<Vec<String>> {
     )
 }
 
-/// Whether a name in an index is one that an export writes, with nothing that leads elsewhere.
+/// Whether a name in an index is one that an export writes, with no way out of the folder.
 fn is_texture_file(name: &str) -> bool {
     let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte);
     let ends = [".exr", ".png", ".hdr", ".ktx2", ".uv"];

@@ -7,14 +7,14 @@ use super::texels::Texels;
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 
-/// 1 of a code.
+/// Code of the value 1.
 const WHITE: f64 = u16::MAX as f64;
 
-/// The file: values from 0 to 1 by their transfer function, which is stated, as the exposure is in text chunks; values
-/// outside become 0 and 1.
+/// Encodes values from 0 to 1; values outside are clamped. The file states the transfer function, and the exposure in a
+/// text chunk.
 ///
 /// # Errors
-/// Sizes that the format cannot have.
+/// A size that the format cannot hold.
 pub fn encode(texels: &Texels, transfer: Transfer, notes: &FileMetadata<'_>) -> Result<Encoded> {
     let codes: Vec<[u16; 3]> = texels
         .values()
@@ -44,7 +44,7 @@ pub fn encode(texels: &Texels, transfer: Transfer, notes: &FileMetadata<'_>) -> 
     })
 }
 
-/// Writes what stands before the image.
+/// An encoder with everything that precedes the image.
 fn encoder<'a>(
     bytes: &'a mut Vec<u8>,
     (width, height): (usize, usize),
@@ -58,7 +58,7 @@ fn encoder<'a>(
         Transfer::Srgb => encoder.set_source_srgb(SrgbRenderingIntent::RelativeColorimetric),
         Transfer::Linear => encoder.set_source_gamma(ScaledFloat::new(1.0)),
     }
-    // Names may have letters that only this kind of text has.
+    // Names may contain letters that only this kind of chunk supports.
     encoder.add_itxt_chunk("Description".into(), notes.comment())?;
     for (keyword, text) in [
         (
@@ -73,7 +73,7 @@ fn encoder<'a>(
     Ok(encoder)
 }
 
-/// The nearest code.
+/// Code nearest to a value.
 fn code(value: f64, transfer: Transfer) -> u16 {
     let share = match transfer {
         Transfer::Srgb => LinearSrgb::encode_channel(value),
@@ -82,7 +82,7 @@ fn code(value: f64, transfer: Transfer) -> u16 {
     (share * WHITE).round() as u16
 }
 
-/// What a code stands for.
+/// Value of a code.
 fn value(code: u16, transfer: Transfer) -> f64 {
     let share = f64::from(code) / WHITE;
     match transfer {

@@ -8,11 +8,11 @@ use super::shared_exponent::RGBE;
 use super::texels::Texels;
 use crate::error::{Error, Result};
 
-/// The file. Values below 0 become 0, and so do channels of less than 1/512 of their texel's largest; each is rounded to
-/// the nearest step. Multiplied by 2^stops, it says so by EXPOSURE, by which readers divide.
+/// Encodes a Radiance picture. Values below 0 become 0, and so do channels of less than 1/512 of their texel's largest;
+/// each is rounded to the nearest step. A factor of 2^stops is stated as EXPOSURE, by which readers divide.
 ///
 /// # Errors
-/// None that is known of: it is written in memory.
+/// None are known: it is encoded in memory.
 pub fn encode(texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
     let (width, height) = texels.size();
     let mut bytes = format!(
@@ -25,7 +25,7 @@ pub fn encode(texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
     }
     let comment: String = notes.comment().chars().filter(|c| !c.is_control()).collect();
     bytes.extend(format!("# {comment}").bytes());
-    // The encoder cuts what it cannot hold, and keeps values that are rounded already.
+    // The encoder truncates, so it gets values that are rounded already.
     let rounded = |texel: &[f32; 3]| match RGBE.code(*texel) {
         (_, exponent) if exponent == RGBE.least => [0.0; 3],
         code => RGBE.value(code),
@@ -35,7 +35,7 @@ pub fn encode(texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
     let mut file = Vec::new();
     let written = HdrEncoder::new(&mut file).encode(&pixels, width, height);
     written.map_err(|error| Error::failure(notes.location, error.to_string(), "report this"))?;
-    // Its own head ends with an empty line; this one says more.
+    // The header of the encoder, which ends with an empty line, is replaced by the fuller one above.
     let head = file.windows(2).position(|two| two == b"\n\n").unwrap_or_default();
     bytes.extend(&file[head..]);
     Ok(Encoded {

@@ -1,17 +1,17 @@
 //! Colours whose channels share an exponent: one value is mantissa · 2^(exponent − bits of a mantissa).
 
-/// A way to store them.
+/// A format of such colours.
 #[derive(Clone, Copy, Debug)]
 pub struct SharedExponent {
     /// Bits of a mantissa.
     pub bits: i32,
-    /// The least exponent.
+    /// Smallest exponent.
     pub least: i32,
-    /// The largest value.
+    /// Largest value.
     pub most: f32,
 }
 
-/// Radiance: eight bits and the exponent + 128. Readers take what has the least exponent for black.
+/// Radiance: eight bits and the exponent + 128. Readers take colours of the smallest exponent for black.
 pub const RGBE: SharedExponent = SharedExponent {
     bits: 8,
     least: -127,
@@ -28,21 +28,21 @@ pub const RGB9E5: SharedExponent = SharedExponent {
 };
 
 impl SharedExponent {
-    /// Mantissas and exponent: each channel in the nearest step of the least exponent that holds the largest. Values below
-    /// 0 become 0.
+    /// Mantissas and exponent. The exponent is the smallest that holds the largest channel; each channel is rounded to
+    /// its nearest step. Values below 0 become 0.
     pub fn code(self, texel: [f32; 3]) -> ([u32; 3], i32) {
         let channels = texel.map(|value| f64::from(value).clamp(0.0, f64::from(self.most)));
         let largest = channels.into_iter().fold(0.0, f64::max);
         let mut exponent = (largest.log2().floor() as i32).saturating_add(1).max(self.least);
         let steps = |value: f64, exponent: i32| (value * f64::from(self.bits - exponent).exp2()).round();
-        // It may be rounded up to the next power of two.
+        // The mantissa may round up to the next power of two.
         if steps(largest, exponent) >= f64::from(self.bits).exp2() {
             exponent += 1;
         }
         (channels.map(|value| steps(value, exponent) as u32), exponent)
     }
 
-    /// What readers make of it.
+    /// The colour that a reader gets.
     pub fn value(self, (mantissas, exponent): ([u32; 3], i32)) -> [f32; 3] {
         let step = f64::from(exponent - self.bits).exp2();
         mantissas.map(|mantissa| (f64::from(mantissa) * step) as f32)

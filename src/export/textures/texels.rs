@@ -14,8 +14,8 @@ pub struct Texels {
 }
 
 impl Texels {
-    /// Irradiance of a map [W/m²] times a factor. What no surface reaches takes on the light of what is beside it, as far as
-    /// it goes: neither a look-up between texels, nor a block of some, nor a coarser level mixes in black.
+    /// Irradiance of a map [W/m²] times a factor. Texels without a surface are filled with light from beside them, so
+    /// that neither filtering, nor block compression, nor mip levels mix in black.
     pub fn new(chart: &Chart, irradiance: &[[f32; 3]], factor: f64) -> Self {
         let scaled = |texel: &[f32; 3]| texel.map(|value| (f64::from(value) * factor) as f32);
         let mut texels = Self {
@@ -29,7 +29,7 @@ impl Texels {
         texels
     }
 
-    /// Black of a size.
+    /// Black texels of a size.
     pub fn black((width, height): (usize, usize)) -> Self {
         Self {
             width,
@@ -38,7 +38,7 @@ impl Texels {
         }
     }
 
-    /// Copies others to a rectangle of their size, and so many around them that go on with those at their border.
+    /// Copies others to a rectangle of their size, and repeats those at their border `gutter` texels outwards.
     pub fn place(&mut self, others: &Self, at: Rectangle, gutter: usize) {
         let rows = at.y.saturating_sub(gutter)..(at.y + at.height + gutter).min(self.height);
         let columns = at.x.saturating_sub(gutter)..(at.x + at.width + gutter).min(self.width);
@@ -51,17 +51,17 @@ impl Texels {
         }
     }
 
-    /// Texels across and down.
+    /// Width and height.
     pub fn size(&self) -> (usize, usize) {
         (self.width, self.height)
     }
 
-    /// Row by row.
+    /// Values, row by row.
     pub fn values(&self) -> &[[f32; 3]] {
         &self.values
     }
 
-    /// Half the size, at least one texel a side: each the mean over what it covers.
+    /// The next mip level: half the size, at least one texel per side, each the mean over what it covers.
     #[must_use]
     pub fn halved(&self) -> Self {
         let [width, height] = [self.width, self.height].map(|side| (side / 2).max(1));
@@ -80,7 +80,7 @@ impl Texels {
         }
     }
 
-    /// Of parts of some rows and columns.
+    /// Mean over shares of some rows and columns.
     fn mean(&self, rows: &[(usize, f64)], columns: &[(usize, f64)]) -> [f32; 3] {
         let mut sum = [0.0; 3];
         for &(row, height) in rows {
@@ -94,7 +94,7 @@ impl Texels {
         sum.map(|sum| sum as f32)
     }
 
-    /// The largest value of any channel; 0 where all are below.
+    /// Largest value of any channel, at least 0.
     pub fn peak(&self) -> f32 {
         self.values
             .as_flattened()
@@ -103,7 +103,7 @@ impl Texels {
     }
 }
 
-/// The texels that hold light of a surface: those that it covers, and the gutter that the bake laid around them.
+/// Texels that hold light of a surface: those that it covers, and the gutter that the bake filled.
 fn known(chart: &Chart) -> Vec<bool> {
     let texels = chart.width * chart.height;
     let mut known: Vec<bool> = (0..texels)
@@ -116,7 +116,7 @@ fn known(chart: &Chart) -> Vec<bool> {
     known
 }
 
-/// Gives every texel that is not known the mean of the known ones of the smallest square, of doubling sizes, that has some.
+/// Fills every unknown texel with the mean of the known ones in the smallest square, of doubling sizes, that has some.
 fn spread(values: &mut [[f32; 3]], known: &[bool], width: usize) {
     let height = known.len() / width;
     if known.iter().all(|known| *known) || (width, height) == (1, 1) {
