@@ -4,7 +4,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -16,6 +16,8 @@ use signal_hook::iterator::Signals;
 use nephroid::error::{Error, Result, Warning};
 use nephroid::progress::{Control, Progress, Stage};
 
+use super::options::{ProgressForm, RunOptions};
+
 /// Exit codes are 128 + signal, as shells have it.
 const SIGNAL_BASE: u8 = 128;
 
@@ -24,6 +26,7 @@ const SIGNAL_BASE: u8 = 128;
 pub struct Console {
     /// No progress on stderr; warnings and errors stay.
     quiet: bool,
+    progress: ProgressForm,
     /// Results as one JSON document.
     pub json: bool,
     control: Arc<Control>,
@@ -35,7 +38,7 @@ impl Console {
     ///
     /// # Errors
     /// A system that refuses the handlers.
-    pub fn open(quiet: bool, json: bool) -> Result<Self> {
+    pub fn open(options: &RunOptions) -> Result<Self> {
         let refused = |error: std::io::Error| {
             Error::failure(
                 "signals",
@@ -44,8 +47,9 @@ impl Console {
             )
         };
         let console = Self {
-            quiet,
-            json,
+            quiet: options.quiet,
+            progress: options.progress,
+            json: options.json,
             control: Arc::default(),
             exit_code: Arc::default(),
         };
@@ -131,9 +135,10 @@ impl Console {
         print_stderr(note);
     }
 
-    /// Shows the stage and how far it is, where a bar is wanted and can be shown.
+    /// Shows the stage and how far it is, where that is wanted and can be shown.
     pub fn bar(&self) -> StageBar {
-        let is_shown = !self.quiet && std::io::stderr().is_terminal();
+        let in_lines = self.progress == ProgressForm::Json;
+        let is_shown = !self.quiet && !in_lines && std::io::stderr().is_terminal();
         let target = if is_shown {
             ProgressDrawTarget::stderr_with_hz(REFRESH_HZ)
         } else {
@@ -148,6 +153,7 @@ impl Console {
         StageBar {
             bar,
             stage: Mutex::new(None),
+            last_line: (!self.quiet && in_lines).then(Mutex::default),
         }
     }
 }
@@ -205,10 +211,30 @@ pub fn bytes(count: u64) -> String {
 /// Redraws per second.
 const REFRESH_HZ: u8 = 10;
 
+/// Least time between two lines on the same stage.
+const BETWEEN_LINES: Duration = Duration::from_millis(100);
+
 /// A progress bar, cleared when it is dropped.
 pub struct StageBar {
     bar: ProgressBar,
     stage: Mutex<Option<Stage>>,
+    /// What the last line was about and when it was written, where progress is told in lines.
+    last_line: Option<Mutex<Option<(Stage, Instant)>>>,
+}
+
+impl StageBar {
+    /// A line for programs: of every stage, its end, and no more often than people look.
+    fn tell(&self, stage: Stage, done: u64, total: u64) {
+        let Some(Ok(mut last)) = self.last_line.as_ref().map(Mutex::lock) else {
+            return;
+        };
+        let is_due = last.is_none_or(|(told, at)| told != stage || at.elapsed() >= BETWEEN_LINES);
+        if is_due || done == total {
+            *last = Some((stage, Instant::now()));
+            let line = serde_json::json!({ "stage": stage.name(), "done": done, "total": total });
+            print_stderr(&line.to_string());
+        }
+    }
 }
 
 impl Progress for StageBar {
@@ -220,6 +246,7 @@ impl Progress for StageBar {
             self.bar.set_prefix(stage.name());
             self.bar.reset_eta();
         }
+        self.tell(stage, done, total);
         self.bar.set_length(total);
         self.bar.set_position(done);
     }
