@@ -101,7 +101,8 @@ class Job:
             elif line.startswith("warning: "):
                 self.messages.append((None, line.removeprefix("warning: ")))
             elif line.startswith("error: "):
-                self.failed = line.removeprefix("error: ")
+                # The user knows of no file.
+                self.failed = line.removeprefix("error: ").replace(f"{self.files.scene}: ", "")
 
     def poll(self):
         """Whether it has ended, one way or the other."""

@@ -281,12 +281,14 @@ def remove(context):
                 if before is not None:
                     tree.links.new(before, link.to_socket)
             tree.nodes.remove(node)
+    copies = []
     for item in bpy.data.objects:
         for modifier in [one for one in item.modifiers if one.type == "NODES" and is_ours(one, BAKED_MESH)]:
-            shown = next((value for value in modifier.values() if isinstance(value, bpy.types.Object)), None)
+            copies += [value for value in modifier.values() if isinstance(value, bpy.types.Object)]
             item.modifiers.remove(modifier)
-            if shown is not None:
-                bpy.data.meshes.remove(shown.data)
+    for mesh in [copy.data for copy in copies]:
+        # Its object goes with it.
+        bpy.data.meshes.remove(mesh)
     for mesh in bpy.data.meshes:
         for name in (UV_LAYER, BACK_UV_LAYER):
             if mesh.library is None and name in mesh.uv_layers:

@@ -91,6 +91,7 @@ class Surface:
         self.volume_node, _ = source(end.inputs["Volume"])
 
     volume_node = None
+    has_unread_colour = False
 
     def fault(self, text):
         if text not in self.faults:
@@ -142,7 +143,9 @@ class Surface:
             if name in {"color", "emission"}:
                 return (1.0, 1.0, 1.0)
             return strength if name == "normal" else self.mean(name, node, origin)
-        self.fault(f"the nodes at its {socket.name} are not read; {'it was ignored' if name == 'normal' else 'its default was baked'}")
+        outcome = "it was ignored" if name == "normal" else "its default was baked"
+        self.fault(f"the nodes at its {socket.name} are not read; {outcome}")
+        self.has_unread_colour |= name == "color"
         return DEFAULTS[name]
 
     def mean(self, name, node, origin):
@@ -216,6 +219,11 @@ class Surface:
             return (1.0 / density, left) if density > 0.0 else None
         self.fault(f"its volume, a {node.bl_label}, is not read; it was baked as clear")
         return None
+
+    def is_matte(self):
+        """Whether only its light map shows its colour, since no caustic leaves it."""
+        values = self.values
+        return values["metallic"] < 0.5 and values["transmission"] < 0.5 and values["roughness"] > 0.3 and values["coat"] == 0.0
 
     def diffuse_share(self):
         """What part of its base colour reflects diffusely."""

@@ -270,6 +270,9 @@ class Export:
             else:
                 surface = Surface(material)
                 entry = surface.gltf(lambda node: self.texture(node, sets, surface.fault))
+                if surface.has_unread_colour and surface.is_matte() and self.settings.layers == "CAUSTIC":
+                    # Its own nodes multiply the light map.
+                    surface.faults = [text for text in surface.faults if "Color are not read" not in text]
                 for text in surface.faults:
                     self.fault(("material", material.name_full))(text)
             self.materials[key] = self.glb.push("materials", entry)

@@ -1,6 +1,6 @@
 """The table of Blender's nodes: each row as glTF, and the light that it makes beside Cycles'.
 
-Arguments: EXTENSION.zip NEPHROID
+Arguments: EXTENSION.zip [NEPHROID] (the program in the extension otherwise)
 """
 
 import json

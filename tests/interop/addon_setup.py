@@ -23,7 +23,7 @@ def empty():
 def install(extension, program=""):
     """Installs the extension; the package with its modules. `program` is taken instead of the one inside."""
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    bpy.ops.extensions.package_install_files(filepath=extension, repo="user_default", enable_on_install=True)
+    bpy.ops.extensions.package_install_files(filepath=os.path.abspath(extension), repo="user_default", enable_on_install=True)
     bpy.context.preferences.addons[MODULE].preferences.program = program
     package = importlib.import_module(MODULE)
     for name in ("bake", "lamps", "lightmaps", "materials", "panel", "scene"):
