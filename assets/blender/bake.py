@@ -73,7 +73,7 @@ class Job:
         self.files = Files(context)
         self.messages = list(self.files.export.messages)
         self.stage, self.share = "start", 0.0
-        self.failed = None
+        self.failed, self.is_cancelled = None, False
         files = self.files
         self.steps = [
             ["bake", files.scene, "-o", files.folder / "maps", "--progress", "json", *files.options()],
@@ -221,11 +221,10 @@ class NEPHROID_OT_bake(bpy.types.Operator):
 
     def modal(self, context, event):
         if event.type == "ESC":
-            running.cancelled = True
+            running.is_cancelled = True
         if event.type not in {"TIMER", "ESC"}:
             return {"PASS_THROUGH"}
-        is_cancelled = getattr(running, "cancelled", False)
-        if not is_cancelled and not running.poll():
+        if not running.is_cancelled and not running.poll():
             context.window_manager.progress_update(round(100 * running.share))
             for area in context.screen.areas if context.screen else ():
                 if area.type == "PROPERTIES":
@@ -233,7 +232,7 @@ class NEPHROID_OT_bake(bpy.types.Operator):
             return {"PASS_THROUGH"}
         context.window_manager.event_timer_remove(self.timer)
         context.window_manager.progress_end()
-        return self.stopped(context) if is_cancelled else self.end(context)
+        return self.stopped(context) if running.is_cancelled else self.end(context)
 
     def stopped(self, context):
         global running
@@ -253,7 +252,7 @@ class NEPHROID_OT_cancel(bpy.types.Operator):
         return running is not None
 
     def execute(self, context):
-        running.cancelled = True
+        running.is_cancelled = True
         return {"FINISHED"}
 
 
@@ -317,6 +316,7 @@ class LiveView:
         if self.is_changed and bpy.context.mode == "OBJECT" and running is None:
             Export(bpy.context, self.files.scene, self.files.settings)
             # Its own switching of modifiers is no change.
+            bpy.context.view_layer.update()
             self.is_changed = False
         return self.PERIOD_S
 

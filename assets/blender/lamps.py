@@ -5,7 +5,7 @@ import math
 import bpy
 import numpy
 
-from .materials import LUMENS_PER_WATT, custom_properties, number, source
+from .materials import LUMENS_PER_WATT, custom_properties, nodes_of, number, output, source
 
 PUNCTUAL, FLAT = "KHR_lights_punctual", "EXT_lights_area"
 
@@ -19,8 +19,8 @@ def strength(lamp, fault):
     channels = numpy.array(lamp.color[:]) * lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0)
     if getattr(lamp, "use_temperature", False):
         channels = channels * numpy.array(lamp.temperature_color[:])
-    if lamp.use_nodes and lamp.node_tree:
-        end = lamp.node_tree.get_output_node("CYCLES") or lamp.node_tree.get_output_node("ALL")
+    if nodes_of(lamp):
+        end = output(lamp)
         node, _ = source(end.inputs["Surface"]) if end else (None, None)
         if node is None or node.type != "EMISSION" or node.inputs["Color"].is_linked or node.inputs["Strength"].is_linked:
             fault("its nodes are not read; it was baked without them")
@@ -65,7 +65,8 @@ def gltf(lamp, scale, fault):
             outer = min(0.5 * lamp.spot_size, 0.5 * math.pi)
             if lamp.spot_size > math.pi:
                 fault("its cone is wider than 180 degrees and was narrowed to that")
-            entry["spot"] = {"outerConeAngle": outer, "innerConeAngle": outer * (1.0 - lamp.spot_blend)}
+            # glTF has no hard edge.
+            entry["spot"] = {"outerConeAngle": outer, "innerConeAngle": outer * (1.0 - max(lamp.spot_blend, 1e-4))}
         return PUNCTUAL, entry, extras
     width, height = size_m(lamp, scale)
     is_disc = lamp.shape in {"DISK", "ELLIPSE"}
@@ -88,11 +89,10 @@ def world_shines(world, wish):
     """Whether the world's light is baked: as wished, by default where it is more than one colour."""
     if world is None or wish == "OFF":
         return False
-    tree = world.node_tree if world.use_nodes else None
-    end = tree and (tree.get_output_node("CYCLES") or tree.get_output_node("ALL"))
-    node = source(end.inputs["Surface"])[0] if end else None
     if wish == "ON":
         return True
+    end = output(world)
+    node = source(end.inputs["Surface"])[0] if end else None
     return node is not None and (node.type != "BACKGROUND" or node.inputs["Color"].is_linked)
 
 

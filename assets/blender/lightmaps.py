@@ -154,7 +154,7 @@ def add_node(material, group):
     """Puts the group before a material's output; why that is impossible, or None."""
     if material.library is not None:
         return f"its material {material.name} is linked from another file; make it local to show its light map"
-    end = output(material) if material.use_nodes else None
+    end = output(material)
     if end is None or not end.inputs["Surface"].is_linked:
         return f"its material {material.name} uses no nodes; turn on Use Nodes to show its light map"
     surface = Surface(material)
@@ -171,6 +171,10 @@ def add_node(material, group):
         link(surface.node.inputs[name].links[0].from_socket, node.inputs["Color"])
     node.inputs["Diffuse"].default_value = surface.diffuse_share()
     node.inputs["Strength"].default_value = 1.0
+    if hasattr(material, "cycles"):
+        # Paths find the light where they meet it; shadow rays to every lit surface would be noise.
+        node["emission_sampling"] = material.cycles.emission_sampling
+        material.cycles.emission_sampling = "NONE"
     return None
 
 
@@ -276,6 +280,8 @@ def remove(context):
     for material in bpy.data.materials:
         tree = material.node_tree
         for node in [node for node in (tree.nodes if tree else ()) if node.type == "GROUP" and node.node_tree in groups]:
+            if "emission_sampling" in node:
+                material.cycles.emission_sampling = node["emission_sampling"]
             before = node.inputs["Shader"].links[0].from_socket if node.inputs["Shader"].is_linked else None
             for link in list(node.outputs["Shader"].links):
                 if before is not None:

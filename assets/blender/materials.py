@@ -3,6 +3,8 @@
 import math
 
 LUMENS_PER_WATT = 683.0
+# Roughness above which the program takes a metal for matte.
+MATTE_METAL = 0.6
 
 # What each shader node is in glTF. A text names a socket of the node; a number is that value.
 NODES = {
@@ -62,9 +64,14 @@ def source(socket):
     return None, None
 
 
-def output(material):
-    """The output node that renders take."""
-    tree = material.node_tree
+def nodes_of(block):
+    """The node tree of a material, lamp or world that uses one."""
+    return block.node_tree if getattr(block, "use_nodes", True) else None
+
+
+def output(block):
+    """The output node that renders take; None without nodes."""
+    tree = nodes_of(block)
     return tree and (tree.get_output_node("CYCLES") or tree.get_output_node("ALL"))
 
 
@@ -82,7 +89,7 @@ class Surface:
         self.values = dict(DEFAULTS, color=tuple(material.diffuse_color)[:3], roughness=1.0)
         # Image texture nodes by property.
         self.images = {}
-        end = output(material) if material.use_nodes else None
+        end = output(material)
         if end is None:
             return
         node, _ = source(end.inputs["Surface"])
@@ -226,8 +233,9 @@ class Surface:
         return values["metallic"] < 0.5 and values["transmission"] < 0.5 and values["roughness"] > 0.3 and values["coat"] == 0.0
 
     def diffuse_share(self):
-        """What part of its base colour reflects diffusely."""
-        return (1.0 - self.values["metallic"]) * (1.0 - self.values["transmission"])
+        """What part of its base colour reflects diffusely; metals do where the program takes them for matte."""
+        metallic = self.values["metallic"] if self.values["roughness"] <= MATTE_METAL else 0.0
+        return (1.0 - metallic) * (1.0 - self.values["transmission"])
 
     def gltf(self, texture):
         """The glTF material. `texture(node)` gives the texture info of an image node."""

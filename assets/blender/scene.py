@@ -12,7 +12,7 @@ import bpy
 import numpy
 
 from . import lamps
-from .materials import Surface
+from .materials import Surface, nodes_of
 
 UV_LAYER, BACK_UV_LAYER = "Nephroid", "Nephroid back"
 # The modifier that shows a baked mesh.
@@ -257,7 +257,7 @@ class Export:
         return self.glb.push("meshes", {"name": item.name, "primitives": primitives}), geometry, sets, kept
 
     def uv_names(self, material):
-        tree = material.node_tree if material.use_nodes else None
+        tree = nodes_of(material)
         return [node.uv_map for node in (tree.nodes if tree else ()) if node.type == "UVMAP"]
 
     def material(self, material, sets):

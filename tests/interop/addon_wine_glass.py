@@ -18,7 +18,9 @@ LUMINANCE = numpy.array([0.2126, 0.7152, 0.0722])
 # Largest difference of a flux from the manifest's [1]: that of sampling it.
 BOUND = 0.01
 SIZE = (480, 360)
-SAMPLES = 32
+SAMPLES = 24
+# Side of the blocks whose means are compared [pixels].
+BLOCK = 8
 PLACES = 1_000_000
 
 faults = []
@@ -87,10 +89,12 @@ def wine_glass():
     red, _ = material("Wine", Base_Color=(1, 1, 1, 1), Transmission_Weight=1.0, Roughness=0.0, IOR=1.34)
     tree = red.node_tree
     absorbs = tree.nodes.new("ShaderNodeVolumeAbsorption")
-    absorbs.inputs["Color"].default_value, absorbs.inputs["Density"].default_value = (0.72, 0.1, 0.14, 1.0), 60.0
+    absorbs.inputs["Color"].default_value, absorbs.inputs["Density"].default_value = (0.9, 0.25, 0.32, 1.0), 45.0
     end = next(node for node in tree.nodes if node.type == "OUTPUT_MATERIAL")
     tree.links.new(absorbs.outputs[0], end.inputs["Volume"])
     wine.data.materials.append(red)
+    # Two surfaces in the same place are met in an order that rounding decides.
+    glass.location.z = wine.location.z = 2e-4
 
 
 def scene():
@@ -124,7 +128,7 @@ def scene():
     sun = bpy.data.lights.new("Sun", "SUN")
     sun.energy, sun.angle, sun.color = 4.0, 0.0093, (1.0, 0.92, 0.8)
     lamp = bpy.data.objects.new("Sun", sun)
-    lamp.rotation_euler = (math.radians(25.0), math.radians(-58.0), 0.0)
+    lamp.rotation_euler = (math.radians(18.0), math.radians(-42.0), 0.0)
     bpy.context.scene.collection.objects.link(lamp)
     world = bpy.data.worlds.new("World")
     world.use_nodes = True
@@ -170,6 +174,7 @@ def state():
         links = made.node_tree.links
         found["material", made.name] = sorted((link.from_node.name, link.from_socket.name, link.to_node.name, link.to_socket.name)
                                               for link in links), sorted(node.name for node in made.node_tree.nodes)
+        found["sampling", made.name] = made.cycles.emission_sampling
     cycles = bpy.context.scene.cycles
     found["scene"] = sorted(bpy.context.scene.keys()), cycles.caustics_reflective, cycles.caustics_refractive
     return found
@@ -246,9 +251,11 @@ def bakes(addon, folder):
     print({entry["surface"]: (entry["side"], entry["uv_set"], entry["width"]) for entry in manifest["maps"]})
     check("Cycles' own caustics are off", not bpy.context.scene.cycles.caustics_refractive)
     lit = picture(folder / "after")
-    check("there is light now where there was none", (lit - dark > 0.05).sum() > 200, f"{(lit - dark > 0.05).sum()} pixels")
-    check("and nowhere less", (dark - lit > 0.05).sum() == 0, f"{(dark - lit > 0.05).sum()} pixels")
+    gain = (lit - dark).reshape(SIZE[1] // BLOCK, BLOCK, SIZE[0] // BLOCK, BLOCK).mean(axis=(1, 3))
+    check("there is light now where there was none", (gain > 0.05).sum() >= 10, f"{(gain > 0.05).sum()} blocks of pixels")
+    check("and nowhere less", gain.min() > -0.02, f"{gain.min():.4f} at least")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "baked.blend"), compress=True)
+    settings.map_size = "256"
     bpy.ops.nephroid.bake()
     check("a second bake replaces the first", [one.name for one in bpy.data.images if one.name.startswith("Nephroid")] == ["Nephroid light"])
     bpy.ops.nephroid.remove()
@@ -304,6 +311,7 @@ def refuses(addon):
     noise = crystal.node_tree.nodes.new("ShaderNodeTexNoise")
     shader = next(node for node in crystal.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     crystal.node_tree.links.new(noise.outputs[0], shader.inputs["Roughness"])
+    bpy.context.scene.nephroid.map_size = "256"
     told("what is not read is said on its object", "WARNING", "Glass", "the nodes at its Roughness")
     crystal.node_tree.nodes.remove(noise)
     bpy.ops.nephroid.remove()

@@ -75,7 +75,7 @@ fn frames_are_the_moments_of_their_times() {
 fn programs_read_progress_line_by_line() {
     let sandbox = Sandbox::new();
     let run = sandbox.succeed("bake builtin:mirror -o out --density 1e4 --map-resolution 64 --progress json");
-    let lines: Vec<serde_json::Value> = run
+    let lines: Vec<Value> = run
         .stderr
         .lines()
         .map(|line| serde_json::from_str(line).expect("a line of JSON"))
