@@ -301,9 +301,9 @@ def remove(context):
                 mesh.uv_layers.remove(mesh.uv_layers[name])
     matte = bpy.data.materials.get(MATTE)
     if matte is not None:
-        for owner in list(bpy.data.meshes) + list(bpy.data.curves):
-            if MATTE in owner.materials:
-                owner.materials.pop(index=owner.materials.find(MATTE))
+        for owner in (*bpy.data.meshes, *bpy.data.curves):
+            if list(owner.materials) == [matte]:
+                owner.materials.clear()
         bpy.data.materials.remove(matte)
     for blocks, name in [(bpy.data.node_groups, LIGHT_MAP_GROUP), (bpy.data.node_groups, BAKED_MESH), (bpy.data.images, IMAGE)]:
         for block in [block for block in blocks if is_ours(block, name)]:
