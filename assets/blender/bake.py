@@ -52,7 +52,9 @@ class Files:
     def options(self):
         """Of the program, for this scene and the settings of the panel."""
         layers = "caustic" if self.settings.layers == "CAUSTIC" else "caustic,direct,indirect"
-        options = ["--preset", self.settings.preset.lower(), "--layers", layers, "--map-resolution", self.settings.map_size.lower()]
+        options = ["--preset", self.settings.preset.lower(), "--layers", layers,
+                   # The file says itself what is solid.
+                   "--map-resolution", self.settings.map_size.lower(), "--solid-glass=off"]
         return options + (["--environment", str(self.world)] if self.has_world else [])
 
     def remove(self):
@@ -77,7 +79,8 @@ class Job:
         files = self.files
         self.steps = [
             ["bake", files.scene, "-o", files.folder / "maps", "--progress", "json", *files.options()],
-            ["export", files.folder / "maps", "--format", "exr", "--bits", "32", "--units", "E/pi", "-o", files.folder / "textures"],
+            ["export", files.folder / "maps", "--format", "exr", "--bits", "32", "--units", "E/pi",
+             "-o", files.folder / "textures"],
         ]
         self.process = None
         try:
@@ -98,7 +101,7 @@ class Job:
             if line.startswith("{"):
                 told = json.loads(line)
                 self.stage, self.share = told["stage"], told["done"] / max(told["total"], 1)
-            elif line.startswith("warning: "):
+            elif line.startswith("warning: ") and "so it is a thin pane" not in line:
                 self.messages.append((None, line.removeprefix("warning: ")))
             elif line.startswith("error: "):
                 # The user knows of no file.
@@ -305,8 +308,8 @@ class LiveView:
         bpy.app.handlers.depsgraph_update_post.append(self.note)
 
     def note(self, scene, depsgraph):
-        if any(update.is_updated_geometry or update.is_updated_transform or update.is_updated_shading for update in depsgraph.updates):
-            self.is_changed = True
+        kinds = ("geometry", "transform", "shading")
+        self.is_changed |= any(getattr(update, f"is_updated_{kind}") for update in depsgraph.updates for kind in kinds)
 
     def look(self):
         """Writes what changed; seconds until the next look, or None where the window was closed."""

@@ -7,7 +7,6 @@ import json
 import math
 import subprocess
 import sys
-from pathlib import Path
 
 import addon_setup  # Before bpy.
 import bpy
@@ -67,7 +66,8 @@ def rows(addon):
           f"{pbr}/baseColorFactor": [0.8, 0.5, 0.2, 1.0], f"{volume}/thicknessFactor": 1.0}, ""),
         ("BsdfPrincipled", dict(Coat_Weight=0.5, Coat_Roughness=0.1),
          {f"{coat}/clearcoatFactor": 0.5, f"{coat}/clearcoatRoughnessFactor": 0.1}, ""),
-        ("BsdfPrincipled", dict(Coat_Weight=0.5, Coat_IOR=2.0), {f"{coat}/clearcoatFactor": 0.5}, "its coat was read with an index of 1.5"),
+        ("BsdfPrincipled", dict(Coat_Weight=0.5, Coat_IOR=2.0), {f"{coat}/clearcoatFactor": 0.5},
+         "its coat was read with an index of 1.5"),
         ("BsdfPrincipled", dict(Specular_IOR_Level=0.25), {"extensions/KHR_materials_specular/specularFactor": 0.5}, ""),
         ("BsdfPrincipled", dict(Alpha=0.25), {"alphaMode": "BLEND", f"{pbr}/baseColorFactor": [0.8, 0.8, 0.8, 0.25]}, ""),
         ("BsdfPrincipled", dict(Emission_Color=(2.0, 1.0, 0.5, 1.0), Emission_Strength=3.0),
@@ -75,12 +75,14 @@ def rows(addon):
         ("BsdfPrincipled", dict(Sheen_Weight=1.0), {}, "its Sheen Weight was ignored"),
         ("BsdfPrincipled", dict(Thin_Film_Thickness=300.0), {}, "its Thin Film Thickness was ignored"),
         ("BsdfGlass", dict(Color=red, Roughness=0.0, IOR=1.6),
-         {factor: 1.0, f"{pbr}/baseColorFactor": red, f"{pbr}/roughnessFactor": 0.0, "extensions/KHR_materials_ior/ior": 1.6}, ""),
+         {factor: 1.0, f"{pbr}/baseColorFactor": red, f"{pbr}/roughnessFactor": 0.0,
+          "extensions/KHR_materials_ior/ior": 1.6}, ""),
         ("BsdfRefraction", dict(IOR=1.4), {factor: 1.0, "extensions/KHR_materials_ior/ior": 1.4},
          "its Refraction BSDF was read as glass, which reflects as well"),
         ("BsdfAnisotropic", dict(Color=red, Roughness=0.05),
          {f"{pbr}/metallicFactor": 1.0, f"{pbr}/baseColorFactor": red, f"{pbr}/roughnessFactor": 0.05}, ""),
-        ("BsdfDiffuse", dict(Color=red), {f"{pbr}/metallicFactor": 0.0, f"{pbr}/roughnessFactor": 1.0, f"{pbr}/baseColorFactor": red}, ""),
+        ("BsdfDiffuse", dict(Color=red),
+         {f"{pbr}/metallicFactor": 0.0, f"{pbr}/roughnessFactor": 1.0, f"{pbr}/baseColorFactor": red}, ""),
         ("BsdfTransparent", {}, {"alphaMode": "BLEND", f"{pbr}/baseColorFactor": [0.0, 0.0, 0.0, 0.0]}, ""),
         ("BsdfTranslucent", dict(Color=red), {f"{pbr}/baseColorFactor": red},
          "its Translucent BSDF was read as matte: no light goes through"),
@@ -125,7 +127,8 @@ def special_rows(addon):
 
     stated = read()[0]["extensions"]["KHR_materials_volume"]
     distance, colour = stated["attenuationDistance"], numpy.array(stated["attenuationColor"])
-    check("Volume Absorption after 0.3 m", (colour ** (0.3 / distance)).tolist(), [math.exp(-4.0 * (1 - c) * 0.3) for c in (0.9, 0.5, 0.1)])
+    check("Volume Absorption after 0.3 m", (colour ** (0.3 / distance)).tolist(),
+          [math.exp(-4.0 * (1 - c) * 0.3) for c in (0.9, 0.5, 0.1)])
     made.nephroid.is_thin, made.nephroid.glass = True, "N-BK7"
     made["metal"] = "gold"
     check("thin wall", read()[0]["extensions"]["KHR_materials_volume"]["thicknessFactor"], 0.0)
@@ -189,8 +192,9 @@ def by_nephroid(addon, names):
     files = addon.bake.Files(bpy.context)
     maps = files.folder / "maps"
     world = ["--environment", str(files.world)] if files.has_world else []
-    subprocess.run([addon.bake.program(), "bake", str(files.scene), "-o", str(maps), "--layers", "caustic,direct", "--quiet",
-                    "--map-resolution", str(4 * SIDE), "--max-error", "1%", *world], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([addon.bake.program(), "bake", str(files.scene), "-o", str(maps), "--layers", "caustic,direct",
+                    "--quiet", "--map-resolution", str(4 * SIDE), "--max-error", "1%", "--solid-glass=off", *world],
+                   check=True, stdout=subprocess.DEVNULL)
     manifest = json.loads((maps / "manifest.json").read_text())
     means = {name: numpy.zeros(3) for name in names}
     for entry in manifest["maps"]:
@@ -245,7 +249,6 @@ def lamps(addon):
 def world(addon):
     """An image of a sky with a bright quarter, turned, on planes that face three ways."""
     empty()
-    # Casts nothing worth the name, but without it there is nothing to bake.
     image = bpy.data.images.new("sky", 64, 32, float_buffer=True)
     image.colorspace_settings.name = "Linear Rec.709"
     pixels = numpy.full((32, 64, 4), 0.1, dtype=numpy.float32)

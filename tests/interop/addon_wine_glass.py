@@ -174,7 +174,8 @@ def state():
         modifiers = [(one.name, one.show_viewport, one.show_render) for one in item.modifiers]
         found["object", item.name] = modifiers, [slot.material and slot.material.name for slot in item.material_slots]
     for mesh in bpy.data.meshes:
-        found["mesh", mesh.name] = [layer.name for layer in mesh.uv_layers], len(mesh.loops), [one and one.name for one in mesh.materials]
+        materials = [one and one.name for one in mesh.materials]
+        found["mesh", mesh.name] = [layer.name for layer in mesh.uv_layers], len(mesh.loops), materials
     for made in bpy.data.materials:
         links = made.node_tree.links
         found["material", made.name] = sorted((link.from_node.name, link.from_socket.name, link.to_node.name, link.to_socket.name)
@@ -263,7 +264,8 @@ def bakes(addon, folder):
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "baked.blend"), compress=True)
     settings.map_size = "256"
     bpy.ops.nephroid.bake()
-    check("a second bake replaces the first", [one.name for one in bpy.data.images if one.name.startswith("Nephroid")] == ["Nephroid light"])
+    check("a second bake replaces the first",
+          [one.name for one in bpy.data.images if one.name.startswith("Nephroid")] == ["Nephroid light"])
     bpy.ops.nephroid.remove()
     after = state()
     check("Remove takes everything away", after == before, [key for key in {*before, *after} if before.get(key) != after.get(key)])
@@ -279,7 +281,8 @@ def cancels(addon):
         time.sleep(0.01)
     check("the bake tells how far it is", job.stage == "caustic" and 0.0 <= job.share <= 1.0, f"{job.stage} {job.share}")
     told = []
-    manager = SimpleNamespace(event_timer_remove=lambda timer: None, progress_end=lambda: None, nephroid_messages=bpy.context.window_manager.nephroid_messages)
+    manager = SimpleNamespace(event_timer_remove=lambda timer: None, progress_end=lambda: None,
+                              nephroid_messages=bpy.context.window_manager.nephroid_messages)
     operator = SimpleNamespace(timer=None, report=lambda *message: told.append(message))
     operator.stopped = lambda context: addon.bake.NEPHROID_OT_bake.stopped(operator, context)
     outcome = addon.bake.NEPHROID_OT_bake.modal(operator, SimpleNamespace(window_manager=manager), SimpleNamespace(type="ESC"))
