@@ -80,7 +80,7 @@ def write_tile(uvs, part, place, folder, tile):
     geometry = part.geometry
     rows = numpy.flatnonzero(geometry.slots == part.primitives[place["primitive"]])
     if place["uv_file"]:
-        data = (folder / "maps" / place["uv_file"]).read_bytes()
+        data = (folder / "textures" / place["uv_file"]).read_bytes()
         own = numpy.frombuffer(data, dtype="<f8", offset=16).reshape(-1, 3, 2) * (1.0, -1.0) + (0.0, 1.0)
     else:
         own = geometry.uvs[part.sets[int(place["uv_set"][-1])]][geometry.loops[rows]]

@@ -301,7 +301,8 @@ def refuses(addon):
         except RuntimeError as error:
             # What an operator reports as an error, Python gets as an exception.
             print(f"    {str(error).strip()}")
-        check(what, any(all(part in message for part, message in zip(wanted, one)) for one in messages()), messages())
+        is_said = any(all(part in message for part, message in zip(wanted, one)) for one in messages())
+        check(what, is_said and all(one[0] == wanted[0] for one in messages()), messages())
 
     crystal = bpy.data.materials["Crystal"]
     crystal.nephroid.glass = "unobtainium"
