@@ -4,7 +4,7 @@ use std::io::{ErrorKind, IsTerminal, Write};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
@@ -16,6 +16,8 @@ use signal_hook::iterator::Signals;
 use nephroid::error::{Error, Result, Warning};
 use nephroid::progress::{Control, Progress, Stage};
 
+use super::options::{ProgressForm, RunOptions};
+
 /// Exit codes of signals are 128 + signal, as in shells.
 const SIGNAL_BASE: u8 = 128;
 
@@ -24,6 +26,7 @@ const SIGNAL_BASE: u8 = 128;
 pub struct Console {
     /// Hides progress, but not warnings and errors.
     quiet: bool,
+    progress: ProgressForm,
     /// Prints results as one JSON document.
     pub json: bool,
     control: Arc<Control>,
@@ -35,7 +38,7 @@ impl Console {
     ///
     /// # Errors
     /// Handlers that cannot be installed.
-    pub fn open(quiet: bool, json: bool) -> Result<Self> {
+    pub fn open(options: &RunOptions) -> Result<Self> {
         let refused = |error: std::io::Error| {
             Error::failure(
                 "signals",
@@ -44,8 +47,9 @@ impl Console {
             )
         };
         let console = Self {
-            quiet,
-            json,
+            quiet: options.quiet,
+            progress: options.progress,
+            json: options.json,
             control: Arc::default(),
             exit_code: Arc::default(),
         };
@@ -132,9 +136,10 @@ impl Console {
         print_stderr(note);
     }
 
-    /// A progress bar; hidden if `quiet`, or if stderr is no terminal.
+    /// Shows the stage and how far it is, where that is wanted and can be shown.
     pub fn bar(&self) -> StageBar {
-        let is_shown = !self.quiet && std::io::stderr().is_terminal();
+        let in_lines = self.progress == ProgressForm::Json;
+        let is_shown = !self.quiet && !in_lines && std::io::stderr().is_terminal();
         let target = if is_shown {
             ProgressDrawTarget::stderr_with_hz(REFRESH_HZ)
         } else {
@@ -149,6 +154,7 @@ impl Console {
         StageBar {
             bar,
             stage: Mutex::new(None),
+            last_line: (!self.quiet && in_lines).then(Mutex::default),
         }
     }
 }
@@ -206,10 +212,30 @@ pub fn bytes(count: u64) -> String {
 /// Redraws per second.
 const REFRESH_HZ: u8 = 10;
 
+/// Least time between two lines on the same stage.
+const BETWEEN_LINES: Duration = Duration::from_millis(100);
+
 /// A progress bar that is cleared on drop.
 pub struct StageBar {
     bar: ProgressBar,
     stage: Mutex<Option<Stage>>,
+    /// What the last line was about and when it was written, where progress is told in lines.
+    last_line: Option<Mutex<Option<(Stage, Instant)>>>,
+}
+
+impl StageBar {
+    /// A line for programs: of every stage, its end, and no more often than people look.
+    fn tell(&self, stage: Stage, done: u64, total: u64) {
+        let Some(Ok(mut last)) = self.last_line.as_ref().map(Mutex::lock) else {
+            return;
+        };
+        let is_due = last.is_none_or(|(told, at)| told != stage || at.elapsed() >= BETWEEN_LINES);
+        if is_due || done == total {
+            *last = Some((stage, Instant::now()));
+            let line = serde_json::json!({ "stage": stage.name(), "done": done, "total": total });
+            print_stderr(&line.to_string());
+        }
+    }
 }
 
 impl Progress for StageBar {
@@ -221,6 +247,7 @@ impl Progress for StageBar {
             self.bar.set_prefix(stage.name());
             self.bar.reset_eta();
         }
+        self.tell(stage, done, total);
         self.bar.set_length(total);
         self.bar.set_position(done);
     }

@@ -133,7 +133,7 @@ fn parse_and_run() -> Result<ExitCode> {
     if !options.no_cache {
         nephroid::files::cache::enable();
     }
-    let console = Console::open(options.quiet, options.json)?;
+    let console = Console::open(options)?;
     let outcome = command(&console);
     match console.exit_code() {
         None => outcome.map(|()| ExitCode::SUCCESS),

@@ -53,6 +53,15 @@ impl SceneOptions {
     }
 }
 
+/// How progress is told on stderr.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ProgressForm {
+    /// A bar for people, where stderr is a terminal.
+    Bar,
+    /// Lines for programs: `{"stage":"caustic","done":12,"total":100}`.
+    Json,
+}
+
 #[derive(Debug, Args)]
 pub struct RunOptions {
     /// Worker threads [default: one per core]
@@ -61,6 +70,15 @@ pub struct RunOptions {
     /// No progress bar
     #[arg(long, hide_short_help = true)]
     pub quiet: bool,
+    /// Progress on stderr: a bar, or JSON lines for other programs
+    #[arg(
+        long,
+        value_name = "bar|json",
+        value_enum,
+        default_value = "bar",
+        hide_short_help = true
+    )]
+    pub progress: ProgressForm,
     /// Print the result as one JSON document
     #[arg(long)]
     pub json: bool,

@@ -8,7 +8,8 @@
 //! | [`surfaces`] | which surfaces get maps, layers, resolution, texture coordinates |
 //! | [`moving_scenes`] | running water and keyframes: live, baked, rendered |
 //! | [`formats`] | the folder of a bake, exported files, units |
-//! | [`engines`] | maps in three.js, Blender, Godot, Unity, Bevy and Unreal |
+//! | [`blender`] | the add-on: bake the open scene, and what it reads |
+//! | [`engines`] | maps in three.js, Godot, Unity, Bevy and Unreal |
 //! | [`many_machines`] | one bake on many machines |
 //! | [`options`] | every option of a bake: values, default, accuracy, cost |
 //! | [`accuracy`] | estimators, error targets, energy accounts, studies, comparisons |
@@ -19,6 +20,9 @@
 
 #[doc = include_str!("accuracy.md")]
 pub mod accuracy {}
+
+#[doc = include_str!("blender.md")]
+pub mod blender {}
 
 #[doc = include_str!("changes.md")]
 pub mod changes {}

@@ -72,6 +72,20 @@ fn frames_are_the_moments_of_their_times() {
 }
 
 #[test]
+fn programs_read_progress_line_by_line() {
+    let sandbox = Sandbox::new();
+    let run = sandbox.succeed("bake builtin:mirror -o out --density 1e4 --map-resolution 64 --progress json");
+    let lines: Vec<Value> = run
+        .stderr
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("a line of JSON"))
+        .collect();
+    let last = lines.last().expect("progress of a bake");
+    assert_eq!(last["stage"], "caustic");
+    assert_eq!(last["done"], last["total"]);
+}
+
+#[test]
 fn bake_prints_the_manifest_that_it_writes() {
     let sandbox = Sandbox::new();
     let bake = "bake builtin:mirror -o out --estimator wavefront --density 1e4 --map-resolution 64x32 --layers direct,caustic";

@@ -1,0 +1,124 @@
+"""Blender's lamps as glTF's, watt for watt, and the world as an image."""
+
+import math
+
+import bpy
+import numpy
+
+from .materials import LUMENS_PER_WATT, custom_properties, nodes_of, number, output, source
+
+PUNCTUAL, FLAT = "KHR_lights_punctual", "EXT_lights_area"
+
+WORLD_SIZE = (1024, 512)
+# Enough to find a sun in a sky within its pixel.
+WORLD_SAMPLES = 16
+
+
+def strength(lamp, fault):
+    """Watts (of a sun W/m²) of each channel, with exposure, temperature and a plain Emission node."""
+    channels = numpy.array(lamp.color[:]) * lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0)
+    if getattr(lamp, "use_temperature", False):
+        channels = channels * numpy.array(lamp.temperature_color[:])
+    if nodes_of(lamp):
+        end = output(lamp)
+        node, _ = source(end.inputs["Surface"]) if end else (None, None)
+        if node is None or node.type != "EMISSION" or node.inputs["Color"].is_linked or node.inputs["Strength"].is_linked:
+            fault("its nodes are not read; it was baked without them")
+        else:
+            channels = channels * numpy.array(number(node.inputs["Color"].default_value)) * node.inputs["Strength"].default_value
+    return channels
+
+
+def size_m(lamp, scale):
+    """Width and height of an area lamp."""
+    width, height = lamp.size * scale[0], lamp.size * scale[1]
+    if lamp.shape in {"RECTANGLE", "ELLIPSE"}:
+        height = lamp.size_y * scale[1]
+    return width, height
+
+
+def gltf(lamp, scale, fault):
+    """The list that a lamp stands in, its entry there, and the extras of its node; (None, None, None) for a dark one.
+
+    `fault(text)` is told what is lost.
+    """
+    channels = strength(lamp, fault)
+    brightest = float(channels.max())
+    if brightest <= 0.0:
+        return None, None, None
+    # Of a lamp that has no size, all of its light counts: `normalize` divides by its area.
+    entry = {"name": lamp.name_full, "color": [max(float(channel), 0.0) / brightest for channel in channels]}
+    extras = custom_properties(lamp)
+    if lamp.type == "SUN":
+        if lamp.angle > 0.0:
+            extras.setdefault("angular_diameter_deg", min(math.degrees(lamp.angle), 180.0))
+        entry.update(type="directional", intensity=brightest * LUMENS_PER_WATT)
+        return PUNCTUAL, entry, extras
+    if lamp.type in {"POINT", "SPOT"}:
+        area_m2 = math.pi * lamp.shadow_soft_size ** 2
+        if not getattr(lamp, "normalize", True):
+            brightest *= area_m2
+        if lamp.shadow_soft_size > 0.0:
+            extras.setdefault("radius_m", lamp.shadow_soft_size)
+        entry.update(type=lamp.type.lower(), intensity=brightest / (4.0 * math.pi) * LUMENS_PER_WATT)
+        if lamp.type == "SPOT":
+            outer = min(0.5 * lamp.spot_size, 0.5 * math.pi)
+            if lamp.spot_size > math.pi:
+                fault("its cone is wider than 180 degrees and was narrowed to that")
+            # glTF has no hard edge.
+            entry["spot"] = {"outerConeAngle": outer, "innerConeAngle": outer * (1.0 - max(lamp.spot_blend, 1e-4))}
+        return PUNCTUAL, entry, extras
+    width, height = size_m(lamp, scale)
+    is_disc = lamp.shape in {"DISK", "ELLIPSE"}
+    area_m2 = width * height * (0.25 * math.pi if is_disc else 1.0)
+    if area_m2 <= 0.0:
+        fault("has no area and was left out")
+        return None, None, None
+    if lamp.shape == "ELLIPSE":
+        fault("is an ellipse and was baked as a disc of the same area")
+    if getattr(lamp, "spread", math.pi) < math.pi - 1e-3:
+        fault("its spread was ignored; it was baked with one of 180 degrees")
+    radiance = brightest / math.pi / (area_m2 if getattr(lamp, "normalize", True) else 1.0)
+    kind = "disk" if is_disc else "rect"
+    entry.update(type=kind, shape=kind, intensity=radiance * LUMENS_PER_WATT,
+                 size=math.sqrt(width * height) if is_disc else height, rect={"aspect": 1.0 if is_disc else width / height})
+    return FLAT, entry, extras
+
+
+def world_shines(world, wish):
+    """Whether the world's light is baked: as wished, by default where it is more than one colour."""
+    if world is None or wish == "OFF":
+        return False
+    if wish == "ON":
+        return True
+    end = output(world)
+    node = source(end.inputs["Surface"])[0] if end else None
+    return node is not None and (node.type != "BACKGROUND" or node.inputs["Color"].is_linked)
+
+
+def write_world(world, path):
+    """Renders a world, whatever its nodes, to an equirectangular OpenEXR image whose centre lies at Blender's −y."""
+    scene = bpy.data.scenes.new("Nephroid world")
+    lens = bpy.data.cameras.new("Nephroid world")
+    camera = bpy.data.objects.new("Nephroid world", lens)
+    try:
+        scene.collection.objects.link(camera)
+        scene.camera, scene.world = camera, world
+        scene.render.engine = "CYCLES"
+        lens.type = "PANO"
+        owner = lens if hasattr(lens, "panorama_type") else lens.cycles
+        owner.panorama_type = "EQUIRECTANGULAR"
+        camera.rotation_euler = (math.radians(90.0), 0.0, math.radians(180.0))
+        render = scene.render
+        render.resolution_x, render.resolution_y = WORLD_SIZE
+        render.resolution_percentage = 100
+        render.image_settings.file_format = "OPEN_EXR"
+        render.image_settings.color_mode, render.image_settings.color_depth = "RGB", "32"
+        render.filepath = str(path)
+        render.use_file_extension = False
+        scene.cycles.samples, scene.cycles.use_denoising = WORLD_SAMPLES, False
+        bpy.ops.render.render(scene=scene.name, write_still=True)
+    finally:
+        bpy.data.scenes.remove(scene)
+        bpy.data.objects.remove(camera)
+        bpy.data.cameras.remove(lens)

@@ -1,0 +1,315 @@
+"""Light maps in Blender: images, coordinates and nodes that add their light, and how to take all of it away again.
+
+One tiled image holds the maps of all surfaces; its first tile is black, for surfaces without one. A material gets one
+group node before its output. Coordinates lie in a UV layer of their own: of the mesh, where that is what was baked,
+else of a copy of the baked mesh, which a modifier shows in its place.
+"""
+
+import json
+from pathlib import Path
+
+import bpy
+import numpy
+
+from .materials import LIGHT_MAP_GROUP, NODES, Surface, output
+from .scene import BACK_UV_LAYER, BAKED_MESH, UV_LAYER
+
+IMAGE, MATTE = "Nephroid light", "Nephroid matte"
+FIRST_TILE, MOST_TILES = 1001, 999
+CAUSTIC_FLAGS = ("caustics_reflective", "caustics_refractive")
+# Keeps coordinates off the borders of their tile.
+INSET = 1e-5
+
+
+def is_ours(block, name):
+    """Whether a data-block is ours: Blender numbers names that are taken."""
+    return block.name == name or block.name.startswith(name + ".")
+
+
+def put_back(context, export, folder, keeps_lamps, fault):
+    """Shows the exported textures in `folder` on the surfaces of the scene; how many have one.
+
+    `fault(object name, text)` is told of surfaces that cannot show theirs.
+    """
+    remove(context)
+    index = json.loads((folder / "textures" / "index.json").read_text())
+    entries = [(texture["file"], place) for texture in index["textures"] for place in texture["maps"]]
+    shown, files, coordinates = {}, [], {}
+    for file, place in entries:
+        part = export.parts[place["node"]]
+        item = bpy.data.objects.get(part.object)
+        why = unusable(item, part) or (len(files) >= MOST_TILES and "there are too many maps; its was left out")
+        if why:
+            fault(part.object, why)
+            continue
+        files.append(folder / "textures" / file)
+        uvs = coordinates.setdefault(part.object, {}).setdefault(place["side"], numpy.zeros((len(part.geometry.loops), 3, 2)))
+        write_tile(uvs, part, place, folder, len(files))
+        shown[part.object] = part
+    if not shown:
+        return 0
+    image = load_tiles(files, folder)
+    group = light_map_group(image, keeps_lamps)
+    lit = set()
+    for name, part in shown.items():
+        item = bpy.data.objects[name]
+        write_layers(item, part, coordinates[name])
+        lit.update(slot for slot in materials_of(item) if slot is not None)
+    for material in lit:
+        why = add_node(material, group)
+        if why:
+            for name in users_of(material, shown):
+                fault(name, why)
+    remember(context.scene)
+    return len(files)
+
+
+def unusable(item, part):
+    """Why an object cannot show a map; None where it can."""
+    if item is None:
+        return "was removed or renamed while its light map was baked"
+    if part.is_instance:
+        return "is an instance, which cannot have a light map of its own; make instances real to give it one"
+    if item.library is not None or (item.data and item.data.library is not None):
+        return "is linked from another file and cannot be changed; make it local to give it a light map"
+    return None
+
+
+def write_tile(uvs, part, place, folder, tile):
+    """Writes the coordinates of a map, moved to its tile, into those of its object."""
+    geometry = part.geometry
+    rows = numpy.flatnonzero(geometry.slots == part.primitives[place["primitive"]])
+    if place["uv_file"]:
+        data = (folder / "textures" / place["uv_file"]).read_bytes()
+        own = numpy.frombuffer(data, dtype="<f8", offset=16).reshape(-1, 3, 2) * (1.0, -1.0) + (0.0, 1.0)
+    else:
+        own = geometry.uvs[part.sets[int(place["uv_set"][-1])]][geometry.loops[rows]]
+    if len(own) != len(rows):
+        raise ValueError(f"the light map of {part.object} has {len(own)} triangles instead of {len(rows)}; bake again")
+    uvs[rows] = numpy.clip(own, INSET, 1.0 - INSET) + (tile % 10, tile // 10)
+
+
+def load_tiles(files, folder):
+    """One image of a tile a file, packed into the .blend, after a black one."""
+    black = bpy.data.images.new(IMAGE, 1, 1, float_buffer=True)
+    black.file_format = "OPEN_EXR"
+    black.save(filepath=str(folder / f"light.{FIRST_TILE}.exr"))
+    bpy.data.images.remove(black)
+    for number, file in enumerate(files, FIRST_TILE + 1):
+        Path(file).rename(folder / f"light.{number}.exr")
+    image = bpy.data.images.load(str(folder / f"light.{FIRST_TILE}.exr"))
+    image.name = IMAGE
+    image.source = "TILED"
+    image.filepath = str(folder / "light.<UDIM>.exr")
+    for number in range(len(files)):
+        image.tiles.new(FIRST_TILE + 1 + number)
+    image.colorspace_settings.name = "Linear Rec.709"
+    image.pack()
+    return image
+
+
+def light_map_group(image, keeps_lamps):
+    """Adds albedo · E/π to a shader, or shows nothing else."""
+    tree = bpy.data.node_groups.new(LIGHT_MAP_GROUP, "ShaderNodeTree")
+    for name, kind, way in [("Shader", "Shader", "INPUT"), ("Color", "Color", "INPUT"), ("Diffuse", "Float", "INPUT"),
+                            ("Strength", "Float", "INPUT"), ("Shader", "Shader", "OUTPUT")]:
+        tree.interface.new_socket(name, in_out=way, socket_type=f"NodeSocket{kind}")
+
+    def node(kind, x, y, **values):
+        made = tree.nodes.new(f"ShaderNode{kind}")
+        made.location = (x, y)
+        for name, value in values.items():
+            setattr(made, name, value)
+        return made
+
+    inputs, outputs = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
+    inputs.location, outputs.location = (-200, 300), (800, 200)
+    front, back = node("UVMap", -400, 0, uv_map=UV_LAYER), node("UVMap", -400, -150, uv_map=BACK_UV_LAYER)
+    side = node("NewGeometry", -400, -300)
+    place = node("Mix", -200, 0, data_type="VECTOR")
+    texture = node("TexImage", 0, 0, image=image, extension="EXTEND")
+    tinted = node("VectorMath", 250, 100, operation="MULTIPLY")
+    amount = node("Math", 250, -150, operation="MULTIPLY")
+    emission, both = node("Emission", 450, 100), node("AddShader", 620, 200)
+    vectors = [socket for socket in place.inputs if socket.type == "VECTOR" and socket.name in "AB"]
+    link = tree.links.new
+    link(side.outputs["Backfacing"], next(socket for socket in place.inputs if socket.type == "VALUE"))
+    link(front.outputs["UV"], vectors[0])
+    link(back.outputs["UV"], vectors[1])
+    link(next(socket for socket in place.outputs if socket.type == "VECTOR"), texture.inputs["Vector"])
+    link(texture.outputs["Color"], tinted.inputs[0])
+    link(inputs.outputs["Color"], tinted.inputs[1])
+    link(inputs.outputs["Diffuse"], amount.inputs[0])
+    link(inputs.outputs["Strength"], amount.inputs[1])
+    link(tinted.outputs["Vector"], emission.inputs["Color"])
+    link(amount.outputs["Value"], emission.inputs["Strength"])
+    link(emission.outputs["Emission"], both.inputs[1])
+    if keeps_lamps:
+        link(inputs.outputs["Shader"], both.inputs[0])
+    link(both.outputs["Shader"], outputs.inputs["Shader"])
+    return tree
+
+
+def add_node(material, group):
+    """Puts the group before a material's output; why that is impossible, or None."""
+    if material.library is not None:
+        return f"its material {material.name} is linked from another file; make it local to show its light map"
+    end = output(material)
+    if end is None or not end.inputs["Surface"].is_linked:
+        return f"its material {material.name} uses no nodes; turn on Use Nodes to show its light map"
+    surface = Surface(material)
+    tree, link = material.node_tree, material.node_tree.links.new
+    node = tree.nodes.new("ShaderNodeGroup")
+    node.node_tree = group
+    node.label, node.location = LIGHT_MAP_GROUP, (end.location[0], end.location[1] + 220)
+    before = end.inputs["Surface"].links[0].from_socket
+    link(before, node.inputs["Shader"])
+    link(node.outputs["Shader"], end.inputs["Surface"])
+    colour, name = surface.values["color"], NODES.get(surface.node.type, {}).get("color") if surface.node else None
+    node.inputs["Color"].default_value = (*colour, 1.0)
+    if isinstance(name, str) and surface.node.inputs[name].is_linked:
+        link(surface.node.inputs[name].links[0].from_socket, node.inputs["Color"])
+    node.inputs["Diffuse"].default_value = surface.diffuse_share()
+    node.inputs["Strength"].default_value = 1.0
+    if hasattr(material, "cycles"):
+        # Paths find the light where they meet it; shadow rays to every lit surface would be noise.
+        node["emission_sampling"] = material.cycles.emission_sampling
+        material.cycles.emission_sampling = "NONE"
+    return None
+
+
+def materials_of(item):
+    """An object's materials; one of ours where it has none."""
+    if not any(slot.material for slot in item.material_slots):
+        matte = bpy.data.materials.get(MATTE) or bpy.data.materials.new(MATTE)
+        matte.use_nodes = True
+        if item.material_slots:
+            item.material_slots[0].material = matte
+        else:
+            item.data.materials.append(matte)
+    return [slot.material for slot in item.material_slots]
+
+
+def users_of(material, names):
+    return [name for name in names if any(slot.material == material for slot in bpy.data.objects[name].material_slots)]
+
+
+def write_layers(item, part, sides):
+    """Writes coordinates into the mesh that shows them."""
+    geometry = part.geometry
+    mesh = item.data
+    is_own = item.type == "MESH" and mesh.users == 1 and not item.modifiers and len(mesh.loops) == geometry.loop_count
+    layers = {side: by_loop(uvs, geometry) for side, uvs in sides.items()}
+    if is_own and all(layer is not None for layer in layers.values()):
+        for side, layer in layers.items():
+            add_layer(mesh, side, layer)
+        return
+    materials_of(item)
+    mesh = copy_of(geometry, f"{item.name} as baked", [slot.material for slot in item.material_slots])
+    for side, uvs in sides.items():
+        add_layer(mesh, side, uvs.reshape(-1, 2))
+    modifier = item.modifiers.new(BAKED_MESH, "NODES")
+    modifier.node_group = baked_mesh_group()
+    modifier.show_in_editmode = False
+    socket = next(entry for entry in modifier.node_group.interface.items_tree if entry.name == "Object")
+    modifier[socket.identifier] = bpy.data.objects.new(mesh.name, mesh)
+
+
+def by_loop(uvs, geometry):
+    """Coordinates of each corner of a mesh's polygons; None where the triangles of one disagree."""
+    layer = numpy.zeros((geometry.loop_count, 2))
+    layer[geometry.loops] = uvs
+    return layer if numpy.abs(layer[geometry.loops] - uvs).max() < 1e-6 else None
+
+
+def add_layer(mesh, side, values):
+    """A UV layer that does not become the active one."""
+    layer = mesh.uv_layers.new(name=UV_LAYER if side == "front" else BACK_UV_LAYER, do_init=False)
+    layer.uv.foreach_set("vector", numpy.ascontiguousarray(values, dtype=numpy.float32).ravel())
+
+
+def copy_of(geometry, name, materials):
+    """The triangles of a baked mesh, with its normals and UV layers."""
+    mesh = bpy.data.meshes.new(name)
+    corners = geometry.loops.ravel()
+    mesh.vertices.add(len(geometry.positions))
+    mesh.vertices.foreach_set("co", geometry.positions.ravel())
+    mesh.loops.add(len(corners))
+    mesh.loops.foreach_set("vertex_index", geometry.vertices[corners])
+    mesh.polygons.add(len(geometry.loops))
+    mesh.polygons.foreach_set("loop_start", numpy.arange(0, len(corners), 3, dtype=numpy.int32))
+    for material in materials:
+        mesh.materials.append(material)
+    mesh.polygons.foreach_set("material_index", geometry.slots.astype(numpy.int32))
+    for layer_name, values in geometry.uvs.items():
+        layer = mesh.uv_layers.new(name=layer_name, do_init=False)
+        layer.uv.foreach_set("vector", values[corners].ravel())
+        layer.active_render = layer_name == geometry.active_uv
+    mesh.update(calc_edges=True)
+    mesh.normals_split_custom_set(geometry.normals[corners])
+    return mesh
+
+
+def baked_mesh_group():
+    """Shows another object's mesh instead of one's own."""
+    known = bpy.data.node_groups.get(BAKED_MESH)
+    if known is not None:
+        return known
+    tree = bpy.data.node_groups.new(BAKED_MESH, "GeometryNodeTree")
+    tree.is_modifier = True
+    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    tree.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject")
+    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    inputs, shown, outputs = (tree.nodes.new(name) for name in ("NodeGroupInput", "GeometryNodeObjectInfo", "NodeGroupOutput"))
+    tree.links.new(inputs.outputs["Object"], shown.inputs["Object"])
+    tree.links.new(shown.outputs["Geometry"], outputs.inputs["Geometry"])
+    return tree
+
+
+def remember(scene):
+    """Turns Cycles' own caustics off, which would be there twice, and notes how they were."""
+    if hasattr(scene, "cycles"):
+        scene["nephroid_caustics"] = [int(getattr(scene.cycles, name)) for name in CAUSTIC_FLAGS]
+        for name in CAUSTIC_FLAGS:
+            setattr(scene.cycles, name, False)
+
+
+def remove(context):
+    """Takes away everything that `put_back` added; whether there was anything."""
+    groups = [group for group in bpy.data.node_groups if is_ours(group, LIGHT_MAP_GROUP)]
+    for material in bpy.data.materials:
+        tree = material.node_tree
+        for node in [node for node in (tree.nodes if tree else ()) if node.type == "GROUP" and node.node_tree in groups]:
+            if "emission_sampling" in node:
+                material.cycles.emission_sampling = node["emission_sampling"]
+            before = node.inputs["Shader"].links[0].from_socket if node.inputs["Shader"].is_linked else None
+            for link in list(node.outputs["Shader"].links):
+                if before is not None:
+                    tree.links.new(before, link.to_socket)
+            tree.nodes.remove(node)
+    copies = []
+    for item in bpy.data.objects:
+        for modifier in [one for one in item.modifiers if one.type == "NODES" and is_ours(one, BAKED_MESH)]:
+            copies += [value for value in modifier.values() if isinstance(value, bpy.types.Object)]
+            item.modifiers.remove(modifier)
+    for mesh in [copy.data for copy in copies]:
+        # Its object goes with it.
+        bpy.data.meshes.remove(mesh)
+    for mesh in bpy.data.meshes:
+        for name in (UV_LAYER, BACK_UV_LAYER):
+            if mesh.library is None and name in mesh.uv_layers:
+                mesh.uv_layers.remove(mesh.uv_layers[name])
+    matte = bpy.data.materials.get(MATTE)
+    if matte is not None:
+        for owner in (*bpy.data.meshes, *bpy.data.curves):
+            if list(owner.materials) == [matte]:
+                owner.materials.clear()
+        bpy.data.materials.remove(matte)
+    for blocks, name in [(bpy.data.node_groups, LIGHT_MAP_GROUP), (bpy.data.node_groups, BAKED_MESH), (bpy.data.images, IMAGE)]:
+        for block in [block for block in blocks if is_ours(block, name)]:
+            blocks.remove(block)
+    kept = context.scene.pop("nephroid_caustics", None)
+    if kept is not None:
+        for name, value in zip(CAUSTIC_FLAGS, kept):
+            setattr(context.scene.cycles, name, bool(value))
+    return bool(groups)

@@ -1,0 +1,105 @@
+"""Builds what is handed out, for the system that it runs on: wheel, source archive, tarball, Blender extension.
+
+Usage: python package.py OUTPUT_FOLDER [MATURIN-ARGUMENTS...]   (needs cargo and `pip install maturin`)
+
+Each holds the licences of all crates in the program. Further arguments go to `maturin build`, such as
+`--target x86_64-apple-darwin`, or `--compatibility manylinux_2_28 --zig` for older systems.
+"""
+
+import json
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+ROOT = HERE.parent.parent
+LICENCES = HERE / "LICENSES.txt"
+# Folders of crates have licences by these names.
+LICENCE_FILES = ("license", "licence", "copying", "notice", "unlicense", "copyright", "ofl", "ufl")
+
+# Platforms of wheels as Blender calls them.
+BLENDER_PLATFORMS = [("manylinux", "x86_64", "linux-x64"), ("linux", "x86_64", "linux-x64"), ("macosx", "arm64", "macos-arm64"),
+                     ("macosx", "x86_64", "macos-x64"), ("win", "amd64", "windows-x64"), ("win", "arm64", "windows-arm64")]
+
+
+def output_of(*command):
+    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+
+
+def licences(target):
+    """Our own licences, then those of all crates that are linked, each text once, after the crates that it covers."""
+    on = ["--target", target] if target else []
+    told = output_of("cargo", "tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}", *on)
+    linked = {tuple(line.split()[:2]) for line in told.splitlines() if line}
+    packages = json.loads(output_of("cargo", "metadata", "--locked", "--format-version", "1"))["packages"]
+    texts, bare = {}, []
+    for package in packages:
+        name = f"{package['name']} {package['version']}"
+        if (package["name"], f"v{package['version']}") not in linked or package["name"] == "nephroid":
+            continue
+        folder = Path(package["manifest_path"]).parent
+        files = [file for file in sorted(folder.rglob("*")) if file.name.lower().startswith(LICENCE_FILES) and file.is_file()]
+        for file in files:
+            texts.setdefault(file.read_text(errors="replace").strip(), []).append(f"{name} ({package['license']}): {file.name}")
+        if not files:
+            bare.append(f"{name} ({package['license'] or 'see its licence file'}), {package['repository'] or 'no repository'}")
+    parts = ["Nephroid: MIT or Apache-2.0, at your choice. The crates that it contains follow."]
+    parts += [(ROOT / name).read_text() for name in ("LICENSE-MIT", "LICENSE-APACHE")]
+    parts += ["\n".join(names) + "\n\n" + text for text, names in texts.items()]
+    parts.append("These crates bring no text of their own; the licences they name stand above.\n\n" + "\n".join(bare))
+    return ("\n\n" + "=" * 80 + "\n\n").join(parts) + "\n"
+
+
+def extension(wheel, output):
+    """The Blender extension, with the program inside as a wheel."""
+    system = next(blender for start, machine, blender in BLENDER_PLATFORMS
+                  if f"-{start}" in wheel.name and wheel.stem.endswith(machine))
+    path = output / f"nephroid-blender-{wheel.name.split('-')[1]}-{system}.zip"
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in sorted((ROOT / "assets" / "blender").iterdir()):
+            if file.name == "blender_manifest.toml":
+                head, permissions, rest = file.read_text().partition("[permissions]")
+                head += f'platforms = ["{system}"]\nwheels = ["./wheels/{wheel.name}"]\n\n'
+                archive.writestr(file.name, head + permissions + rest)
+            elif file.suffix == ".py":
+                archive.write(file, file.name)
+        archive.write(LICENCES, LICENCES.name)
+        archive.write(wheel, f"wheels/{wheel.name}", zipfile.ZIP_STORED)
+    return path
+
+
+def tarball(wheel, output):
+    """The bare program from a wheel, beside licences and README."""
+    path = output / f"{wheel.stem.replace('-py3-none', '')}.tar.gz"
+    with zipfile.ZipFile(wheel) as archive, tarfile.open(path, "w:gz") as packed:
+        program = next(info for info in archive.infolist() if ".data/scripts/nephroid" in info.filename)
+        entry = tarfile.TarInfo(f"nephroid/{Path(program.filename).name}")
+        entry.size, entry.mode = program.file_size, 0o755
+        packed.addfile(entry, archive.open(program))
+        for file in [LICENCES, ROOT / "README.md"]:
+            packed.add(file, f"nephroid/{file.name}")
+    return path
+
+
+def main():
+    output = Path(sys.argv[1]).resolve()
+    output.mkdir(parents=True, exist_ok=True)
+    arguments = sys.argv[2:]
+    target = arguments[arguments.index("--target") + 1] if "--target" in arguments else None
+    LICENCES.write_text(licences(target))
+    for wheel in output.glob("nephroid-*.whl"):
+        wheel.unlink()
+    try:
+        subprocess.run([sys.executable, "-m", "maturin", "sdist", "--out", output], cwd=HERE, check=True)
+        subprocess.run([sys.executable, "-m", "maturin", "build", "--release", "--out", output, *arguments], cwd=HERE, check=True)
+        wheel = next(output.glob("nephroid-*.whl"))
+        made = [wheel, *output.glob("nephroid-*.tar.gz"), tarball(wheel, output), extension(wheel, output)]
+    finally:
+        LICENCES.unlink()
+    for file in dict.fromkeys(made):
+        print(f"{file.stat().st_size / 1e6:6.1f} MB  {file}")
+
+
+main()
