@@ -1,5 +1,7 @@
 //! Files for other programs: maps with their manifest, pictures, glTF, textures; and how maps are read back.
 
+#[cfg(feature = "gpu")]
+pub mod chains;
 pub mod exr;
 pub mod float_image;
 pub mod frame_folder;

@@ -60,6 +60,20 @@ impl Gpu {
         Self::from_adapter(any, adapter, limits)
     }
 
+    /// A device that draws nothing and keeps what buffers hold, of the size that every browser offers: to gather what a
+    /// renderer would send to one. Needs no adapter.
+    ///
+    /// # Errors
+    /// None that is known of.
+    pub fn idle() -> Result<Self> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::NOOP;
+        descriptor.backend_options.noop.enable = true;
+        let instance = wgpu::Instance::new(descriptor);
+        let adapter = request_adapter(&instance, None)?;
+        Self::from_adapter(instance, adapter, wgpu::Limits::default())
+    }
+
     /// A device with the adapter's own limits that can present to `surface`, which was made by `instance`.
     ///
     /// # Errors

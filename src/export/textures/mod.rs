@@ -25,7 +25,7 @@ pub mod index;
 mod ktx2;
 mod png16;
 mod radiance;
-mod shared_exponent;
+pub(super) mod shared_exponent;
 mod texels;
 
 pub use self::content::Content;

@@ -1,13 +1,19 @@
 //! The mean of several pictures of the same view: edges of what is seen in mirrors and through glass become as smooth
 //! as all others.
 
-use super::bindings::{bind_group, bind_group_layout, cover_pipeline, texture, uniform};
+use super::bindings::{Binding, bind_group, bind_group_layout, cover_pipeline, texture, uniform};
 use super::shaders::ACCUMULATED;
 use super::uniforms::Accumulation;
 use crate::gpu::Gpu;
 
 /// A mean of many half floats needs more digits than they have.
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+pub(super) const BINDINGS: [Binding; 3] = [
+    uniform(wgpu::ShaderStages::FRAGMENT),
+    texture(false, wgpu::TextureViewDimension::D2),
+    texture(false, wgpu::TextureViewDimension::D2),
+];
 
 /// Two pictures in turn: the mean, and the mean before.
 #[derive(Debug)]
@@ -44,9 +50,7 @@ impl Mean {
             })
         };
         let pictures = [picture(), picture()];
-        let picture = || texture(false, wgpu::TextureViewDimension::D2);
-        let bindings = [uniform(wgpu::ShaderStages::FRAGMENT), picture(), picture()];
-        let layout = bind_group_layout(gpu, "mean", &bindings);
+        let layout = bind_group_layout(gpu, "mean", &BINDINGS);
         Self {
             width,
             height,
