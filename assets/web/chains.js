@@ -50,6 +50,7 @@ class EyePass {
     const names = ["nodes", "triangles", "corners", "map_uvs", "indices", "lights"];
     this.traced = this.bind("traced", [uniforms.start, ...names.map((name) => buffers[name]), uniforms.wavelengths]);
     this.sky = this.textures.sky && this.bind("sky", [this.textures.sky.createView()]);
+    this.bodies = bodies(scene, part);
     this.shown = {};
     this.light = [{}, {}];
   }
@@ -184,7 +185,9 @@ class EyePass {
       this.view = null;
       return false;
     }
-    this.view = view;
+    // The camera may be another one when the view is drawn again.
+    const { matrixWorld, fov, near } = view.camera;
+    this.view = { ...view, layers: { ...view.layers }, camera: { elements: [...matrixWorld.elements], fov, near } };
     this.count = 0;
     await this.drawPicture();
     return true;
@@ -199,7 +202,7 @@ class EyePass {
 
   async drawPicture() {
     const { device, view, count } = this;
-    const { width, height, layers = {}, line = 2 } = view;
+    const { width, height, layers, line = 2 } = view;
     if (this.canvas.width !== width || this.canvas.height !== height) Object.assign(this.canvas, { width, height });
     this.makeTargets(width, height);
     this.setLight(0, layers);
@@ -220,8 +223,7 @@ class EyePass {
 
   writeUniforms({ camera, width, height, exposureStops, moving }, picture) {
     const { scene, device, uniforms } = this;
-    const matrix = camera.matrixWorld.elements;
-    const axis = (column, factor = 1) => [0, 1, 2].map((row) => matrix[4 * column + row] * factor);
+    const axis = (column, factor = 1) => [0, 1, 2].map((row) => camera.elements[4 * column + row] * factor);
     const [eye, forward] = [axis(3), axis(2, -1)];
     const halfHeight = Math.tan((camera.fov * Math.PI) / 360);
     const aspect = width / height;
@@ -250,6 +252,7 @@ class EyePass {
     write(device, uniforms.start, scene.ChainStart, {
       eye: eye.map((coordinate, index) => (coordinate - centre_m[index]) * per_m),
       near: [camera.near * per_m],
+      media: media(this.bodies, eye),
       branching_depth: new Uint32Array([moving ? BRANCHING.moving : BRANCHING.resting]),
     });
     device.queue.writeBuffer(uniforms.wavelengths, 0, this.wavelengths(picture));
@@ -337,4 +340,59 @@ function write(device, buffer, { fields }, values) {
   for (const [name, value] of Object.entries(values)) {
     device.queue.writeBuffer(buffer, fields[name], value instanceof Uint32Array ? value : new Float32Array(value));
   }
+}
+
+// Bodies that an eye can be in: number, and triangles in the scene [m] with the box around them.
+function bodies(scene, part) {
+  const view = (name) => { const bytes = part(scene.contents[name]); return new DataView(bytes.buffer, bytes.byteOffset); };
+  const [records, corners, indices] = ["objects", "corners", "indices"].map(view);
+  const [stride, size] = [scene.vertices[0].arrayStride, scene.vertices[2].arrayStride];
+  const { solid, row_x: rows } = scene.ObjectRecord.fields;
+  const numbers = (data, first, count) => Array.from({ length: count }, (_, at) => data.getFloat32(first + 4 * at, true));
+  const found = [];
+  for (const [, count, objectCount, first, firstObject] of scene.draws.composed) {
+    for (let object = firstObject; object < firstObject + objectCount; object += 1) {
+      if (!records.getUint32(object * size + solid, true)) continue;
+      const m = numbers(records, object * size + rows, 12);
+      const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+      const places = new Float64Array(3 * count);
+      for (let at = 0; at < count; at += 1) {
+        const [x, y, z] = numbers(corners, indices.getUint32(4 * (first + at), true) * stride, 3);
+        for (let axis = 0; axis < 3; axis += 1) {
+          const place = m[4 * axis] * x + m[4 * axis + 1] * y + m[4 * axis + 2] * z + m[4 * axis + 3];
+          places[3 * at + axis] = place;
+          low[axis] = Math.min(low[axis], place);
+          high[axis] = Math.max(high[axis], place);
+        }
+      }
+      found.push({ object, places, low, high });
+    }
+  }
+  return found;
+}
+
+// Those that a ray from the eye straight up leaves more often than it enters, as `medium.wgsl` has them: 16 bits each, the
+// one first that is left first.
+function media(bodies, [x, y, z]) {
+  const within = [];
+  for (const { object, places: p, low, high } of bodies) {
+    if ([x, y, z].some((place, axis) => place < low[axis] || place > high[axis])) continue;
+    let leaves = 0, nearest = Infinity;
+    for (let a = 0; a < p.length; a += 9) {
+      // Twice the areas, seen from below, of the triangles that the eye makes with each side.
+      const area = (i, j) => (p[j] - x) * (p[i + 2] - z) - (p[i] - x) * (p[j + 2] - z);
+      const [ab, bc, ca] = [area(a, a + 3), area(a + 3, a + 6), area(a + 6, a)];
+      const whole = ab + bc + ca;
+      if (whole === 0 || [ab, bc, ca].some((part) => part / whole < 0)) continue;
+      const height = (bc * p[a + 1] + ca * p[a + 4] + ab * p[a + 7]) / whole - y;
+      if (height <= 0) continue;
+      leaves += Math.sign(whole);
+      if (whole > 0) nearest = Math.min(nearest, height);
+    }
+    if (leaves > 0) within.push({ object, nearest });
+  }
+  const words = new Uint32Array(4);
+  within.sort((a, b) => a.nearest - b.nearest);
+  within.slice(0, 8).forEach(({ object }, place) => { words[place >> 1] |= (object + 1) << (16 * (place & 1)); });
+  return words;
 }

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy
 import OpenEXR
 
+import chains_pixels
 import textures
 from three_pixels import pixels as three_pixels
 
@@ -160,6 +161,8 @@ def main():
             files += check_three(name, nephroid, modules, browser, folder)
             files += check_blender(name, nephroid, folder)
             textures.check(nephroid, modules, folder / name, folder / f"{name}_textures", run, faults)
+        for name in chains_pixels.SCENES:
+            chains_pixels.check(name, nephroid, browser, folder, run, faults)
         for number, scene in enumerate(others):
             maps = folder / f"other{number}"
             run(nephroid, "bake", scene, "-o", maps, "--default-light", "--density", "2000", "--map-resolution", "64",

@@ -12,7 +12,7 @@ use super::pipelines::{
     COMPOSED_BINDINGS, DEPTH_FORMAT, FRAME_BINDINGS, HDR_FORMAT, PipelineKey, RenderTarget, TRACED_BINDINGS,
 };
 use super::shaders::{ACCUMULATED, SKY, SUMMED, TONE_MAPPING};
-use super::uniforms::{ChainStart, DisplayWhite, Frame, SeenWavelengths};
+use super::uniforms::{ChainStart, DisplayWhite, Frame, ObjectRecord, SeenWavelengths};
 use super::{EyeQuality, Renderer, sky, tone_mapping};
 use crate::error::Result;
 use crate::eye_pass::reference::ChainLimits;
@@ -213,6 +213,7 @@ impl Renderer {
             "textures": textures,
             "Frame": offsets(&Frame::layout()),
             "ChainStart": offsets(&ChainStart::layout()),
+            "ObjectRecord": offsets(&ObjectRecord::layout()),
             "local": local,
             "background": background,
         })
