@@ -9,10 +9,12 @@ const BRANCHING = { moving: 2, resting: 4 };
 // Buffers have some size even without content [bytes].
 const LEAST_BYTES = 256;
 
-// Everything of a scene on the device. `asset` gives the bytes of a file of the page; throws where WebGPU is not there.
-export async function start({ canvas, asset }) {
+// Everything of a scene on the device. `asset` gives the bytes of a file of the page; throws where WebGPU is not there, or
+// is played by the processor and that is not forced.
+export async function start({ canvas, asset, isForced }) {
   const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
   if (!adapter) throw new Error("the browser offers no WebGPU");
+  if (adapter.info.isFallbackAdapter && !isForced) throw new Error("the browser has WebGPU without a graphics card");
   const wanted = ["maxBufferSize", "maxStorageBufferBindingSize", "maxTextureDimension2D"];
   const requiredLimits = Object.fromEntries(wanted.map((name) => [name, adapter.limits[name]]));
   const device = await adapter.requestDevice({ requiredLimits });

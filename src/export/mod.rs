@@ -16,6 +16,7 @@ pub mod sequence;
 pub mod shards;
 pub mod textures;
 pub mod uv_file;
+pub mod web;
 
 pub use float_image::FloatImage;
 pub use quantity::{DEFAULT_CUT, Quantity};

@@ -181,7 +181,7 @@ impl StagedFolder {
         self.root.path()
     }
 
-    /// Writes a file of a plain name aside; one of the same name is replaced.
+    /// Writes a file of a plain name aside, or of one in a folder within (`maps/a.exr`); one of the same name is replaced.
     ///
     /// # Errors
     /// A disk that is full; a folder of that name where the file is to be.
@@ -194,6 +194,7 @@ impl StagedFolder {
                 "choose another place or remove the folder",
             ));
         }
+        make_parent(&self.aside.path().join(name))?;
         let written = write_atomically(&self.aside.path().join(name), |writer| writer.write_all(bytes));
         // Errors name the place that the user knows.
         written.map_err(|error| Error {
@@ -213,10 +214,17 @@ impl StagedFolder {
     pub fn commit(self) -> Result<()> {
         for name in &self.names {
             let place = self.root.path().join(name);
+            make_parent(&place)?;
             fs::rename(self.aside.path().join(name), &place).map_err(|error| unwritable(&place, &error))?;
         }
         sync(self.root.path()).map_err(|error| unwritable(self.root.path(), &error))
     }
+}
+
+/// Makes the folder that a file is to be in.
+fn make_parent(file: &Path) -> Result<()> {
+    let parent = file.parent().unwrap_or(file);
+    fs::create_dir_all(parent).map_err(|error| unwritable(parent, &error))
 }
 
 /// Brings the names in a folder to the disk, where the system knows how.

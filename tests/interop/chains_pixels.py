@@ -80,7 +80,7 @@ def check(name, nephroid, browser, folder, run, faults):
     file = folder / f"{name}.png"
     told = json.loads(run(nephroid, "render", f"builtin:{name}", *size, "-o", file, "--json"))
     view = {"camera": camera(site / "scene.glb"), "width": WIDTH, "height": HEIGHT,
-            "exposureStops": told["exposure_stops"], "toneMap": 4}
+            "exposureStops": told["exposure_stops"], "toneMap": "soft"}
     layers = [{}, {"caustic": False}] if name == "ball" else [{}]
     pictures, frames_ms = drawn(browser, site, {"view": view, "pictures": PICTURES, "layers": layers})
     wanted = decoded(numpy.fromfile(file, numpy.uint8))

@@ -182,7 +182,13 @@ impl Renderer {
         });
         let buffers = [CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT].map(|layout| vertices(&layout));
         let surfaces: Vec<Value> = keys.iter().map(|key| surface(*key)).collect();
-        let tone_maps = ToneMap::ALL.map(|tone_map| constants(&tone_mapping::constants(tone_map, true)));
+        let tone_maps: Map<String, Value> = ToneMap::ALL
+            .into_iter()
+            .map(|tone_map| {
+                let values = tone_mapping::constants(tone_map, true);
+                (<&str>::from(tone_map).into(), constants(&values))
+            })
+            .collect();
         let background = self
             .scene
             .sky()
