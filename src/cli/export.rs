@@ -444,7 +444,7 @@ fn glb_text(file: &str, report: &GlbReport) -> String {
             map.tex_coord,
             map.intensity,
             match report.options.carrier {
-                Carrier::LightMap => report.unit,
+                Carrier::LightMap | Carrier::Beside => report.unit,
                 Carrier::Emissive | Carrier::Unlit => "of what is shown",
             },
             100.0 * map.cut_share,
