@@ -62,7 +62,7 @@ fn locate(record: u32, level: u32, uv: vec2f) -> Spot {
     let at = record + RECORD_WORDS + level * LEVEL_WORDS;
     let size = vec2f(f32(image_table[at]), f32(image_table[at + 1u]));
     let wraps = image_table[record + 3u];
-    let wrap = vec2u(wraps & 3u, wraps >> 2u & 3u);
+    let wrap = vec2u(wraps & 3u, (wraps >> 2u) & 3u);
     let place = vec2f(folded(uv.x, wrap.x), folded(uv.y, wrap.y)) * level_extent(record, level) - 0.5;
     let position = vec2f(wrapped(place.x, size.x, wrap.x), wrapped(place.y, size.y, wrap.y));
     let low = min(floor(position), size - 1.0);

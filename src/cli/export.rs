@@ -10,6 +10,7 @@ use nephroid::export::map_set::MapSet;
 use nephroid::export::textures::{
     self, Content, Encoding, Exposure, Packing, TextureFolder, TextureOptions, TextureReport, Transfer,
 };
+use nephroid::export::web::Site;
 use nephroid::export::{DEFAULT_CUT, Quantity};
 use nephroid::files;
 use nephroid::illumination::IlluminationMap;
@@ -37,6 +38,7 @@ const FORMATS: &[Named<&str>] = &[
     ("png", "png"),
     ("hdr", "hdr"),
     ("ktx2", "ktx2"),
+    ("web", "web"),
 ];
 
 const CARRIERS: &[Named<Carrier>] = &[
@@ -73,13 +75,16 @@ const TRANSFERS: &[Named<Transfer>] = &[("srgb", Transfer::Srgb), ("linear", Tra
 pub struct ExportArguments {
     /// Folder that `bake` wrote
     maps: PathBuf,
-    /// glb (scene with maps) or textures: exr, png, hdr, ktx2
+    /// glb (scene with maps), web (a page to walk through) or textures: exr, png, hdr, ktx2
     #[arg(long, value_parser = values::named(FORMATS), default_value = "glb")]
     format: &'static str,
     /// File, or folder for textures [default: in the folder of the maps]
     #[arg(short, long, value_name = "FILE|FOLDER")]
     output: Option<PathBuf>,
-    /// Textures: write into a folder that holds other files
+    /// web: one HTML file that opens from the disk
+    #[arg(long)]
+    single_file: bool,
+    /// Textures, web: write into a folder that holds other files
     #[arg(long, hide_short_help = true)]
     force: bool,
     /// Scene of the maps, if it has moved
@@ -129,10 +134,10 @@ pub struct ExportArguments {
 
 /// Result of a .glb for `--json`.
 #[derive(Serialize)]
-struct WrittenFile<'a> {
+struct WrittenFile<'a, Report> {
     file: &'a str,
     #[serde(flatten)]
-    report: &'a GlbReport,
+    report: &'a Report,
 }
 
 /// Result of textures for `--json`.
@@ -152,6 +157,7 @@ impl ExportArguments {
         self.validate()?;
         match self.format {
             "glb" => self.write_glb(console),
+            "web" => self.write_web(console),
             _ => self.write_textures(console),
         }
     }
@@ -203,20 +209,23 @@ impl ExportArguments {
             "glb" => "a .glb".to_string(),
             format => format!("--format {format}"),
         };
-        let takes_exposure = !is("glb") || self.carrier == Some(Carrier::Unlit);
+        let takes_exposure = !is("glb web") || self.carrier == Some(Carrier::Unlit);
         let multiplied = "light that materials multiply: it is for --as unlit only";
         let mixed = "--atlas, as smaller sizes mix the maps in it";
         // Option, whether it is given, whether it applies, and what it does not apply to.
         let options = [
             ("--as", self.carrier.is_some(), is("glb"), &*kind),
             ("--lights", self.lights.is_some(), is("glb"), &kind),
-            ("--layer", self.layer.is_some(), !is("glb"), &kind),
+            ("--units", self.units.is_some(), !is("web"), &kind),
+            ("--single-file", self.single_file, is("web"), &kind),
+            ("--layer", self.layer.is_some(), !is("glb web"), &kind),
             ("--transfer", self.transfer.is_some(), is("png"), &kind),
             ("--packing", self.packing.is_some(), is("ktx2"), &kind),
             ("--mips", self.mips, is("ktx2"), &kind),
             ("--mips", self.mips, self.atlas.is_none(), mixed),
-            ("--atlas", self.atlas.is_some(), !is("glb"), &kind),
+            ("--atlas", self.atlas.is_some(), !is("glb web"), &kind),
             ("--force", self.force, !is("glb"), &kind),
+            ("--force", self.force, !self.single_file, "one file"),
             ("--cut", self.cut.is_some(), is("glb png"), &kind),
             ("--exposure", self.exposure.is_some(), takes_exposure, multiplied),
         ];
@@ -260,6 +269,45 @@ impl ExportArguments {
             report: &report,
         };
         console.print_result(&glb_text(file, &report), &written)
+    }
+
+    fn write_web(&self, console: &Console) -> Result<()> {
+        let scene = self.load()?;
+        if MapSet::sequence_of(&self.maps)?.is_some() {
+            return Err(Error::usage(
+                "--format web",
+                "shows one moment, and these maps are of many",
+                "bake one (--time), or render the frames (nephroid render --frames)",
+            ));
+        }
+        let default = if self.single_file { "site.html" } else { "site" };
+        let output = self.output.clone().unwrap_or_else(|| self.maps.join(default));
+        if self.single_file {
+            check_target(&output, &scene)?;
+        }
+        let set = MapSet::open(&self.maps, &scene)?;
+        let exposure_stops = exposure_of(&scene, &set.read_all()?);
+        let site = Site::new(&scene, &set, exposure_stops, console.control())?;
+        let report = if self.single_file {
+            site.write_file(&output)?
+        } else {
+            site.write_folder(&output, self.force)?
+        };
+        console.warn(&report.warnings);
+        let file = &output.display().to_string();
+        let (files, textures, bytes) = (report.files, report.textures, report.bytes);
+        let what = match self.single_file {
+            true => "open it in a browser",
+            false => "let any server serve it, such as python3 -m http.server -d",
+        };
+        let text = format!("{file}: {files} files with {textures} textures, {bytes} bytes\n{what} {file}");
+        console.print_result(
+            &text,
+            &WrittenFile {
+                file,
+                report: &report,
+            },
+        )
     }
 
     fn glb_options(&self, scene: &Scene, maps: &[IlluminationMap]) -> GlbOptions {
@@ -396,7 +444,7 @@ fn glb_text(file: &str, report: &GlbReport) -> String {
             map.tex_coord,
             map.intensity,
             match report.options.carrier {
-                Carrier::LightMap => report.unit,
+                Carrier::LightMap | Carrier::Beside => report.unit,
                 Carrier::Emissive | Carrier::Unlit => "of what is shown",
             },
             100.0 * map.cut_share,

@@ -1,5 +1,7 @@
 //! Files for other programs: maps with their manifest, pictures, glTF, textures; and how maps are read back.
 
+#[cfg(feature = "gpu")]
+pub mod chains;
 pub mod exr;
 pub mod float_image;
 pub mod frame_folder;
@@ -14,6 +16,7 @@ pub mod sequence;
 pub mod shards;
 pub mod textures;
 pub mod uv_file;
+pub mod web;
 
 pub use float_image::FloatImage;
 pub use quantity::{DEFAULT_CUT, Quantity};

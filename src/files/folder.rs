@@ -180,7 +180,7 @@ impl StagedFolder {
         self.root.path()
     }
 
-    /// Stages a file, given its plain name; replaces one of the same name.
+    /// Writes a file of a plain name aside, or of one in a folder within (`maps/a.exr`); one of the same name is replaced.
     ///
     /// # Errors
     /// A full disk; a folder where the file is to be.
@@ -193,6 +193,7 @@ impl StagedFolder {
                 "choose another place or remove the folder",
             ));
         }
+        make_parent(&self.aside.path().join(name))?;
         let written = write_atomically(&self.aside.path().join(name), |writer| writer.write_all(bytes));
         // Errors name the path that the user knows.
         written.map_err(|error| Error {
@@ -212,10 +213,17 @@ impl StagedFolder {
     pub fn commit(self) -> Result<()> {
         for name in &self.names {
             let place = self.root.path().join(name);
+            make_parent(&place)?;
             fs::rename(self.aside.path().join(name), &place).map_err(|error| unwritable(&place, &error))?;
         }
         sync(self.root.path()).map_err(|error| unwritable(self.root.path(), &error))
     }
+}
+
+/// Makes the folder that a file is to be in.
+fn make_parent(file: &Path) -> Result<()> {
+    let parent = file.parent().unwrap_or(file);
+    fs::create_dir_all(parent).map_err(|error| unwritable(parent, &error))
 }
 
 /// Flushes a folder's entries to disk, where the system supports it.

@@ -57,6 +57,20 @@ impl Gpu {
         Self::from_adapter(any, adapter, limits)
     }
 
+    /// A device that draws nothing and keeps what buffers hold, of the size that every browser offers: to gather what a
+    /// renderer would send to one. Needs no adapter.
+    ///
+    /// # Errors
+    /// None that is known of.
+    pub fn idle() -> Result<Self> {
+        let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+        descriptor.backends = wgpu::Backends::NOOP;
+        descriptor.backend_options.noop.enable = true;
+        let instance = wgpu::Instance::new(descriptor);
+        let adapter = request_adapter(&instance, None)?;
+        Self::from_adapter(instance, adapter, wgpu::Limits::default())
+    }
+
     /// A device with all limits of its adapter, which can present to `surface`. The surface was created by `instance`.
     ///
     /// # Errors

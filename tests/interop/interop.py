@@ -1,11 +1,10 @@
-"""What other programs make of our files: Khronos' validator, three.js in a browser, Blender.
+"""What other programs make of our files: Khronos' validator, three.js in a browser, Blender; and our own page.
 
 Usage: interop.py NEPHROID MODULES BROWSER SCENES... (SCENES: other files to export and validate)
 Each figure is a mean over blocks of pixels of the floor, against the radiance that our own maps say.
 """
 
 import json
-import re
 import subprocess
 import sys
 import tempfile
@@ -14,6 +13,8 @@ from pathlib import Path
 import numpy
 import OpenEXR
 
+import chains_pixels
+import page
 import textures
 from three_pixels import pixels as three_pixels
 
@@ -62,16 +63,14 @@ def wholly_lit(picture):
     return (low > 0.8 * high) & (low > 0)
 
 
-def compare(what, found, wanted, step=0.0):
-    """Prints how far two pictures are apart, and keeps it where that is too far. `step` is the least light above black
-    that the picture's format holds, which says how much of the difference is rounding."""
+def compare(what, found, wanted):
+    """Prints how far two pictures are apart, and keeps it where that is too far."""
     found, wanted = blocks(found), blocks(wanted)
     has_light = wanted > 0.05 * wanted.mean()
     relative = numpy.abs(found / numpy.maximum(wanted, 1e-30) - 1.0)
     worst = numpy.unravel_index(numpy.where(has_light, relative, 0.0).argmax(), relative.shape)
     ratio = float(found.sum() / wanted.sum())
-    told = f", which holds {wanted[worst] / step:.2f} steps of its format per pixel" if step else ""
-    print(f"{what}: worst block off by {100 * relative[worst]:.2f} %{told}, whole floor {ratio:.4f} of ours")
+    print(f"{what}: worst block off by {100 * relative[worst]:.2f} %, whole floor {ratio:.4f} of ours")
     if relative[worst] > BOUND or abs(ratio - 1.0) > BOUND:
         faults.append(what)
 
@@ -83,12 +82,6 @@ def interpolated(picture):
         wide = numpy.moveaxis(numpy.pad(picture, around, mode="edge"), axis, 0)
         picture = numpy.moveaxis(wide[:-2] / 8 + wide[1:-1] * 3 / 4 + wide[2:] / 8, 0, axis)
     return picture
-
-
-def eight_bit_step(told):
-    """Light of the first step of an 8-bit sRGB texture of the floor, of what `export` printed, as a share of 1."""
-    line = next(line for line in told.splitlines() if line.startswith("floor"))
-    return float(re.search(r"white = ([\d.e+-]+)", line).group(1)) / (255 * 12.92)
 
 
 def floor_of(name, folder, nephroid, layers):
@@ -105,10 +98,13 @@ def check_three(name, nephroid, modules, browser, folder):
     albedo = 0.5
     light, area = floor_of(name, folder / name, nephroid, "caustic")
     file = folder / f"{name}.glb"
-    told = run(nephroid, "export", folder / name, "-o", file, "--units", "lux", "--lights", "remove", "--cut", "0")
-    found, revision = three_pixels(browser, modules, file, ["floor"], area, SIDE)
+    run(nephroid, "export", folder / name, "-o", file, "--units", "lux", "--lights", "remove")
+    shared = folder / f"{name}_shared"
+    run(nephroid, "export", folder / name, "-o", shared, "--format", "ktx2", "--units", "lux")
+    texture = json.loads((shared / "index.json").read_text())["textures"][0]["file"]
+    found, revision = three_pixels(browser, modules, file, ["floor"], area, SIDE, shared / texture)
     wanted = light * LUMENS_PER_WATT * albedo / numpy.pi
-    compare(f"three.js r{revision}, {name}, caustic map", found, wanted, eight_bit_step(told) * albedo / numpy.pi)
+    compare(f"three.js r{revision}, {name}, caustic map in RGB9E5", found, wanted)
     numpy.save(folder / f"{name}_three.npy", found)
 
     direct, area = floor_of(name, folder / f"{name}_direct", nephroid, "caustic,direct")
@@ -159,7 +155,13 @@ def main():
         for name in SCENES:
             files += check_three(name, nephroid, modules, browser, folder)
             files += check_blender(name, nephroid, folder)
+            page.check(nephroid, browser, f"builtin:{name}", folder / f"{name}_direct", folder / f"{name}_page", run, faults)
             textures.check(nephroid, modules, folder / name, folder / f"{name}_textures", run, faults)
+        for name in chains_pixels.SCENES:
+            chains_pixels.check(name, nephroid, browser, folder, run, faults)
+        gallery = folder / "gallery"
+        run(nephroid, "bake", "builtin:gallery", "-o", gallery, "--layers", "caustic,direct,indirect", "--quiet")
+        page.check(nephroid, browser, "builtin:gallery", gallery, folder / "gallery_page", run, faults)
         for number, scene in enumerate(others):
             maps = folder / f"other{number}"
             run(nephroid, "bake", scene, "-o", maps, "--default-light", "--density", "2000", "--map-resolution", "64",

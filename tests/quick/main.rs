@@ -25,6 +25,7 @@ mod gpu {
     mod picture;
     #[allow(dead_code, reason = "full tests use the rest")]
     mod rig;
+    mod web;
 }
 
 mod laws;

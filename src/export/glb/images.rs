@@ -43,7 +43,7 @@ pub fn light_of(
         }
     }
     let factor = match options.carrier {
-        Carrier::LightMap => options.quantity.factor(),
+        Carrier::LightMap | Carrier::Beside => options.quantity.factor(),
         Carrier::Emissive => match options.quantity {
             Quantity::Irradiance | Quantity::IrradianceByPi => std::f64::consts::FRAC_1_PI,
             Quantity::Illuminance | Quantity::IlluminanceByPi => {
@@ -52,7 +52,7 @@ pub fn light_of(
         },
         Carrier::Unlit => options.exposure_stops.exp2() * std::f64::consts::FRAC_1_PI,
     };
-    if options.carrier == Carrier::LightMap {
+    if matches!(options.carrier, Carrier::LightMap | Carrier::Beside) {
         return light.into_iter().map(|light| light * factor).collect();
     }
     let albedo = albedo(scene, &map.chart);
@@ -149,7 +149,7 @@ pub fn encode(
 ) -> Result<LightImage> {
     let white = match options.carrier {
         Carrier::Unlit => 1.0,
-        Carrier::LightMap | Carrier::Emissive => {
+        Carrier::LightMap | Carrier::Emissive | Carrier::Beside => {
             let values = light.iter().flat_map(|light| light.to_array());
             white(values, options.cut).unwrap_or(1.0)
         }

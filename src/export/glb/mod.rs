@@ -28,6 +28,9 @@ pub enum Carrier {
     Emissive,
     /// Light that the surface reflects, as the colour of a KHR_materials_unlit material.
     Unlit,
+    /// Nothing: the maps lie beside the file, which has their coordinates alone. Of a surface with light on both sides, both
+    /// maps follow the same ones.
+    Beside,
 }
 
 /// What becomes of the scene's own lights. With lights in the file and their direct light in the maps, it would be lit
@@ -163,7 +166,11 @@ pub fn encode(
     };
     let objects = maps.iter().map(|map| &scene.objects[map.chart.object()]);
     glb.push_own_meshes(objects.map(|object| object.node).collect());
-    for map in front_maps(maps, scene, &mut report.warnings) {
+    let written = match options.carrier {
+        Carrier::Beside => one_of_each(maps),
+        _ => front_maps(maps, scene, &mut report.warnings),
+    };
+    for map in written {
         let object = &scene.objects[map.chart.object()];
         let dense = map.dense();
         let world_from_node = world_from_node.get(&object.node);
@@ -235,6 +242,13 @@ fn front_maps<'a>(
     front
 }
 
+/// One map of each object.
+fn one_of_each(maps: &[IlluminationMap]) -> Vec<&IlluminationMap> {
+    let mut objects = BTreeSet::new();
+    let maps = maps.iter();
+    maps.filter(|map| objects.insert(map.chart.object())).collect()
+}
+
 fn add_map(
     glb: &mut Glb,
     scene: &Scene,
@@ -244,6 +258,19 @@ fn add_map(
     options: GlbOptions,
 ) -> Result<ExportedMap> {
     let object = &scene.objects[map.chart.object()];
+    let mut exported = ExportedMap {
+        surface: object.name.clone(),
+        node: object.node,
+        primitive: object.primitive,
+        tex_coord,
+        intensity: 1.0,
+        cut_texels: 0,
+        cut_share: 0.0,
+        negative_texels: 0,
+    };
+    if options.carrier == Carrier::Beside {
+        return Ok(exported);
+    }
     let light = images::light_of(map, layers, scene, options);
     let image = images::encode(&light, (map.width(), map.height()), options, &object.name)?;
     let image_index = glb.push_png(&format!("{} light", object.name), &image.png);
@@ -260,16 +287,11 @@ fn add_map(
         image.white,
         options,
     );
-    Ok(ExportedMap {
-        surface: object.name.clone(),
-        node: object.node,
-        primitive: object.primitive,
-        tex_coord,
-        intensity: image.white,
-        cut_texels: image.cut_texels,
-        cut_share: image.cut_share,
-        negative_texels: image.negative_texels,
-    })
+    exported.intensity = image.white;
+    exported.cut_texels = image.cut_texels;
+    exported.cut_share = image.cut_share;
+    exported.negative_texels = image.negative_texels;
+    Ok(exported)
 }
 
 impl Glb {
@@ -344,6 +366,7 @@ fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64
     }
     let black = json!([0.0, 0.0, 0.0, 1.0]);
     match options.carrier {
+        Carrier::Beside => {}
         Carrier::LightMap => {
             texture["intensity"] = json!(intensity);
             material["extensions"][LIGHT_MAP] = texture;

@@ -1,5 +1,7 @@
 //! `index.json`: describes each texture of an export.
 
+use std::collections::BTreeMap;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Encoding, TextureOptions};
@@ -17,6 +19,31 @@ pub const FILE_NAME: &str = "index.json";
 
 /// Marks an index of this program.
 pub const KIND: &str = "nephroid textures";
+
+/// By program. Values are to be those of `engines.md`.
+const HOW_TO_LOAD: [(&str, &str); 4] = [
+    (
+        "three.js",
+        "ktx2 with --units lux: light = await new KTX2Loader().detectSupport(renderer).loadAsync(file); \
+         (exr: EXRLoader, hdr: HDRLoader) light.channel = 1 (0 for TEXCOORD_0); material.lightMap = light; \
+         material.lightMapIntensity = 2 ** -exposure_stops",
+    ),
+    (
+        "Godot",
+        "exr with --units E/pi: import as Lossless or VRAM Uncompressed; in a spatial shader \
+         EMISSION = base_colour * texture(light_map, UV2).rgb * scale",
+    ),
+    (
+        "Unity",
+        "exr with --units E/pi: texture type Lightmap; LightmapSettings.lightmaps = new[] { new LightmapData { \
+         lightmapColor = texture } }; renderer.lightmapIndex = 0",
+    ),
+    (
+        "Bevy",
+        "ktx2 with --units lux/pi: commands.entity(surface).insert(Lightmap { image: assets.load(file), ..default() }); \
+         material.lightmap_exposure = 2_f32.powf(-exposure_stops)",
+    ),
+];
 
 /// Everything in `index.json`.
 #[derive(Clone, Debug, Serialize)]
@@ -41,6 +68,8 @@ pub struct TextureIndex {
     pub row_0: &'static str,
     /// Scene of the maps.
     pub scene: SceneSummary,
+    /// How programs load the files, a few lines for each.
+    pub how_to_load: BTreeMap<&'static str, &'static str>,
     /// Frames per second of a sequence.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fps: Option<f64>,
@@ -154,6 +183,7 @@ impl TextureIndex {
             primaries: "BT.709 (linear sRGB)",
             row_0: "v = 0",
             scene: reader.scene_summary().clone(),
+            how_to_load: HOW_TO_LOAD.into_iter().collect(),
             fps: reader.fps(),
             textures,
         }

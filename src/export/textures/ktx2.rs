@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use super::bc6h;
 use super::encoding::{Encoded, FileMetadata};
-use super::shared_exponent::RGB9E5;
+use super::shared_exponent::{RGB9E5, rgb9e5_word};
 use super::texels::Texels;
 use crate::error::{Error, Result};
 
@@ -48,11 +48,7 @@ impl Packing {
             Self::Rgb9e5 => {
                 let codes = texels.values().par_iter().map(|texel| RGB9E5.code(*texel));
                 let codes: Vec<_> = codes.collect();
-                let word = |([r, g, b], exponent): &([u32; 3], i32)| {
-                    let exponent = (exponent - RGB9E5.least) as u32;
-                    (r | g << 9 | b << 18 | exponent << 27).to_le_bytes()
-                };
-                let bytes = codes.iter().flat_map(word).collect();
+                let bytes = codes.iter().flat_map(|code| rgb9e5_word(*code)).collect();
                 (bytes, codes.into_iter().map(|code| RGB9E5.value(code)).collect())
             }
             Self::Bc6h => bc6h::pack(texels),

@@ -20,13 +20,13 @@ use crate::progress::Control;
 pub mod atlas;
 mod bc6h;
 mod content;
-mod encoding;
+pub(super) mod encoding;
 pub mod index;
-mod ktx2;
+pub(super) mod ktx2;
 mod png16;
 mod radiance;
-mod shared_exponent;
-mod texels;
+pub(super) mod shared_exponent;
+pub(super) mod texels;
 
 pub use self::content::Content;
 pub use self::encoding::{Encoding, Transfer};
@@ -295,7 +295,7 @@ struct Sheet {
 }
 
 /// Name of a map's files without the suffix of their content; that of a frame ends with its number.
-fn stem(entry: &MapEntry) -> String {
+pub(super) fn stem(entry: &MapEntry) -> String {
     let file = entry.file.strip_prefix("maps/").unwrap_or(&entry.file);
     file.strip_suffix(".exr").unwrap_or(file).replace('/', "_")
 }

@@ -27,6 +27,12 @@ pub const RGB9E5: SharedExponent = SharedExponent {
     most: 65408.0,
 };
 
+/// How E5B9G9R9 is stored.
+pub fn rgb9e5_word(([r, g, b], exponent): ([u32; 3], i32)) -> [u8; 4] {
+    let exponent = (exponent - RGB9E5.least) as u32;
+    (r | g << 9 | b << 18 | exponent << 27).to_le_bytes()
+}
+
 impl SharedExponent {
     /// Mantissas and exponent. The exponent is the smallest that holds the largest channel; each channel is rounded to
     /// its nearest step. Values below 0 become 0.

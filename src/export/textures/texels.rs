@@ -29,6 +29,15 @@ impl Texels {
         texels
     }
 
+    /// Values as they are, row by row, of a size that has as many.
+    pub fn of((width, height): (usize, usize), values: Vec<[f32; 3]>) -> Self {
+        Self {
+            width,
+            height,
+            values,
+        }
+    }
+
     /// Black texels of a size.
     pub fn black((width, height): (usize, usize)) -> Self {
         Self {

@@ -1,12 +1,18 @@
 //! Averages pictures of the same view, which antialiases what is seen in mirrors and through glass.
 
-use super::bindings::{bind_group, bind_group_layout, cover_pipeline, texture, uniform};
+use super::bindings::{Binding, bind_group, bind_group_layout, cover_pipeline, texture, uniform};
 use super::shaders::ACCUMULATED;
 use super::uniforms::Accumulation;
 use crate::gpu::Gpu;
 
 /// Half floats are too coarse for the mean of many frames.
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+pub(super) const BINDINGS: [Binding; 3] = [
+    uniform(wgpu::ShaderStages::FRAGMENT),
+    texture(false, wgpu::TextureViewDimension::D2),
+    texture(false, wgpu::TextureViewDimension::D2),
+];
 
 /// A running mean of frames. The two pictures alternate between the current mean and the previous one.
 #[derive(Debug)]
@@ -43,9 +49,7 @@ impl Mean {
             })
         };
         let pictures = [picture(), picture()];
-        let picture = || texture(false, wgpu::TextureViewDimension::D2);
-        let bindings = [uniform(wgpu::ShaderStages::FRAGMENT), picture(), picture()];
-        let layout = bind_group_layout(gpu, "mean", &bindings);
+        let layout = bind_group_layout(gpu, "mean", &BINDINGS);
         Self {
             width,
             height,

@@ -7,7 +7,7 @@ use crate::gpu::Gpu;
 /// Type of a binding, with the stages that it is visible to.
 pub(super) type Binding = (wgpu::ShaderStages, wgpu::BindingType);
 
-pub(super) fn uniform(stages: wgpu::ShaderStages) -> Binding {
+pub(super) const fn uniform(stages: wgpu::ShaderStages) -> Binding {
     let buffer = wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Uniform,
         has_dynamic_offset: false,
@@ -16,7 +16,7 @@ pub(super) fn uniform(stages: wgpu::ShaderStages) -> Binding {
     (stages, buffer)
 }
 
-pub(super) fn texture(filterable: bool, view_dimension: wgpu::TextureViewDimension) -> Binding {
+pub(super) const fn texture(filterable: bool, view_dimension: wgpu::TextureViewDimension) -> Binding {
     let texture = wgpu::BindingType::Texture {
         sample_type: wgpu::TextureSampleType::Float { filterable },
         view_dimension,
@@ -26,7 +26,7 @@ pub(super) fn texture(filterable: bool, view_dimension: wgpu::TextureViewDimensi
 }
 
 /// A buffer that fragment shaders read.
-pub(super) fn storage() -> Binding {
+pub(super) const fn storage() -> Binding {
     let buffer = wgpu::BindingType::Buffer {
         ty: wgpu::BufferBindingType::Storage { read_only: true },
         has_dynamic_offset: false,
@@ -160,6 +160,11 @@ impl Storage {
             written.copy_from_slice(bytes);
             gpu.queue.write_buffer(&self.buffer, offset as u64, bytes);
         }
+    }
+
+    /// What it holds.
+    pub(super) fn bytes(&self) -> &[u8] {
+        &self.written
     }
 
     /// Vertex attributes are read from it, too.

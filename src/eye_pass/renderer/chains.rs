@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
 use crate::geometry::PackedNode;
+use crate::geometry::bvh::Frame;
 use crate::gpu::Gpu;
 use crate::scene::emitter::{Emitter, EmitterKind};
 use crate::scene::{Object, Scene};
@@ -185,6 +186,21 @@ impl ChainScene {
     /// Length of a local unit [m].
     pub(super) fn unit_m(&self) -> f64 {
         1.0 / self.tracer.frame().scale
+    }
+
+    /// What nodes and triangles hold, by name, and lamps, of which there are none.
+    pub(super) fn contents(&self) -> [(&'static str, Vec<u8>); 3] {
+        let held = |storage: &Storage| storage.bytes().to_vec();
+        [
+            ("nodes", held(&self.nodes)),
+            ("triangles", held(&self.triangles)),
+            ("lights", held(&self.lights)),
+        ]
+    }
+
+    /// Local coordinates.
+    pub(super) fn frame(&self) -> &Frame {
+        self.tracer.frame()
     }
 
     pub(super) fn bindings(&self) -> [wgpu::BindingResource<'_>; 2] {

@@ -347,24 +347,23 @@ impl Packing<'_> {
         if self.indices.is_empty() {
             return;
         }
-        let filled = |label, contents, usage| self.gpu.filled_buffer(label, contents, usage);
+        let shared = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC;
+        let filled = |label, contents, usage| self.gpu.filled_buffer(label, contents, usage | shared);
         self.pages.push(Page {
             corners: filled(
                 "corners",
                 bytemuck::cast_slice(&self.corners),
-                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST,
+                wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
             ),
             indices: filled(
                 "indices",
                 bytemuck::cast_slice(&self.indices),
-                wgpu::BufferUsages::INDEX | wgpu::BufferUsages::STORAGE,
+                wgpu::BufferUsages::INDEX,
             ),
             map_uvs: self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some("map coordinates"),
                 size: (self.corners.len() * size_of::<MapUv>()) as u64,
-                usage: wgpu::BufferUsages::VERTEX
-                    | wgpu::BufferUsages::STORAGE
-                    | wgpu::BufferUsages::COPY_DST,
+                usage: shared | wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }),
         });

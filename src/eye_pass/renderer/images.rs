@@ -3,19 +3,19 @@
 use std::sync::Arc;
 
 use super::bindings::Storage;
-use super::maps::{DeviceMap, ShownMap};
+use super::maps::{self, DeviceMap, ShownMap};
 use super::paging::{Level, PagedImage, TILE, Texels, TilePool, Uploaded, is_halved};
 use crate::gpu::Gpu;
-use crate::illumination::Receiver;
+use crate::illumination::{IlluminationMap, Receiver};
 use crate::optics::LinearSrgb;
 use crate::scene::{Material, Scene, Texture, TextureRef};
+use crate::settings::LayerKind;
 
 /// Stands for a missing image; `NO_IMAGE` in the shaders.
 pub(super) const NO_IMAGE: u32 = u32::MAX;
 
 /// Device memory of a map tile [bytes].
-const MAP_TILE_BYTES: u64 =
-    (super::paging::STORED * super::paging::STORED * size_of::<super::maps::Texel>()) as u64;
+const MAP_TILE_BYTES: u64 = (super::paging::STORED * super::paging::STORED * size_of::<maps::Texel>()) as u64;
 
 #[derive(Debug)]
 pub(super) struct Images {
@@ -213,6 +213,30 @@ impl Images {
     /// Tiles of maps, and of textures.
     pub(super) fn views(&self) -> [wgpu::TextureView; 2] {
         [self.map_pool.view(), self.texture_pool.view()]
+    }
+
+    /// Sizes of the pools of tiles of maps, and of textures.
+    pub(super) fn pool_sizes(&self) -> [[u32; 3]; 2] {
+        [self.map_pool.size(), self.texture_pool.size()]
+    }
+
+    /// Texels of all tiles of maps, of one layer of their light.
+    pub(super) fn layer_tiles(&self, maps: &[IlluminationMap], kind: LayerKind) -> Vec<maps::Texel> {
+        let layers = maps.iter().filter_map(|map| {
+            let shown = self.maps[map.chart.receiver.index()].as_ref()?;
+            Some((shown, shown.levels_of(&map.layer(kind)?.irradiance)))
+        });
+        let layers: Vec<_> = layers.collect();
+        let tiles = layers
+            .iter()
+            .flat_map(|(shown, levels)| shown.image.tiles(Some(levels)));
+        self.map_pool.filled(tiles)
+    }
+
+    /// Texels of all tiles of textures.
+    pub(super) fn texture_tiles(&self) -> Vec<Texel> {
+        self.texture_pool
+            .filled(self.textures.iter().flat_map(|image| image.tiles(None)))
     }
 
     fn write_table(&mut self, gpu: &Gpu) -> Uploaded {

@@ -74,6 +74,15 @@ impl DeviceMap {
         (map, uploaded)
     }
 
+    /// Levels of a part of its light [W/m²], divided as its own are.
+    pub(super) fn levels_of(&self, part: &[[f32; 3]]) -> Vec<Level<Texel>> {
+        let shown = ShownMap {
+            chart: Arc::clone(&self.chart),
+            irradiance: Cow::Borrowed(part),
+        };
+        levels(&shown, &self.minification, self.irradiance_scale)
+    }
+
     /// Whether a map can replace this one in place: both have the same chart.
     pub(super) fn can_become(&self, map: &ShownMap) -> bool {
         let (old, new) = (&self.chart, &map.chart);

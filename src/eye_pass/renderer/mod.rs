@@ -30,6 +30,7 @@ mod tiled;
 mod timing;
 mod tone_mapping;
 mod uniforms;
+mod web;
 
 pub use draws::EyeQuality;
 pub use draws::{EyeCounts, GpuMs};
@@ -38,6 +39,7 @@ pub use offscreen::{render_counted, render_offscreen, render_sampled};
 pub use paging::Uploaded;
 pub use probe::{ProbedHit, probe};
 pub use shaders::{Specialisation, programs, shared_structs, specialisations, vertex_attributes};
+pub use web::WebScene;
 
 use std::sync::Arc;
 

@@ -231,7 +231,7 @@ impl Renderer {
     }
 
     /// Builds what chains are traced through, or updates it if it is stale.
-    fn make_chain_scene(&mut self, gpu: &Gpu) {
+    pub(super) fn make_chain_scene(&mut self, gpu: &Gpu) {
         if self.chain_scene.is_some() && !self.chain_scene_is_stale {
             return;
         }
@@ -317,8 +317,8 @@ impl Renderer {
         ))
     }
 
-    fn draw_each(&self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw]) {
-        // Consecutive instances of the same segment become one draw.
+    /// Instances that follow each other are one draw.
+    pub(super) fn runs(&self, draws: &[Draw]) -> Vec<(PipelineKey, &Segment, Range<u32>)> {
         let mut runs: Vec<(PipelineKey, &Segment, Range<u32>)> = Vec::new();
         for draw in draws {
             let object = draw.object as u32;
@@ -331,9 +331,13 @@ impl Renderer {
                 }
             }
         }
+        runs
+    }
+
+    fn draw_each(&self, pass: &mut wgpu::RenderPass<'_>, draws: &[Draw]) {
         pass.set_vertex_buffer(2, self.objects.records.buffer().slice(..));
         let (mut present_key, mut present_page) = (None, None);
-        for (key, segment, objects) in runs {
+        for (key, segment, objects) in self.runs(draws) {
             let Some(pipeline) = self.surfaces.get(key) else {
                 continue;
             };

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::bindings::{bind_group_layout, pipeline_layout, storage, texture, uniform};
+use super::bindings::{Binding, bind_group_layout, pipeline_layout, storage, texture, uniform};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
 use super::objects::Inspected;
 use super::objects::surface_code;
@@ -18,6 +18,28 @@ use crate::scene::SurfaceKind;
 pub(super) const HDR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Float;
 /// Reversed, with an infinite far plane: see `passes::clip_from_camera`.
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+
+/// Group 0 of all surfaces: frame, objects, images and their tiles.
+pub(super) const FRAME_BINDINGS: [Binding; 5] = [
+    uniform(wgpu::ShaderStages::VERTEX_FRAGMENT),
+    storage(),
+    storage(),
+    texture(false, wgpu::TextureViewDimension::D2Array),
+    texture(false, wgpu::TextureViewDimension::D2Array),
+];
+/// Group 1 of what traces: start, nodes, triangles, corners, map coordinates, indices, lights, wavelengths.
+pub(super) const TRACED_BINDINGS: [Binding; 8] = [
+    uniform(wgpu::ShaderStages::FRAGMENT),
+    storage(),
+    storage(),
+    storage(),
+    storage(),
+    storage(),
+    storage(),
+    uniform(wgpu::ShaderStages::FRAGMENT),
+];
+/// Group 1 of what shows what was traced.
+pub(super) const COMPOSED_BINDINGS: [Binding; 1] = [texture(false, wgpu::TextureViewDimension::D2)];
 
 /// What a pipeline writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -173,6 +195,37 @@ impl PipelineKey {
         }
     }
 
+    /// Whether it writes depths, and which it passes. Chains are traced once per pixel: where the surface is the nearest,
+    /// which was drawn before.
+    pub(super) fn depth(self) -> (bool, wgpu::CompareFunction) {
+        if self.writes == RenderTarget::Traced {
+            (false, wgpu::CompareFunction::Equal)
+        } else {
+            (true, wgpu::CompareFunction::Greater)
+        }
+    }
+
+    pub(super) fn cull_mode(self) -> Option<wgpu::Face> {
+        match self.faces {
+            Faces::Front => Some(wgpu::Face::Back),
+            Faces::Both => None,
+        }
+    }
+
+    /// Samples per pixel, of a picture that has so many.
+    pub(super) fn sample_count(self, of_picture: u32) -> u32 {
+        if self.writes.is_of_traced_picture() {
+            1
+        } else {
+            of_picture
+        }
+    }
+
+    /// Whether chains end in an environment.
+    pub(super) fn has_sky(self) -> bool {
+        self.how.has_sky
+    }
+
     /// Values of the shader's overrides.
     pub(super) fn constants(self) -> Vec<(&'static str, f64)> {
         let mask = ("HAS_MASK", flag(self.how.has_mask));
@@ -222,20 +275,12 @@ pub(super) struct SurfacePipelines {
 
 impl SurfacePipelines {
     pub(super) fn new(gpu: &Gpu, sample_count: u32) -> Self {
-        let frame = [
-            uniform(wgpu::ShaderStages::VERTEX_FRAGMENT),
-            storage(),
-            storage(),
-            texture(false, wgpu::TextureViewDimension::D2Array),
-            texture(false, wgpu::TextureViewDimension::D2Array),
-        ];
-        let traced_picture = [texture(false, wgpu::TextureViewDimension::D2)];
         Self {
             modules: HashMap::new(),
             sample_count,
-            frame_layout: bind_group_layout(gpu, "frame", &frame),
+            frame_layout: bind_group_layout(gpu, "frame", &FRAME_BINDINGS),
             traced_layout: None,
-            composed_layout: bind_group_layout(gpu, "traced picture", &traced_picture),
+            composed_layout: bind_group_layout(gpu, "traced picture", &COMPOSED_BINDINGS),
             made: HashMap::new(),
         }
     }
@@ -278,18 +323,8 @@ impl SurfacePipelines {
     }
 
     fn make_traced_layout(&mut self, gpu: &Gpu) {
-        let chains = [
-            uniform(wgpu::ShaderStages::FRAGMENT),
-            storage(),
-            storage(),
-            storage(),
-            storage(),
-            storage(),
-            storage(),
-            uniform(wgpu::ShaderStages::FRAGMENT),
-        ];
         self.traced_layout
-            .get_or_insert_with(|| bind_group_layout(gpu, "chains", &chains));
+            .get_or_insert_with(|| bind_group_layout(gpu, "chains", &TRACED_BINDINGS));
     }
 
     fn layout(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::PipelineLayout {
@@ -327,12 +362,7 @@ impl SurfacePipelines {
             },
             targets,
         });
-        // Chains are traced once per pixel: where the depth prepass found the surface to be the nearest.
-        let (depth_write, depth_compare) = if writes == RenderTarget::Traced {
-            (false, wgpu::CompareFunction::Equal)
-        } else {
-            (true, wgpu::CompareFunction::Greater)
-        };
+        let (depth_write, depth_compare) = key.depth();
         gpu.device
             .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(key.entry_point().unwrap_or("depth")),
@@ -344,10 +374,7 @@ impl SurfacePipelines {
                     buffers: &[Some(CORNER_LAYOUT), Some(MAP_UV_LAYOUT), Some(OBJECT_LAYOUT)],
                 },
                 primitive: wgpu::PrimitiveState {
-                    cull_mode: match key.faces {
-                        Faces::Front => Some(wgpu::Face::Back),
-                        Faces::Both => None,
-                    },
+                    cull_mode: key.cull_mode(),
                     ..Default::default()
                 },
                 depth_stencil: Some(wgpu::DepthStencilState {
@@ -358,11 +385,7 @@ impl SurfacePipelines {
                     bias: Default::default(),
                 }),
                 multisample: wgpu::MultisampleState {
-                    count: if writes.is_of_traced_picture() {
-                        1
-                    } else {
-                        self.sample_count
-                    },
+                    count: key.sample_count(self.sample_count),
                     ..Default::default()
                 },
                 fragment,

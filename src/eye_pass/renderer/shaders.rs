@@ -82,6 +82,11 @@ pub(super) const ACCUMULATED: Program = program! { "accumulated":
     "shared/cover" "eye_pass/accumulated"
 };
 
+/// Layers of light in the tiles of maps, for hosts that switch them.
+pub(super) const SUMMED: Program = program! { "summed":
+    "shared/cover" "eye_pass/summed"
+};
+
 /// Single rays, to compare the device's hits with the CPU's.
 pub(super) const PROBE: Program = program! { "probe":
     "shared/traversal" "eye_pass/probe"
@@ -105,6 +110,7 @@ pub fn programs() -> Vec<Program> {
         SKY,
         COMPOSED,
         ACCUMULATED,
+        SUMMED,
         PROBE,
         TONE_MAPPING,
     ]
@@ -159,7 +165,11 @@ pub fn specialisations() -> Vec<Specialisation> {
         entry_point,
         constants: Vec::new(),
     };
-    let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
+    let mut all = vec![
+        alone(ACCUMULATED, "accumulated"),
+        alone(SUMMED, "summed"),
+        alone(SKY, "sky_drawn"),
+    ];
     for writes in RenderTarget::all() {
         for kind in KINDS {
             for flags in 0..64 {

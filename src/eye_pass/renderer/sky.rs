@@ -5,14 +5,17 @@ use std::sync::Arc;
 
 use wgpu::util::DeviceExt;
 
-use super::bindings::{bind_group, bind_group_layout, pipeline_layout, texture};
+use super::bindings::{Binding, bind_group, bind_group_layout, pipeline_layout, texture};
 use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
 use super::shaders::SKY;
 use crate::gpu::Gpu;
 use crate::scene::Environment;
 
 /// Radiance may exceed the range of half floats.
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
+
+/// Group 2 of what shows the environment.
+pub(super) const BINDINGS: [Binding; 1] = [texture(false, wgpu::TextureViewDimension::D2)];
 
 /// An environment, uploaded and ready to be drawn.
 #[derive(Debug)]
@@ -28,7 +31,7 @@ pub(super) struct Sky {
 
 /// Layout of group 2 of pipelines that show an environment.
 pub(super) fn layout(gpu: &Gpu) -> wgpu::BindGroupLayout {
-    bind_group_layout(gpu, "sky", &[texture(false, wgpu::TextureViewDimension::D2)])
+    bind_group_layout(gpu, "sky", &BINDINGS)
 }
 
 impl Sky {
@@ -97,7 +100,7 @@ impl Sky {
 }
 
 /// Size and pixels of an environment, halved by means of 2 × 2 pixels until both sides are at most `limit`.
-fn fitted(source: &Environment, limit: usize) -> (usize, usize, Vec<[f32; 4]>) {
+pub(super) fn fitted(source: &Environment, limit: usize) -> (usize, usize, Vec<[f32; 4]>) {
     let (mut width, mut height) = source.size();
     let mut pixels: Vec<[f32; 4]> = source.pixels().iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
     while width.max(height) > limit.max(1) {

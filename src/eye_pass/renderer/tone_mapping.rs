@@ -2,12 +2,17 @@
 
 use std::collections::HashMap;
 
-use super::bindings::{bind_group, bind_group_layout, cover_pipeline, texture, uniform};
+use super::bindings::{Binding, bind_group, bind_group_layout, cover_pipeline, texture, uniform};
 use super::shaders::TONE_MAPPING;
 use super::uniforms::DisplayWhite;
 use crate::eye_pass::ToneMap;
 use crate::gpu::Gpu;
 use crate::optics::spectrum::xyz::{IDENTITY, Matrix3};
+
+pub(super) const BINDINGS: [Binding; 2] = [
+    texture(false, wgpu::TextureViewDimension::D2),
+    uniform(wgpu::ShaderStages::FRAGMENT),
+];
 
 /// The pipelines created so far.
 #[derive(Debug)]
@@ -22,14 +27,10 @@ pub(super) struct ToneMappingPipelines {
 
 impl ToneMappingPipelines {
     pub(super) fn new(gpu: &Gpu, target: wgpu::TextureFormat) -> Self {
-        let bindings = [
-            texture(false, wgpu::TextureViewDimension::D2),
-            uniform(wgpu::ShaderStages::FRAGMENT),
-        ];
         Self {
             module: TONE_MAPPING.module(&gpu.device),
             target,
-            layout: bind_group_layout(gpu, "tone mapping", &bindings),
+            layout: bind_group_layout(gpu, "tone mapping", &BINDINGS),
             white_balance: IDENTITY,
             white: white(gpu, &IDENTITY),
             made: HashMap::new(),

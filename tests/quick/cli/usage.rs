@@ -234,7 +234,11 @@ fn bad_export_options_are_refused() {
          --format hdr --transfer linear => --transfer
          --format ktx2 --bits 16 => --bits
          --format ktx2 --cut 1% => --cut
-         --format ktx2 --atlas --mips => --mips",
+         --format ktx2 --atlas --mips => --mips
+         --single-file => --single-file
+         --format web --units lux => --units
+         --format web --layer sum => --layer
+         --format web --single-file --force => --force",
     );
     assert_refused(1, "export", "nowhere => nowhere");
 }

@@ -81,6 +81,22 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         uploaded
     }
 
+    /// Place, width and texels of each tile that takes a place, of other levels of the same sizes or its own.
+    pub(in super::super) fn tiles<'a>(
+        &'a self,
+        levels: Option<&'a [Level<T>]>,
+    ) -> impl Iterator<Item = (u32, usize, Vec<T>)> {
+        let levels = levels.unwrap_or(&self.levels).iter().zip(&self.pages);
+        levels.flat_map(|(level, pages)| {
+            let held = level.places().zip(pages).filter(|(_, page)| **page < COARSER);
+            held.map(|(tile, page)| {
+                let mut texels = Vec::new();
+                level.gather(self.wrap, tile, &mut texels);
+                (*page, stored(tile[0], level.size[0]), texels)
+            })
+        })
+    }
+
     /// Makes levels from `finest` on resident and evicts finer ones.
     pub(in super::super) fn set_finest(&mut self, gpu: &Gpu, pool: &mut TilePool, finest: usize) -> Uploaded {
         let finest = finest.min(self.levels.len() - 1);

@@ -121,17 +121,12 @@ impl TilePool {
 
     /// Writes texels into a slot, `width` of them per row, starting at its corner.
     fn write<T: Pod>(&self, gpu: &Gpu, place: u32, texels: &[T], width: usize) {
-        let within = place % PER_LAYER;
-        let side = STORED as u32;
+        let [x, y, z] = origin(place);
         gpu.queue.write_texture(
             wgpu::TexelCopyTextureInfo {
                 texture: &self.texture,
                 mip_level: 0,
-                origin: wgpu::Origin3d {
-                    x: within % ACROSS * side,
-                    y: within / ACROSS * side,
-                    z: place / PER_LAYER,
-                },
+                origin: wgpu::Origin3d { x, y, z },
                 aspect: wgpu::TextureAspect::All,
             },
             bytemuck::cast_slice(texels),
@@ -146,6 +141,29 @@ impl TilePool {
                 depth_or_array_layers: 1,
             },
         );
+    }
+
+    /// Texels of the whole pool, of tiles given by place, width and texels; zero where none is.
+    pub(in super::super) fn filled<T: Pod>(
+        &self,
+        tiles: impl Iterator<Item = (u32, usize, Vec<T>)>,
+    ) -> Vec<T> {
+        let [across, down, layers] = self.size().map(|side| side as usize);
+        let mut filled = vec![T::zeroed(); across * down * layers];
+        for (place, width, texels) in tiles {
+            let [x, y, layer] = origin(place).map(|at| at as usize);
+            for (row, texels) in texels.chunks_exact(width).enumerate() {
+                let first = (layer * down + y + row) * across + x;
+                filled[first..first + width].copy_from_slice(texels);
+            }
+        }
+        filled
+    }
+
+    /// Texels across and down, and layers.
+    pub(in super::super) fn size(&self) -> [u32; 3] {
+        let size = self.texture.size();
+        [size.width, size.height, size.depth_or_array_layers]
     }
 
     /// Slots in use.
@@ -164,6 +182,12 @@ impl TilePool {
     fn capacity(&self) -> u32 {
         self.rows * ACROSS * self.layers
     }
+}
+
+/// The corner of a place: column, row, layer.
+fn origin(place: u32) -> [u32; 3] {
+    let (within, side) = (place % PER_LAYER, STORED as u32);
+    [within % ACROSS * side, within / ACROSS * side, place / PER_LAYER]
 }
 
 fn texture(gpu: &Gpu, label: &str, format: wgpu::TextureFormat, rows: u32, layers: u32) -> wgpu::Texture {

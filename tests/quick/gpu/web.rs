@@ -1,0 +1,127 @@
+//! What a browser gets of a scene: draws within their buffers, modules that hold, and the light of the maps layer by
+//! layer. Pictures are compared by `tests/run --interop`.
+
+use std::collections::HashMap;
+use std::io::Read as _;
+
+use nephroid::export::chains::encode;
+use nephroid::illumination::{IlluminationMap, Layer};
+
+use crate::prelude::*;
+use support::floors::{diffuse, floor_map, floor_scene};
+
+const SIDE: usize = 4;
+
+fn scene(has_ball: bool) -> (Scene, Vec<IlluminationMap>) {
+    let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
+    if has_ball {
+        let ball = shapes::sphere(dvec3(0.5, 0.3, 0.5), 0.2, 2);
+        parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
+    }
+    let light = |factor: f32| (0..SIDE * SIDE).map(|texel| [factor * texel as f32; 3]).collect();
+    let mut map = floor_map(0, SIDE, SIDE, light(0.25));
+    map.layers.push(Layer {
+        kind: LayerKind::Direct,
+        irradiance: light(0.5),
+    });
+    (scene, vec![map])
+}
+
+/// The description, and the bytes that it names.
+struct Unpacked {
+    description: Value,
+    contents: Vec<u8>,
+}
+
+impl Unpacked {
+    fn of(packed: &[u8]) -> Self {
+        let mut file = Vec::new();
+        let read = flate2::read::GzDecoder::new(packed).read_to_end(&mut file);
+        read.expect("gzip");
+        let (length, rest) = file.split_at(4);
+        let length = u32::from_le_bytes(length.try_into().expect("four bytes")) as usize;
+        Self {
+            description: serde_json::from_slice(&rest[..length]).expect("JSON"),
+            contents: rest[length..].to_vec(),
+        }
+    }
+
+    fn part(&self, place: &Value) -> &[u8] {
+        let [first, length] = [0, 1].map(|which| place[which].as_u64().expect("a number") as usize);
+        &self.contents[first..first + length]
+    }
+
+    fn buffer(&self, name: &str) -> &[u8] {
+        self.part(&self.description["contents"][name])
+    }
+}
+
+fn packed(has_ball: bool) -> Option<Unpacked> {
+    let (scene, maps) = scene(has_ball);
+    encode(&scene, &maps)
+        .expect("it is small")
+        .map(|bytes| Unpacked::of(&bytes))
+}
+
+#[test]
+fn draws_lie_within_their_buffers() {
+    let packed = packed(true).expect("glass");
+    let about = &packed.description;
+    let number = |value: &Value| value.as_u64().expect("a number") as usize;
+    let record = about["vertices"][2]["arrayStride"].as_u64().expect("a stride") as usize;
+    let (indices, objects) = (
+        packed.buffer("indices").len() / 4,
+        packed.buffer("objects").len() / record,
+    );
+    let mut drawn = HashMap::new();
+    for (list, draws) in about["draws"].as_object().expect("lists") {
+        for draw in draws.as_array().expect("draws") {
+            let [pipeline, index_count, object_count, first_index, first_object] =
+                std::array::from_fn(|which: usize| number(&draw[which]));
+            let surface = &about["surfaces"][pipeline];
+            assert!(about["programs"][surface["program"].as_str().expect("a name")].is_string());
+            assert!(first_index + index_count <= indices && first_object + object_count <= objects);
+            *drawn.entry(list.as_str()).or_insert(0) += object_count;
+        }
+    }
+    // The floor and the ball: both hide, the ball is traced and composed, the floor shows itself.
+    assert_eq!(
+        drawn,
+        HashMap::from([("depths", 2), ("traced", 1), ("composed", 1), ("own", 1)])
+    );
+    let corners = packed.buffer("corners").len() / number(&about["vertices"][0]["arrayStride"]);
+    let words = packed.buffer("indices").chunks_exact(4);
+    let largest = words
+        .map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")))
+        .max();
+    assert_eq!(largest.expect("triangles") as usize + 1, corners);
+}
+
+#[test]
+fn layers_add_up_to_the_maps() {
+    let packed = packed(true).expect("glass");
+    let about = &packed.description;
+    let across = about["textures"]["map_tiles"]["size"][0]
+        .as_u64()
+        .expect("a size") as usize;
+    let table: Vec<u32> = bytemuck::pod_collect_to_vec(packed.buffer("image_table"));
+    let scale = f32::from_bits(table[2]);
+    let value = |layer: &str, texel: usize| {
+        let words: Vec<u32> = bytemuck::pod_collect_to_vec(packed.part(&about["layers"][layer]));
+        let word = words[texel / SIDE * across + texel % SIDE];
+        (word & 511) as f32 * f32::exp2((word >> 27) as f32 - 24.0) * scale
+    };
+    let total = scene(true).1[0].total();
+    for (texel, [wanted, ..]) in total.iter().enumerate() {
+        let found = value("caustic", texel) + value("direct", texel);
+        assert!(
+            (found - wanted).abs() <= wanted / 256.0,
+            "texel {texel}: {found} for {wanted}"
+        );
+    }
+}
+
+#[test]
+fn a_scene_without_mirrors_and_glass_has_none() {
+    assert!(packed(false).is_none());
+}
