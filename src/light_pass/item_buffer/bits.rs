@@ -9,7 +9,7 @@ const WORDS_PER_ROW: usize = CELLS_PER_SIDE / 64;
 const _: () = assert!(WORDS_PER_ROW == 2);
 
 /// One bit per cell, row by row.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct CellBits(Vec<[u64; WORDS_PER_ROW]>);
 
 impl CellBits {
