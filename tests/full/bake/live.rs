@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use nephroid::bake::{Bake, Baker, ShardSource, ShardSums, StopReason};
+use nephroid::bake::{Bake, ShardSource, ShardSums, StopReason};
 use nephroid::error::Result;
 use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::LinearSrgb;
