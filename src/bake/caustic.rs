@@ -273,12 +273,14 @@ impl CausticLayer<'_> {
             limited: &limited,
             open_lights: lights.len(),
         };
+        let scene = self.tracer.scene();
+        let moving = (lights.len() > 1 && scene.is_animated()).then_some(&**scene);
         for light in &lights {
             let state = states.of_mut(light.light);
             let has_bumps = self.plan.is_on(Effect::Bumps);
             let spectrum = self.spectra.key(light.light);
             let bytes = self.settings.kept_light_bytes();
-            state.begin(&light.launch, (has_bumps, spectrum), bytes);
+            state.begin(light, (has_bumps, spectrum), bytes, moving);
         }
         let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
         course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());
@@ -458,8 +460,35 @@ impl CausticLayer<'_> {
         lights.filter(|light| scene.lights[light.light].strength().max_channel() > 0.0)
     }
 
+    /// Does something with the rays of a light, whose ways are noted where its state asks for that.
+    pub(super) fn noting<R>(
+        &self,
+        state: &mut LightState,
+        run: impl FnOnce(&CausticLayer, &mut LightState) -> R,
+    ) -> R {
+        let noting = state
+            .traversed
+            .as_ref()
+            .map(|traversed| self.tracer.noting(traversed));
+        let tracer = noting.as_ref().unwrap_or(self.tracer);
+        run(&CausticLayer { tracer, ..*self }, state)
+    }
+
     /// Adds one level to a light.
     fn advance(
+        &self,
+        light: &VisibleLight,
+        sizes: &Sizes,
+        state: &mut LightState,
+        light_progress: &mut LightProgress,
+        course: &mut BakeContext,
+    ) -> Result<()> {
+        self.noting(state, |layer, state| {
+            layer.next_level(light, sizes, state, light_progress, course)
+        })
+    }
+
+    fn next_level(
         &self,
         light: &VisibleLight,
         sizes: &Sizes,

@@ -253,12 +253,12 @@ impl CausticLayer<'_> {
                 for light in lights {
                     let unit = self.unit(light)?;
                     let state = states.of_mut(light.light);
-                    statistics.merge(&match self.settings.estimator {
-                        estimator if estimator.refines() => {
-                            self.wavefront_statistics(light, unit, state, course)
+                    statistics.merge(&self.noting(state, |layer, state| {
+                        match self.settings.estimator.refines() {
+                            true => layer.wavefront_statistics(light, unit, state, course),
+                            false => layer.splat_statistics(light, unit, state, course),
                         }
-                        _ => self.splat_statistics(light, unit, state, course),
-                    });
+                    }));
                 }
                 // A cancelled run has seen only a part.
                 let complete = !course.control.is_cancelled();

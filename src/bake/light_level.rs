@@ -1,17 +1,19 @@
 //! What a baker caches for one light: rays, and the maps of the last bake's levels.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use super::band_layers::LevelBand;
 use super::band_maps::BandMaps;
 use super::map_size::Sizes;
 use super::spectra::SpectralKey;
+use crate::geometry::enclosure::Bounds;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::caustic::arrival_cache::ArrivalCache;
+use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
-use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger::CarriedFlux;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::ReceiverMaps;
@@ -21,9 +23,9 @@ use crate::light_pass::wavefront::overshoot::PatchOvershoot;
 use crate::light_pass::wavefront::pass::TracedLight;
 use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
-use crate::scene::Light;
+use crate::scene::{Light, Scene};
 use crate::settings::{BakeSettings, Estimator};
-use crate::transport::EffectSet;
+use crate::transport::{EffectSet, TraversedCells};
 
 /// Everything that a light's paths depend on besides the scene.
 #[derive(Clone, Debug, PartialEq)]
@@ -174,8 +176,10 @@ impl LightStates {
 /// What is kept of one light between bakes.
 #[derive(Debug, Default)]
 pub(super) struct LightState {
-    /// Where its rays start.
-    launch: Option<Launch>,
+    /// Where its rays start, and what they are aimed at.
+    aim: Option<VisibleLight>,
+    /// Where they went, of all that is kept.
+    pub(super) traversed: Option<Arc<TraversedCells>>,
     /// Whether bumps bent its rays.
     has_bumps: bool,
     /// What the wavelengths of its rays depended on.
@@ -257,18 +261,29 @@ impl LightState {
             + self.arrivals.as_ref().map_or(0, |(_, arrivals)| arrivals.bytes())
     }
 
-    /// Drops rays that start elsewhere or took other paths, and caches of more than `kept_bytes`.
+    /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes. From then on their ways
+    /// are noted where the scene is moving.
     pub(super) fn begin(
         &mut self,
-        launch: &Launch,
+        light: &VisibleLight,
         (has_bumps, spectrum): (bool, Option<&SpectralKey>),
         kept_bytes: u64,
+        moving: Option<&Scene>,
     ) {
-        if self.launch.as_ref() != Some(launch) {
-            *self = Self {
-                launch: Some(launch.clone()),
-                ..Self::default()
-            };
+        match &self.aim {
+            Some(aim) if aim.launch == light.launch => {
+                if !aim.aims_as(light) {
+                    self.forget_maps();
+                }
+            }
+            _ => *self = Self::default(),
+        }
+        self.aim = Some(light.clone());
+        // Tracers of single wavelengths note nothing.
+        let noted = moving.filter(|_| spectrum.is_none()).and_then(Scene::bounds);
+        self.traversed.take_if(|_| noted.is_none());
+        if self.rays.is_empty() && self.levels.is_empty() && self.traversed.is_none() {
+            self.traversed = noted.map(|bounds| Arc::new(TraversedCells::within(bounds)));
         }
         let went_alike = self.has_bumps == has_bumps && self.spectrum.as_ref() == spectrum;
         (self.has_bumps, self.spectrum) = (has_bumps, spectrum.cloned());
@@ -277,6 +292,18 @@ impl LightState {
         }
         self.arrivals
             .take_if(|(_, arrivals)| arrivals.bytes() > kept_bytes);
+    }
+
+    /// Whether no path can have come near what changed: objects and the boxes in which they are or were [m].
+    pub(super) fn is_beyond(&self, changed: &[(usize, Bounds)], scene: &Scene) -> bool {
+        self.aim
+            .as_ref()
+            .zip(self.traversed.as_ref())
+            .is_some_and(|(aim, traversed)| {
+                changed.iter().all(|&(object, bounds)| {
+                    !traversed.meets(bounds) && !aim.is_aimed_at(object, bounds, scene)
+                })
+            })
     }
 
     /// Drops maps whose paths changed. Rays stay, as their cache knows which of them are valid.

@@ -162,17 +162,22 @@ impl Baker {
             .map(|tracer| Arc::new(tracer.edited(scene.clone())));
         let sizes = std::mem::replace(&mut self.sizes, ChartCache::new(scene.clone()));
         self.sizes = sizes.edited(scene.clone(), &change.shapes);
-        if change.moves_paths() || change.shares {
+        let is_other = change.moves_paths() || !change.shares.is_empty();
+        if change.moves_shadows {
             self.direct.clear();
             self.sizes.forget_borders(None);
+        }
+        if is_other {
             self.indirect.clear();
             self.lights.statistics = None;
         }
         if change.moves_paths() || !change.lights.is_empty() {
             self.aim = None;
         }
+        let changed = change.boxes(&self.scene, &scene);
         for state in self.lights.iter_mut() {
-            if change.moves_paths() || change.shares {
+            let is_beyond = |changed: &Vec<_>| state.is_beyond(changed, &self.scene);
+            if is_other && !changed.as_ref().is_some_and(is_beyond) {
                 state.forget_maps();
             }
             if change.moves_paths() {

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use crate::geometry::enclosure::Bounds;
 use crate::scene::{Light, LightKind, Material, Scene};
 
 /// The difference between a scene and its edited copy.
@@ -11,8 +12,10 @@ pub(super) struct SceneChange {
     pub(super) shapes: Vec<usize>,
     /// Objects whose material sends light in other directions.
     pub(super) directions: Vec<usize>,
-    /// Whether any material reflects, transmits or absorbs another share of light, changed directions included.
-    pub(super) shares: bool,
+    /// Objects that take another share of the light, those included.
+    pub(super) shares: Vec<usize>,
+    /// Whether light that meets nothing specular may be another.
+    pub(super) moves_shadows: bool,
     /// Lights with another place, size or emission profile; strength and colour alone do not count.
     pub(super) lights: Vec<usize>,
 }
@@ -47,7 +50,8 @@ impl SceneChange {
         let lights = old.lights.iter().zip(&new.lights).enumerate();
         Some(Self {
             directions: changed(leave_alike).collect(),
-            shares: changed(share_alike).next().is_some(),
+            shares: changed(share_alike).collect(),
+            moves_shadows: !shapes.is_empty() || changed(shade_alike).next().is_some(),
             lights: lights
                 .filter(|(_, (old, new))| !shine_alike(old, new) || is_moved_with(new))
                 .map(|(light, _)| light)
@@ -60,16 +64,26 @@ impl SceneChange {
     pub(super) fn moves_paths(&self) -> bool {
         !(self.shapes.is_empty() && self.directions.is_empty())
     }
+
+    /// Objects that changed, with the boxes that they were and are in [m]; `None` where the scene's own box is another.
+    pub(super) fn boxes(&self, old: &Scene, new: &Scene) -> Option<Vec<(usize, Bounds)>> {
+        let changed = self.shapes.iter().chain(&self.shares);
+        let boxes = |&object: &usize| [old, new].map(|scene| Some((object, scene.objects[object].bounds()?)));
+        (old.bounds() == new.bounds()).then(|| changed.flat_map(boxes).flatten().collect())
+    }
 }
 
 /// Whether both materials send light in the same directions.
 fn leave_alike(a: &Material, b: &Material) -> bool {
+    a.bending_waves() == b.bending_waves() && leave_alike_without_waves(a, b)
+}
+
+fn leave_alike_without_waves(a: &Material, b: &Material) -> bool {
     let has_alpha = a.alpha_mask.is_some() || a.coverage.is_some();
     a.surface == b.surface
         && a.ior == b.ior
         && a.glass == b.glass
         && a.volume.is_some() == b.volume.is_some()
-        && a.bending_waves() == b.bending_waves()
         && a.bending_map() == b.bending_map()
         && a.double_sided == b.double_sided
         && a.alpha_mask == b.alpha_mask
@@ -81,8 +95,18 @@ fn leave_alike(a: &Material, b: &Material) -> bool {
 
 /// Whether both materials also reflect, transmit and absorb the same shares of light.
 fn share_alike(a: &Material, b: &Material) -> bool {
-    leave_alike(a, b)
-        && a.base_colour == b.base_colour
+    leave_alike(a, b) && have_same_shares(a, b)
+}
+
+/// The same for light that meets nothing specular: clear surfaces stop it, whatever their waves.
+fn shade_alike(a: &Material, b: &Material) -> bool {
+    leave_alike_without_waves(a, b)
+        && have_same_shares(a, b)
+        && (!a.surface.is_receiver() || a.bending_waves() == b.bending_waves())
+}
+
+fn have_same_shares(a: &Material, b: &Material) -> bool {
+    a.base_colour == b.base_colour
         && a.base_colour_texture == b.base_colour_texture
         && a.metallic == b.metallic
         && a.roughness == b.roughness

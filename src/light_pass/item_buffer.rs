@@ -120,6 +120,11 @@ impl ItemBuffer {
         }
     }
 
+    /// Whether both mark the same cells.
+    pub fn marks_as(&self, other: &Self) -> bool {
+        self.faces == other.faces && self.casters == other.casters
+    }
+
     pub fn is_marked(&self, face: usize, column: usize, row: usize) -> bool {
         self.faces[face].get(column, row)
     }

@@ -14,6 +14,7 @@ mod packed;
 pub mod smoothing;
 mod surroundings;
 pub mod tracer;
+mod traversed;
 
 pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use effects::EffectSet;
@@ -24,3 +25,4 @@ pub use microfacets::Microfacets;
 pub use packed::{PackedInstance, PackedMesh};
 pub use surroundings::media_at;
 pub use tracer::{RayHit, SurfaceHit, Tracer};
+pub use traversed::TraversedCells;

@@ -13,6 +13,7 @@ use super::hierarchy::{self, Hierarchy, SceneNode};
 use super::interaction::DiffuseResponse;
 use super::normal_texture::{TextureBump, texel_m};
 use super::smoothing::smoothing_groups;
+use super::traversed::TraversedCells;
 use crate::geometry::{Ray, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
@@ -21,7 +22,7 @@ use crate::scene::{
 };
 
 /// A scene with its hierarchies and shape data. Edited copies share what the edits leave unchanged.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Tracer {
     scene: Arc<Scene>,
     hierarchy: Arc<Hierarchy>,
@@ -37,6 +38,8 @@ pub struct Tracer {
     has_partial: bool,
     /// Wavelength of all light; `None` for RGB.
     wavelength: Option<Nanometres>,
+    /// Where its rays go, if that is wanted.
+    traversed: Option<Arc<TraversedCells>>,
 }
 
 /// Shape data of an object, computed on first use.
@@ -124,6 +127,7 @@ impl Tracer {
             specular,
             has_bumps: true,
             wavelength: None,
+            traversed: None,
         }
     }
 
@@ -165,6 +169,7 @@ impl Tracer {
             specular,
             has_bumps: self.has_bumps,
             wavelength: None,
+            traversed: None,
         }
     }
 
@@ -172,14 +177,30 @@ impl Tracer {
     #[must_use]
     pub fn without_bumps(&self) -> Self {
         Self {
-            scene: Arc::clone(&self.scene),
-            hierarchy: Arc::clone(&self.hierarchy),
-            shapes: self.shapes.clone(),
-            specular: self.specular.clone(),
             has_bumps: false,
-            has_masks: self.has_masks,
-            has_partial: self.has_partial,
-            wavelength: self.wavelength,
+            ..self.clone()
+        }
+    }
+
+    /// The same scene for rays whose way is noted.
+    #[must_use]
+    pub fn noting(&self, traversed: &Arc<TraversedCells>) -> Self {
+        Self {
+            traversed: Some(Arc::clone(traversed)),
+            ..self.clone()
+        }
+    }
+
+    /// Notes that light lies somewhere in a box [m], whatever rays say.
+    pub fn note_box(&self, bounds: (DVec3, DVec3)) {
+        if let Some(traversed) = &self.traversed {
+            traversed.add_box(bounds);
+        }
+    }
+
+    fn note_ray(&self, ray: &Ray, distance_m: f64) {
+        if let Some(traversed) = &self.traversed {
+            traversed.add_ray(ray, distance_m);
         }
     }
 
@@ -316,12 +337,14 @@ impl Tracer {
     }
 
     fn closest(&self, ray: &Ray) -> Option<(RayHit, hierarchy::Found<'_>)> {
-        if self.has_masks {
+        let closest = if self.has_masks {
             self.hierarchy
                 .closest(ray, |object, triangle, at| self.is_there(object, triangle, at))
         } else {
             self.hierarchy.closest(ray, |_, _, _| true)
-        }
+        };
+        self.note_ray(ray, closest.map_or(f64::INFINITY, |(place, _)| place.distance_m));
+        closest
     }
 
     /// Surface data of a hit.
@@ -403,6 +426,7 @@ impl Tracer {
 
     /// Whether any surface lies on the ray before `distance_m`.
     pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
+        self.note_ray(ray, distance_m);
         if self.has_masks {
             let is_there = |object: usize, triangle: usize, at| self.is_there(object, triangle, at);
             self.hierarchy.is_blocked(ray, distance_m, is_there)
@@ -416,6 +440,7 @@ impl Tracer {
         if !self.has_partial {
             return f64::from(u8::from(!self.is_blocked(ray, distance_m)));
         }
+        self.note_ray(ray, distance_m);
         let holes = RefCell::new(Vec::new());
         let is_blocked = self
             .hierarchy

@@ -10,6 +10,7 @@ mod bake {
     mod coverage;
     mod indirect;
     mod live;
+    mod motion;
     mod plan;
     mod probe;
     mod soft;

@@ -38,13 +38,16 @@ def run(*command, cwd=None):
     return done.stdout
 
 
-def baked(folder, surface):
-    """E of a surface's map [W/m²], array [height, width, 3], row 0 at v = 0; and the side of a texel [m]."""
+def baked(folder, surface, frame=None):
+    """E of a surface's map [W/m²], array [height, width, 3], row 0 at v = 0, of a frame (from 0) where there are several;
+    the side of a texel [m] and the file."""
     manifest = json.loads((folder / "manifest.json").read_text())
-    entry = next(entry for entry in manifest["maps"] if entry["surface"] == surface)
+    moment = manifest if frame is None else manifest["sequence"]["frames"][frame]
+    entry = next(entry for entry in moment["maps"] if entry["surface"] == surface)
     image = OpenEXR.File(str(folder / entry["file"]), separate_channels=True)
     channels = image.parts[0].channels
-    return numpy.stack([channels[name].pixels for name in "RGB"], axis=-1), entry["texel_area_m2"] ** 0.5
+    light = numpy.stack([channels[name].pixels for name in "RGB"], axis=-1)
+    return light, entry["texel_area_m2"] ** 0.5, folder / entry["file"]
 
 
 def blocks(picture):
@@ -88,7 +91,7 @@ def floor_of(name, folder, nephroid, layers):
     """Bakes a built-in scene; its folder, E of its floor and the floor's area seen from above."""
     run(nephroid, "bake", f"builtin:{name}", "-o", folder, "--layers", layers, "--map-resolution", SIDE,
         "--density", "1e5", "--quiet", "--force")
-    light, texel_m = baked(folder, "floor")
+    light, texel_m, _ = baked(folder, "floor")
     half = 0.5 * SIDE * texel_m
     return light, (-half, -half, half, half)
 
@@ -132,8 +135,8 @@ def check_three(name, nephroid, modules, browser, folder):
 def check_blender(name, nephroid, folder):
     """Emission in W/(m² sr)."""
     albedo = 0.5
-    light, area = baked(folder / name, "floor")[0], None
-    half = 0.5 * SIDE * baked(folder / name, "floor")[1]
+    light, texel_m, _ = baked(folder / name, "floor")
+    half = 0.5 * SIDE * texel_m
     area = ",".join(str(value) for value in (-half, -half, half, half))
     file = folder / f"{name}_emissive.glb"
     run(nephroid, "export", folder / name, "-o", file, "--as", "emissive", "--units", "E", "--lights", "remove",
@@ -143,6 +146,26 @@ def check_blender(name, nephroid, folder):
     version = next(line for line in told.splitlines() if line.startswith("blender "))
     compare(f"{version}, {name}, emission", numpy.load(out), interpolated(light) * albedo / numpy.pi)
     return [file]
+
+
+def check_sequence(nephroid, folder):
+    """Maps of moving water on a plane in Blender: each frame shows its own."""
+    frames = 3
+    run(nephroid, "bake", "builtin:pool", "-o", folder, "--frames", frames, "--fps", "8", "--map-resolution", SIDE,
+        "--density", "1e5", "--quiet")
+    maps = [baked(folder, "floor", frame) for frame in range(frames)]
+    half = 0.5 * SIDE * maps[0][1]
+    area = ",".join(str(value) for value in (-half, -half, half, half))
+    out = folder / "sequence.npy"
+    told = run(sys.executable, HERE / "blender_pixels.py", maps[0][2], out, "floor", area, SIDE, frames)
+    version = next(line for line in told.splitlines() if line.startswith("blender "))
+    found = numpy.load(out)
+    for frame, (light, _, _) in enumerate(maps):
+        compare(f"{version}, pool, frame {frame + 1} of {frames}", found[frame], interpolated(light))
+    moved = numpy.abs(blocks(found[1]) / blocks(found[0]) - 1.0).max()
+    print(f"pool: blocks change by up to {100 * moved:.0f} % from frame to frame")
+    if moved < 5 * BOUND:
+        faults.append("a sequence in which nothing moves")
 
 
 def main():
@@ -162,6 +185,7 @@ def main():
         gallery = folder / "gallery"
         run(nephroid, "bake", "builtin:gallery", "-o", gallery, "--layers", "caustic,direct,indirect", "--quiet")
         page.check(nephroid, browser, "builtin:gallery", gallery, folder / "gallery_page", run, faults)
+        check_sequence(nephroid, folder / "sequence")
         for number, scene in enumerate(others):
             maps = folder / f"other{number}"
             run(nephroid, "bake", scene, "-o", maps, "--default-light", "--density", "2000", "--map-resolution", "64",

@@ -41,9 +41,19 @@ impl VisibleLight {
         self.visible.as_ref().unwrap_or(&self.item_buffer)
     }
 
-    /// Specular objects that rays are aimed at from any point of the light (indices).
-    pub fn casters(&self) -> &[usize] {
-        &self.casters
+    /// Whether rays start and are aimed as those of another light.
+    pub fn aims_as(&self, other: &Self) -> bool {
+        self.launch == other.launch
+            && self.item_buffer.marks_as(&other.item_buffer)
+            && self.visible().marks_as(other.visible())
+            && self.casters == other.casters
+    }
+
+    /// Whether rays are aimed at an object that lies in a box [m], or at something before or behind it.
+    pub fn is_aimed_at(&self, object: usize, bounds: (DVec3, DVec3), scene: &Scene) -> bool {
+        let has_places = scene.lights[self.light].has_extent();
+        (has_places && self.casters.contains(&object))
+            || self.item_buffer.is_marked_towards(&self.launch, bounds)
     }
 
     /// Spheres that photons are aimed at from all points of the light; `source` is the light of unit strength.

@@ -8,7 +8,7 @@ const WORDS_PER_ROW: usize = CELLS_PER_SIDE / 64;
 // Rows are also read as one 128-bit word.
 const _: () = assert!(WORDS_PER_ROW == 2);
 
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct CellBits(Vec<[u64; WORDS_PER_ROW]>);
 
 impl CellBits {

@@ -191,6 +191,7 @@ impl<'a> Receivers<'a> {
     /// objects against boxes around parts of the beam.
     pub fn meets_others(&self, beam: &PatchBeam, except: [u32; 2]) -> bool {
         let whole = beam.bounds(0.0, 1.0);
+        self.tracer.note_box(whole);
         self.bounds.iter().enumerate().any(|(object, bounds)| {
             !except.contains(&(object as u32))
                 && overlap(whole, *bounds)

@@ -11,7 +11,7 @@ use nephroid::scene::builtin::shapes;
 use nephroid::scene::{Edit, Mesh, Scene};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
-use support::tools::{at, bits, brute, caustic, map_of, set, settings};
+use support::tools::{at, bake, bits, brute, caustic, map_of, set, settings};
 
 pub fn session(scene: &Scene) -> Baker {
     Baker::new(Arc::new(scene.clone())).expect("a session")
@@ -112,6 +112,15 @@ pub fn difference(a: &Bake, b: &Bake) -> Option<String> {
 #[track_caller]
 pub fn assert_same(a: &Bake, b: &Bake, what: &str) {
     assert_eq!(difference(a, b), None, "{what}");
+}
+
+/// Fails unless a session now gives what a fresh bake of its scene gives.
+#[track_caller]
+pub fn assert_fresh(session: &mut Baker, settings: &BakeSettings, what: &str) -> (Bake, Bake) {
+    let now = run(session, settings);
+    let fresh = bake(Scene::clone(session.scene()), settings);
+    assert_same(&now, &fresh, what);
+    (now, fresh)
 }
 
 pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use glam::DVec3;
-use nephroid::bake::{Bake, Baker, ShardSource, ShardSums, StopReason};
+use nephroid::bake::{Bake, ShardSource, ShardSums, StopReason};
 use nephroid::error::Result;
 use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::LinearSrgb;
@@ -21,19 +21,11 @@ use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
 use crate::bake::common::{
-    CAUSTIC_AND_DIRECT, all_bits, assert_same, automatic, difference, edit, run, session, sized, with_layers,
+    CAUSTIC_AND_DIRECT, all_bits, assert_fresh, assert_same, automatic, difference, edit, run, session,
+    sized, with_layers,
 };
 use support::hard_scenes::under_square_lamp;
 use support::tools::{at, bake, builtin_scene, energy_fault, photons, set, settings};
-
-/// Fails unless a session now gives what a fresh bake of its scene gives.
-#[track_caller]
-fn assert_fresh(session: &mut Baker, settings: &BakeSettings, what: &str) -> (Bake, Bake) {
-    let now = run(session, settings);
-    let fresh = bake(Scene::clone(session.scene()), settings);
-    assert_same(&now, &fresh, what);
-    (now, fresh)
-}
 
 fn moved(object: usize, translation: DVec3) -> Edit {
     Edit::Place(object, Motion::turned(0.0, translation))
