@@ -180,6 +180,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     });
     substance::warn_of_ranges(&scene, &mut report);
     rebase(&mut scene);
+    waves::lift(&mut scene, &document.extras.nodes, &mut report);
     scene.warnings = report.into_warnings();
     Ok(scene)
 }

@@ -1,18 +1,25 @@
 //! Waves of materials: `nephroid_waves` in a material's `extras`, a list of
 //! `{ "amplitude_m", "wavelength_m", "direction": [x, y, z] or [x, z], "phase_rad", "period_s" or "depth_m" }` in the
-//! file's world coordinates.
+//! file's world coordinates. `nephroid_swells: true` in a node's `extras` lifts its meshes by them, which are then stated as
+//! they are in still water.
+
+use std::sync::Arc;
 
 use glam::DVec3;
 use gltf::json::Value;
 use serde::Deserialize;
 use serde_json::json;
 
+use super::extras;
 use super::report::Report;
 use crate::scene::waves::gravity_period_s;
-use crate::scene::{Wave, Waves};
+use crate::scene::{Scene, Wave, Waves};
 
 /// Key of waves in the extras of a material.
 pub const KEY: &str = "nephroid_waves";
+
+/// Says in a node's extras that they lift its meshes.
+pub const SWELLS_KEY: &str = "nephroid_swells";
 
 /// A wave as stated in the file.
 #[derive(Debug, Deserialize)]
@@ -45,6 +52,26 @@ pub fn read(stated: &Value, owner: &str, report: &mut Report) -> Option<Waves> {
             );
         })
         .ok()
+}
+
+/// Lifts the objects of nodes that ask for it; `nodes` are their extras.
+pub fn lift(scene: &mut Scene, nodes: &[Value], report: &mut Report) {
+    for index in 0..scene.objects.len() {
+        let object = &scene.objects[index];
+        if extras::stated(nodes, object.node, SWELLS_KEY) != Some(&Value::Bool(true)) {
+            continue;
+        }
+        if scene.material_of(index).waves.is_some() {
+            scene.swells.insert(index, Arc::clone(object.mesh()));
+        } else {
+            report.warn(
+                format!("object `{}`", object.name),
+                format!("has `{SWELLS_KEY}`, but its material has no `{KEY}`: it stays still"),
+                "give its material waves",
+            );
+        }
+    }
+    scene.lift();
 }
 
 fn wave(stated: &WaveEntry) -> Result<Wave, String> {

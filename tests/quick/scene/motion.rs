@@ -103,6 +103,31 @@ fn water_is_lifted_where_its_waves_are() {
     assert!(highest(&edited) < 1.0101 && highest(&rest) > 1.04);
 }
 
+#[test]
+fn a_file_says_that_waves_lift_a_mesh() {
+    let with = |waves: Value| {
+        let mut file = Glb::triangle().with_material(json!({ "extras": waves }));
+        file.json["nodes"][0]["extras"] = json!({ "nephroid_swells": true });
+        file.scene()
+    };
+    let wave = json!({ "amplitude_m": 0.1, "wavelength_m": 1.7, "direction": [1, 0], "phase_rad": 0.3, "period_s": 2 });
+    let rest = with(json!({ "nephroid_waves": [wave] }));
+    warns_not(&rest);
+    for time_s in [0.0, 0.7] {
+        let moment = rest.at(time_s);
+        let phase = |x: f64| 2.0 * PI * x / 1.7 + 0.3 - PI * time_s;
+        for (x, position) in [0.0, 1.0, 0.0]
+            .into_iter()
+            .zip(&moment.objects[0].mesh_in_scene().positions)
+        {
+            near(position.z, 0.1 * phase(x).cos(), 1e-7, time_s);
+        }
+    }
+    let still = with(json!({}));
+    assert_warned(&still, &["tri", "nephroid_swells", "stays still"]);
+    assert!(still.swells.is_empty());
+}
+
 /// A triangle that turns about y and below it a lamp and a camera, 2 m away along x.
 fn turning() -> Glb {
     let mut file = Glb::triangle().with_light("lamp", json!({ "type": "point", "intensity": 683.0 }));

@@ -3,11 +3,14 @@
 pub(super) mod lights;
 pub(super) mod materials;
 
+use std::sync::Arc;
+
 use glam::{DMat3, DQuat, DVec3};
 use gltf::json::Value;
 use serde_json::json;
 
 use super::glb::Glb;
+use super::waves;
 use crate::error::{Error, Result, Warning};
 use crate::files;
 use crate::scene::{Camera, Mesh, Object, Scene, Texture, texture::Wrap};
@@ -35,8 +38,8 @@ pub fn document(scene: &Scene) -> Result<(Glb, Vec<Warning>)> {
         let written = materials::written(material, shift, &mut warnings);
         glb.push("/materials", written);
     }
-    for object in &scene.objects {
-        add_object(object, shift, &mut glb);
+    for (index, object) in scene.objects.iter().enumerate() {
+        add_object(object, scene.swells.get(&index), shift, &mut glb);
     }
     lights::add_all(scene, &mut glb, &mut warnings);
     for camera in &scene.cameras {
@@ -68,7 +71,8 @@ fn png(width: u32, height: u32, rgba: Vec<u8>, name: &str) -> Result<Vec<u8>> {
     })
 }
 
-fn add_object(object: &Object, shift: DVec3, glb: &mut Glb) {
+/// `still`: the mesh of a surface that its waves lift, in the scene as built-in ones have it.
+fn add_object(object: &Object, still: Option<&Arc<Mesh>>, shift: DVec3, glb: &mut Glb) {
     let Mesh {
         positions,
         normals,
@@ -77,7 +81,7 @@ fn add_object(object: &Object, shift: DVec3, glb: &mut Glb) {
         // Built-in scenes have none.
         colours: _,
         triangles,
-    } = &**object.mesh_in_scene();
+    } = &**still.unwrap_or(object.mesh_in_scene());
     let vectors = |list: &[DVec3], shift: DVec3| -> Vec<[f32; 3]> {
         let shifted = list.iter().map(|vector| (*vector + shift).as_vec3().to_array());
         shifted.collect()
@@ -95,7 +99,11 @@ fn add_object(object: &Object, shift: DVec3, glb: &mut Glb) {
     let indices = glb.push_indices(triangles.iter().flatten().copied());
     let primitive = json!({ "attributes": attributes, "indices": indices, "material": object.material });
     let mesh = glb.push("/meshes", json!({ "primitives": [primitive] }));
-    glb.push_root(json!({ "name": object.name, "mesh": mesh }));
+    let mut node = json!({ "name": object.name, "mesh": mesh });
+    if still.is_some() {
+        node["extras"] = json!({ waves::SWELLS_KEY: true });
+    }
+    glb.push_root(node);
 }
 
 fn add_camera(camera: &Camera, shift: DVec3, glb: &mut Glb) {
@@ -162,6 +170,7 @@ mod tests {
                 assert!((a - b).abs() < SAME, "{name}: {}", wanted.name);
             }
         }
+        assert!(scene.swells.keys().eq(read.swells.keys()), "{name}");
         assert_eq!(scene.lights.len(), read.lights.len(), "{name}");
         for (wanted, found) in scene.lights.iter().zip(&read.lights) {
             assert_eq!(wanted.name, found.name);
