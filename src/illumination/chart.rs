@@ -1,11 +1,12 @@
 //! Where a surface lies in its map: the contract between the light pass (deposits), the eye pass (looks up) and the
 //! exporters.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::islands::Islands;
 use super::seams::{SeamTexel, SeamTexels};
 use super::tiles::TileLayout;
 use super::{Receiver, Side};
@@ -49,9 +50,16 @@ pub struct Chart {
     pub beyond: Vec<SeamTexel>,
     /// Texels that touch where there is no room beside the surface.
     pub joints: Vec<SeamTexels>,
+    /// Found when they are first asked for.
+    pub islands: OnceLock<Option<Islands>>,
 }
 
 impl Chart {
+    /// Its islands; `None` where it is one.
+    pub fn islands(&self) -> Option<&Islands> {
+        self.islands.get_or_init(|| Islands::find(self)).as_ref()
+    }
+
     /// Number of texels.
     pub fn texel_count(&self) -> usize {
         match &self.layout {
@@ -87,6 +95,7 @@ impl Chart {
         Self {
             texel_areas_m2,
             layout: None,
+            islands: OnceLock::new(),
             ..self.clone()
         }
     }

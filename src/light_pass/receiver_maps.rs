@@ -19,8 +19,6 @@ pub struct ReceiverMap {
     /// The flux so far: `levels[0]` at the map's size, each further one at half the size of the one before, made once a
     /// kernel is smooth enough for it. Of a map in tiles there is but one.
     levels: Vec<FluxAccumulator>,
-    /// Islands of the chart, where there is more than one.
-    islands: Option<Islands>,
 }
 
 /// Gives the chart of a receiver at a size that suits it; `None` where it cannot take a map.
@@ -167,11 +165,9 @@ const MIN_LEVEL_SIDE: usize = 16;
 
 impl ReceiverMap {
     fn new(chart: Arc<Chart>, flux: FluxAccumulator) -> Self {
-        let islands = Islands::find(&chart);
         Self {
             chart,
             levels: vec![flux],
-            islands,
         }
     }
 
@@ -205,7 +201,7 @@ impl ReceiverMap {
 
     /// Whether neighbouring texels are neighbours on the surface.
     pub fn is_one_piece(&self) -> bool {
-        self.islands.is_none() && self.chart.layout.is_none()
+        self.chart.islands().is_none() && self.chart.layout.is_none()
     }
 
     /// The coarsest level at which a smooth kernel of the given spread [texels of the map] is still well resolved.
@@ -261,8 +257,8 @@ impl ReceiverMap {
 impl ReceiverMap {
     /// The island that an arrival lies on.
     pub fn island(&self, arrival: &Arrival) -> u32 {
-        self.islands
-            .as_ref()
+        self.chart
+            .islands()
             .map_or(0, |islands| islands.of_triangle(arrival.triangle as usize))
     }
 
@@ -278,7 +274,7 @@ impl ReceiverMap {
             IslandCoverage {
                 size,
                 chart,
-                islands: self.islands.as_ref(),
+                islands: self.chart.islands(),
             },
         )
     }

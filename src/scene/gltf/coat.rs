@@ -91,9 +91,9 @@ struct Coat {
 /// Why it has to be left out, to go after the name of the material.
 fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
     match material.surface {
-        SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => Err(format!(
-            "its clearcoat of roughness {roughness:.2} was left out, as it hardly shines"
-        )),
+        SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => {
+            Err("its clearcoat was left out, as it is rough and hardly shines".into())
+        }
         SurfaceKind::Diffuse => {
             // What is below is matte, whatever it was.
             (material.metallic, material.transmission, material.volume) = (0.0, 0.0, None);
