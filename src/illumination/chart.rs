@@ -1,11 +1,12 @@
 //! Maps a surface into its illumination map: the contract between the light pass (deposits), the eye pass (looks up)
 //! and the exporters.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::islands::Islands;
 use super::seams::{SeamTexel, SeamTexels};
 use super::tiles::TileLayout;
 use super::{Receiver, Side};
@@ -48,9 +49,16 @@ pub struct Chart {
     pub beyond: Vec<SeamTexel>,
     /// Texels that touch at seams without a gutter.
     pub joints: Vec<SeamTexels>,
+    /// Found when they are first asked for.
+    pub islands: OnceLock<Option<Islands>>,
 }
 
 impl Chart {
+    /// Its islands; `None` where it is one.
+    pub fn islands(&self) -> Option<&Islands> {
+        self.islands.get_or_init(|| Islands::find(self)).as_ref()
+    }
+
     pub fn texel_count(&self) -> usize {
         match &self.layout {
             Some(layout) => layout.texel_count(),
@@ -85,6 +93,7 @@ impl Chart {
         Self {
             texel_areas_m2,
             layout: None,
+            islands: OnceLock::new(),
             ..self.clone()
         }
     }

@@ -157,6 +157,8 @@ fn sizes_do_not_meet(with: &Side<'_>, without: &Side<'_>) -> Error {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::OnceLock;
+
     use glam::DVec2;
 
     use super::*;
@@ -177,6 +179,7 @@ mod tests {
                 layout: None,
                 beyond: Vec::new(),
                 joints: Vec::new(),
+                islands: OnceLock::new(),
             }),
             layers: vec![Layer {
                 kind: LayerKind::Caustic,

@@ -18,8 +18,6 @@ pub struct ReceiverMap {
     /// Accumulated flux: `levels[0]` at the map's size, each further level at half the size of the one before,
     /// allocated once a kernel is smooth enough for it. Tiled maps have one level.
     levels: Vec<FluxAccumulator>,
-    /// `None` if the chart is a single island.
-    islands: Option<Islands>,
 }
 
 /// Returns the chart of a receiver at a suitable size; `None` if it cannot take a map.
@@ -164,11 +162,9 @@ const MIN_LEVEL_SIDE: usize = 16;
 
 impl ReceiverMap {
     fn new(chart: Arc<Chart>, flux: FluxAccumulator) -> Self {
-        let islands = Islands::find(&chart);
         Self {
             chart,
             levels: vec![flux],
-            islands,
         }
     }
 
@@ -202,7 +198,7 @@ impl ReceiverMap {
 
     /// Whether neighbouring texels are neighbours on the surface.
     pub fn is_one_piece(&self) -> bool {
-        self.islands.is_none() && self.chart.layout.is_none()
+        self.chart.islands().is_none() && self.chart.layout.is_none()
     }
 
     /// The coarsest level that still resolves a smooth kernel of the given spread [texels of the map].
@@ -258,8 +254,8 @@ impl ReceiverMap {
 impl ReceiverMap {
     /// The island on which an arrival lies.
     pub fn island(&self, arrival: &Arrival) -> u32 {
-        self.islands
-            .as_ref()
+        self.chart
+            .islands()
             .map_or(0, |islands| islands.of_triangle(arrival.triangle as usize))
     }
 
@@ -275,7 +271,7 @@ impl ReceiverMap {
             IslandCoverage {
                 size,
                 chart,
-                islands: self.islands.as_ref(),
+                islands: self.chart.islands(),
             },
         )
     }

@@ -56,6 +56,7 @@ pub fn floor_map(object: usize, width: usize, height: usize, irradiance: Vec<[f3
         layout: None,
         beyond: Vec::new(),
         joints: Vec::new(),
+        islands: std::sync::OnceLock::new(),
     };
     map_of(chart, irradiance)
 }

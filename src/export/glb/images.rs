@@ -257,6 +257,7 @@ mod tests {
             layout: None,
             beyond: Vec::new(),
             joints: Vec::new(),
+            islands: std::sync::OnceLock::new(),
         };
         let corners = [DVec2::ZERO, DVec2::new(0.5, 0.0), DVec2::new(0.0, 0.5)];
         spread(&chart, corners, 5, &mut nearest);

@@ -39,10 +39,9 @@ impl Minification {
                 .map(|area| *area as f32)
                 .collect::<Vec<_>>(),
         ];
-        let islands = Islands::find(chart);
-        let mut owners = islands.map(|islands| {
+        let mut owners = chart.islands().map(|islands| {
             let texels = 0..chart.width * chart.height;
-            texels.map(|texel| Owner::of(&islands, texel)).collect::<Vec<_>>()
+            texels.map(|texel| Owner::of(islands, texel)).collect::<Vec<_>>()
         });
         while let Some(&fine) = sizes.last().filter(|size| is_halved(**size)) {
             if let Some(fine_owners) = &owners {

@@ -5,7 +5,7 @@ mod given;
 mod plane;
 mod unwrap;
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::DVec2;
 
@@ -159,6 +159,7 @@ impl Parametrisation {
             height,
             texel_areas_m2,
             layout: None,
+            islands: OnceLock::new(),
         }
     }
 

@@ -1,6 +1,6 @@
 //! The texel that is probed.
 
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec2, DVec3};
 
@@ -98,6 +98,7 @@ impl Target {
             layout: None,
             beyond: Vec::new(),
             joints: Vec::new(),
+            islands: OnceLock::new(),
             ..*self.chart
         }
     }

@@ -6,7 +6,6 @@ use glam::{DVec2, DVec3};
 
 use super::facets::Facets;
 use crate::geometry::Ray;
-use crate::illumination::islands::Islands;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::scene::{Mesh, SurfaceKind};
@@ -97,7 +96,6 @@ impl PlaneChart {
 #[derive(Debug)]
 pub struct ReceiverSurface {
     pub chart: Arc<Chart>,
-    islands: Option<Islands>,
     /// `None` where it is not flat.
     pub plane: Option<PlaneChart>,
     /// Whether it takes all incident light.
@@ -108,8 +106,8 @@ pub struct ReceiverSurface {
 
 impl ReceiverSurface {
     pub fn island(&self, triangle: u32) -> u32 {
-        self.islands
-            .as_ref()
+        self.chart
+            .islands()
             .map_or(0, |islands| islands.of_triangle(triangle as usize))
     }
 
@@ -179,7 +177,6 @@ impl<'a> Receivers<'a> {
         let chart = (self.chart_for)(receiver)?;
         let mesh = scene.objects[object].mesh_in_scene();
         Some(ReceiverSurface {
-            islands: Islands::find(&chart),
             plane: PlaneChart::of(mesh, &chart),
             is_diffuse: scene.material_of(object).surface == SurfaceKind::Diffuse,
             area_m2: mesh.area_m2(),

@@ -89,9 +89,9 @@ struct Coat {
 /// Reason why the coat is left out, to follow the name of the material.
 fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
     match material.surface {
-        SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => Err(format!(
-            "its clearcoat of roughness {roughness:.2} was left out, as it hardly shines"
-        )),
+        SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => {
+            Err("its clearcoat was left out, as it is rough and hardly shines".into())
+        }
         SurfaceKind::Diffuse => {
             // The body below the coat is diffuse, whatever it was.
             (material.metallic, material.transmission, material.volume) = (0.0, 0.0, None);

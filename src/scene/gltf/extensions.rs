@@ -1,5 +1,7 @@
 //! Which glTF extensions are read, which are ignored, and which stop the loading.
 
+use gltf::json::Value;
+
 use super::report::Report;
 use super::{draco, glossiness, instancing, meshopt, nodes};
 use crate::error::{Error, Result};
@@ -40,6 +42,41 @@ const LEFT_OUT: [&str; 5] = [
     "KHR_materials_sheen",
     "KHR_xmp_json_ld",
 ];
+
+/// Extensions of materials that are left out: the factor without which they do nothing, and what is missed.
+const OF_MATERIALS: [(&str, &str, &str); 3] = [
+    (
+        "KHR_materials_anisotropy",
+        "anisotropyStrength",
+        "expect round highlights instead of stretched ones",
+    ),
+    (
+        "KHR_materials_iridescence",
+        "iridescenceFactor",
+        "expect reflections without the colours of a thin film",
+    ),
+    (
+        "KHR_materials_sheen",
+        "sheenColorFactor",
+        "expect cloth that does not shine at grazing angles",
+    ),
+];
+
+/// What a material misses without an extension that is not read; `None` where that does nothing.
+pub fn loss(extension: &str, stated: &Value) -> Option<&'static str> {
+    let known = OF_MATERIALS.iter().find(|(name, ..)| *name == extension);
+    let Some((_, factor, loss)) = known else {
+        return Some("expect it to look and bake as if it were not there");
+    };
+    let factor = stated.get(factor).unwrap_or(&Value::Null);
+    let channels = factor
+        .as_array()
+        .map_or(std::slice::from_ref(factor), Vec::as_slice);
+    let is_on = channels
+        .iter()
+        .any(|channel| channel.as_f64().is_some_and(|channel| channel != 0.0));
+    is_on.then_some(loss)
+}
 
 /// Refuses a file that requires an unsupported extension, and warns of used ones that are ignored.
 ///

@@ -1,7 +1,6 @@
 //! Textures of transmission, roughness and metallic factors, combined into one image.
 
-use std::collections::BTreeMap;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use glam::DMat3;
 use image::RgbaImage;
@@ -16,9 +15,17 @@ const MOST_OF_OTHERS: f64 = 0.01;
 /// Smallest difference that counts as variation of a factor: two steps of an 8-bit image.
 const EVEN: f64 = 2.0 / 255.0;
 
+/// What [`Material::class_of`] knows.
+const CLASSES: [SurfaceKind; 4] = [
+    SurfaceKind::Diffuse,
+    SurfaceKind::Mirror,
+    SurfaceKind::ThinWall,
+    SurfaceKind::Mixed,
+];
+
 /// A factor texture with its linear channels.
 pub struct FactorImage {
-    pub pixels: Rc<RgbaImage>,
+    pub pixels: Arc<RgbaImage>,
     pub wrap: [Wrap; 2],
     pub is_nearest: bool,
     /// TEXCOORD set and transform; `None` for a set that is not read.
@@ -34,8 +41,10 @@ impl FactorImage {
 
     /// Code of the texel that lies nearest to a texel of an image of another size.
     fn code(&self, channel: usize, place: [u32; 2], [width, height]: [u32; 2]) -> u8 {
-        let scaled =
-            |at: u32, own: u32, other: u32| (u64::from(at) * u64::from(own) / u64::from(other)) as u32;
+        let scaled = |at: u32, own: u32, other: u32| match own == other {
+            true => at,
+            false => (u64::from(at) * u64::from(own) / u64::from(other)) as u32,
+        };
         let x = scaled(place[0], self.pixels.width(), width);
         let y = scaled(place[1], self.pixels.height(), height);
         self.pixels.get_pixel(x, y).0[channel]
@@ -97,20 +106,22 @@ impl Factors<'_> {
     pub fn class(&self, material: &Material) -> Option<SurfaceKind> {
         let whole = [material.transmission, material.roughness, material.metallic];
         let (mut low, mut high) = ([u8::MAX; 3], [0; 3]);
-        let mut counts: BTreeMap<SurfaceKind, u64> = BTreeMap::new();
+        let mut counts = CLASSES.map(|class| (class, 0_u64));
         for codes in self.codes() {
             for channel in 0..3 {
                 low[channel] = low[channel].min(codes[channel]);
                 high[channel] = high[channel].max(codes[channel]);
             }
             let at = |channel: usize| whole[channel] * f64::from(codes[channel]) / 255.0;
-            *counts.entry(Material::class_of(at(2), at(1), at(0))).or_default() += 1;
+            let class = Material::class_of(at(2), at(1), at(0));
+            let own = counts.iter_mut().filter(|(known, _)| *known == class);
+            own.for_each(|(_, count)| *count += 1);
         }
         let differs = |channel: usize| {
             whole[channel] * (f64::from(high[channel]) - f64::from(low[channel])) / 255.0 >= EVEN
         };
-        let all: u64 = counts.values().sum();
-        let (&most, &count) = counts.iter().max_by_key(|(_, count)| **count)?;
+        let all: u64 = counts.iter().map(|(_, count)| count).sum();
+        let (most, count) = counts.into_iter().max_by_key(|(_, count)| *count)?;
         let is_one = count as f64 >= (1.0 - MOST_OF_OTHERS) * all as f64;
         match is_one {
             true => differs(1).then_some(most),

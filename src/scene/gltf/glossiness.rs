@@ -78,13 +78,13 @@ pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Repo
         converted["baseColorTexture"] = stated.diffuse_texture;
     }
     material.insert("pbrMetallicRoughness".into(), converted);
-    report.warn(
-        owner,
-        format!(
-            "its specular-glossiness was read as metallic {metallic:.2} and roughness {roughness:.2}, without its texture"
-        ),
-        "convert it with `gltf-transform metalrough`",
-    );
+    if !is_told {
+        report.warn(
+            owner,
+            "its specular-glossiness was read without its texture, with the same roughness everywhere",
+            "convert it with `gltf-transform metalrough`",
+        );
+    }
 }
 
 fn strongest(colour: [f64; 3]) -> f64 {

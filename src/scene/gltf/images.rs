@@ -1,15 +1,16 @@
 //! Decodes images one by one, so that a bad image costs one texture and not the scene.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::io::Cursor;
 use std::path::Path;
-use std::rc::Rc;
+use std::sync::Arc;
 
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
 use gltf::json::texture::{MagFilter, Sampler, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use image::{ImageFormat, ImageReader, Limits, RgbaImage};
+use rayon::prelude::*;
 
 use super::buffers::Buffers;
 use super::report::{Budget, Report};
@@ -26,7 +27,7 @@ const LARGEST_SIDE: u32 = 16_384;
 const GREY: u8 = 188;
 
 /// Texels, wrap modes in u and v, and whether look-ups take the nearest texel.
-type Pixels = (Rc<RgbaImage>, [Wrap; 2], bool);
+type Pixels = (Arc<RgbaImage>, [Wrap; 2], bool);
 
 /// Reads the images that materials ask for, each once.
 #[derive(Debug)]
@@ -34,7 +35,7 @@ pub struct Images<'a> {
     root: &'a Root,
     buffers: &'a Buffers<'a>,
     folder: &'a Path,
-    decoded: HashMap<usize, Rc<RgbaImage>>,
+    decoded: HashMap<usize, Arc<RgbaImage>>,
     by_source: HashMap<(usize, [u8; 2], bool), usize>,
     textures: Vec<Texture>,
 }
@@ -55,6 +56,33 @@ impl<'a> Images<'a> {
     /// The scene's textures.
     pub fn into_textures(self) -> Vec<Texture> {
         self.textures
+    }
+
+    /// Decodes the images of glTF textures side by side, for whoever asks for them later. What cannot be read is left to
+    /// that.
+    ///
+    /// # Errors
+    /// More memory than the budget has.
+    pub fn decode_ahead(
+        &mut self,
+        textures: impl Iterator<Item = Index<gltf::json::Texture>>,
+        budget: &mut Budget,
+    ) -> Result<()> {
+        let images: BTreeSet<usize> = textures.filter_map(|texture| self.source(texture)).collect();
+        let missing = images
+            .into_iter()
+            .filter(|image| !self.decoded.contains_key(image));
+        for images in missing.collect::<Vec<_>>().chunks(rayon::current_num_threads()) {
+            let most_bytes = budget.left() / images.len() as u64;
+            let read = |image: &usize| Some((*image, self.read(*image, "image", most_bytes).ok()?));
+            let decoded: Vec<_> = images.par_iter().filter_map(read).collect();
+            for (image, pixels) in decoded {
+                let owner = format!("image `{}`", self.name(image));
+                budget.take(pixels.as_raw().len() as u64, &owner)?;
+                self.decoded.insert(image, Arc::new(pixels));
+            }
+        }
+        Ok(())
     }
 
     /// Index among the scene's textures of a glTF texture; `None`, with a warning, where it has no image.
@@ -152,6 +180,19 @@ impl<'a> Images<'a> {
         owner: &str,
         report: &mut Report,
     ) -> Option<usize> {
+        let found = self.source(texture);
+        if found.is_none() {
+            report.warn(
+                owner,
+                "refers to an image that does not exist; it was left out",
+                "add the image",
+            );
+        }
+        found
+    }
+
+    /// The image of a glTF texture, if it has one.
+    fn source(&self, texture: Index<gltf::json::Texture>) -> Option<usize> {
         let texture = self.root.textures.get(texture.value());
         let stated = |name: &str| {
             let extensions = texture?.extensions.as_ref()?;
@@ -162,15 +203,7 @@ impl<'a> Images<'a> {
             .into_iter()
             .find_map(stated);
         let image = image.or(texture.map(|texture| texture.source.value()));
-        let found = image.filter(|image| *image < self.root.images.len());
-        if found.is_none() {
-            report.warn(
-                owner,
-                "refers to an image that does not exist; it was left out",
-                "add the image",
-            );
-        }
-        found
+        image.filter(|image| *image < self.root.images.len())
     }
 
     fn sampler(&self, texture: Index<gltf::json::Texture>) -> Option<&Sampler> {
@@ -201,12 +234,12 @@ impl<'a> Images<'a> {
         names::name(self.root.images[image].name.as_ref(), "image", image)
     }
 
-    fn decode(&mut self, image: usize, budget: &mut Budget, report: &mut Report) -> Result<Rc<RgbaImage>> {
+    fn decode(&mut self, image: usize, budget: &mut Budget, report: &mut Report) -> Result<Arc<RgbaImage>> {
         if let Some(known) = self.decoded.get(&image) {
             return Ok(known.clone());
         }
         let owner = format!("image `{}`", self.name(image));
-        let pixels = match self.read(image, &owner, budget) {
+        let pixels = match self.read(image, &owner, budget.left()) {
             Ok(pixels) => pixels,
             Err(why) => {
                 report.warn(
@@ -218,23 +251,23 @@ impl<'a> Images<'a> {
             }
         };
         budget.take(pixels.as_raw().len() as u64, &owner)?;
-        let pixels = Rc::new(pixels);
+        let pixels = Arc::new(pixels);
         self.decoded.insert(image, pixels.clone());
         Ok(pixels)
     }
 
-    fn read(&self, image: usize, owner: &str, budget: &Budget) -> std::result::Result<RgbaImage, String> {
+    fn read(&self, image: usize, owner: &str, most_bytes: u64) -> std::result::Result<RgbaImage, String> {
         let image = &self.root.images[image];
         let loaded;
         let bytes = match (image.buffer_view, &image.uri) {
             (Some(view), _) => self.buffers.view(view, owner).map_err(|error| error.what)?.data,
             (None, Some(uri)) => {
-                loaded = uri::read(uri, self.folder, budget.left(), owner).map_err(|error| error.what)?;
+                loaded = uri::read(uri, self.folder, most_bytes, owner).map_err(|error| error.what)?;
                 &loaded
             }
             (None, None) => return Err("has no data".into()),
         };
-        guard::without_panic(|| decode(bytes, budget.left())).unwrap_or_else(|| Err("is damaged".into()))
+        guard::without_panic(|| decode(bytes, most_bytes)).unwrap_or_else(|| Err("is damaged".into()))
     }
 }
 

@@ -3,20 +3,21 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use gltf::json::Value;
 use gltf::json::extensions::material as extension;
 use gltf::json::material::Material as Source;
-use gltf::json::texture::Info;
+use gltf::json::texture::{Info, Texture};
 use gltf::json::validation::Checked;
+use gltf::json::{Index, Value};
 
 use super::document::Document;
 use super::images::Images;
 use super::numbers::widen;
 use super::report::{Budget, Report};
 use super::substance::{self, Composition};
-use super::{coat, extras, names, spectrum, waves};
+use super::{coat, extensions, extras, names, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
+use crate::scene::material::METAL_ROUGHNESS_LIMIT;
 use crate::scene::{Material, SurfaceKind, Volume};
 use crate::units::LUMENS_PER_WATT;
 
@@ -84,26 +85,36 @@ pub fn read_all(
     budget: &mut Budget,
     report: &mut Report,
 ) -> Result<Vec<Material>> {
-    let sources = document.root.materials.iter().enumerate();
-    sources
-        .map(|(index, source)| {
-            let name = names::name(source.name.as_ref(), "material", index);
-            let stated = |key: &str| extras::stated(&document.extras.materials, index, key);
-            let mut reading = MaterialReader {
-                owner: format!("material `{name}`"),
-                source,
-                waves: stated(waves::KEY),
-                glass: stated(substance::GLASS_KEY),
-                metal: stated(substance::METAL_KEY),
-                spectrum: stated(spectrum::KEY),
-                folder,
-                images: &mut *images,
-                budget: &mut *budget,
-                report: &mut *report,
-            };
-            reading.read(name)
-        })
-        .collect()
+    let sources = &document.root.materials;
+    images.decode_ahead(sources.iter().flat_map(textures), budget)?;
+    let mut materials = Vec::with_capacity(sources.len());
+    for (index, source) in sources.iter().enumerate() {
+        let name = names::name(source.name.as_ref(), "material", index);
+        let mut reading = MaterialReader::new((document, index), folder, images, budget, report);
+        materials.push(reading.read(name)?);
+    }
+    // What is matte needs no normals.
+    let of_shiny = sources
+        .iter()
+        .zip(&materials)
+        .filter(|(_, material)| material.surface.is_specular());
+    let normals = of_shiny.filter_map(|(source, _)| Some(source.normal_texture.as_ref()?.index));
+    images.decode_ahead(normals, budget)?;
+    for (index, material) in materials.iter_mut().enumerate() {
+        let mut reading = MaterialReader::new((document, index), folder, images, budget, report);
+        material.normal_map = reading.normal_map(material)?;
+    }
+    Ok(materials)
+}
+
+/// Textures that a material is read with, whatever it is made of.
+fn textures(source: &Source) -> impl Iterator<Item = Index<Texture>> {
+    let pbr = &source.pbr_metallic_roughness;
+    let glows = source.emissive_factor.0 != [0.0; 3];
+    let emission = source.emissive_texture.as_ref().filter(|_| glows);
+    let infos = [&pbr.base_color_texture, &pbr.metallic_roughness_texture];
+    let infos = infos.into_iter().flatten().chain(emission);
+    infos.map(|info| info.index)
 }
 
 /// The colour of a texel, in linear light.
@@ -125,6 +136,34 @@ pub struct MaterialReader<'a, 'b> {
     pub images: &'a mut Images<'b>,
     pub budget: &'a mut Budget,
     pub report: &'a mut Report,
+}
+
+impl<'a, 'b> MaterialReader<'a, 'b> {
+    fn new(
+        (document, index): (&'a Document, usize),
+        folder: &'a Path,
+        images: &'a mut Images<'b>,
+        budget: &'a mut Budget,
+        report: &'a mut Report,
+    ) -> Self {
+        let source = &document.root.materials[index];
+        let stated = |key: &str| extras::stated(&document.extras.materials, index, key);
+        Self {
+            owner: format!(
+                "material `{}`",
+                names::name(source.name.as_ref(), "material", index)
+            ),
+            source,
+            waves: stated(waves::KEY),
+            glass: stated(substance::GLASS_KEY),
+            metal: stated(substance::METAL_KEY),
+            spectrum: stated(spectrum::KEY),
+            folder,
+            images,
+            budget,
+            report,
+        }
+    }
 }
 
 impl MaterialReader<'_, '_> {
@@ -185,8 +224,7 @@ impl MaterialReader<'_, '_> {
             material.polish = self.polish(specular)?;
         }
         self.coat(&mut material, extensions)?;
-        material.normal_map = self.normal_map(&material)?;
-        self.name_what_is_ignored(extensions, &material, is_polish);
+        self.name_what_is_ignored(extensions, &material);
         Ok(material)
     }
 
@@ -384,8 +422,10 @@ impl MaterialReader<'_, '_> {
         match surface {
             // Metallic 1 with roughness 1 is glTF's default, which needs no warning.
             SurfaceKind::Diffuse if is_metal && (roughness < 1.0 || material.metal.is_some()) => self.warn(
-                format!("is a metal of roughness {roughness:.2}, treated as diffuse"),
-                "lower its roughness for a mirror",
+                format!(
+                    "is a metal rougher than {METAL_ROUGHNESS_LIMIT} and was read as matte, in its own colour"
+                ),
+                "expect no reflections; lower its roughness for them",
             ),
             SurfaceKind::Mirror | SurfaceKind::Diffuse | SurfaceKind::Mixed if material.glass.is_some() => {
                 self.warn(
@@ -398,12 +438,7 @@ impl MaterialReader<'_, '_> {
         surface
     }
 
-    fn name_what_is_ignored(
-        &mut self,
-        extensions: &extension::Material,
-        material: &Material,
-        is_polish: bool,
-    ) {
+    fn name_what_is_ignored(&mut self, extensions: &extension::Material, material: &Material) {
         let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
             Checked::Valid(_) => {}
@@ -412,36 +447,42 @@ impl MaterialReader<'_, '_> {
                 "export the file again",
             ),
         }
-        let changed_specular = extensions.specular.as_ref().filter(|_| !is_polish);
-        let changed_specular = changed_specular.is_some_and(|specular| {
+        let mut ignored = Vec::new();
+        // What is matte has no highlights, and those of metals are of their colour.
+        let changed_specular = extensions.specular.as_ref().is_some_and(|specular| {
             specular.specular_factor.0 != 1.0
                 || specular.specular_color_factor.0 != [1.0; 3]
                 || specular.specular_texture.is_some()
                 || specular.specular_color_texture.is_some()
         });
-        let mut ignored = Vec::new();
-        if changed_specular {
-            ignored.push("KHR_materials_specular".to_owned());
+        if changed_specular && material.surface.is_clear() {
+            ignored.push((
+                "KHR_materials_specular".to_owned(),
+                "expect reflections of full strength",
+            ));
         }
         let volume = extensions.volume.as_ref().filter(|_| material.volume.is_some());
         if volume.is_some_and(|volume| volume.thickness_texture.is_some()) {
-            ignored.push("thickness texture, as its mesh says how thick it is,".to_owned());
+            ignored.push((
+                "thickness texture".to_owned(),
+                "expect it to be as thick as its mesh is",
+            ));
         }
         if is_matte && self.source.normal_texture.is_some() {
-            ignored.push("normal texture, as it is diffuse,".to_owned());
-        }
-        ignored.extend(
-            extensions
-                .others
-                .keys()
-                .filter(|key| ![coat::NAME, substance::NAME].contains(&key.as_str()))
-                .map(|key| names::name(Some(key), "extension", 0)),
-        );
-        if !ignored.is_empty() {
-            self.warn(
-                format!("its {} was ignored", ignored.join(", ")),
+            ignored.push((
+                "normal texture, as it is diffuse,".to_owned(),
                 "expect it to look and bake as if it were not there",
-            );
+            ));
+        }
+        for (key, stated) in &extensions.others {
+            if ![coat::NAME, substance::NAME].contains(&key.as_str())
+                && let Some(loss) = extensions::loss(key, stated)
+            {
+                ignored.push((names::name(Some(key), "extension", 0), loss));
+            }
+        }
+        for (what, loss) in ignored {
+            self.warn(format!("its {what} was ignored"), loss);
         }
     }
 }

@@ -118,11 +118,7 @@ impl MaterialReader<'_, '_> {
             material.roughness = 1.0;
         } else if class.is_some_and(|class| class != SurfaceKind::Diffuse) {
             self.warn(
-                format!(
-                    "its textures of factors follow different coordinates and were read as their means, metallic {:.2}, \
-                     roughness {:.2} and transmission {:.2}",
-                    material.metallic, material.roughness, material.transmission
-                ),
+                "its textures of transmission and of roughness follow different coordinates and were read as their means",
                 "give both the same set and transform",
             );
         }
@@ -234,15 +230,8 @@ impl MaterialReader<'_, '_> {
         };
         let texture = self.images.get(image.texture);
         let map = NormalMap::new(image, scale, texture);
-        // Includes the substitute for an image that could not be read.
-        if map.detail_texels == f64::INFINITY {
-            self.warn(
-                "its normal texture is the same everywhere and was left out",
-                "give it some relief, or none",
-            );
-            return Ok(None);
-        }
-        Ok(Some(map))
+        // The same everywhere, as what stands in for an image that could not be read: nothing is bent.
+        Ok((map.detail_texels < f64::INFINITY).then_some(map))
     }
 
     pub(super) fn base_colour_texture(&mut self) -> Result<Option<TextureRef>> {

@@ -45,6 +45,7 @@ pub(super) fn full_chart((width, height): (usize, usize)) -> Chart {
         layout: None,
         beyond: Vec::new(),
         joints: Vec::new(),
+        islands: std::sync::OnceLock::new(),
     }
 }
 

@@ -356,12 +356,16 @@ fn materials_of_old_are_converted() {
             0.5,
         ),
     ] {
+        let has_texture = stated.get("specularGlossinessTexture").is_some();
         let name = "KHR_materials_pbrSpecularGlossiness";
         let mut file = Glb::triangle().with_material(json!({ "extensions": { name: stated } }));
         file.json["extensionsUsed"] = json!([name]);
         file.json["extensionsRequired"] = json!([name]);
         let scene = file.scene();
-        warns(&scene, "its specular-glossiness was read as metallic");
+        match has_texture {
+            true => warns(&scene, "its specular-glossiness was read without its texture"),
+            false => warns_not(&scene),
+        }
         let material = scene.material_of(0);
         near(material.base_colour.to_array(), base, 1e-6, "base colour");
         near(

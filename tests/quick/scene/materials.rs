@@ -427,15 +427,19 @@ fn normal_textures_of_what_is_specular_are_read() {
             &plain,
             factors(0.0, 1.0),
             &image[..],
-            "normal texture, as it is diffuse,",
+            "material `m` | normal texture, as it is diffuse,",
         ),
-        (&plain, polish.clone(), b"no image", "the same everywhere"),
-        (&fourth, polish.clone(), &image, "TEXCOORD_3"),
+        (&plain, polish.clone(), b"no image", "image0 | replaced by grey"),
+        (&fourth, polish.clone(), &image, "material `m` | TEXCOORD_3"),
     ] {
         let scene = embossed(image, normals.clone(), factors);
         assert!(scene.material_of(0).normal_map.is_none());
-        warns(&scene, &format!("material `m` | {why}"));
+        warns(&scene, why);
     }
+    // A flat one bends nothing, and there is nothing to say of it.
+    let scene = embossed(&png(&[[128, 128, 255, 255]; 4], 2), plain.clone(), polish.clone());
+    assert!(scene.material_of(0).normal_map.is_none());
+    warns_not(&scene);
     // Each image has coordinates of its own.
     let mut coloured = polish;
     coloured["baseColorTexture"] = json!({ "index": 0, "texCoord": 1 });

@@ -83,6 +83,43 @@ fn required_extensions_are_refused_or_left_out() {
     );
 }
 
+/// Once per extension, whatever else a material has, and not where the extension does nothing.
+#[test]
+fn what_materials_miss_is_said_once_an_extension() {
+    let mut file = Glb::triangle();
+    file.json["extensionsUsed"] = json!(["KHR_materials_sheen", "KHR_materials_anisotropy"]);
+    let sheen = json!({ "sheenColorFactor": [0.0, 0.5, 0.0] });
+    for (name, extensions) in [
+        ("velvet", json!({ "KHR_materials_sheen": sheen })),
+        (
+            "off",
+            json!({ "KHR_materials_sheen": {}, "KHR_materials_anisotropy": { "anisotropyStrength": 0.0 } }),
+        ),
+        (
+            "silk",
+            json!({ "KHR_materials_sheen": sheen, "KHR_materials_anisotropy": { "anisotropyStrength": 0.5 } }),
+        ),
+        // Matte: there are no reflections to be dimmed.
+        (
+            "dull",
+            json!({ "KHR_materials_specular": { "specularFactor": 0.5 } }),
+        ),
+    ] {
+        file.push("materials", json!({ "name": name, "extensions": extensions }));
+    }
+    let told = file.scene().warnings;
+    let told: Vec<String> = told.iter().map(ToString::to_string).collect();
+    assert_eq!(
+        told,
+        [
+            "material `velvet`, material `silk`: its KHR_materials_sheen was ignored; \
+             expect cloth that does not shine at grazing angles",
+            "material `silk`: its KHR_materials_anisotropy was ignored; \
+             expect round highlights instead of stretched ones",
+        ]
+    );
+}
+
 fn with_uri(uri: &str, beside: &[(&str, &[u8])]) -> Result<Scene> {
     let mut file = Glb::triangle();
     file.json["buffers"] = json!([{ "byteLength": 36, "uri": uri }]);

@@ -150,7 +150,7 @@ fn metal_in_extras_is_a_mirror_of_its_colour() {
     // glTF's roughness is 1 where a file is silent.
     let silver = json!({ "extras": { "metal": "silver" } });
     let scene = Glb::triangle().with_material(silver).scene();
-    warns(&scene, "metal of roughness 1.00, treated as diffuse");
+    warns(&scene, "metal rougher than 0.6 and was read as matte");
 }
 
 #[test]

@@ -55,6 +55,7 @@ pub fn chart(object: usize, width: usize, height: usize, texel_areas_m2: Vec<f64
         layout: None,
         beyond: Vec::new(),
         joints: Vec::new(),
+        islands: std::sync::OnceLock::new(),
     })
 }
 
