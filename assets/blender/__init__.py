@@ -25,7 +25,7 @@ class NephroidSettings(bpy.types.PropertyGroup):
         ("ALL", "All Light", "Caustics, direct and indirect light; the surfaces show nothing else")])
     map_size: EnumProperty(name="Map Size", default="1024", items=[
         ("AUTO", "As Fine as the Light", "Up to 4096 texels a side")] + [
-        (str(size), str(size), f"{size} × {size} texels") for size in (256, 512, 1024, 2048, 4096)])
+        (str(size), str(size), f"{size} × {size} texels") for size in (128, 256, 512, 1024, 2048, 4096)])
     lamps: PointerProperty(name="Lamps", type=bpy.types.Collection,
                            description="Only lamps of this collection; empty takes all")
     objects: PointerProperty(name="Objects", type=bpy.types.Collection,

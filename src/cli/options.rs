@@ -71,13 +71,7 @@ pub struct RunOptions {
     #[arg(long, hide_short_help = true)]
     pub quiet: bool,
     /// Progress on stderr: a bar, or JSON lines for other programs
-    #[arg(
-        long,
-        value_name = "bar|json",
-        value_enum,
-        default_value = "bar",
-        hide_short_help = true
-    )]
+    #[arg(long, value_enum, default_value = "bar", hide = true)]
     pub progress: ProgressForm,
     /// Print the result as one JSON document
     #[arg(long)]

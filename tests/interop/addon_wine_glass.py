@@ -235,7 +235,7 @@ def messages():
 def bakes(addon, folder):
     """Bake, pictures, flux, Remove, and a second bake over the first."""
     settings = bpy.context.scene.nephroid
-    settings.map_size, settings.preset = "512", "DRAFT"
+    settings.map_size, settings.preset = "256", "DRAFT"
     before = state()
     bpy.context.scene.cycles.caustics_reflective = bpy.context.scene.cycles.caustics_refractive = False
     dark = picture(folder / "before")
@@ -262,7 +262,7 @@ def bakes(addon, folder):
     check("there is light now where there was none", (gain > 0.05).sum() >= 10, f"{(gain > 0.05).sum()} blocks of pixels")
     check("and nowhere less", gain.min() > -0.02, f"{gain.min():.4f} at least")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "baked.blend"), compress=True)
-    settings.map_size = "256"
+    settings.map_size = "128"
     bpy.ops.nephroid.bake()
     check("a second bake replaces the first",
           [one.name for one in bpy.data.images if one.name.startswith("Nephroid")] == ["Nephroid light"])
@@ -321,7 +321,7 @@ def refuses(addon):
     noise = crystal.node_tree.nodes.new("ShaderNodeTexNoise")
     shader = next(node for node in crystal.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     crystal.node_tree.links.new(noise.outputs[0], shader.inputs["Roughness"])
-    bpy.context.scene.nephroid.map_size = "256"
+    bpy.context.scene.nephroid.map_size = "128"
     told("what is not read is said on its object", "WARNING", "Glass", "the nodes at its Roughness")
     crystal.node_tree.nodes.remove(noise)
     bpy.ops.nephroid.remove()
