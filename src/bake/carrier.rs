@@ -16,7 +16,7 @@ use crate::settings::Estimator;
 
 /// Time of a cell of patches over that of a photon's segment, where a photon has but one; it grows with the cube of their
 /// number, as the branches do that patches follow. Measured on the built-in scenes.
-const CELL: f64 = 2.0;
+const CELL_COST: f64 = 2.0;
 
 /// Cost of a receiver query, including the deposit of its triangle, relative to a photon segment.
 const RECEIVER_QUERY: f64 = 0.4;
@@ -29,11 +29,11 @@ const MAX_PATHS: f64 = 4.0;
 
 /// Patches have to promise the target at this fraction of the photons' cost: their forecasts tend to be too low, and
 /// their work is lost if the carrier changes.
-const PROMISE: f64 = 0.5;
+const PATCH_COST_FRACTION: f64 = 0.5;
 
 /// Relative RMSE of the photons that audit patches which interpolate between wavelengths. On the map of a prism, with
 /// some sixty lit texels, it reveals a bias of 10 %.
-const AUDITORS: f64 = 0.15;
+const AUDIT_RMSE: f64 = 0.15;
 
 /// Range of the power of 1/error with which work grows.
 const POWERS: (f64, f64) = (1.0, 2.5);
@@ -181,7 +181,7 @@ impl CausticLayer<'_> {
             || is_late
             || is_biased
             || so_far + next > by_photons
-            || promised > PROMISE * by_photons
+            || promised > PATCH_COST_FRACTION * by_photons
         {
             light_progress.turn_to_photons();
         }
@@ -203,7 +203,7 @@ impl CausticLayer<'_> {
         let is_coarse = rival
             .error
             .as_ref()
-            .is_some_and(|error| error.estimate.relative_rmse > AUDITORS);
+            .is_some_and(|error| error.estimate.relative_rmse > AUDIT_RMSE);
         let known = photon_segments(rival).filter(|_| is_coarse);
         known.is_some_and(|(segments, per_photon)| {
             GROWTH.1 * segments < cost_of(&light_progress.levels, per_photon)
@@ -226,14 +226,14 @@ impl CausticLayer<'_> {
                 cells as f64 * part.node_count() as f64
             })
             .sum();
-        GROWTH.1 * segments < CELL * per_photon.powi(3) * cells
+        GROWTH.1 * segments < CELL_COST * per_photon.powi(3) * cells
     }
 }
 
 /// Cost of a level of patches in photon segments, at `per_photon` segments per photon.
 fn cost(level: &LightLevel, per_photon: f64) -> f64 {
     let (cells, queries) = level.work;
-    CELL * per_photon.powi(3) * cells as f64 + RECEIVER_QUERY * queries as f64
+    CELL_COST * per_photon.powi(3) * cells as f64 + RECEIVER_QUERY * queries as f64
 }
 
 /// Total [`cost`] of the levels.

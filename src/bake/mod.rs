@@ -301,7 +301,7 @@ impl Baker {
     }
 
     /// Prepares a bake.
-    fn ground<'a>(
+    fn prepare<'a>(
         &mut self,
         settings: &'a BakeSettings,
         progress: &'a dyn Progress,
@@ -367,7 +367,7 @@ impl Baker {
         let mut clock = Clock::default();
         let mut level = level;
         let first_look = self.first_look(settings, (progress, control), (&mut level, &mut clock));
-        let ground = self.ground(settings, progress, control, (&mut clock, began));
+        let ground = self.prepare(settings, progress, control, (&mut clock, began));
         let PreparedBake {
             tracer,
             aim,

@@ -291,13 +291,13 @@ impl StudyArguments {
                 )),
             };
         };
-        let desk = StudyRun { common, console };
+        let run = StudyRun { common, console };
         match kind {
-            Kind::Convergence(study) => desk.convergence(study),
-            Kind::Reference(study) => desk.reference(study),
-            Kind::Effects(study) => desk.effects(study),
-            Kind::Spectrum(study) => desk.spectrum(study),
-            Kind::Built(name) => desk.built(name),
+            Kind::Convergence(study) => run.convergence(study),
+            Kind::Reference(study) => run.reference(study),
+            Kind::Effects(study) => run.effects(study),
+            Kind::Spectrum(study) => run.spectrum(study),
+            Kind::Built(name) => run.built(name),
         }
     }
 }

@@ -222,7 +222,7 @@ impl Scene {
             }
         }
         for light in 0..self.lights.len() {
-            let loaded = self.light_when_loaded(light);
+            let loaded = self.original_light_index(light);
             let node = loaded.and_then(|loaded| clip.light_nodes.get(loaded));
             if let Some(carrying) = node.and_then(|node| of(*node)) {
                 let kind = &mut self.lights[light].kind;

@@ -22,7 +22,7 @@ impl Change {
         let mut changes = Vec::new();
         let mut push = |of: &str, edit| changes.push(Self { of: of.into(), edit });
         for (index, now) in edited.lights.iter().enumerate() {
-            match edited.light_when_loaded(index) {
+            match edited.original_light_index(index) {
                 Some(place) => {
                     for edit in LightEdit::between(&loaded.lights[place], now) {
                         push(&now.name, Edit::Light(place, edit));

@@ -410,14 +410,14 @@ impl Scene {
         let (middle, radius_m) = (0.5 * (low + high), 0.5 * (high - low).length());
         let of_lamp = |light: &Light| match Emitter::middle(light, self) {
             Some(emitter) => emitter.strength * received_per_m2(&emitter.kind, middle, radius_m),
-            None => self.light_from_around(),
+            None => self.environment_at_centre(),
         };
         let lamps = self.lights.iter().map(of_lamp);
         lamps.fold(LinearSrgb::BLACK, |sum, light| sum + light)
     }
 
     /// The same for the environment.
-    fn light_from_around(&self) -> LinearSrgb {
+    fn environment_at_centre(&self) -> LinearSrgb {
         let Some((environment, strength)) = self.sky() else {
             return LinearSrgb::BLACK;
         };

@@ -96,15 +96,15 @@ impl Scene {
     }
 
     /// Index of a light in the scene as loaded; `None` if it was added since.
-    pub fn light_when_loaded(&self, light: usize) -> Option<usize> {
+    pub fn original_light_index(&self, light: usize) -> Option<usize> {
         let list = &self.light_list;
         let loaded = 0..self.lights.len() - list.added.len() + list.removed.len();
         loaded.filter(|place| !list.removed.contains(place)).nth(light)
     }
 
     /// A light as it was in `loaded` or, if it was added since, as it was added.
-    pub fn light_at_first<'a>(&'a self, light: usize, loaded: &'a Self) -> &'a Light {
-        match self.light_when_loaded(light) {
+    pub fn original_light<'a>(&'a self, light: usize, loaded: &'a Self) -> &'a Light {
+        match self.original_light_index(light) {
             Some(place) => &loaded.lights[place],
             None => &self.light_list.added[light + self.light_list.added.len() - self.lights.len()],
         }

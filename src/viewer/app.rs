@@ -53,7 +53,7 @@ impl From<accessibility::Event> for UserEvent {
 /// Scrolling by this many pixels counts as one wheel notch.
 const PIXELS_PER_NOTCH: f64 = 40.0;
 /// Interval at which an idle window checks whether it was asked to stop.
-const LOOK_FOR_STOP: Duration = Duration::from_millis(100);
+const STOP_POLL_INTERVAL: Duration = Duration::from_millis(100);
 /// Interval between frames that only show the progress of a bake. It is longer on a software rasterizer, which takes
 /// CPU time from the bake.
 const BAKING_FRAME: Duration = Duration::from_millis(100);
@@ -557,7 +557,7 @@ impl ApplicationHandler<UserEvent> for App {
     }
 
     fn about_to_wait(&mut self, event_loop: &ActiveEventLoop) {
-        let look = self.stop.as_ref().map(|_| Instant::now() + LOOK_FOR_STOP);
+        let look = self.stop.as_ref().map(|_| Instant::now() + STOP_POLL_INTERVAL);
         let until = [self.wake_at, look].into_iter().flatten().min();
         event_loop.set_control_flow(until.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
         self.model.picture.latencies.end_turn(Instant::now());

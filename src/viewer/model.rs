@@ -2,7 +2,7 @@
 
 mod filming;
 mod opening;
-mod pending_search;
+mod pending_tasks;
 mod picking;
 mod playing;
 mod saved_state;
@@ -99,11 +99,11 @@ pub struct Model {
     /// The light that the mouse drags.
     placing: picking::DraggedLight,
     /// Tasks that wait for the collision surfaces.
-    pending_search: pending_search::PendingSearch,
+    pending_tasks: pending_tasks::PendingTasks,
     /// Plays the camera path; `None` if it is not being played.
     player: Option<Player>,
     /// Outcome of the last command of the camera path.
-    pub film_told: Option<String>,
+    pub film_message: Option<String>,
     /// The scene that was last probed.
     probed_scene: Option<Arc<Scene>>,
     /// Whether the exposure was restored from an earlier session.
@@ -153,9 +153,9 @@ impl Model {
             reference: None,
             picking: None,
             placing: picking::DraggedLight::default(),
-            pending_search: pending_search::PendingSearch::default(),
+            pending_tasks: pending_tasks::PendingTasks::default(),
             player: None,
-            film_told: None,
+            film_message: None,
             probed_scene: None,
             files: Files::new(&options.files, wake),
             state: BakeState::Idle,
@@ -356,7 +356,7 @@ impl Model {
         self.poll_probe(has_maps);
         self.poll_sketch();
         self.poll_pick();
-        self.poll_sought();
+        self.poll_pending();
         if has_maps {
             self.maps_revision += 1;
             self.compare_again();
@@ -429,8 +429,8 @@ impl Model {
             Command::Choose(choices) => self.choose(*choices),
             Command::Edit(edit) => drop(self.edit(&edit)),
             Command::Release => self.edits.release(),
-            Command::Undo => self.turn_back(true),
-            Command::Redo => self.turn_back(false),
+            Command::Undo => self.step_history(true),
+            Command::Redo => self.step_history(false),
             Command::Rebake => self.rebake(),
             Command::Cancel => self.cancel(),
             Command::EffectDifference(effect) => self.compare(effect),
@@ -439,8 +439,8 @@ impl Model {
             Command::Play(command) => self.set_time(command),
             Command::Export(export) => self.export(export),
             Command::ClearProbe => self.probe(None),
-            Command::Brightest => self.seek(|pending_search| pending_search.brightest = true),
-            Command::AddLight(light) => self.seek(|pending_search| pending_search.light = Some(light)),
+            Command::Brightest => self.seek(|pending_tasks| pending_tasks.brightest = true),
+            Command::AddLight(light) => self.seek(|pending_tasks| pending_tasks.light = Some(light)),
             Command::Open(source) => self.open(&source),
             Command::Browse | Command::SaveScene | Command::SavePicture | Command::MeasureExposure => {
                 return Some(command);
@@ -507,7 +507,7 @@ impl Model {
     }
 
     /// Undoes the last change, or redoes the last undone one.
-    fn turn_back(&mut self, is_back: bool) {
+    fn step_history(&mut self, is_back: bool) {
         self.refusal = None;
         let Some((text, [from, to])) = self.edits.turn(is_back) else {
             return;

@@ -106,7 +106,7 @@ impl Baker {
         check(settings)?;
         self.threads.of(settings)?.install(|| {
             let (whole, mut clock) = (Stopwatch::start(), Clock::default());
-            let ground = self.ground(settings, progress, control, (&mut clock, Instant::now()));
+            let ground = self.prepare(settings, progress, control, (&mut clock, Instant::now()));
             let mut role = ShardRole::shard(share);
             let mut states = LightStates::default();
             ground.bake(&self.sizes, &mut states, &mut clock, &mut role, &mut ())?;

@@ -171,7 +171,7 @@ pub(super) fn remove(scene: &mut Scene, index: usize) -> Result<()> {
         ));
     }
     let of_file = scene.lights.len() - scene.light_list.added.len();
-    match scene.light_when_loaded(index) {
+    match scene.original_light_index(index) {
         Some(place) => {
             let removed = &mut scene.light_list.removed;
             removed.push(place);

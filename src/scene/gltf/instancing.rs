@@ -108,7 +108,7 @@ fn unit(rotation: [f64; 4]) -> [f64; 4] {
 }
 
 /// Adds a child node for each instance.
-pub fn take_apart(document: &mut Document, instanced: &[Instanced]) {
+pub fn expand_instances(document: &mut Document, instanced: &[Instanced]) {
     for whole in instanced {
         let first = document.root.nodes.len();
         let mesh = document.root.nodes[whole.node].mesh.take();
@@ -129,7 +129,7 @@ pub fn take_apart(document: &mut Document, instanced: &[Instanced]) {
 
 impl Glb {
     /// The same in a document to be written.
-    pub(super) fn take_apart(&mut self, instanced: &[Instanced]) {
+    pub(super) fn expand_instances(&mut self, instanced: &[Instanced]) {
         for whole in instanced {
             let node = format!("/nodes/{}", whole.node);
             let mesh = self.json.pointer(&format!("{node}/mesh")).cloned();

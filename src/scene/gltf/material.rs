@@ -224,7 +224,7 @@ impl MaterialReader<'_, '_> {
             material.polish = self.polish(specular)?;
         }
         self.coat(&mut material, extensions)?;
-        self.name_what_is_ignored(extensions, &material);
+        self.warn_of_ignored(extensions, &material);
         Ok(material)
     }
 
@@ -438,7 +438,7 @@ impl MaterialReader<'_, '_> {
         surface
     }
 
-    fn name_what_is_ignored(&mut self, extensions: &extension::Material, material: &Material) {
+    fn warn_of_ignored(&mut self, extensions: &extension::Material, material: &Material) {
         let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
             Checked::Valid(_) => {}

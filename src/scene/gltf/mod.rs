@@ -130,7 +130,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         &mut report,
     )?;
     let instanced = instancing::read(&document.root, &buffers, &mut budget)?;
-    instancing::take_apart(&mut document, &instanced);
+    instancing::expand_instances(&mut document, &instanced);
 
     let mut images = images::Images::new(&document.root, &buffers, folder);
     let materials = material::read_all(&document, folder, &mut images, &mut budget, &mut report)?;
@@ -308,8 +308,8 @@ impl File {
             let buffers =
                 buffers::Buffers::resolve(all, views, split.binary, &folder, &mut budget, &mut report)?;
             let instanced = instancing::read(root, &buffers, &mut budget)?;
-            instancing::take_apart(&mut document, &instanced);
-            glb.take_apart(&instanced);
+            instancing::expand_instances(&mut document, &instanced);
+            glb.expand_instances(&instanced);
         }
         let placed = nodes::place(&document, &mut report)?;
         Ok(Self {

@@ -132,7 +132,7 @@ fn write(folder: &ConfigFolder, snapshot: Snapshot) {
 }
 
 /// Polling interval. A change counts once two polls see the same state, so that unfinished writes are not read.
-pub const BETWEEN_LOOKS: Duration = Duration::from_millis(500);
+pub const POLL_INTERVAL: Duration = Duration::from_millis(500);
 
 /// Modification times and sizes [bytes] of files; `None` for a missing file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -160,7 +160,7 @@ impl Stamps {
 pub(super) fn changed(known: Stamps, task: &Task) -> Stamps {
     let mut before = known.clone();
     while !task.control.is_cancelled() {
-        thread::sleep(BETWEEN_LOOKS);
+        thread::sleep(POLL_INTERVAL);
         let now = known.again();
         if now == before && now != known {
             return now;

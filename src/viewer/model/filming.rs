@@ -65,8 +65,8 @@ impl Model {
         }
         match outcome {
             Ok(None) => {}
-            Ok(Some(told)) => self.film_told = Some(told),
-            Err(error) => self.film_told = Some(error.to_string()),
+            Ok(Some(told)) => self.film_message = Some(told),
+            Err(error) => self.film_message = Some(error.to_string()),
         }
     }
 

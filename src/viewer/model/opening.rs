@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::Model;
-use super::pending_search::PendingSearch;
+use super::pending_tasks::PendingTasks;
 use super::picking::DraggedLight;
 use super::saved_state::RestoredParts;
 use crate::error::Result;
@@ -34,7 +34,7 @@ impl Model {
         };
         let source = self.edits.loaded().source.clone();
         self.files.opened(&source);
-        self.exposure_is_kept = self.find_again((!options.files.fresh).then_some(what));
+        self.exposure_is_kept = self.restore_saved_state((!options.files.fresh).then_some(what));
     }
 
     /// Loads a scene (a path as typed, or `builtin:NAME`), which replaces the present one when it is ready. Cancels a
@@ -116,11 +116,11 @@ impl Model {
         self.player = None;
         self.picking = None;
         self.placing = DraggedLight::default();
-        self.pending_search = PendingSearch::default();
+        self.pending_tasks = PendingTasks::default();
         self.choices.watches = false;
         self.edits = EditedScene::new(scene);
         self.playback = Playback::default();
-        self.exposure_is_kept = self.find_again(Some(RestoredParts::ALL));
+        self.exposure_is_kept = self.restore_saved_state(Some(RestoredParts::ALL));
         self.forget_maps();
         self.bake_first();
     }

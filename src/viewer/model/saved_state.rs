@@ -80,7 +80,7 @@ impl Model {
     }
 
     /// Restores the saved state of the scene, as far as wanted; returns whether there was one.
-    pub(super) fn find_again(&mut self, what: Option<RestoredParts>) -> bool {
+    pub(super) fn restore_saved_state(&mut self, what: Option<RestoredParts>) -> bool {
         self.full_source = full_source(&self.edits.loaded().source);
         let (kept, warning) = match what {
             Some(_) => self.files.read_back(&self.full_source),

@@ -78,7 +78,7 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
         let idle = (!model.exporter.state.is_running()).then_some("Nothing is filmed now.");
         ask(ui, "Stop", idle, commands, FilmCommand::Stop);
     });
-    if let Some(told) = &model.film_told {
+    if let Some(told) = &model.film_message {
         ui.label(RichText::new(told).small());
     }
     export::outcome(ui, model);

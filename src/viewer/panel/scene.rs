@@ -214,7 +214,7 @@ fn one_of<'a>(
 
 fn light(ui: &mut Ui, light: usize, model: &Model, commands: &mut Vec<Command>) {
     let shown = &model.scene().lights[light];
-    let of_file = model.scene().light_at_first(light, model.loaded());
+    let of_file = model.scene().original_light(light, model.loaded());
     let kind = shown.kind;
     power(ui, light, (&kind, &of_file.kind), commands);
     light_size::show(ui, light, (shown, of_file), commands);

@@ -45,11 +45,11 @@ fn each_change_of_lights_is_one_step() {
     let names: Vec<&str> = scene.lights.iter().map(|light| light.name.as_str()).collect();
     assert_eq!(names, ["lamp", "spot", "newer"]);
     assert_eq!(
-        [1, 2].map(|light| scene.light_when_loaded(light)),
+        [1, 2].map(|light| scene.original_light_index(light)),
         [Some(2), None]
     );
     // As it came, and not as it is now.
-    assert_eq!(scene.light_at_first(2, &loaded), &lamp("newer"));
+    assert_eq!(scene.original_light(2, &loaded), &lamp("newer"));
     for before in states.iter().rev().skip(1) {
         edits_of.turn(true).expect("it is taken back");
         assert_eq!(state(&edits_of), *before);

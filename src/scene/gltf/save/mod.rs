@@ -93,7 +93,7 @@ impl Patch<'_> {
         let materials = self.document.root.materials.len();
         let shift = self.edited.origin_world;
         for (index, is) in self.edited.lights.iter().enumerate() {
-            let place = self.edited.light_when_loaded(index);
+            let place = self.edited.original_light_index(index);
             let (was, origin) = match place {
                 Some(place) => (Some(&self.loaded.lights[place]), origins.get(place)),
                 None => (None, None),
@@ -174,7 +174,9 @@ impl Patch<'_> {
 /// Whether a light that is not in the file is written to it: it was added or edited, or there are added lights, with
 /// which the file would no longer be given a default sun.
 fn is_to_be_written(light: usize, loaded: &Scene, edited: &Scene) -> bool {
-    let was = edited.light_when_loaded(light).map(|place| &loaded.lights[place]);
+    let was = edited
+        .original_light_index(light)
+        .map(|place| &loaded.lights[place]);
     was != Some(&edited.lights[light]) || !edited.light_list.added.is_empty()
 }
 

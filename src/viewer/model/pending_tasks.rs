@@ -26,29 +26,29 @@ const HALVINGS: i32 = 6;
 
 /// Tasks for when the collision surfaces are built.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PendingSearch {
+pub(super) struct PendingTasks {
     pub light: Option<NewLight>,
     pub brightest: bool,
 }
 
 impl Model {
     /// Adds a task and runs it as soon as the collision surfaces are built.
-    pub(super) fn seek(&mut self, what: impl FnOnce(&mut PendingSearch)) {
-        what(&mut self.pending_search);
-        self.poll_sought();
+    pub(super) fn seek(&mut self, what: impl FnOnce(&mut PendingTasks)) {
+        what(&mut self.pending_tasks);
+        self.poll_pending();
     }
 
     /// Runs the pending tasks if the collision surfaces are built.
-    pub(super) fn poll_sought(&mut self) {
-        if self.pending_search.light.is_none() && !self.pending_search.brightest {
+    pub(super) fn poll_pending(&mut self) {
+        if self.pending_tasks.light.is_none() && !self.pending_tasks.brightest {
             return;
         }
         let Some(surfaces) = self.surfaces() else { return };
-        let pending_search = std::mem::take(&mut self.pending_search);
-        if let Some(light) = pending_search.light {
+        let pending_tasks = std::mem::take(&mut self.pending_tasks);
+        if let Some(light) = pending_tasks.light {
             self.add_light(light, &surfaces);
         }
-        if pending_search.brightest {
+        if pending_tasks.brightest {
             self.show_brightest(&surfaces);
         }
     }
