@@ -39,14 +39,14 @@ class Handler(SimpleHTTPRequestHandler):
         pass
 
 
-def pixels(browser, modules, file, only, area, side, light=None):
+def pixels(browser, modules, file, only, area, side, light=None, stops=0):
     """Linear radiance of a square picture from above, row 0 at the least z: array [side, side, 3]. `light`: a KTX 2.0 file
-    in the folder of the .glb, which takes the place of its light map."""
+    in the folder of the .glb, which takes the place of its light map, times 2^`stops`."""
     roots = {"modules": modules, "page": Path(__file__).parent, "files": file.parent}
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, roots=roots))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     Handler.done.clear()
-    more = {"map": f"/files/{light.relative_to(file.parent)}"} if light else {}
+    more = {"map": f"/files/{light.relative_to(file.parent)}", "stops": stops} if light else {}
     query = urlencode(more | {"file": f"/files/{file.name}", "only": ",".join(only), "side": side,
                        "area": ",".join(str(value) for value in area)})
     url = f"http://127.0.0.1:{server.server_port}/page/three.html?{query}"
