@@ -393,7 +393,7 @@ fn difference(texels: &Texels, half: &Texels) -> f64 {
     let at = |column: usize, row: usize| luminance(&half.values()[row * across + column]);
     // The nearer and the farther of two texels of half the size, from the middle of a quarter of the nearer.
     let both = |place: usize, count: usize| {
-        let beside = if place % 2 == 0 {
+        let beside = if place.is_multiple_of(2) {
             (place / 2).saturating_sub(1)
         } else {
             place / 2 + 1

@@ -30,8 +30,8 @@ APART = 4
 PATIENCE_S = 3600
 # The flags by which Chromium without a graphics card gives a canvas to WebGPU.
 FLAGS = ["--headless=new", "--no-sandbox", "--no-first-run", "--enable-unsafe-webgpu", "--enable-features=Vulkan",
-         "--use-vulkan=swiftshader", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-vulkan-surface",
-         "--ignore-gpu-blocklist", "--disable-gpu-watchdog"]
+         "--use-vulkan=swiftshader", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist",
+         "--disable-gpu-watchdog"]
 
 
 def camera(file):
