@@ -30,7 +30,7 @@ fn surfaces_are_classified() {
         (1.0, 0.0, &none, Mirror, ""),
         (0.5, 0.3, &none, Mirror, ""),
         (1.0, 0.6, &none, Mirror, ""),
-        (1.0, 0.61, &none, Diffuse, "is a metal of roughness 0.61"),
+        (1.0, 0.61, &none, Diffuse, "is a metal rougher than 0.6"),
         (1.0, 1.0, &none, Diffuse, ""),
         (0.0, 1.0, &none, Diffuse, ""),
         (0.0, 0.1, &none, Mixed, ""),
@@ -429,7 +429,7 @@ fn normal_textures_of_what_is_specular_are_read() {
             &image[..],
             "material `m` | normal texture, as it is diffuse,",
         ),
-        (&plain, polish.clone(), b"no image", "image0 | replaced by grey"),
+        (&plain, polish.clone(), b"no image", "image `picture` | replaced by grey"),
         (&fourth, polish.clone(), &image, "material `m` | TEXCOORD_3"),
     ] {
         let scene = embossed(image, normals.clone(), factors);
