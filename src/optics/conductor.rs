@@ -4,9 +4,9 @@
 /// the medium of the incident light.
 ///
 /// `cos_incident` [0, 1] is the cosine between the incident ray and the normal, `n` > 0, `k` ≥ 0. With k = 0 these are
-/// the reflectances of a dielectric, total reflection included, and 0 where n is 1 too; at grazing incidence both are
-/// 1. Source: Born and Wolf, Principles of Optics, 14.2; the cosine of the refracted wave is kept as a complex number
-/// to avoid cancellation.
+/// the reflectances of a dielectric, total reflection included, and 0 where n is 1 too; both are 1 at grazing
+/// incidence. Source: Born and Wolf, Principles of Optics, 14.2; the cosine of the refracted wave is kept as a complex
+/// number to avoid cancellation.
 pub fn conductor_reflectance_sp(cos_incident: f64, n: f64, k: f64) -> [f64; 2] {
     if n == 1.0 && k == 0.0 {
         return [0.0; 2];
