@@ -4,7 +4,7 @@
 //! Cells are marked by projecting the scene's hierarchy onto the faces of the launch domain and, where a box does not
 //! decide, the triangles of specular objects below it. Triangles are tested exactly against the cells: one that is
 //! smaller than a cell, edge-on or on a cube edge is never missed. Cells whose whole frustum is covered by opaque faces
-//! in front of every caster are dropped ([`hidden`]); all other occlusion is left to the rays.
+//! in front of every caster are dropped (`hidden`); all other occlusion is left to the rays.
 
 mod bits;
 mod builder;
