@@ -429,7 +429,12 @@ fn normal_textures_of_what_is_specular_are_read() {
             &image[..],
             "material `m` | normal texture, as it is diffuse,",
         ),
-        (&plain, polish.clone(), b"no image", "image `picture` | replaced by grey"),
+        (
+            &plain,
+            polish.clone(),
+            b"no image",
+            "image `picture` | replaced by grey",
+        ),
         (&fourth, polish.clone(), &image, "material `m` | TEXCOORD_3"),
     ] {
         let scene = embossed(image, normals.clone(), factors);
