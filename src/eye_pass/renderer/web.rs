@@ -54,8 +54,10 @@ impl WebScene {
     pub fn new(scene: &Scene, maps: &[IlluminationMap]) -> Result<Option<Self>> {
         let gpu = Gpu::idle()?;
         let mut renderer = Renderer::new(&gpu, scene, wgpu::TextureFormat::Rgba8Unorm, SAMPLES)?;
-        renderer.set_map_budget(MAP_BUDGET_BYTES);
+        // Coarse first: tiles then fill the pool without gaps.
+        renderer.set_map_budget(0);
         renderer.set_maps(&gpu, scene, maps)?;
+        renderer.set_map_budget(MAP_BUDGET_BYTES);
         renderer.fit_maps(&gpu);
         let mut looks = renderer.objects.list.iter();
         if !looks.any(|look| renderer.draw_state().is_specular(look)) {
