@@ -50,9 +50,11 @@ impl TraversedCells {
                 return;
             }
         }
-        if enter_m > leave_m || !leave_m.is_finite() {
+        if enter_m > leave_m {
             return;
         }
+        // A ray across a flat scene stays in one cell for ever.
+        let leave_m = if leave_m.is_finite() { leave_m } else { enter_m };
         let [from, to] = [enter_m, leave_m].map(|along_m| origin + direction * along_m);
         // One part for each cell along the longest axis.
         let parts = (to - from).abs().max_element().ceil().max(1.0);
@@ -118,31 +120,40 @@ mod tests {
     #[test]
     fn a_ray_passes_the_cells_on_its_way_and_no_others() {
         let (low, high) = (DVec3::new(-2.0, 0.0, -3.0), DVec3::new(2.0, 1.0, 5.0));
-        for (origin, direction) in [
-            (DVec3::new(-1.9, 0.1, -2.0), DVec3::new(1.0, 0.2, 1.7)),
-            (DVec3::new(0.3, 0.9, 4.0), DVec3::new(0.01, -1.0, -0.02)),
-            (DVec3::new(-9.0, 0.5, 1.0), DVec3::X),
+        let aside = DVec3::new(0.3, 0.3, 0.4);
+        // Two distances at which each ray is inside.
+        for (origin, direction, [near_m, far_m]) in [
+            (DVec3::new(-1.9, 0.1, -2.0), DVec3::new(1.0, 0.2, 1.7), [0.4, 0.8]),
+            (
+                DVec3::new(0.3, 0.9, 4.0),
+                DVec3::new(0.01, -1.0, -0.02),
+                [0.4, 0.8],
+            ),
+            (DVec3::new(-9.0, 0.5, 1.0), DVec3::X, [8.0, 9.0]),
         ] {
-            let cells = TraversedCells::within((low, high));
             let ray = ray(origin, direction);
+            let cells = TraversedCells::within((low, high));
+            cells.add_ray(&ray, near_m);
+            assert!(cells.meets(around(ray.at(near_m))));
+            assert!(!cells.meets(around(ray.at(far_m))), "beyond its end");
             cells.add_ray(&ray, 8.5);
             for step in 0..=850 {
                 let point = ray.at(0.01 * f64::from(step));
                 let is_inside = point.cmpge(low).all() && point.cmple(high).all();
                 assert!(!is_inside || cells.meets(around(point)), "{point}");
             }
-            let aside = DVec3::new(0.3, -0.2, 0.4);
-            assert!(!cells.meets(around(ray.at(0.4) + aside)));
-            assert!(!cells.meets(around(ray.at(9.5).clamp(low, high))) || ray.at(9.5).x > high.x);
+            assert!(!cells.meets(around(ray.at(near_m) + aside)), "beside it");
         }
     }
 
     #[test]
     fn rays_that_miss_the_box_or_never_end_are_no_trouble() {
-        let cells = TraversedCells::within((DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0)));
+        let flat = (DVec3::ZERO, DVec3::new(1.0, 0.0, 1.0));
+        let cells = TraversedCells::within(flat);
         cells.add_ray(&ray(DVec3::new(0.5, 3.0, 3.0), DVec3::X), f64::INFINITY);
-        assert!(!cells.meets((DVec3::ZERO, DVec3::ONE)));
+        assert!(!cells.meets(flat));
         cells.add_ray(&ray(DVec3::new(0.5, 3.0, 0.5), DVec3::NEG_Y), f64::INFINITY);
-        assert!(cells.meets(around(DVec3::new(0.5, 0.0, 0.5))));
+        let [hit, other] = [0.5, 0.1].map(|x| DVec3::new(x, 0.0, 0.5));
+        assert!(cells.meets((hit, hit)) && !cells.meets((other, other)));
     }
 }
