@@ -6,26 +6,36 @@ const MOST_PICTURES = 16;
 // Steps of the places within a pixel, and surfaces at which both ways on are followed: those of the window.
 const STEPS = [0.7548776662466927, 0.5698402909980532];
 const BRANCHING = { moving: 2, resting: 4 };
+const LAYERS = ["caustic", "direct", "indirect"];
+// Workgroups across a tile of `summed.wgsl`: 65 texels by eights.
+const TILE_GROUPS = 9;
+// Stands for no object, on triangles of instanced meshes.
+const NO_OBJECT = 0xffffffff;
 // Buffers have some size even without content [bytes].
 const LEAST_BYTES = 256;
 
-// Everything of a scene on the device. `asset` gives the bytes of a file of the page; throws where WebGPU is not there, or
-// is played by the processor and that is not forced.
-export async function start({ canvas, asset, isForced }) {
+// Everything of a scene on the device. `asset` gives the bytes of a file of the page, `maps` are the page's, with their
+// layers' `images`; throws where WebGPU is not there, or is played by the processor and that is not forced.
+export async function start({ canvas, asset, maps, isForced }) {
   const adapter = await navigator.gpu?.requestAdapter({ powerPreference: "high-performance" });
   if (!adapter) throw new Error("the browser offers no WebGPU");
   if (adapter.info.isFallbackAdapter && !isForced) throw new Error("the browser has WebGPU without a graphics card");
   const wanted = ["maxBufferSize", "maxStorageBufferBindingSize", "maxTextureDimension2D"];
   const requiredLimits = Object.fromEntries(wanted.map((name) => [name, adapter.limits[name]]));
   const device = await adapter.requestDevice({ requiredLimits });
-  const packed = new Blob([await asset("chains.gz")]).stream();
-  const file = new Uint8Array(await new Response(packed.pipeThrough(new DecompressionStream("gzip"))).arrayBuffer());
+  const file = await asset("chains.gz");
   const length = new DataView(file.buffer, file.byteOffset).getUint32(0, true);
   const scene = JSON.parse(new TextDecoder().decode(file.subarray(4, 4 + length)));
-  const part = ([first, bytes]) => file.subarray(4 + length + first, 4 + length + first + bytes);
+  const part = ([first, bytes, record]) => {
+    const stored = file.subarray(4 + length + first, 4 + length + first + bytes);
+    return record ? unfiltered(stored, record) : stored;
+  };
+  scene.contents = Object.fromEntries(Object.entries(scene.contents).map(([name, place]) => [name, part(place)]));
+  scene.maps = scene.maps.map(part);
+  placeTriangles(scene);
   device.pushErrorScope("out-of-memory");
   device.pushErrorScope("validation");
-  const eye = new EyePass(device, canvas, scene, part);
+  const eye = new EyePass(device, canvas, scene, maps);
   await eye.makePipelines();
   eye.setLight(0, {});
   for (const error of [await device.popErrorScope(), await device.popErrorScope()]) {
@@ -35,7 +45,7 @@ export async function start({ canvas, asset, isForced }) {
 }
 
 class EyePass {
-  constructor(device, canvas, scene, part) {
+  constructor(device, canvas, scene, maps) {
     Object.assign(this, { device, canvas, scene });
     this.lost = device.lost.then((loss) => loss.message || loss.reason);
     this.screenFormat = navigator.gpu.getPreferredCanvasFormat();
@@ -45,20 +55,22 @@ class EyePass {
     this.modules = Object.fromEntries(modules);
     const layouts = Object.entries(scene.layouts).map(([label, entries]) => [label, device.createBindGroupLayout({ label, entries })]);
     this.layouts = Object.fromEntries(layouts);
-    this.makeBuffers(part);
-    this.makeTextures(part);
+    this.makeBuffers();
+    this.makeTextures();
+    this.makeMaps(maps);
     // What is bound as `traced` and `frame` stays; only what it holds changes.
     const { uniforms, buffers } = this;
     const names = ["nodes", "triangles", "corners", "map_uvs", "indices", "lights"];
     this.traced = this.bind("traced", [uniforms.start, ...names.map((name) => buffers[name]), uniforms.wavelengths]);
     this.sky = this.textures.sky && this.bind("sky", [this.textures.sky.createView()]);
-    this.bodies = bodies(scene, part);
+    this.bodies = bodies(scene);
     this.shown = {};
     this.light = [{}, {}];
   }
 
-  makeBuffers(part) {
+  makeBuffers() {
     const { device, scene } = this;
+    const { contents } = scene;
     const made = (label, bytes, usage) => {
       const buffer = device.createBuffer({ label, size: Math.max(bytes.length, LEAST_BYTES), usage: usage | GPUBufferUsage.COPY_DST });
       device.queue.writeBuffer(buffer, 0, bytes);
@@ -67,22 +79,23 @@ class EyePass {
     const { STORAGE, VERTEX, INDEX, UNIFORM } = GPUBufferUsage;
     const names = ["objects", "image_table", "nodes", "triangles", "corners", "map_uvs", "indices", "lights"];
     const usage = (name) => STORAGE | (name === "indices" ? INDEX : VERTEX);
-    this.buffers = Object.fromEntries(names.map((name) => [name, made(name, part(scene.contents[name]), usage(name))]));
-    const sets = part(scene.contents.wavelengths);
+    this.buffers = Object.fromEntries(names.map((name) => [name, made(name, contents[name], usage(name))]));
+    const sets = contents.wavelengths;
     this.wavelengths = (picture) => {
       const bytes = sets.length / scene.pictures;
       return sets.subarray((picture % scene.pictures) * bytes, (picture % scene.pictures + 1) * bytes);
     };
     this.uniforms = {
       frame: made("frame", new Uint8Array(scene.Frame.size), UNIFORM),
-      start: made("start", part(scene.contents.start), UNIFORM),
+      start: made("start", contents.start, UNIFORM),
       wavelengths: made("wavelengths", this.wavelengths(0), UNIFORM),
-      white: made("white", part(scene.contents.white), UNIFORM),
+      white: made("white", contents.white, UNIFORM),
       share: made("share", new Uint8Array(16), UNIFORM),
+      factors: made("factors", new Uint8Array(16), UNIFORM),
     };
   }
 
-  makeTextures(part) {
+  makeTextures() {
     const { scene } = this;
     const { TEXTURE_BINDING, COPY_DST } = GPUTextureUsage;
     const filled = (label, { size, format }, bytes) => {
@@ -92,15 +105,35 @@ class EyePass {
       return texture;
     };
     const named = ["texture_tiles", "sky"].filter((name) => scene.contents[name]);
-    this.textures = Object.fromEntries(named.map((name) => [name, filled(name, scene.textures[name], part(scene.contents[name]))]));
-    const tiles = { ...scene.textures.map_tiles, format: "rgb9e5ufloat" };
-    this.layers = Object.entries(scene.layers).map(([name, place]) => [name, filled(name, tiles, part(place))]);
+    this.textures = Object.fromEntries(named.map((name) => [name, filled(name, scene.textures[name], scene.contents[name])]));
+  }
+
+  // Textures of all layers of each map, and where its tiles lie.
+  makeMaps(maps) {
+    const { device, scene } = this;
+    const usage = GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST;
+    const texture = ({ width, height, levels }) => {
+      const made = device.createTexture({ size: [width, height], mipLevelCount: levels.length, format: "rgb9e5ufloat", usage });
+      levels.forEach((words, mipLevel) => {
+        const size = [width, height].map((side) => Math.max(side >> mipLevel, 1));
+        device.queue.writeTexture({ texture: made, mipLevel }, words, { bytesPerRow: 4 * size[0] }, size);
+      });
+      return made.createView();
+    };
+    const black = texture({ width: 1, height: 1, levels: [new Uint32Array(1)] });
+    this.maps = maps.map(({ images }, index) => {
+      const bytes = scene.maps[index];
+      const tiles = device.createBuffer({ size: Math.max(bytes.length, LEAST_BYTES), usage: GPUBufferUsage.STORAGE | GPUBufferUsage.COPY_DST });
+      device.queue.writeBuffer(tiles, 0, bytes);
+      return { tiles, count: bytes.length / scene.MapTile.size, layers: LAYERS.map((layer) => (images[layer] ? texture(images[layer]) : black)) };
+    });
+    this.bilinear = device.createSampler({ magFilter: "linear", minFilter: "linear" });
   }
 
   bind(layout, resources) {
     const resource = (it) => (it instanceof GPUBuffer ? { buffer: it } : it);
     const entries = resources.map((it, binding) => ({ binding, resource: resource(it) }));
-    return this.device.createBindGroup({ layout: this.layouts[layout], entries });
+    return this.device.createBindGroup({ layout: this.layouts[layout] ?? layout, entries });
   }
 
   // A pipeline as the file describes it, with its module and layouts in place of their names.
@@ -119,37 +152,36 @@ class EyePass {
   async makePipelines() {
     const { device, scene } = this;
     const made = (description, changes) => device.createRenderPipelineAsync(this.descriptor(description, changes));
-    const sum = { operation: "add", srcFactor: "one", dstFactor: "one" };
-    const added = [{ format: scene.formats.radiance, blend: { color: sum, alpha: sum } }];
     this.surfaces = await Promise.all(scene.surfaces.map((description) => made(description)));
     this.skyPipeline = this.sky && (await made(scene.sky));
     this.mean = await made(scene.mean);
-    this.summed = await made(scene.summed, { targets: added });
+    const compute = { module: this.modules.summed, entryPoint: "summed" };
+    this.summed = await device.createComputePipelineAsync({ layout: "auto", compute });
   }
 
   // The tiles of all maps hold the layers that are switched on: first for all of the picture, then beside its line.
   setLight(side, layers) {
     const { device } = this;
-    const key = JSON.stringify(layers);
+    const factors = LAYERS.map((layer) => Number(layers[layer] ?? 1));
+    const key = factors.join();
     if (this.light[side].key === key) return;
     const { size, format } = this.scene.textures.map_tiles;
-    const usage = GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.RENDER_ATTACHMENT;
+    const usage = GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.STORAGE_BINDING;
     const tiles = this.light[side].tiles ?? device.createTexture({ label: "map tiles", size, format, usage });
-    const encoder = device.createCommandEncoder();
-    for (let layer = 0; layer < size[2]; layer += 1) {
-      const one = { dimension: "2d", baseArrayLayer: layer, arrayLayerCount: 1 };
-      const pass = encoder.beginRenderPass({ colorAttachments: [cleared(tiles.createView(one))] });
-      pass.setPipeline(this.summed);
-      for (const [name, texture] of this.layers) {
-        if (layers[name] === 0 || layers[name] === false) continue;
-        pass.setBindGroup(0, this.bind("summed", [texture.createView(one)]));
-        pass.draw(3);
-      }
-      pass.end();
-    }
-    device.queue.submit([encoder.finish()]);
     const all = { dimension: "2d-array" };
     const { buffers, textures, uniforms } = this;
+    device.queue.writeBuffer(uniforms.factors, 0, new Float32Array(factors));
+    const encoder = device.createCommandEncoder();
+    const pass = encoder.beginComputePass();
+    pass.setPipeline(this.summed);
+    const layout = this.summed.getBindGroupLayout(0);
+    for (const map of this.maps) {
+      const bound = [uniforms.factors, map.tiles, this.bilinear, ...map.layers, tiles.createView(all)];
+      pass.setBindGroup(0, this.bind(layout, bound));
+      if (map.count) pass.dispatchWorkgroups(TILE_GROUPS, TILE_GROUPS, map.count);
+    }
+    pass.end();
+    device.queue.submit([encoder.finish()]);
     const views = [tiles.createView(all), textures.texture_tiles.createView(all)];
     const frame = this.bind("frame", [uniforms.frame, buffers.objects, buffers.image_table, ...views]);
     this.light[side] = { key, tiles, frame };
@@ -344,28 +376,61 @@ function write(device, buffer, { fields }, values) {
   }
 }
 
+// Undoes what `filtered` of the exporter did: bytes of a record lie with those of the others, and words are differences.
+function unfiltered(stored, record) {
+  const count = stored.length / record, across = record / 4;
+  const bytes = new Uint8Array(stored.length), words = new Uint32Array(bytes.buffer);
+  for (let plane = 0, at = 0; plane < record; plane += 1) {
+    for (let place = plane; place < bytes.length; place += record) bytes[place] = stored[at++];
+  }
+  for (let word = across; word < words.length; word += 1) words[word] += words[word - across];
+  return bytes;
+}
+
+// Where corners of objects are in the scene [m]: a function of an object and a corner's place in the list of indices.
+function placing({ contents: { objects, corners, indices }, vertices, ObjectRecord }) {
+  const floats = (bytes) => new Float32Array(bytes.buffer, bytes.byteOffset, bytes.length / 4);
+  const [rows, points, numbers] = [floats(objects), floats(corners), new Uint32Array(indices.buffer)];
+  const [stride, across] = [vertices[0].arrayStride / 4, ObjectRecord.size / 4];
+  return (object, index) => {
+    const at = numbers[index] * stride, row = object * across + ObjectRecord.fields.row_x / 4;
+    return [row, row + 4, row + 8].map((row) =>
+      rows[row] * points[at] + rows[row + 1] * points[at + 1] + rows[row + 2] * points[at + 2] + rows[row + 3]);
+  };
+}
+
+// Gives triangles their corners back, in local coordinates, and the numbers of their order.
+function placeTriangles(scene) {
+  const { contents: { triangles }, Triangle: { size, fields }, local: { centre_m: centre, per_m: perM } } = scene;
+  const words = new Uint32Array(triangles.buffer), floats = new Float32Array(triangles.buffer);
+  const place = placing(scene);
+  for (let at = 0; at < words.length; at += size / 4) {
+    const object = words[at + fields.object / 4], first = words[at + fields.first_index / 4];
+    if (object === NO_OBJECT) continue;
+    const order = at + fields.order / 4;
+    words[order] = ((words[order] + first) >>> 0) / 3;
+    [fields.a, fields.b, fields.c].forEach((field, corner) =>
+      floats.set(place(object, first + corner).map((coordinate, axis) => (coordinate - centre[axis]) * perM), at + field / 4));
+  }
+}
+
 // Bodies that an eye can be in: number, and triangles in the scene [m] with the box around them.
-function bodies(scene, part) {
-  const view = (name) => { const bytes = part(scene.contents[name]); return new DataView(bytes.buffer, bytes.byteOffset); };
-  const [records, corners, indices] = ["objects", "corners", "indices"].map(view);
-  const [stride, size] = [scene.vertices[0].arrayStride, scene.vertices[2].arrayStride];
-  const { solid, row_x: rows } = scene.ObjectRecord.fields;
-  const numbers = (data, first, count) => Array.from({ length: count }, (_, at) => data.getFloat32(first + 4 * at, true));
+function bodies(scene) {
+  const { objects } = scene.contents;
+  const records = new DataView(objects.buffer, objects.byteOffset);
+  const place = placing(scene);
   const found = [];
   for (const [, count, objectCount, first, firstObject] of scene.draws.composed) {
     for (let object = firstObject; object < firstObject + objectCount; object += 1) {
-      if (!records.getUint32(object * size + solid, true)) continue;
-      const m = numbers(records, object * size + rows, 12);
-      const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+      if (!records.getUint32(object * scene.ObjectRecord.size + scene.ObjectRecord.fields.solid, true)) continue;
       const places = new Float64Array(3 * count);
+      const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
       for (let at = 0; at < count; at += 1) {
-        const [x, y, z] = numbers(corners, indices.getUint32(4 * (first + at), true) * stride, 3);
-        for (let axis = 0; axis < 3; axis += 1) {
-          const place = m[4 * axis] * x + m[4 * axis + 1] * y + m[4 * axis + 2] * z + m[4 * axis + 3];
-          places[3 * at + axis] = place;
-          low[axis] = Math.min(low[axis], place);
-          high[axis] = Math.max(high[axis], place);
-        }
+        place(object, first + at).forEach((coordinate, axis) => {
+          places[3 * at + axis] = coordinate;
+          low[axis] = Math.min(low[axis], coordinate);
+          high[axis] = Math.max(high[axis], coordinate);
+        });
       }
       found.push({ object, places, low, high });
     }

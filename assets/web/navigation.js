@@ -21,6 +21,12 @@ export class Navigation {
     this.ray = new THREE.Raycaster();
     this.cameras = [];
     stage.gltf.scene.traverse((node) => { if (node.isPerspectiveCamera) this.cameras.push(node); });
+    // What single keys do.
+    this.keys = {
+      KeyC: () => this.nextCamera(),
+      KeyF: () => this.frame(),
+      KeyV: () => this.setMode(MODES[(MODES.indexOf(this.mode) + 1) % MODES.length]),
+    };
     this.next = 0;
     if (this.cameras.length) this.nextCamera();
     else this.frame();
@@ -165,9 +171,7 @@ export class Navigation {
     addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("input, select")) return;
       if (AXES[event.code] || event.code.startsWith("Shift")) this.held.add(event.code);
-      else if (event.code === "KeyC") this.nextCamera();
-      else if (event.code === "KeyF") this.frame();
-      else if (event.code === "KeyV") this.setMode(MODES[(MODES.indexOf(this.mode) + 1) % MODES.length]);
+      else if (this.keys[event.code]) this.keys[event.code]();
       else return;
       event.preventDefault();
       this.changed();

@@ -2,6 +2,7 @@
 
 import { Stage } from "stage";
 import { Navigation } from "navigation";
+import { Motion } from "motion";
 
 const LUMENS_PER_WATT = 683;
 // A picture that takes longer is drawn coarser while the camera moves [ms].
@@ -17,21 +18,40 @@ const shown = { layers: {}, line: 2, exposure_stops: about.exposure_stops, tone_
 const stage = new Stage(canvas, about);
 // Our own shaders by WebGPU on a canvas over ours: what is to be seen there, if anything, and whether it is at work.
 const traced = { eye: null, view: null, isBusy: false, took: 0 };
-let navigation, range, slowest = 0, isDue = false, before = 0;
+let navigation, motion, range, slowest = 0, isDue = false, before = 0;
 let exposureBase = about.exposure_stops;
 
-// Files that have come, of all.
+// Files that have come, by name, and how many the first picture needs.
+const files = new Map();
 const coming = { done: 0, all: about.maps.reduce((sum, map) => sum + Object.keys(map.layers).length, 1) };
-async function asset(name) {
+async function read(name) {
   let bytes;
-  if (globalThis.packedFile) bytes = await globalThis.packedFile(name);
+  if (globalThis.packedFile) bytes = globalThis.packedFile(name);
   else {
     const answer = await fetch(name);
     if (!answer.ok) throw new Error(`${name} is not there (${answer.status})`);
     bytes = new Uint8Array(await answer.arrayBuffer());
   }
+  // Servers may unpack it themselves.
+  if (bytes[0] === 0x1f && bytes[1] === 0x8b) {
+    const unpacked = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    bytes = new Uint8Array(await new Response(unpacked).arrayBuffer());
+  }
   by("loading").querySelector("progress").value = ++coming.done / coming.all;
   return bytes;
+}
+
+function asset(name) {
+  if (!files.has(name)) files.set(name, read(name));
+  return files.get(name);
+}
+
+/** The files of all moments, one after the other, so that they play without a halt. */
+async function readAhead() {
+  for (let moment = 1; moment < about.frames.count; moment++) {
+    const layers = about.maps.flatMap((map) => Object.values(map.layers));
+    await Promise.all(layers.map((names) => names[moment] && asset(names[moment])));
+  }
 }
 
 const nextFrame = () => new Promise((resolve) => requestAnimationFrame(resolve));
@@ -67,7 +87,7 @@ async function startTracing() {
   if (!about.chains || wish === "0") return;
   try {
     const { start } = await import("chains");
-    traced.eye = await start({ canvas: by("chains"), asset, isForced: wish === "1" });
+    traced.eye = await start({ canvas: by("chains"), asset, maps: stage.maps, isForced: wish === "1" });
   } catch (error) {
     by("missing").append(` Exact ones are left out: ${error.message}.`);
     return;
@@ -218,6 +238,13 @@ async function start() {
   addEventListener("resize", resize);
   await lookAgain();
   await nextFrame();
+  if (about.frames) {
+    const show = (moment, seconds) => stage.show(asset, moment, seconds);
+    motion = new Motion(by("motion"), about.frames, { show, changed: request, rested: lookAgain });
+    globalThis.nephroid.motion = motion;
+    navigation.keys.KeyT = () => motion.toggle();
+    readAhead();
+  }
   globalThis.nephroid.state = "done";
   await startTracing();
 }

@@ -87,9 +87,9 @@ vec3 around(vec3 from, vec3 direction, float blur) {
   vec3 far = max((box_high - from) / direction, (box_low - from) / direction);
   float distance_m = min(far.x, min(far.y, far.z));
   vec3 towards = distance_m > 0.0 ? from + direction * distance_m - probe_at : direction;
-  // Its alpha is the caustics' share.
+  // Radiance times the gain; its alpha is the caustics' share.
   vec4 seen = textureLod(probe, towards, blur);
-  return gl_FragCoord.x > line ? seen.rgb * (1.0 - seen.a) : seen.rgb;
+  return (gl_FragCoord.x > line ? 1.0 - seen.a : 1.0) / gain * seen.rgb;
 }
 
 #ifdef GLASS

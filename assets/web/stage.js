@@ -3,7 +3,7 @@
 
 import * as THREE from "three";
 import { GLTFLoader } from "GLTFLoader";
-import { ZSTDDecoder } from "zstddec";
+import { ktx2 } from "ktx2";
 import * as shaders from "shaders";
 
 const LAYERS = ["caustic", "direct", "indirect"];
@@ -15,23 +15,11 @@ const MIDDLE_GREY = 0.18;
 const MEASURED = [160, 90];
 // Layers of three.js: what is opaque, mirrors and glass, and once more solid glass for its backs and mirrors alone.
 const OPAQUE = 0, SPECULAR = 1, SOLID = 2, MIRRORS = 3;
-const RGB9E5 = 123;
 
-const zstd = new ZSTDDecoder();
+const key = (node, primitive) => `${node}/${primitive}`;
 
-/** A KTX 2.0 file of shared exponents with zstd: {width, height, levels: [Uint32Array]}. */
-export async function ktx2(bytes) {
-  await zstd.init();
-  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.byteLength);
-  const word = (at) => view.getUint32(at, true);
-  if (word(12) !== RGB9E5 || word(44) !== 2) throw new Error("a map has a format that this page does not read");
-  const levels = Array.from({ length: word(40) }, (_, level) => {
-    const [offset, length, whole] = [0, 8, 16].map((field) => Number(view.getBigUint64(80 + 24 * level + field, true)));
-    const unpacked = zstd.decode(bytes.subarray(offset, offset + length), whole);
-    return new Uint32Array(unpacked.buffer, unpacked.byteOffset, whole / 4);
-  });
-  return { width: word(20), height: word(24), levels };
-}
+/** The file of a layer at a moment; light that stands still has one alone. */
+const fileAt = (files, moment) => files[files.length > 1 ? moment : 0];
 
 function texture({ width, height, levels }) {
   const made = new THREE.DataTexture(levels[0], width, height, THREE.RGBFormat, THREE.UnsignedInt5999Type);
@@ -96,26 +84,63 @@ export class Stage {
   async load(asset) {
     const { about } = this;
     const loader = new GLTFLoader();
-    const scene = asset("scene.glb").then((bytes) =>
+    const scene = asset("scene.glb.gz").then((bytes) =>
       loader.parseAsync(bytes.buffer.slice(bytes.byteOffset, bytes.byteOffset + bytes.byteLength), ""));
-    const maps = about.maps.map(async (map) => {
-      const layers = Object.entries(map.layers).map(async ([layer, file]) => [layer, texture(await ktx2(await asset(file)))]);
-      return { ...map, textures: Object.fromEntries(await Promise.all(layers)) };
-    });
-    const sky = about.sky ? texture(await ktx2(await asset(about.sky))) : null;
+    this.maps = about.maps.map((map) => ({ ...map, images: {}, textures: {} }));
+    const maps = this.read(asset, 0);
+    const sky = about.sky && asset(about.sky).then(ktx2).then(texture);
     this.gltf = await scene;
     this.scene.add(this.gltf.scene);
     this.scene.updateMatrixWorld(true);
-    this.dress(await Promise.all(maps));
-    if (sky) this.addSky(sky);
+    this.dress();
+    // Shaders are made while maps are unpacked.
+    this.renderer.compile(this.scene, this.camera);
+    await maps;
+    this.maps.forEach((map) => this.light(map));
+    if (sky) this.addSky(await sky);
     this.bounds = new THREE.Box3();
     this.meshes.forEach((mesh) => this.bounds.expandByObject(mesh));
     this.radius = Math.max(this.bounds.getSize(new THREE.Vector3()).length() / 2, 1e-6);
   }
 
+  /** Reads the maps of a moment, but for those that are shown already. */
+  async read(asset, moment) {
+    const read = async (map, layer, file) => {
+      if (map.images[layer]?.file === file) return;
+      const image = file ? { file, ...(await ktx2(await asset(file))) } : null;
+      return () => {
+        map.textures[layer]?.dispose();
+        [map.images[layer], map.textures[layer]] = [image, image && texture(image)];
+      };
+    };
+    const layers = this.maps.flatMap((map) =>
+      Object.entries(map.layers).map(([layer, files]) => read(map, layer, fileAt(files, moment))));
+    // All change at once.
+    (await Promise.all(layers)).forEach((change) => change?.());
+  }
+
+  /** Shows another moment: its maps, and objects where the file's keyframes move them. */
+  async show(asset, moment, seconds) {
+    await this.read(asset, moment);
+    this.maps.forEach((map) => this.light(map));
+    if (!this.gltf.animations.length) return;
+    if (!this.mixer) {
+      this.mixer = new THREE.AnimationMixer(this.gltf.scene);
+      this.gltf.animations.forEach((clip) => this.mixer.clipAction(clip).play());
+    }
+    this.mixer.setTime(seconds);
+    this.scene.updateMatrixWorld(true);
+  }
+
+  /** Gives a map's textures to its mesh. */
+  light({ mesh, side, layers, textures }) {
+    for (const layer of Object.keys(layers)) {
+      if (mesh) mesh.material.uniforms[side === "back" ? `${layer}_back` : layer].value = textures[layer] ?? this.black;
+    }
+  }
+
   /** Gives every mesh its material. */
-  dress(maps) {
-    const key = (node, primitive) => `${node}/${primitive}`;
+  dress() {
     const looks = new Map(this.about.objects.map((look) => [key(look.node, look.primitive), look]));
     this.meshes = [];
     this.gltf.scene.traverse((mesh) => {
@@ -125,7 +150,7 @@ export class Stage {
       const place = key(node, of.get(mesh)?.primitives ?? 0);
       const look = looks.get(place);
       if (!look) { mesh.visible = false; return; }
-      this.dressOne(mesh, look, maps.filter((map) => key(map.node, map.primitive) === place));
+      this.dressOne(mesh, look, this.maps.filter((map) => key(map.node, map.primitive) === place));
       this.meshes.push(mesh);
     });
     this.nest();
@@ -133,7 +158,6 @@ export class Stage {
 
   dressOne(mesh, look, maps) {
     const had = mesh.material;
-    const [front, back] = ["front", "back"].map((side) => maps.find((map) => map.side === side)?.textures ?? {});
     const base = had.map ?? this.white;
     const uv = (channel) => (channel === 0 ? "uv" : `uv${channel}`);
     const channels = [maps[0]?.uv ?? 0, base.channel];
@@ -153,14 +177,12 @@ export class Stage {
       box_low: vector([0, 0, 0]), box_high: vector([0, 0, 0]) };
     base.updateMatrix();
     base.anisotropy = 4;
-    for (const layer of LAYERS) {
-      uniforms[layer] = { value: front[layer] ?? this.black };
-      uniforms[`${layer}_back`] = { value: back[layer] ?? this.black };
-    }
+    LAYERS.forEach((layer) => { uniforms[layer] = { value: this.black }; uniforms[`${layer}_back`] = { value: this.black }; });
     mesh.material = new THREE.ShaderMaterial({ vertexShader: shaders.surfaceVertex, fragmentShader: shaders.surfaceFragment,
       defines, uniforms, vertexColors: Boolean(mesh.geometry.attributes.color),
       side: look.kind === "glass" && !this.isSheet(mesh) ? THREE.FrontSide : THREE.DoubleSide,
       transparent: isClear || had.transparent, depthWrite: !isClear, premultipliedAlpha: look.kind === "pane" });
+    maps.forEach((map) => { map.mesh = mesh; });
     mesh.userData.isGlass = look.kind === "glass";
     if (isSpecular) {
       mesh.layers.disable(OPAQUE);

@@ -251,6 +251,28 @@ impl ExportArguments {
         }
     }
 
+    /// The scene at each moment of the maps, at least one.
+    fn scenes(&self, scene: &Scene) -> Result<Vec<Scene>> {
+        let sequence = MapSet::sequence_of(&self.maps)?;
+        let scenes = sequence.map_or(Vec::new(), |sequence| sequence.scenes(scene));
+        Ok(if scenes.is_empty() {
+            vec![scene.clone()]
+        } else {
+            scenes
+        })
+    }
+
+    /// The maps of each moment, given the scene at them.
+    fn moments<'a>(&self, scenes: &'a [Scene]) -> Result<Vec<MapSet<'a>>> {
+        if MapSet::sequence_of(&self.maps)?.is_none_or(|sequence| sequence.frames.is_empty()) {
+            return Ok(vec![MapSet::open(&self.maps, &scenes[0])?]);
+        }
+        let frames = scenes.iter().enumerate();
+        frames
+            .map(|(frame, scene)| MapSet::open_frame(&self.maps, scene, frame))
+            .collect()
+    }
+
     fn write_glb(&self, console: &Console) -> Result<()> {
         let scene = self.load()?;
         let output = self.output.clone().unwrap_or_else(|| {
@@ -273,21 +295,15 @@ impl ExportArguments {
 
     fn write_web(&self, console: &Console) -> Result<()> {
         let scene = self.load()?;
-        if MapSet::sequence_of(&self.maps)?.is_some() {
-            return Err(Error::usage(
-                "--format web",
-                "shows one moment, and these maps are of many",
-                "bake one (--time), or render the frames (nephroid render --frames)",
-            ));
-        }
         let default = if self.single_file { "site.html" } else { "site" };
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(default));
         if self.single_file {
             check_target(&output, &scene)?;
         }
-        let set = MapSet::open(&self.maps, &scene)?;
-        let exposure_stops = exposure_of(&scene, &set.read_all()?);
-        let site = Site::new(&scene, &set, exposure_stops, console.control())?;
+        let scenes = self.scenes(&scene)?;
+        let moments = self.moments(&scenes)?;
+        let exposure_stops = exposure_of(&scene, &moments[0].read_all()?);
+        let site = Site::new(&scene, &moments, exposure_stops, console.control())?;
         let report = if self.single_file {
             site.write_file(&output)?
         } else {
@@ -332,18 +348,8 @@ impl ExportArguments {
     }
 
     fn write_textures(&self, console: &Console) -> Result<()> {
-        let scene = self.load()?;
-        let sequence = MapSet::sequence_of(&self.maps)?;
-        let scenes = sequence
-            .as_ref()
-            .map_or(Vec::new(), |sequence| sequence.scenes(&scene));
-        let frames = scenes.iter().enumerate();
-        let mut readers = frames
-            .map(|(frame, scene)| MapSet::open_frame(&self.maps, scene, frame))
-            .collect::<Result<Vec<_>>>()?;
-        if readers.is_empty() {
-            readers.push(MapSet::open(&self.maps, &scene)?);
-        }
+        let scenes = self.scenes(&self.load()?)?;
+        let readers = self.moments(&scenes)?;
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(self.format));
         let folder = TextureFolder::open(&output, self.force)?;
         let report = textures::write(&readers, self.texture_options(), folder, console.control())?;

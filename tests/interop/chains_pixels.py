@@ -1,6 +1,7 @@
 """Mirrors and glass as the page's own shaders trace them by WebGPU, beside pictures of the program."""
 
 import base64
+import gzip
 import json
 import struct
 import subprocess
@@ -35,8 +36,8 @@ FLAGS = ["--headless=new", "--no-sandbox", "--no-first-run", "--enable-unsafe-we
 
 
 def camera(file):
-    """The first camera of a .glb as three.js would have it."""
-    data = file.read_bytes()
+    """The first camera of a packed .glb as three.js would have it."""
+    data = gzip.decompress(file.read_bytes())
     document = json.loads(data[20:20 + struct.unpack_from("<I", data, 12)[0]])
     node = next(node for node in document["nodes"] if "camera" in node)
     x, y, z, w = node.get("rotation", [0, 0, 0, 1])
@@ -79,7 +80,7 @@ def check(name, nephroid, browser, folder, run, faults):
     size = ["--maps", maps, "--size", f"{WIDTH}x{HEIGHT}", "--backend", "gpu"]
     file = folder / f"{name}.png"
     told = json.loads(run(nephroid, "render", f"builtin:{name}", *size, "-o", file, "--json"))
-    view = {"camera": camera(site / "scene.glb"), "width": WIDTH, "height": HEIGHT,
+    view = {"camera": camera(site / "scene.glb.gz"), "width": WIDTH, "height": HEIGHT,
             "exposureStops": told["exposure_stops"], "toneMap": "soft"}
     layers = [{}, {"caustic": False}] if name == "ball" else [{}]
     pictures, frames_ms = drawn(browser, site, {"view": view, "pictures": PICTURES, "layers": layers})

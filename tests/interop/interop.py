@@ -150,8 +150,8 @@ def check_blender(name, nephroid, folder):
     return [file]
 
 
-def check_sequence(nephroid, folder):
-    """Maps of moving water on a plane in Blender: each frame shows its own."""
+def check_sequence(nephroid, browser, folder):
+    """Maps of moving water on a plane in Blender, where each frame shows its own, and in the page."""
     frames = 3
     run(nephroid, "bake", "builtin:pool", "-o", folder, "--frames", frames, "--fps", "8", "--map-resolution", SIDE,
         "--density", "1e5", "--quiet")
@@ -164,6 +164,7 @@ def check_sequence(nephroid, folder):
     found = numpy.load(out)
     for frame, (light, _, _) in enumerate(maps):
         compare(f"{version}, pool, frame {frame + 1} of {frames}", found[frame], interpolated(light))
+    page.check_motion(nephroid, browser, folder, folder.with_name("sequence_page"), run, faults)
     moved = numpy.abs(blocks(found[1]) / blocks(found[0]) - 1.0).max()
     print(f"pool: blocks change by up to {100 * moved:.0f} % from frame to frame")
     if moved < 5 * BOUND:
@@ -187,7 +188,7 @@ def main():
         gallery = folder / "gallery"
         run(nephroid, "bake", "builtin:gallery", "-o", gallery, "--layers", "caustic,direct,indirect", "--quiet")
         page.check(nephroid, browser, "builtin:gallery", gallery, folder / "gallery_page", run, faults)
-        check_sequence(nephroid, folder / "sequence")
+        check_sequence(nephroid, browser, folder / "sequence")
         for number, scene in enumerate(others):
             maps = folder / f"other{number}"
             run(nephroid, "bake", scene, "-o", maps, "--default-light", "--density", "2000", "--map-resolution", "64",

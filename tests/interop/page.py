@@ -10,6 +10,7 @@ import subprocess
 import tempfile
 import threading
 import time
+from contextlib import contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -22,12 +23,19 @@ import websocket
 PATIENCE_S = 300
 SIZE = (960, 540)
 PHONE = (390, 844)
-# Mean FLIP of surfaces with maps beside `nephroid render` [1]; mirrors and glass are approximated in the page.
+# Mean FLIP of matt surfaces with maps beside `nephroid render` [1]: what is seen in mirrors, glass and polish is
+# approximated in the page.
 FLIP = 0.03
+# In false colours, polished surfaces are as grey as mirrors and glass.
+MATT = """nephroid.stage.meshes.forEach(({ material }) => {
+  if (material.uniforms.polish.value > 0) { delete material.defines.LIT; material.needsUpdate = true; }
+})"""
 # What has no map, in false colours: 1 % in linear light.
 NO_MAP = 25
 # Scripts of the page with three.js, gzipped [bytes].
 CODE = 1 << 20
+# A folder of a built-in scene [bytes].
+FOLDER = 12e6
 
 
 class Quiet(SimpleHTTPRequestHandler):
@@ -104,7 +112,7 @@ class Browser:
 
 
 def flip(wanted, found, coloured):
-    """Mean FLIP over the picture, and over the surfaces with maps alone: false colours leave mirrors and glass grey."""
+    """Mean FLIP over the picture, and over the matt surfaces with maps alone: false colours leave others grey."""
     wanted, found, coloured = (cv2.imread(str(file))[:, :, ::-1] for file in (wanted, found, coloured))
     pictures = [picture.astype("float32") / 255 for picture in (wanted, found)]
     error = flip_evaluator.evaluate(*pictures, "LDR", applyMagma=False)[0].squeeze()
@@ -143,6 +151,40 @@ def steer(browser, faults):
     browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
 
 
+@contextmanager
+def served(folder):
+    """Address of a folder behind a server."""
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=folder))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield f"http://127.0.0.1:{server.server_port}/"
+    server.shutdown()
+
+
+def check_motion(nephroid, browser, maps, folder, run, faults):
+    """A sequence plays by T, and its slider shows each moment."""
+    run(nephroid, "export", maps, "--format", "web", "-o", folder)
+    tab = Browser(browser)
+    with served(folder) as own:
+        tab.open(own, SIZE)
+        count = tab.value("nephroid.motion.count")
+        tab.call("Input.dispatchKeyEvent", type="keyDown", code="KeyT", key="t")
+        end = time.time() + PATIENCE_S
+        seen = set()
+        while len(seen) < 2 and time.time() < end:
+            seen.add(tab.value("nephroid.motion.shown"))
+        tab.value("nephroid.motion.toggle()")
+        shots = [folder / f"{moment}.png" for moment in (0, count - 1)]
+        for moment, shot in zip((0, count - 1), shots):
+            tab.value(f"nephroid.motion.seek({moment}).then(() => new Promise(requestAnimationFrame))")
+            tab.picture(shot)
+    tab.close()
+    first, last = (cv2.imread(str(shot)).astype("float32") / 255 for shot in shots)
+    changed = float(flip_evaluator.evaluate(first, last, "LDR", applyMagma=False)[0].mean())
+    print(f"{maps.name}, web: {count} moments, mean FLIP {changed:.4f} between the first and the last")
+    if len(seen) < 2 or not changed > 0:
+        faults.append("the page of a sequence stands still")
+
+
 def check(nephroid, browser, scene, maps, folder, run, faults):
     folder.mkdir(exist_ok=True)
     site, file, picture = folder / "site", folder / "site.html", folder / "render.png"
@@ -150,35 +192,34 @@ def check(nephroid, browser, scene, maps, folder, run, faults):
         run(nephroid, "export", maps, "--format", "web", "-o", path, *options)
     told = json.loads(run(nephroid, "render", scene, "--maps", maps, "--size", "{}x{}".format(*SIZE), "-o", picture, "--json"))
     query = f"?exposure={told['exposure_stops']}"
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Quiet, directory=site))
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    own = f"http://127.0.0.1:{server.server_port}/"
     tab = Browser(browser)
-    try:
+    with served(site) as own:
         for what, url, allowed in [("folder", own, own), ("one file", file.as_uri(), file.as_uri())]:
             seconds, asked = tab.open(url + query, SIZE)
             shot = folder / f"{what.replace(' ', '_')}.png"
             tab.picture(shot)
             away = [url for url in asked if not url.startswith((allowed, "data:", "blob:"))]
+            tab.value(MATT)
             tab.value("document.querySelector('[name=colours]').click()")
             time.sleep(3)
             tab.picture(folder / "colours.png")
             whole, maps_alone = flip(picture, shot, folder / "colours.png")
-            print(f"{scene}, web as {what}: mean FLIP {whole:.4f} beside render, {maps_alone:.4f} of surfaces with maps; "
+            print(f"{scene}, web as {what}: mean FLIP {whole:.4f} beside render, {maps_alone:.4f} of matt surfaces; "
                   f"first picture after {seconds:.2f} s, {len(asked)} requests, {len(away)} elsewhere")
             if away or maps_alone > FLIP:
                 faults.append(f"{scene} as {what}: {away or 'FLIP'}")
         steer(tab, faults)
         tab.open(own, PHONE, is_phone=True)
+        tab.picture(folder / "phone.png")
         wide = tab.value("document.scrollingElement.scrollWidth - innerWidth")
         if wide > 0:
             faults.append(f"{scene}: wider than a phone by {wide} pixels")
-    finally:
-        tab.close()
-        server.shutdown()
+    tab.close()
     code = [entry for entry in site.rglob("*") if entry.suffix in {".js", ".html"}]
     packed = sum(len(subprocess.run(["gzip", "-9c", entry], capture_output=True, check=True).stdout) for entry in code)
     whole = sum(entry.stat().st_size for entry in site.rglob("*") if entry.is_file())
     print(f"{scene}: folder {whole / 1e6:.2f} MB, code {packed / 1e3:.0f} kB gzipped, one file {file.stat().st_size / 1e6:.2f} MB")
     if packed > CODE:
         faults.append(f"{scene}: the page's code is {packed} bytes")
+    if whole > FOLDER:
+        faults.append(f"{scene}: the folder is {whole} bytes")

@@ -10,6 +10,7 @@ use super::bindings::bind_group;
 use super::geometry::{Geometry, Segment};
 use super::objects::absorption_per_m;
 use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle, rgb};
+use super::web::Content;
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
 use crate::eye_pass::reference::ChainLimits;
@@ -188,13 +189,25 @@ impl ChainScene {
         1.0 / self.tracer.frame().scale
     }
 
-    /// What nodes and triangles hold, by name, and lamps, of which there are none.
-    pub(super) fn contents(&self) -> [(&'static str, Vec<u8>); 3] {
-        let held = |storage: &Storage| storage.bytes().to_vec();
+    /// What nodes and triangles hold, by name, and lamps, of which there are none. Triangles of the scene come without their
+    /// corners, which their indices tell.
+    pub(super) fn contents_without_corners(&self) -> [(&'static str, Content); 3] {
+        let mut triangles: Vec<Triangle> = bytemuck::pod_collect_to_vec(self.triangles.bytes());
+        for triangle in triangles
+            .iter_mut()
+            .filter(|triangle| triangle.object != NO_OBJECT)
+        {
+            let none = [0.0; 3];
+            (triangle.a, triangle.b, triangle.c) = (none, none, none);
+            // Numbers that mostly follow from each other.
+            triangle.order = triangle.order.wrapping_mul(3).wrapping_sub(triangle.first_index);
+        }
+        let nodes: Vec<Node> = bytemuck::pod_collect_to_vec(self.nodes.bytes());
+        let lights: Vec<LightRecord> = bytemuck::pod_collect_to_vec(self.lights.bytes());
         [
-            ("nodes", held(&self.nodes)),
-            ("triangles", held(&self.triangles)),
-            ("lights", held(&self.lights)),
+            ("nodes", Content::records(&nodes)),
+            ("triangles", Content::records(&triangles)),
+            ("lights", Content::records(&lights)),
         ]
     }
 

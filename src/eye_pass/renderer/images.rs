@@ -6,10 +6,9 @@ use super::bindings::Storage;
 use super::maps::{self, DeviceMap, ShownMap};
 use super::paging::{Level, PagedImage, TILE, Texels, TilePool, Uploaded, is_halved};
 use crate::gpu::Gpu;
-use crate::illumination::{IlluminationMap, Receiver};
+use crate::illumination::Receiver;
 use crate::optics::LinearSrgb;
 use crate::scene::{Material, Scene, Texture, TextureRef};
-use crate::settings::LayerKind;
 
 /// Stands for a missing image; `NO_IMAGE` in the shaders.
 pub(super) const NO_IMAGE: u32 = u32::MAX;
@@ -220,23 +219,10 @@ impl Images {
         [self.map_pool.size(), self.texture_pool.size()]
     }
 
-    /// Texels of all tiles of maps, of one layer of their light.
-    pub(super) fn layer_tiles(&self, maps: &[IlluminationMap], kind: LayerKind) -> Vec<maps::Texel> {
-        let layers = maps.iter().filter_map(|map| {
-            let shown = self.maps[map.chart.receiver.index()].as_ref()?;
-            Some((shown, shown.levels_of(&map.layer(kind)?.irradiance)))
-        });
-        let layers: Vec<_> = layers.collect();
-        let tiles = layers
-            .iter()
-            .flat_map(|(shown, levels)| shown.image.tiles(Some(levels)));
-        self.map_pool.filled(tiles)
-    }
-
     /// Texels of all tiles of textures.
     pub(super) fn texture_tiles(&self) -> Vec<Texel> {
         self.texture_pool
-            .filled(self.textures.iter().flat_map(|image| image.tiles(None)))
+            .filled(self.textures.iter().flat_map(PagedImage::tiles))
     }
 
     fn write_table(&mut self, gpu: &Gpu) -> Uploaded {

@@ -9,8 +9,9 @@ use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 use rayon::slice::{ParallelSlice, ParallelSliceMut};
 
 use super::minify::Minification;
-use super::paging::{Level, PagedImage, Texels, TilePool, Uploaded};
+use super::paging::{Level, PagedImage, TILE, Texels, TilePool, Uploaded, origin};
 use super::tiled;
+use super::uniforms::MapTile;
 use crate::gpu::Gpu;
 use crate::illumination::{Chart, IlluminationMap};
 use crate::scene::texture::Wrap;
@@ -74,13 +75,15 @@ impl DeviceMap {
         (map, uploaded)
     }
 
-    /// Levels of a part of its light [W/m²], divided as its own are.
-    pub(super) fn levels_of(&self, part: &[[f32; 3]]) -> Vec<Level<Texel>> {
-        let shown = ShownMap {
-            chart: Arc::clone(&self.chart),
-            irradiance: Cow::Borrowed(part),
+    /// Its tiles in their pool.
+    pub(super) fn tiles(&self) -> Vec<MapTile> {
+        let tile = |(slot, level, tile): (u32, &Level<Texel>, [usize; 2])| MapTile {
+            corner: origin(slot),
+            irradiance_scale: self.irradiance_scale,
+            first_texel: tile.map(|index| (index * TILE) as f32),
+            extent: level.extent,
         };
-        levels(&shown, &self.minification, self.irradiance_scale)
+        self.image.held().map(tile).collect()
     }
 
     /// Whether a map can replace this one in place: both have the same chart.

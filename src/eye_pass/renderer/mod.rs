@@ -39,7 +39,7 @@ pub use offscreen::{render_counted, render_offscreen, render_sampled};
 pub use paging::Uploaded;
 pub use probe::{ProbedHit, probe};
 pub use shaders::{Specialisation, programs, shared_structs, specialisations, vertex_attributes};
-pub use web::WebScene;
+pub use web::{Content, WebScene};
 
 use std::sync::Arc;
 

@@ -4,8 +4,8 @@ use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
 use super::pipelines::{Faces, PipelineFlags, PipelineKey, RenderTarget};
 use super::tone_mapping;
 use super::uniforms::{
-    Accumulation, ChainStart, DisplayWhite, Frame, LightRecord, Node, ObjectRecord, ProbeHit, ProbeRay,
-    SeenWavelengths, Triangle,
+    Accumulation, ChainStart, DisplayWhite, Frame, LightRecord, MapTile, Node, ObjectRecord, ProbeHit,
+    ProbeRay, SeenWavelengths, Triangle,
 };
 use crate::eye_pass::ToneMap;
 use crate::gpu::layout::StructLayout;
@@ -83,9 +83,7 @@ pub(super) const ACCUMULATED: Program = program! { "accumulated":
 };
 
 /// Layers of light in the tiles of maps, for hosts that switch them.
-pub(super) const SUMMED: Program = program! { "summed":
-    "shared/cover" "eye_pass/summed"
-};
+pub(super) const SUMMED: Program = program! { "summed": "eye_pass/summed" };
 
 /// Single rays, to compare the device's hits with the CPU's.
 pub(super) const PROBE: Program = program! { "probe":
@@ -123,6 +121,7 @@ pub fn shared_structs() -> Vec<StructLayout> {
         ChainStart::layout(),
         LightRecord::layout(),
         ObjectRecord::layout(),
+        MapTile::layout(),
         SeenWavelengths::layout(),
         Node::layout(),
         Triangle::layout(),
@@ -165,11 +164,7 @@ pub fn specialisations() -> Vec<Specialisation> {
         entry_point,
         constants: Vec::new(),
     };
-    let mut all = vec![
-        alone(ACCUMULATED, "accumulated"),
-        alone(SUMMED, "summed"),
-        alone(SKY, "sky_drawn"),
-    ];
+    let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
     for writes in RenderTarget::all() {
         for kind in KINDS {
             for flags in 0..64 {

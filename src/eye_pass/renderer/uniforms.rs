@@ -49,6 +49,20 @@ shader_struct! {
 }
 
 shader_struct! {
+    /// A tile of a map in the pool of tiles.
+    MapTile {
+        /// Its first texel in the pool: column, row, layer.
+        corner: [u32; 3],
+        /// E [W/m²] of a stored value of 1.
+        irradiance_scale: f32,
+        /// Column and row of its first texel in its level.
+        first_texel: [f32; 2],
+        /// Texels of the level that the unit square of coordinates spans.
+        extent: [f32; 2],
+    }
+}
+
+shader_struct! {
     /// Start and limits of chains.
     ChainStart {
         /// Camera position, local.

@@ -1,18 +1,19 @@
 //! A scene for browsers: what this renderer would hand to a device, and how, for a host that draws as it does by WebGPU.
 //! Descriptors have the names and words of that interface.
 
-use half::f16;
+use bytemuck::Pod;
 use serde_json::{Map, Value, json};
 
 use super::accumulation;
 use super::bindings::Binding;
 use super::draws::{Draw, DrawList};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
+use super::maps::DeviceMap;
 use super::pipelines::{
     COMPOSED_BINDINGS, DEPTH_FORMAT, FRAME_BINDINGS, HDR_FORMAT, PipelineKey, RenderTarget, TRACED_BINDINGS,
 };
 use super::shaders::{ACCUMULATED, SKY, SUMMED, TONE_MAPPING};
-use super::uniforms::{ChainStart, DisplayWhite, Frame, ObjectRecord, SeenWavelengths};
+use super::uniforms::{ChainStart, DisplayWhite, Frame, MapTile, ObjectRecord, SeenWavelengths, Triangle};
 use super::{EyeQuality, Renderer, sky, tone_mapping};
 use crate::error::Result;
 use crate::eye_pass::reference::ChainLimits;
@@ -23,8 +24,9 @@ use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::IDENTITY;
 use crate::scene::{Camera, Scene};
-use crate::settings::LayerKind;
 
+/// Of the three corners of a triangle [bytes].
+const INDEX_BYTES: usize = 3 * size_of::<u32>();
 /// Samples per pixel, as in a window.
 const SAMPLES: u32 = 4;
 /// What pictures in a browser are taken to have [pixels].
@@ -40,14 +42,39 @@ const PICTURES: u32 = 17;
 pub struct WebScene {
     /// Shader modules, layouts, pipelines, draws and structs.
     pub description: Value,
-    /// What buffers and textures hold, by their names in the description.
-    pub contents: Vec<(&'static str, Vec<u8>)>,
-    /// Tiles of maps, of each layer that was baked.
-    pub layers: Vec<(LayerKind, Vec<[f16; 4]>)>,
+    /// What buffers and textures hold, by their names in the description. Triangles lack what their indices tell.
+    pub contents: Vec<(&'static str, Content)>,
+    /// Where each map's tiles lie, as `summed.wgsl` reads them.
+    pub map_tiles: Vec<Content>,
+}
+
+/// What a buffer or a texture holds.
+#[derive(Debug)]
+pub struct Content {
+    pub bytes: Vec<u8>,
+    /// Length of each of its records [bytes], if it has any that resemble each other.
+    pub record_bytes: Option<usize>,
+}
+
+impl Content {
+    pub(super) fn records<T: Pod>(records: &[T]) -> Self {
+        Self {
+            bytes: bytemuck::cast_slice(records).to_vec(),
+            record_bytes: Some(size_of::<T>()),
+        }
+    }
+
+    fn plain<T: Pod>(items: &[T]) -> Self {
+        Self {
+            record_bytes: None,
+            ..Self::records(items)
+        }
+    }
 }
 
 impl WebScene {
-    /// Gathers a scene in the light of its maps; `None` where nothing in it is specular.
+    /// Gathers a scene with maps of some sizes; `None` where nothing in it is specular. Of their light, only the largest
+    /// value counts: the host fills the tiles.
     ///
     /// # Errors
     /// A scene beyond what every browser's device holds; maps that do not belong to the scene.
@@ -92,61 +119,67 @@ impl Renderer {
     }
 
     fn web_scene(&self, gpu: &Gpu, maps: &[IlluminationMap]) -> Result<WebScene> {
-        let is_baked = |kind: &LayerKind| maps.iter().any(|map| map.layer(*kind).is_some());
         let images = &self.objects.images;
-        let layers = LayerKind::ALL.into_iter().filter(is_baked);
-        let layers = layers.map(|kind| (kind, images.layer_tiles(maps, kind)));
-        let [map_tiles, texture_tiles] = images.pool_sizes();
+        let tiles = maps.iter().map(|map| {
+            let shown = images.map(map.chart.receiver);
+            Content::records(&shown.map_or(Vec::new(), DeviceMap::tiles))
+        });
+        let map_tiles = tiles.collect();
+        let [map_pool, texture_pool] = images.pool_sizes();
         let mut textures = json!({
-            "map_tiles": {"size": map_tiles, "format": word(HDR_FORMAT)},
-            "texture_tiles": {"size": texture_tiles, "format": "rgba8unorm-srgb"},
+            "map_tiles": {"size": map_pool, "format": word(HDR_FORMAT)},
+            "texture_tiles": {"size": texture_pool, "format": "rgba8unorm-srgb"},
         });
         let mut contents = self.web_buffers(gpu)?;
-        contents.push((
-            "texture_tiles",
-            bytemuck::cast_slice(&images.texture_tiles()).to_vec(),
-        ));
+        contents.push(("texture_tiles", Content::plain(&images.texture_tiles())));
         if let Some(environment) = self.scene.environment.as_ref().filter(|_| self.shows_sky()) {
             let limit = gpu.limits().max_texture_dimension_2d as usize;
             let (width, height, pixels) = sky::fitted(environment, limit);
             textures["sky"] = json!({"size": [width, height, 1], "format": word(sky::FORMAT)});
-            contents.push(("sky", bytemuck::cast_slice(&pixels).to_vec()));
+            contents.push(("sky", Content::plain(&pixels)));
         }
         Ok(WebScene {
             description: self.web_description(textures),
             contents,
-            layers: layers.collect(),
+            map_tiles,
         })
     }
 
-    fn web_buffers(&self, gpu: &Gpu) -> Result<Vec<(&'static str, Vec<u8>)>> {
+    fn web_buffers(&self, gpu: &Gpu) -> Result<Vec<(&'static str, Content)>> {
         let mut buffers = vec![
-            ("objects", self.objects.records.bytes().to_vec()),
-            ("image_table", self.objects.images.table.bytes().to_vec()),
+            ("objects", Content::plain(self.objects.records.bytes())),
+            ("image_table", Content::plain(self.objects.images.table.bytes())),
         ];
         if let Some(page) = self.geometry.pages.first() {
-            buffers.push(("corners", readback::read_buffer(gpu, &page.corners)?));
-            buffers.push(("map_uvs", readback::read_buffer(gpu, &page.map_uvs)?));
-            buffers.push(("indices", readback::read_buffer(gpu, &page.indices)?));
+            let [corner, uv] = [CORNER_LAYOUT, MAP_UV_LAYOUT].map(|layout| layout.array_stride as usize);
+            for (name, buffer, record) in [
+                ("corners", &page.corners, corner),
+                ("map_uvs", &page.map_uvs, uv),
+                ("indices", &page.indices, INDEX_BYTES),
+            ] {
+                let bytes = readback::read_buffer(gpu, buffer)?;
+                let record_bytes = Some(record);
+                buffers.push((name, Content { bytes, record_bytes }));
+            }
         }
         if let Some(scene) = &self.chain_scene {
-            buffers.extend(scene.contents());
+            buffers.extend(scene.contents_without_corners());
             let view = View::new(self.outside(), [1, 1]);
             let limits = ChainLimits {
                 branching_depth: EyeQuality::STILL.branching_depth,
                 ..ChainLimits::default()
             };
             let start = scene.start(&view, &limits, false);
-            buffers.push(("start", bytemuck::bytes_of(&start).to_vec()));
+            buffers.push(("start", Content::plain(&[start])));
         }
         let seen = |picture| match self.draw_state().parts_wavelengths {
             true => SeenWavelengths::of(&wavelengths::of_picture(picture), &self.objects.glasses),
             false => SeenWavelengths::default(),
         };
         let seen: Vec<SeenWavelengths> = (0..PICTURES).map(seen).collect();
-        buffers.push(("wavelengths", bytemuck::cast_slice(&seen).to_vec()));
+        buffers.push(("wavelengths", Content::plain(&seen)));
         let white = DisplayWhite::new(&IDENTITY);
-        buffers.push(("white", bytemuck::bytes_of(&white).to_vec()));
+        buffers.push(("white", Content::plain(&[white])));
         Ok(buffers)
     }
 
@@ -204,14 +237,12 @@ impl Renderer {
                 "sky": layout(&sky::BINDINGS),
                 "nothing": layout(&[]),
                 "mean": layout(&accumulation::BINDINGS),
-                "summed": layout(&COMPOSED_BINDINGS),
                 "shown": layout(&tone_mapping::BINDINGS),
             },
             "vertices": buffers,
             "surfaces": surfaces,
             "sky": sky_pipeline(),
             "mean": cover(ACCUMULATED, "mean", "accumulated", accumulation::FORMAT),
-            "summed": cover(SUMMED, "summed", "summed", HDR_FORMAT),
             "shown": cover(TONE_MAPPING, "shown", "to_display", HDR_FORMAT),
             "tone_maps": tone_maps,
             "formats": {"radiance": word(HDR_FORMAT), "depth": word(DEPTH_FORMAT), "mean": word(accumulation::FORMAT)},
@@ -222,6 +253,8 @@ impl Renderer {
             "Frame": offsets(&Frame::layout()),
             "ChainStart": offsets(&ChainStart::layout()),
             "ObjectRecord": offsets(&ObjectRecord::layout()),
+            "MapTile": offsets(&MapTile::layout()),
+            "Triangle": offsets(&Triangle::layout()),
             "local": local,
             "background": background,
         })

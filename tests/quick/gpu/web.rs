@@ -97,28 +97,31 @@ fn draws_lie_within_their_buffers() {
     assert_eq!(largest.expect("triangles") as usize + 1, corners);
 }
 
+/// The host fills tiles of each level, which lie beside each other in the pool, from textures of any size.
 #[test]
-fn layers_add_up_to_the_maps() {
+fn tiles_hold_the_whole_map() {
     let packed = packed(true).expect("glass");
     let about = &packed.description;
-    let across = about["textures"]["map_tiles"]["size"][0]
-        .as_u64()
-        .expect("a size") as usize;
-    let table: Vec<u32> = bytemuck::pod_collect_to_vec(packed.buffer("image_table"));
-    let scale = f32::from_bits(table[2]);
-    let value = |layer: &str, texel: usize| {
-        let words: Vec<u32> = bytemuck::pod_collect_to_vec(packed.part(&about["layers"][layer]));
-        let word = words[texel / SIDE * across + texel % SIDE];
-        (word & 511) as f32 * f32::exp2((word >> 27) as f32 - 24.0) * scale
-    };
-    let total = scene(true).1[0].total();
-    for (texel, [wanted, ..]) in total.iter().enumerate() {
-        let found = value("caustic", texel) + value("direct", texel);
-        assert!(
-            (found - wanted).abs() <= wanted / 256.0,
-            "texel {texel}: {found} for {wanted}"
-        );
+    let size = &about["textures"]["map_tiles"]["size"];
+    let [across, down] = [0, 1].map(|axis| size[axis].as_u64().expect("a size") as usize);
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(packed.part(&about["maps"][0]));
+    let tiles: Vec<&[u32]> = words.chunks_exact(8).collect();
+    let mut texels = 0;
+    let mut corners = Vec::new();
+    for tile in &tiles {
+        let [column, row] = [0, 1].map(|axis| tile[axis] as usize);
+        let [first_x, first_y, width, height] = [4, 5, 6, 7].map(|word| f32::from_bits(tile[word]) as usize);
+        let [wide, high] = [width - first_x, height - first_y].map(|left| left.min(64));
+        assert!(column + wide < across && row + high < down);
+        // E of a stored value of 1: stored values are halves.
+        let largest = scene(true).1[0].total().into_iter().flatten().fold(0.0, f32::max);
+        assert!(largest / f32::from_bits(tile[3]) <= 32768.0);
+        texels += wide * high;
+        corners.push([column, row, tile[2] as usize]);
     }
+    assert_eq!(texels, SIDE * SIDE, "one level, as it is small");
+    corners.dedup();
+    assert_eq!(corners.len(), tiles.len());
 }
 
 #[test]

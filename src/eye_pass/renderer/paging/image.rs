@@ -81,19 +81,20 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         uploaded
     }
 
-    /// Place, width and texels of each tile that takes a place, of other levels of the same sizes or its own.
-    pub(in super::super) fn tiles<'a>(
-        &'a self,
-        levels: Option<&'a [Level<T>]>,
-    ) -> impl Iterator<Item = (u32, usize, Vec<T>)> {
-        let levels = levels.unwrap_or(&self.levels).iter().zip(&self.pages);
-        levels.flat_map(|(level, pages)| {
+    /// The tiles that take a slot: slot, level, column and row.
+    pub(in super::super) fn held(&self) -> impl Iterator<Item = (u32, &Level<T>, [usize; 2])> {
+        self.levels.iter().zip(&self.pages).flat_map(|(level, pages)| {
             let held = level.places().zip(pages).filter(|(_, page)| **page < COARSER);
-            held.map(|(tile, page)| {
-                let mut texels = Vec::new();
-                level.gather(self.wrap, tile, &mut texels);
-                (*page, stored(tile[0], level.size[0]), texels)
-            })
+            held.map(move |(tile, page)| (*page, level, tile))
+        })
+    }
+
+    /// Slot, width and texels of each tile that takes one.
+    pub(in super::super) fn tiles(&self) -> impl Iterator<Item = (u32, usize, Vec<T>)> {
+        self.held().map(|(page, level, tile)| {
+            let mut texels = Vec::new();
+            level.gather(self.wrap, tile, &mut texels);
+            (page, stored(tile[0], level.size[0]), texels)
         })
     }
 

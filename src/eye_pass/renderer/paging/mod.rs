@@ -184,8 +184,8 @@ impl TilePool {
     }
 }
 
-/// The corner of a place: column, row, layer.
-fn origin(place: u32) -> [u32; 3] {
+/// The corner of a slot: column, row, layer.
+pub(super) fn origin(place: u32) -> [u32; 3] {
     let (within, side) = (place % PER_LAYER, STORED as u32);
     [within % ACROSS * side, within / ACROSS * side, place / PER_LAYER]
 }

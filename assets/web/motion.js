@@ -1,0 +1,60 @@
+// Maps of many moments, shown in turn: a button plays and pauses, a slider chooses the moment.
+
+export class Motion {
+  /** `frames`: {count, fps}; `show(moment, seconds)` makes a moment ready, `changed` draws it, `rested` follows a stop. */
+  constructor(bar, frames, { show, changed, rested }) {
+    Object.assign(this, { ...frames, show, changed, rested, moment: 0, shown: 0, isBusy: false, isPlaying: false });
+    [this.button, this.slider, this.clock] = bar.children;
+    bar.hidden = false;
+    this.slider.max = this.count - 1;
+    this.button.onclick = () => this.toggle();
+    this.slider.oninput = () => {
+      this.isPlaying = false;
+      this.seek(Number(this.slider.value)).then(rested);
+    };
+    this.tell();
+  }
+
+  tell() {
+    this.slider.value = this.moment;
+    this.clock.value = `${(this.moment / this.fps).toFixed(2)} s`;
+    this.button.textContent = this.isPlaying ? "❚❚" : "▶";
+    this.button.title = this.button.ariaLabel = this.isPlaying ? "Pause (T)" : "Play (T)";
+  }
+
+  /** Shows a moment, or the one that is asked for meanwhile. */
+  async seek(moment) {
+    this.moment = moment;
+    this.tell();
+    if (this.isBusy) return;
+    this.isBusy = true;
+    while (this.shown !== this.moment) {
+      const next = this.moment;
+      await this.show(next, next / this.fps);
+      this.shown = next;
+      this.changed();
+    }
+    this.isBusy = false;
+  }
+
+  toggle() {
+    if (this.isPlaying) this.pause();
+    else this.play();
+  }
+
+  pause() {
+    this.isPlaying = false;
+    this.tell();
+  }
+
+  /** On from here, from the start again behind the end; moments are left out where the browser is slower. */
+  async play() {
+    this.isPlaying = true;
+    const began = performance.now() - (1000 * this.moment) / this.fps;
+    while (this.isPlaying) {
+      const now = await new Promise((resolve) => requestAnimationFrame(resolve));
+      if (this.isPlaying) await this.seek(Math.floor((Math.max(now - began, 0) * this.fps) / 1000) % this.count);
+    }
+    this.rested();
+  }
+}
