@@ -28,11 +28,16 @@ export class Motion {
     this.tell();
     if (this.isBusy) return;
     this.isBusy = true;
-    while (this.shown !== this.moment) {
-      const next = this.moment;
-      await this.show(next, next / this.fps);
-      this.shown = next;
-      this.changed();
+    try {
+      while (this.shown !== this.moment) {
+        const next = this.moment;
+        await this.show(next, next / this.fps);
+        this.shown = next;
+        this.changed();
+      }
+    } catch (error) {
+      this.pause();
+      this.clock.value = error.message;
     }
     this.isBusy = false;
   }

@@ -21,7 +21,7 @@ const traced = { eye: null, view: null, isBusy: false, took: 0 };
 let navigation, motion, range, slowest = 0, isDue = false, before = 0;
 let exposureBase = about.exposure_stops;
 
-// Files that have come, by name, and how many the first picture needs.
+// Files of later moments, by name; and how many have come, of those that the first picture needs.
 const files = new Map();
 const coming = { done: 0, all: about.maps.reduce((sum, map) => sum + Object.keys(map.layers).length, 1) };
 async function read(name) {
@@ -41,16 +41,17 @@ async function read(name) {
   return bytes;
 }
 
-function asset(name) {
-  if (!files.has(name)) files.set(name, read(name));
-  return files.get(name);
-}
+const asset = (name) => files.get(name) ?? read(name);
 
-/** The files of all moments, one after the other, so that they play without a halt. */
+/** Reads the files of all moments, so that they play without a halt. */
 async function readAhead() {
-  for (let moment = 1; moment < about.frames.count; moment++) {
-    const layers = about.maps.flatMap((map) => Object.values(map.layers));
-    await Promise.all(layers.map((names) => names[moment] && asset(names[moment])));
+  const layers = about.maps.flatMap((map) => Object.values(map.layers)).filter((names) => names.length > 1);
+  for (let moment = 0; moment < about.frames.count; moment++) {
+    for (const name of layers.map((names) => names[moment])) {
+      if (name && !files.has(name)) files.set(name, read(name));
+      // A file that does not come is missed when its moment is shown.
+      await files.get(name)?.catch(() => {});
+    }
   }
 }
 

@@ -258,7 +258,8 @@ impl Site {
         let mut peak_w_m2 = 0.0;
         for (layer, texels) in map.layers.iter().zip(sizes::fitted(map)) {
             let name = format!("maps/{}_{}.ktx2", stem(entry), layer.kind.name());
-            let bytes = texture(&name, &texels)?;
+            let what = format!("{} light of {}", layer.kind.name(), entry.surface);
+            let bytes = texture(&what, &texels)?;
             peak_w_m2 += texels.peak();
             shown.size = shown.size.max(texels.size());
             let files = shown.layers.entry(layer.kind).or_default();
@@ -443,12 +444,12 @@ fn gzip(bytes: &[u8]) -> Vec<u8> {
 }
 
 /// A file of one level: the page makes the others.
-fn texture(name: &str, texels: &Texels) -> Result<Vec<u8>> {
+fn texture(what: &str, texels: &Texels) -> Result<Vec<u8>> {
     let notes = FileMetadata {
         quantity: Quantity::Irradiance,
         exposure_stops: 0.0,
-        what: name.into(),
-        location: name,
+        what: what.into(),
+        location: what,
     };
     Ok(ktx2::encode(texels, Packing::Rgb9e5, false, &notes)?.bytes)
 }
