@@ -266,8 +266,8 @@ impl Site {
             files.resize(moment, None);
             // Light that stands still is there once.
             let last = files.last().and_then(|last| last.clone());
-            let is_same = |(known, held): &&(String, Vec<u8>)| Some(known) == last.as_ref() && *held == bytes;
-            if self.files.iter().any(|file| is_same(&file)) {
+            let is_same = |(known, held): &(String, Vec<u8>)| Some(known) == last.as_ref() && *held == bytes;
+            if self.files.iter().any(is_same) {
                 files.push(last);
             } else {
                 files.push(Some(name.clone()));

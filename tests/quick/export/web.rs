@@ -157,6 +157,8 @@ fn a_sequence_has_maps_of_each_moment() {
     let layers = &moving["maps"][0]["layers"];
     let caustics = layers["caustic"].as_array().expect("files");
     assert!(caustics.len() == 3 && caustics[0] != caustics[1], "{layers}");
+    // Clear water alone moves: direct light stands still.
+    assert_eq!(layers["direct"].as_array().expect("files").len(), 1, "{layers}");
     let is_there = |name: &&str| sandbox.path("site").join(name).is_file();
     assert!(files(&moving).iter().all(is_there));
     std::fs::write(sandbox.path("site/maps/mine.txt"), "mine").expect("it can be written");

@@ -46,12 +46,24 @@ impl Unpacked {
         }
     }
 
-    fn part(&self, place: &Value) -> &[u8] {
+    /// Bytes at a place; those of records lie by their place in a record, and their words are differences.
+    fn part(&self, place: &Value) -> Vec<u8> {
         let [first, length] = [0, 1].map(|which| place[which].as_u64().expect("a number") as usize);
-        &self.contents[first..first + length]
+        let stored = &self.contents[first..first + length];
+        let Some(record) = place[2].as_u64().map(|record| record as usize) else {
+            return stored.to_vec();
+        };
+        let byte = |at: usize| stored[at % record * (length / record) + at / record];
+        let mut words: Vec<u32> = Vec::new();
+        for word in 0..length / 4 {
+            let change = u32::from_le_bytes([0, 1, 2, 3].map(|part| byte(4 * word + part)));
+            let before = word.checked_sub(record / 4).map_or(0, |before| words[before]);
+            words.push(change.wrapping_add(before));
+        }
+        bytemuck::cast_slice(&words).to_vec()
     }
 
-    fn buffer(&self, name: &str) -> &[u8] {
+    fn buffer(&self, name: &str) -> Vec<u8> {
         self.part(&self.description["contents"][name])
     }
 }
@@ -90,8 +102,9 @@ fn draws_lie_within_their_buffers() {
         HashMap::from([("depths", 2), ("traced", 1), ("composed", 1), ("own", 1)])
     );
     let corners = packed.buffer("corners").len() / number(&about["vertices"][0]["arrayStride"]);
-    let words = packed.buffer("indices").chunks_exact(4);
+    let words = packed.buffer("indices");
     let largest = words
+        .chunks_exact(4)
         .map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")))
         .max();
     assert_eq!(largest.expect("triangles") as usize + 1, corners);
@@ -104,7 +117,7 @@ fn tiles_hold_the_whole_map() {
     let about = &packed.description;
     let size = &about["textures"]["map_tiles"]["size"];
     let [across, down] = [0, 1].map(|axis| size[axis].as_u64().expect("a size") as usize);
-    let words: Vec<u32> = bytemuck::pod_collect_to_vec(packed.part(&about["maps"][0]));
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(&packed.part(&about["maps"][0]));
     let tiles: Vec<&[u32]> = words.chunks_exact(8).collect();
     let mut texels = 0;
     let mut corners = Vec::new();
