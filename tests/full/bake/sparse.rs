@@ -1,22 +1,17 @@
-//! Maps in tiles: how much memory they save and what that costs; their sizes, levels on the way, and layers light by
-//! light.
-
-use std::sync::Arc;
+//! Maps in tiles: how much memory they save and what that costs; direct light beside caustics, and levels on the way.
 
 use glam::{DQuat, DVec3};
 use nephroid::bake::{BYTES_PER_TEXEL, Bake};
 use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
 use nephroid::settings::{BakeSettings, LayerKind};
-use nephroid::units::{Flux, Irradiance};
+use nephroid::units::Flux;
 
 use crate::bake::common::{
-    CAUSTIC_AND_DIRECT, assert_same, automatic, rmse, run, session, sized, torus, towards, with_layers,
+    CAUSTIC_AND_DIRECT, assert_same, automatic, rmse, session, sized, torus, towards, with_layers,
 };
-use support::meshes::floor;
 use support::tools::{at, bake, builtin_scene, caustic, energy_fault, map_of, set};
 
 fn auto(density_per_sr: f64) -> BakeSettings {
@@ -126,56 +121,6 @@ fn tiles_keep_bits_and_direct_light() {
         (in_tiles / whole - 1.0).abs() < 2e-3,
         "{in_tiles} W, dense {whole} W"
     );
-}
-
-/// A plate above a floor of 4 m, in parallel light.
-fn plate_in_the_sun(direction: DVec3) -> Scene {
-    let mut scene = parts::reference_scene(2.0);
-    let plate = floor(0.4, 0.5);
-    parts::add(
-        &mut scene,
-        "plate",
-        plate,
-        parts::matte("plate", LinearSrgb::grey(0.5)),
-    );
-    scene.lights.push(parts::sun("sun", direction, Irradiance(1.0)));
-    scene
-}
-
-/// Maps of direct light are fine where shadows end, whatever was baked before.
-#[test]
-fn shadows_end_within_small_texels() {
-    let settings = automatic(with_layers(&[LayerKind::Direct], towards(0.1, 1)));
-    let scene = plate_in_the_sun(DVec3::new(0.1, -1.0, 0.2));
-    let fresh = bake(scene.clone(), &settings);
-    let map = map_of(&fresh, &scene, "floor");
-    assert!(map.chart.layout.is_some());
-    let dense = map.dense();
-    let (width, height) = (dense.width(), dense.height());
-    assert!(
-        4.0 / width as f64 <= 4.0 * 2_f64.sqrt() / 1_600.0 * 1.5,
-        "{width} texels"
-    );
-    let direct = dense.layer(LayerKind::Direct).expect("the layer");
-    // Under the plate's middle, which is shown 5 cm and 10 cm off.
-    let row = (height as f64 * (2.1 / 4.0)) as usize;
-    let e: Vec<f32> = direct.irradiance[row * width..(row + 1) * width]
-        .iter()
-        .map(|e| e[0])
-        .collect();
-    let brightest = e.iter().copied().fold(0.0, f32::max);
-    let between = e
-        .iter()
-        .filter(|e| (0.02..0.98).contains(&(**e / brightest)))
-        .count();
-    let dark = e.iter().filter(|e| **e < 0.5 * brightest).count() as f64 * 4.0 / width as f64;
-    assert!((dark - 0.8).abs() < 0.01, "{dark} m of shadow");
-    assert!(between <= 6, "{between} texels between light and shadow");
-
-    let mut session = session(&plate_in_the_sun(DVec3::new(-0.4, -1.0, 0.0)));
-    run(&mut session, &settings);
-    session.set_scene(Arc::new(scene)).expect("an edit");
-    assert_same(&run(&mut session, &settings), &fresh, "after another sun");
 }
 
 /// Texels of automatic maps for a target.

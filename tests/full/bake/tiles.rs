@@ -82,26 +82,6 @@ fn deposited(layout: Option<TileLayout>, triangles: &[FluxTriangle]) -> (Vec<Flu
 }
 
 #[test]
-fn places_of_texels_agree() {
-    let layout = mixed();
-    let mut seen = vec![0; layout.texel_count()];
-    for row in 0..SIZE.1 {
-        let texels: Vec<usize> = layout.row_texels(row).collect();
-        assert_eq!(texels.len(), SIZE.0);
-        for (column, texel) in texels.into_iter().enumerate() {
-            assert_eq!(texel, layout.texel(column, row));
-            seen[texel] += 1;
-        }
-    }
-    for tile in layout.tiles() {
-        let texels = 1 << (2 * tile.level);
-        assert!(seen[tile.texels].iter().all(|&count| count == texels));
-    }
-    let levels: Vec<u8> = layout.tiles().map(|tile| tile.level).collect();
-    assert!((0..=4).all(|level| levels.contains(&level)), "{levels:?}");
-}
-
-#[test]
 fn the_finest_tiles_hold_what_a_map_holds() {
     let triangles = triangles(4_000);
     let layout = layout_of(|_| 0);

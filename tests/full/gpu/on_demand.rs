@@ -161,26 +161,3 @@ fn new_maps_reach_mirrors_out_of_view() {
         assert_eq!(rig.renderer.counts().specular_pipelines, 3, "{} maps", maps.len());
     }
 }
-
-fn tells_time(rig: &Rig) -> bool {
-    rig.gpu
-        .device
-        .features()
-        .contains(wgpu::Features::TIMESTAMP_QUERY)
-}
-
-#[test]
-fn device_tells_how_long_it_took() {
-    let mut rig = or_skip!(rig());
-    assert_eq!(rig.renderer.counts().gpu_ms, None, "nothing was drawn");
-    for (view, has_specular) in [(to_matte(), false), (to_specular(), true)] {
-        rig.picture(&view);
-        let times = rig.renderer.counts().gpu_ms;
-        assert_eq!(times.is_some(), tells_time(&rig));
-        let Some(times) = times else { continue };
-        let sum = times.opaque + times.specular;
-        assert!(times.opaque >= 0.0 && sum > 0.0 && sum.is_finite(), "{times:?}");
-        assert!(has_specular || times.specular == 0.0, "{times:?}");
-        assert_eq!(times.tone_mapping, 0.0, "radiance is read back as it is");
-    }
-}

@@ -65,17 +65,6 @@ proptest! {
         near(dielectric_reflectance(theta_i.cos(), eta), by_sines_and_tangents(theta_i, eta), 1e-12, eta);
     }
 
-    /// Stokes: the same share is reflected on the way back.
-    #[test]
-    fn reciprocity(cos_i in 0.001..1.0f64, eta in 0.3..3.0f64) {
-        if let Some(cos_t) = cos_transmitted(cos_i, eta) {
-            let there = dielectric_reflectance(cos_i, eta);
-            let back = dielectric_reflectance(cos_t, 1.0 / eta);
-            // cos θi is recovered from cos θt with an error of 1/cos θ, near the critical angle too.
-            near(there, back, 1e-13 / (cos_t.min(cos_i)).max(1e-8), eta);
-        }
-    }
-
     /// A share is a share, and the flux that goes on makes up the rest: T from the transmitted amplitudes, not from
     /// 1 − R.
     #[test]
