@@ -1,10 +1,9 @@
 //! Glass and water: every angle, every index, bodies in bodies, and what they absorb.
 
 use glam::DVec3;
+use nephroid::optics::LinearSrgb;
 use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::optics::refraction::{cos_transmitted, refract};
-use nephroid::optics::wavelength::VISIBLE;
-use nephroid::optics::{Glass, LinearSrgb, Nanometres, glass};
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{Material, Mesh, Scene, Volume, coincident_faces};
 use nephroid::settings::{BakeSettings, LayerKind};
@@ -93,10 +92,6 @@ fn slabs_and_angles(t: &mut Table) {
     t.case("above-the-critical-angle")
         .bake(out_of_glass(critical_rad + 1e-7), 1e6, 32)
         .arrives(0.0);
-    t.case("dispersion-beyond-its-formula")
-        .check("indices are sound far beyond visible light", ends_of_formulas);
-    t.case("wavelength-at-a-resonance")
-        .check("refused in visible light, finite beside it", resonances);
 }
 
 fn bodies(t: &mut Table) {
@@ -317,46 +312,6 @@ fn tinted(ior: f64, colour: LinearSrgb, distance_m: f64) -> Material {
             attenuation_colour: colour,
         }),
         ..parts::dielectric("tinted", ior)
-    }
-}
-
-/// Every glass of the catalogue beyond both ends of what its formula was made for.
-fn ends_of_formulas() {
-    let (first, last) = (VISIBLE.start().0, VISIBLE.end().0);
-    for glass in glass::catalogue::all() {
-        for step in 0..=100 {
-            let nm = 0.25 * first + (4.0 * last - 0.25 * first) * f64::from(step) / 100.0;
-            let index = glass.dispersion.index(Nanometres(nm));
-            assert!(index.is_finite() && index >= 1.0, "{index} at {nm} nm");
-            assert!(
-                glass.dispersion.slope_per_nm(Nanometres(nm)).is_finite(),
-                "slope at {nm} nm"
-            );
-            assert!(
-                index <= 10.0 || !(first..=last).contains(&nm),
-                "{index} at {nm} nm"
-            );
-        }
-        let [blue, red] = [VISIBLE.start(), VISIBLE.end()].map(|nm| glass.dispersion.index(*nm));
-        assert!(blue >= red, "blue is bent more than red");
-    }
-}
-
-/// A glass that resonates with visible light is refused; one that does just beyond is finite within.
-fn resonances() {
-    let glass =
-        |strength: &str, um: f64| Glass::parse(&format!("sellmeier:{strength},0,{},0.01,100", um * um));
-    for um in [0.4, 0.55, 0.7] {
-        assert!(glass("1.0,0", um).is_err(), "{um} µm");
-    }
-    let (first, last) = (VISIBLE.start().0, VISIBLE.end().0);
-    for um in [1e-3 * (first - 1e-6), 1e-3 * (last + 1e-6)] {
-        let Ok(glass) = glass("0.5,1.0", um) else { continue };
-        let nm = |step: u32| Nanometres(first + (last - first) * f64::from(step) / 100.0);
-        assert!(
-            (0..=100).all(|step| glass.dispersion.index(nm(step)).is_finite()),
-            "{um} µm"
-        );
     }
 }
 

@@ -3,93 +3,27 @@
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
-use nephroid::geometry::cube_face::{self, FaceMapping};
 use nephroid::light_pass::emitter::Emitter;
 use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, HiddenCellPolicy, ItemBuffer};
 use nephroid::light_pass::launch::Launch;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Light, LightKind, Material, Mesh, Scene};
+use nephroid::scene::{Light, LightKind, Mesh, Scene};
 use nephroid::settings::ItemBufferKind;
 use nephroid::transport::Tracer;
-use nephroid::units::{Flux, Irradiance, RadiantIntensity};
+use nephroid::units::{Flux, RadiantIntensity};
 
 use support::laws::Table;
-use support::laws::law::off;
 use support::laws::scenes::{Build, light, random};
 
-const MAPPINGS: [FaceMapping; 2] = [FaceMapping::EqualSolidAngle, FaceMapping::Plain];
-
 pub fn fill(t: &mut Table) {
-    t.case("cells-of-a-cube")
-        .fact("solid angles sum to the sphere", 1e-12, solid_angles_of_all)
-        .fact(
-            "solid angle of a cell is that of its rectangle",
-            1e-6,
-            solid_angle_of_one,
-        )
-        .fact("mappings of a face are inverted", 1e-12, mappings_inverted);
     t.case("item-buffer")
-        .check("each point of a visible triangle is marked", points_marked)
-        .check("a small mirror marks few cells", few_cells)
-        .check("a light on the mirror sees it", light_on_mirror)
-        .check("spans hold every cell that touches a marked one", spans)
-        .check("the whole marks what its triangles mark", whole_and_parts)
-        .check("diffuse surfaces mark nothing", diffuse_marks_nothing)
-        .check("objects beside a cone are no casters", beside_a_cone);
+        .check("each point of a visible triangle is marked", points_marked);
     t.case("hidden-cells")
         .check(
             "every ray of a dropped cell ends on an opaque face",
             dropped_cells,
         )
         .check("a light that is shut in sees no caster", shut_in);
-}
-
-fn solid_angles_of_all() -> f64 {
-    let of = |mapping: FaceMapping, side: usize| {
-        let corner = |index: usize| DVec2::new((index % side) as f64, (index / side) as f64) / side as f64;
-        let cell = |index| mapping.cell_solid_angle_sr(corner(index), corner(index) + 1.0 / side as f64);
-        off(
-            6.0 * (0..side * side).map(cell).sum::<f64>(),
-            4.0 * std::f64::consts::PI,
-        )
-    };
-    let all = MAPPINGS
-        .into_iter()
-        .flat_map(|mapping| [1, 7, 128].map(|side| of(mapping, side)));
-    all.fold(0.0, f64::max)
-}
-
-/// Thin columns are exact rectangles in x; within them the share of v must be the share of solid angle.
-fn solid_angle_of_one() -> f64 {
-    let mapping = FaceMapping::EqualSolidAngle;
-    let width = 1e-5;
-    let mut worst: f64 = 0.0;
-    for u in [0.0, 0.13, 0.5, 0.77, 1.0 - width] {
-        for (v0, v1) in [(0.0, 0.25), (0.25, 0.5), (0.4, 0.9), (0.9, 1.0)] {
-            let plane = |u, v| mapping.plane_from_square(DVec2::new(u, v));
-            let middle = |v| plane(u + 0.5 * width, v).y;
-            let (low, high) = (
-                DVec2::new(plane(u, v0).x, middle(v0)),
-                DVec2::new(plane(u + width, v1).x, middle(v1)),
-            );
-            let stated = mapping.cell_solid_angle_sr(DVec2::new(u, v0), DVec2::new(u + width, v1));
-            worst = worst.max(off(cube_face::rectangle_solid_angle_sr(low, high), stated));
-        }
-    }
-    worst
-}
-
-fn mappings_inverted() -> f64 {
-    let of = |mapping: FaceMapping, index: i32| {
-        let square = DVec2::new(f64::from(index % 21), f64::from(index / 21)) / 20.0;
-        let plane = mapping.plane_from_square(square);
-        let beyond = (plane.abs().max_element() - 1.0).max(0.0);
-        beyond.max((mapping.square_from_plane(plane) - square).abs().max_element())
-    };
-    let all = MAPPINGS
-        .into_iter()
-        .flat_map(|mapping| (0..441).map(move |index| of(mapping, index)));
-    all.fold(0.0, f64::max)
 }
 
 fn lamp(position: DVec3) -> Light {
@@ -180,47 +114,6 @@ fn marked_at(launch: &Launch, buffer: &ItemBuffer, target: DVec3) -> bool {
     })
 }
 
-fn few_cells() {
-    let a = DVec3::new(1.0, 0.2, 0.3);
-    let scene = mirrors(&[[a, a + DVec3::Y * 0.01, a + DVec3::Z * 0.01]]);
-    let marked = build(&equal(&lamp(DVec3::ZERO), &scene), &scene).marked_cells();
-    assert!((1..=4).contains(&marked), "{marked} cells");
-}
-
-fn light_on_mirror() {
-    let scene = mirrors(&[[DVec3::ZERO, DVec3::X, DVec3::Z]]);
-    for position in [DVec3::ZERO, DVec3::new(0.3, 0.0, 0.3), DVec3::new(0.5, 0.0, 0.0)] {
-        let buffer = build(&equal(&lamp(position), &scene), &scene);
-        assert!(buffer.marked_cells() > 0, "nothing marked from {position}");
-    }
-}
-
-fn spans() {
-    let a = DVec3::new(1.0, 0.2, 0.3);
-    let scene = mirrors(&[[a, a + DVec3::Y * 0.3, a + DVec3::Z * 0.1]]);
-    let buffer = build(&equal(&lamp(DVec3::ZERO), &scene), &scene);
-    let overlaps =
-        |i: usize, n: usize, k: usize| i * CELLS_PER_SIDE < (k + 1) * n && k * n < (i + 1) * CELLS_PER_SIDE;
-    for (width, height) in [(1, 1), (5, 3), (128, 128), (300, 301), (1000, 77)] {
-        for (face, row) in (0..6).flat_map(|face| (0..height).map(move |row| (face, row))) {
-            let spans = buffer.lattice_spans(face, row, (width, height));
-            assert!(
-                spans.windows(2).all(|pair| pair[0].1 < pair[1].0),
-                "spans overlap: {spans:?}"
-            );
-            for column in 0..width {
-                let is_listed = spans.iter().any(|span| (span.0..span.1).contains(&column));
-                let mut rows = (0..CELLS_PER_SIDE).filter(|&cell| overlaps(row, height, cell));
-                let touches = rows.any(|cell_row| {
-                    let mut columns = (0..CELLS_PER_SIDE).filter(|&cell| overlaps(column, width, cell));
-                    columns.any(|cell| buffer.is_marked(face, cell, cell_row))
-                });
-                assert_eq!(is_listed, touches, "{width} × {height}: {column} {row}");
-            }
-        }
-    }
-}
-
 /// Marked cells of all faces.
 fn marks(buffer: &ItemBuffer, faces: usize) -> Vec<(usize, usize, usize)> {
     let cells =
@@ -229,102 +122,6 @@ fn marks(buffer: &ItemBuffer, faces: usize) -> Vec<(usize, usize, usize)> {
     cells
         .filter(|&(face, row, column)| buffer.is_marked(face, column, row))
         .collect()
-}
-
-fn spot(outer_cone_rad: f64, position: DVec3, direction: DVec3) -> Light {
-    light(LightKind::Spot {
-        position,
-        direction: direction.normalize(),
-        intensity: RadiantIntensity(1.0),
-        inner_cone_rad: 0.1,
-        outer_cone_rad,
-    })
-}
-
-fn lights() -> [Light; 5] {
-    let narrow_or_wide = |angle| spot(angle, DVec3::new(0.1, -0.2, 0.05), DVec3::new(0.5, 0.7, -0.3));
-    [
-        lamp(DVec3::new(0.01, 0.02, -0.015)),
-        lamp(DVec3::new(5.0, 0.3, 0.2)),
-        narrow_or_wide(0.4),
-        narrow_or_wide(1.2),
-        parts::sun("sun", DVec3::new(0.2, -0.9, 0.3), Irradiance(1.0)),
-    ]
-}
-
-fn whole_and_parts() {
-    for light in lights() {
-        for (seed, count, size) in [(1, 1100, 1e-3), (2, 200, 0.05), (3, 200, 0.6)] {
-            let triangles = cloud(seed, count, size);
-            let scene = mirrors(&triangles);
-            // One frame for all: a sun's follows the casters.
-            let launch = equal(&light, &scene);
-            let faces = launch.face_count();
-            let whole = marks(&build(&launch, &scene), faces);
-            let each = triangles.iter().map(|triangle| mirrors(&[*triangle]));
-            let mut apart: Vec<_> = each
-                .flat_map(|part| marks(&build(&launch, &part), faces))
-                .collect();
-            apart.sort_unstable();
-            apart.dedup();
-            assert!(!whole.is_empty() && whole == apart, "{light:?}, size {size}");
-        }
-    }
-}
-
-fn diffuse_marks_nothing() {
-    let alone = mirrors(&cloud(4, 60, 0.05));
-    let mut among = alone.clone();
-    // Before the mirrors, so that their triangles are not the hierarchy's first.
-    let mut dust = mirrors(&cloud(5, 3000, 0.1)).objects.remove(0);
-    dust.material = 1;
-    among.objects.insert(0, dust);
-    among.materials.push(Material::default());
-    for light in lights() {
-        let launch = equal(&light, &alone);
-        let buffer = ItemBuffer::build(
-            &launch,
-            &Tracer::new(Arc::new(among.clone())),
-            &[1],
-            HiddenCellPolicy::Keep,
-        );
-        let faces = launch.face_count();
-        assert_eq!(marks(&buffer, faces), marks(&build(&launch, &alone), faces));
-    }
-}
-
-fn beside_a_cone() {
-    let small = |at: DVec3| {
-        cloud(6, 50, 0.1)
-            .into_iter()
-            .map(move |t| t.map(|p| p * 0.1 + at))
-    };
-    let ahead = DVec3::new(3.0, 0.2, 0.1);
-    let objects: [Vec<_>; 4] = [
-        small(-ahead).collect(),
-        small(ahead).collect(),
-        // Seen by its last triangle alone.
-        small(-ahead).chain(small(ahead).take(1)).collect(),
-        // A box around the cone, but nothing in it.
-        vec![[-ahead, DVec3::new(3.0, 4.0, 0.1), DVec3::new(-3.0, 4.0, 0.1)]],
-    ];
-    let scene = objects.iter().fold(Scene::default(), |scene, object| {
-        scene.mirror(mirror_mesh(object))
-    });
-    let casters = [0, 1, 2, 3];
-    let launch = launch(
-        &spot(0.3, DVec3::ZERO, DVec3::X),
-        &scene,
-        &casters,
-        ItemBufferKind::Equal,
-    );
-    let buffer = ItemBuffer::build(
-        &launch,
-        &Tracer::new(Arc::new(scene)),
-        &casters,
-        HiddenCellPolicy::Keep,
-    );
-    assert_eq!(buffer.casters, [1, 2]);
 }
 
 /// Walls, an opaque ball and a box at random between a lamp and glass.

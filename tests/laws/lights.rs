@@ -4,20 +4,17 @@ use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 
 use glam::DVec3;
-use nephroid::eye_pass::View;
-use nephroid::eye_pass::reference::{ReferenceSettings, render};
 use nephroid::illumination::Side;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Camera, Environment, Light, LightKind, Mesh, PanelShape, Scene, Volume};
+use nephroid::scene::{Environment, LightKind, Mesh, PanelShape, Scene, Volume};
 use nephroid::settings::{BakeSettings, ItemBufferKind, LayerKind};
-use nephroid::transport::Tracer;
 use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
 
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, values};
-use support::tools::{at, builtin_scene, photons, set, settings};
+use support::tools::{at, photons, set, settings};
 
 pub fn fill(t: &mut Table) {
     // Powers from the smallest that single precision knows to the largest: the map is a scale of itself.
@@ -111,29 +108,6 @@ pub fn fill(t: &mut Table) {
             )
             .measure("E is π under an even sky", 0.05, |bake| off(front_e(bake), PI));
     }
-    for eye in [
-        DVec3::new(0.1, 2.0, 0.05),
-        DVec3::Y * 0.8,
-        DVec3::Y * 0.5,
-        DVec3::new(0.2, 0.0, 0.2),
-    ] {
-        let mut scene = glass_ball(3);
-        scene.cameras[0] = Camera::look_at("camera", eye, DVec3::new(0.1, -1.0, 0.05), 0.9);
-        t.case("lamp-at-the-eye")
-            .bake(scene, 1e3, 32)
-            .must("every pixel is finite", is_picture_finite);
-    }
-    let gallery = t.case("gallery");
-    gallery.bake_with(builtin_scene("gallery"), photons(1e4, 16));
-    gallery.must("every lamp has its caster", |bake| {
-        let ledgers = &bake.result.ledgers;
-        let is_lit = |light: &Light| {
-            ledgers
-                .iter()
-                .any(|l| l.light == light.name && l.energy_w.deposited > 0.003)
-        };
-        bake.scene.lights.iter().all(is_lit)
-    });
     sent_to_a_mirror(t);
     direct(t);
 }
@@ -194,23 +168,6 @@ fn front_e(bake: &Baked) -> f64 {
     fronts
         .map(|map| luminance(map, LayerKind::Caustic)[0] + luminance(map, LayerKind::Direct)[0])
         .sum()
-}
-
-fn is_picture_finite(bake: &Baked) -> bool {
-    let view = View::new(bake.scene.cameras[0].clone(), [24, 16]);
-    let (tracer, settings) = (
-        Tracer::new(Arc::new(bake.scene.clone())),
-        ReferenceSettings::default(),
-    );
-    let picture = render(
-        &tracer,
-        &bake.result.maps,
-        &view,
-        &settings,
-        &(),
-        &Default::default(),
-    );
-    picture.is_ok_and(|picture| picture.radiance.iter().flatten().all(|value| value.is_finite()))
 }
 
 /// What lamps send into the solid angle of a mirror, by both estimators and item buffers.
@@ -311,9 +268,6 @@ fn direct(t: &mut Table) {
     }
     t.case("even-sky")
         .bake_with(sky((1, 1), 2.0, 1.0), layer())
-        .must("E is about 2π, 5 to 14", |bake| {
-            (5.0..14.0).contains(&on_the_floor(bake))
-        })
         .bake_with(sky((1, 1), 2e30, 1.0), layer())
         .compare("1e30 times the radiance", 1e-3, |bake, first| {
             off(on_the_floor(bake), 1e30 * on_the_floor(first))
@@ -322,9 +276,6 @@ fn direct(t: &mut Table) {
         .compare("1e-20 times the scale", 1e-3, |bake, first| {
             off(on_the_floor(bake), 1e-20 * on_the_floor(first))
         });
-    t.case("glowing-ball")
-        .bake_with(glowing(1), layer())
-        .must("the floor is lit", |bake| on_the_floor(bake) > 0.1);
     t.case("blinding-panel")
         .bake_with(panel(0.5, 1.0), layer())
         .must("the floor is lit", |bake| on_the_floor(bake) > 0.1)

@@ -37,13 +37,6 @@ pub fn fill(t: &mut Table) {
                 off(deposited_w(bake), seen_sr)
             });
     }
-    for mirror in mirrors.into_iter().step_by(250) {
-        let scene = around_the_lamp(vec![mirror]);
-        t.case("tiny-mirrors-by-16-times-the-rays")
-            .bake(scene.clone(), 16.0 * DENSITY_PER_SR, 16)
-            .bake(scene, DENSITY_PER_SR, 16)
-            .watts_as_first("watts as of 16 times the rays", 0.05);
-    }
     let mut random = random(5);
     for index in 0..40 {
         let (scene, border) = plate_with_an_opening(&mut random);

@@ -7,7 +7,7 @@ use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings, render};
 use nephroid::geometry::Ray;
 use nephroid::scene::builtin::shapes;
 use nephroid::scene::{Material, Mesh, Object, Scene};
-use nephroid::transport::{MediumStack, Tracer, media_at};
+use nephroid::transport::{Tracer, media_at};
 
 use support::chain_laws;
 use support::laws::Table;
@@ -17,18 +17,12 @@ use support::tools::builtin_scene;
 pub fn fill(t: &mut Table) {
     t.case("rays-at-edges-and-vertices")
         .check("none slips through", no_ray_slips_through);
-    t.case("directions-with-signed-zeros")
-        .check("hit what lies there", signed_zeros);
     t.case("hits-closer-than-an-epsilon")
         .check("are found", close_hits);
-    t.case("light-in-a-mirror-ring")
-        .check("never leaves through the wall", within_a_ring);
     t.case("ray-that-leaves-a-surface")
         .check("does not meet it again", no_second_hit);
     t.case("bodies-around-a-point")
         .check("from the outermost inwards", nested_bodies);
-    t.case("body-inside-out")
-        .check("is around nothing below it", inside_out);
     for (index, law) in chain_laws::all().iter().enumerate() {
         let name = law.name.replace(' ', "-");
         t.case(format!("chain-{name}"))
@@ -53,25 +47,12 @@ fn keeps_to_law(index: usize) {
     law.assert_kept(&picture.expect("nobody cancels"), 1e-6);
 }
 
-/// Triangles that close around their centre: the unit octahedron, divided and pushed onto a sphere.
+/// Triangles of a ball around the origin.
 fn sphere(levels: u32) -> Vec<[DVec3; 3]> {
-    let sign = |signs: u32, bit: u32| if signs >> bit & 1 == 1 { 1.0 } else { -1.0 };
-    let octant = |signs| {
-        [
-            DVec3::X * sign(signs, 0),
-            DVec3::Y * sign(signs, 1),
-            DVec3::Z * sign(signs, 2),
-        ]
-    };
-    let mut triangles: Vec<[DVec3; 3]> = (0..8).map(octant).collect();
-    for _ in 0..levels {
-        let quarters = |[a, b, c]: [DVec3; 3]| {
-            let (ab, bc, ca) = ((a + b).normalize(), (b + c).normalize(), (c + a).normalize());
-            [[a, ab, ca], [ab, b, bc], [ca, bc, c], [ab, bc, ca]]
-        };
-        triangles = triangles.into_iter().flat_map(quarters).collect();
-    }
-    triangles
+    let mesh = shapes::sphere(DVec3::ZERO, 1.0, levels);
+    (0..mesh.triangles.len())
+        .map(|triangle| mesh.corners(triangle))
+        .collect()
 }
 
 fn tracer(triangles: &[[DVec3; 3]]) -> Tracer {
@@ -128,22 +109,6 @@ fn no_ray_slips_through() {
     }
 }
 
-fn signed_zeros() {
-    let tracer = tracer(&sphere(4));
-    for (axis, (sign, zero)) in
-        (0..12).map(|i| (i % 3, [(1.0, 0.0), (1.0, -0.0), (-1.0, 0.0), (-1.0, -0.0)][i / 3]))
-    {
-        let mut direction = DVec3::splat(zero);
-        direction[axis] = sign;
-        let ray = Ray {
-            origin: DVec3::ZERO,
-            direction,
-        };
-        let hit = tracer.intersect(&ray).expect("a wall of the sphere");
-        assert!((hit.distance_m - 1.0).abs() < 0.01, "{direction}: {hit:?}");
-    }
-}
-
 fn close_hits() {
     let square = |y: f64| {
         let [a, b, c, d] =
@@ -162,26 +127,6 @@ fn close_hits() {
             "gap {gap}: {hit:?}"
         );
     }
-}
-
-fn within_a_ring() {
-    let tracer = Tracer::new(Arc::new(builtin_scene("ring")));
-    let mut reflected = 0;
-    for index in 0..100_000_u32 {
-        let angle = (f64::from(index) * 0.618_033_988_749_894_9).fract() * std::f64::consts::TAU;
-        let target = DVec3::new(angle.cos(), (f64::from(index) + 0.5) * 0.499e-5, angle.sin());
-        let mut ray = towards(DVec3::new(-0.7, 1.2, 0.0), target);
-        for _ in 0..64 {
-            let hit = tracer
-                .closest_hit(&ray)
-                .expect("everything ends on the ring or the floor");
-            let turned = tracer.interact(&hit, ray.direction, &MediumStack::default());
-            let Some(branch) = turned.reflection else { break };
-            ray = branch.ray;
-            reflected += 1;
-        }
-    }
-    assert!(reflected > 90_000);
 }
 
 fn no_second_hit() {
@@ -229,13 +174,4 @@ fn nested_bodies() {
             "at {y} m"
         );
     }
-}
-
-fn inside_out() {
-    let scene = Scene::default()
-        .glass(1.5, shapes::sphere(DVec3::ZERO, 0.5, 3))
-        .reshaped(0, |mesh| {
-            mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        });
-    assert!(objects_around(&scene, DVec3::new(0.01, -1.0, 0.02)).is_empty());
 }

@@ -9,13 +9,11 @@ use nephroid::export::pfm;
 use nephroid::illumination::compare::{Agreement, relative_rmse};
 use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::{IlluminationMap, Layer, parametrise};
-use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind};
 use nephroid::study::agreement::{caustic_luminance, pair_maps};
-use nephroid::study::brute_force::{brute_force, relative_noise};
-use nephroid::transport::Tracer;
+use nephroid::study::brute_force::relative_noise;
 use serde::{Deserialize, Serialize};
 
 use support::hard_scenes::{self, Shading, TinyBall};
@@ -98,10 +96,6 @@ pub fn fill(t: &mut Table) {
         .check(
             "neither threads nor half sets leave a trace",
             threads_leave_no_trace,
-        )
-        .check(
-            "it asks for a map size and a number of rays, and can be stopped",
-            brute_force_refuses,
         );
     for (name, file, rays) in [("ring", "S1", 1_000_000), ("mirror", "S5", 800_000)] {
         t.case(format!("brute-force-{name}"))
@@ -262,20 +256,6 @@ fn threads_leave_no_trace() {
     let (one, three, other) = (with(1, 0), with(3, 0), with(3, 1));
     assert_eq!((&one.layers, &one.error), (&three.layers, &three.error));
     assert_ne!(one.layers, other.layers);
-}
-
-fn brute_force_refuses() {
-    let tracer = Tracer::new(Arc::new(builtin_scene("mirror")));
-    let refuse = |settings: &BakeSettings, rays, word| {
-        let error = brute_force(&tracer, settings, rays, &(), &Control::default()).expect_err(word);
-        assert!(error.to_string().contains(word), "{error}");
-    };
-    refuse(&BakeSettings::default(), 10_000, "--map-resolution");
-    refuse(&settings(1.0, 16), 10, "--rays");
-    let control = Control::default();
-    control.cancel();
-    let stopped = brute_force(&tracer, &settings(1.0, 16), 10_000, &(), &control);
-    assert!(stopped.is_err(), "a stopped run gives no reference");
 }
 
 /// What the index says of one scene.

@@ -20,14 +20,10 @@ pub use proptest::prelude::*;
 pub use serde_json::{Value, json};
 pub use support::assert_close;
 pub use support::glb::{Glb, assert_warned};
+pub use support::tools::builtin_scene as built_in;
 
 pub const fn rgb(r: f64, g: f64, b: f64) -> LinearSrgb {
     LinearSrgb::new(r, g, b)
-}
-
-/// A built-in scene that must exist.
-pub fn built_in(name: &str) -> Scene {
-    builtin::build(name).unwrap_or_else(|| panic!("there is no built-in `{name}`"))
 }
 
 /// Options of loading, changed.

@@ -432,22 +432,6 @@ impl<'a> Viewer<'a> {
         below.next().is_some_and(|(role, ..)| role != "DisclosureTriangle")
     }
 
-    /// Chooses the quantity shown and waits until the log confirms it.
-    pub fn choose_view(&mut self, view: &str) {
-        // A slow window may close the list again at once; it is then reopened.
-        poll(&|| format!("no {view} in {:?}", self.controls()), || {
-            self.click("ComboBox", "View");
-            let is_listed = || {
-                std::thread::sleep(Duration::from_millis(200));
-                let mut controls = self.controls().into_iter();
-                controls.any(|(role, name, _)| role == "Button" && name == view)
-            };
-            (0..20).any(|_| is_listed()).then_some(())
-        });
-        self.click("Button", view);
-        self.wait_for("shows", |shows| shows["what"] == view);
-    }
-
     /// Replaces the content of a text field and confirms.
     pub fn type_into(&self, role: &str, name: &str, text: &str) {
         self.click_at(self.centre(role, name));

@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use glam::{DMat3, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 use nephroid::effect::Effect;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, pool, shapes};
 use nephroid::scene::texture::Wrap;
-use nephroid::scene::{
-    Camera, LightSize, Material, Mesh, NormalMap, Scene, Texture, TextureRef, Volume, Wave, Waves,
-};
+use nephroid::scene::{Camera, LightSize, Material, Mesh, NormalMap, Scene, Texture, Volume, Waves};
 use nephroid::settings::LayerKind;
 use nephroid::units::Flux;
+
+use crate::floors::{image, texture_reference};
+use crate::scenes::wave;
 
 /// A scene and the effects that its light pass needs.
 pub struct EffectScene {
@@ -164,26 +165,15 @@ fn coloured_glass() -> Material {
 }
 
 fn wavy_mirror() -> Material {
-    let wave = Wave {
-        amplitude_m: 0.002,
-        wavelength_m: 0.2,
-        direction: DVec3::Y,
-        phase_rad: 0.5,
-        period_s: 0.0,
-    };
     Material {
-        waves: Waves::new(vec![wave]).ok(),
+        waves: Waves::new(vec![wave(0.002, 0.2, DVec3::Y, 0.5)]).ok(),
         ..parts::mirror()
     }
 }
 
 fn textured_mirror() -> Material {
     Material {
-        base_colour_texture: Some(TextureRef {
-            texture: 0,
-            uv_set: 0,
-            uv_transform: DMat3::IDENTITY,
-        }),
+        base_colour_texture: Some(texture_reference()),
         ..parts::mirror()
     }
 }
@@ -191,14 +181,7 @@ fn textured_mirror() -> Material {
 /// Dark and bright columns.
 fn stripes() -> Texture {
     let rgba = (0..64).map(|texel| [if texel % 2 == 0 { 40 } else { 220 }, 128, 128, 255]);
-    Texture {
-        name: "stripes".into(),
-        width: 8,
-        height: 8,
-        rgba: rgba.collect(),
-        wrap: [Wrap::Repeat; 2],
-        is_nearest: false,
-    }
+    image(8, rgba.collect(), Wrap::Repeat)
 }
 
 /// Width and height of the normal map [texels].
@@ -210,18 +193,9 @@ const WIDTH_M: f64 = 3.0;
 
 /// Waves that fit the width of the water, so that a normal map of them tiles.
 pub fn fitting_waves() -> Waves {
-    let wave = |direction: DVec3, wavelength_m, phase_rad| Wave {
-        amplitude_m: 0.015,
-        wavelength_m,
-        direction,
-        phase_rad,
-        period_s: 0.0,
-    };
-    Waves::new(vec![
-        wave(DVec3::X, WIDTH_M / 4.0, 1.0),
-        wave(DVec3::Z, WIDTH_M / 3.0, 2.0),
-    ])
-    .expect("gentle waves")
+    let of = |direction, wavelength_m, phase_rad| wave(0.015, wavelength_m, direction, phase_rad);
+    let waves = vec![of(DVec3::X, WIDTH_M / 4.0, 1.0), of(DVec3::Z, WIDTH_M / 3.0, 2.0)];
+    Waves::new(waves).expect("gentle waves")
 }
 
 /// The pool with these waves as analytic waves.
@@ -249,20 +223,8 @@ pub fn by_image(mirrored: bool) -> Scene {
         let [red, green, blue] = (normal * 127.5 + 127.5).to_array().map(|x| x.round() as u8);
         [red, green, blue, 255]
     };
-    let texture = Texture {
-        name: "normals".into(),
-        width: SIDE,
-        height: SIDE,
-        rgba: (0..SIDE * SIDE).map(texel).collect(),
-        wrap: [Wrap::Repeat; 2],
-        is_nearest: false,
-    };
-    let image = TextureRef {
-        texture: 0,
-        uv_set: 0,
-        uv_transform: DMat3::IDENTITY,
-    };
-    scene.materials[1].normal_map = Some(NormalMap::new(image, 1.0 / STEEPER, &texture));
+    let texture = image(SIDE, (0..SIDE * SIDE).map(texel).collect(), Wrap::Repeat);
+    scene.materials[1].normal_map = Some(NormalMap::new(texture_reference(), 1.0 / STEEPER, &texture));
     scene.textures = vec![Arc::new(texture)];
     scene.name = if mirrored { "by mirrored image" } else { "by image" }.into();
     scene

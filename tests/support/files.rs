@@ -2,121 +2,67 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use base64::encode;
 use serde_json::{Value, json};
 
+use crate::glb::Glb;
+
 /// A horizontal triangle with legs of 1 m, without lights.
-pub fn dark_triangle() -> String {
-    triangle().to_string()
+pub fn dark_triangle() -> Vec<u8> {
+    with_triangle(Glb::empty(), json!({ "name": "floor" }), json!({})).bytes()
 }
 
 /// The same triangle under a sun of 683 lx = 1 W/m²; nothing is specular.
-pub fn lit_matte_triangle() -> String {
-    let mut scene = triangle();
-    scene["extensionsUsed"] = json!(["KHR_lights_punctual"]);
-    scene["extensions"] =
-        json!({"KHR_lights_punctual": {"lights": [{"type": "directional", "intensity": 683.0}]}});
-    scene["nodes"] = json!([
-        {"mesh": 0, "name": "floor"},
-        // Rotated so that its −z axis points down.
-        {"rotation": [-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2],
-         "extensions": {"KHR_lights_punctual": {"light": 0}}},
-    ]);
-    scene["scenes"] = json!([{"nodes": [0, 1]}]);
-    scene.to_string()
+pub fn lit_matte_triangle() -> Vec<u8> {
+    let file = with_triangle(Glb::empty(), json!({ "name": "floor" }), json!({}));
+    let mut file = file.with_light("sun", json!({ "type": "directional", "intensity": 683.0 }));
+    // Rotated so that its −z axis points down.
+    file.json["nodes"][1]["rotation"] = json!([-FRAC_1_SQRT_2, 0.0, 0.0, FRAC_1_SQRT_2]);
+    file.bytes()
 }
 
 /// A point light of 5 cm radius, a sun of 0.53°, a panel of 0.5 m², and the floor as an emitter; the last two emit 1
 /// W/(m² sr).
-pub fn lamps_with_extent() -> String {
-    let mut scene = triangle();
-    scene["materials"] = json!([{"emissiveFactor": [1.0, 1.0, 1.0],
-        "extensions": {"KHR_materials_emissive_strength": {"emissiveStrength": 683.0}}}]);
-    scene["meshes"][0]["primitives"][0]["material"] = json!(0);
-    scene["extensionsUsed"] = json!([
-        "KHR_lights_punctual",
-        "EXT_lights_area",
-        "KHR_materials_emissive_strength"
-    ]);
-    scene["extensions"] = json!({
-        "KHR_lights_punctual": {"lights": [
-            {"type": "point", "extras": {"radius_m": 0.05}},
-            {"type": "directional", "extras": {"angular_diameter_deg": 0.53}},
-        ]},
-        "EXT_lights_area": {"lights": [
-            {"type": "rect", "intensity": 683.0, "size": 0.5, "rect": {"aspect": 2.0}},
-        ]},
-    });
-    scene["nodes"] = json!([
-        {"mesh": 0, "name": "floor"},
-        {"translation": [0.0, 1.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-        {"extensions": {"KHR_lights_punctual": {"light": 1}}},
-        {"translation": [0.0, 2.0, 0.0], "extensions": {"EXT_lights_area": {"light": 0}}},
-    ]);
-    scene["scenes"] = json!([{"nodes": [0, 1, 2, 3]}]);
-    scene.to_string()
+pub fn lamps_with_extent() -> Vec<u8> {
+    let glow = json!({ "emissiveFactor": [1.0, 1.0, 1.0],
+        "extensions": { "KHR_materials_emissive_strength": { "emissiveStrength": 683.0 } } });
+    let file = with_triangle(Glb::empty(), json!({ "name": "floor" }), glow);
+    let ball = json!({ "type": "point", "extras": { "radius_m": 0.05 } });
+    let sun = json!({ "type": "directional", "extras": { "angular_diameter_deg": 0.53 } });
+    let mut file = with_lamp(file, ball, [0.0, 1.0, 0.0]).with_light("sun", sun);
+    file.json["extensions"]["EXT_lights_area"] = json!({ "lights": [
+        { "type": "rect", "intensity": 683.0, "size": 0.5, "rect": { "aspect": 2.0 } },
+    ] });
+    let panel = json!({ "EXT_lights_area": { "light": 0 } });
+    file.push_root(json!({ "translation": [0.0, 2.0, 0.0], "extensions": panel }));
+    file.bytes()
 }
 
 /// A mirror on the ground below a matte ceiling, with three lamps between them: a white one, a green one, and one of
 /// 5 cm radius.
-pub fn mirror_under_lamps() -> String {
-    let mut scene = triangle();
-    scene["materials"] = json!([
-        {"name": "mirror", "pbrMetallicRoughness": {"metallicFactor": 1.0, "roughnessFactor": 0.0}},
-        {"name": "plaster", "pbrMetallicRoughness": {"metallicFactor": 0.0}},
-    ]);
-    let mut ceiling = scene["meshes"][0].clone();
-    ceiling["primitives"][0]["material"] = json!(1);
-    scene["meshes"][0]["primitives"][0]["material"] = json!(0);
-    scene["meshes"] = json!([scene["meshes"][0], ceiling]);
-    scene["extensionsUsed"] = json!(["KHR_lights_punctual"]);
-    scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [
-        {"type": "point", "intensity": 683.0},
-        {"type": "point", "intensity": 300.0, "color": [0.2, 1.0, 0.1]},
-        {"type": "point", "intensity": 500.0, "extras": {"radius_m": 0.05}},
-    ]}});
-    scene["nodes"] = json!([
-        {"mesh": 0, "name": "ground"},
-        {"mesh": 1, "name": "ceiling", "translation": [-1.0, 1.5, -1.0], "scale": [4.0, 4.0, 4.0]},
-        {"translation": [0.2, 0.7, 0.2], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-        {"translation": [0.6, 0.6, 0.1], "extensions": {"KHR_lights_punctual": {"light": 1}}},
-        {"translation": [0.3, 0.8, 0.4], "extensions": {"KHR_lights_punctual": {"light": 2}}},
-    ]);
-    scene["scenes"] = json!([{"nodes": [0, 1, 2, 3, 4]}]);
-    scene.to_string()
+pub fn mirror_under_lamps() -> Vec<u8> {
+    let mirror = json!({ "pbrMetallicRoughness": { "metallicFactor": 1.0, "roughnessFactor": 0.0 } });
+    let plaster = json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0 } });
+    let ceiling = json!({ "name": "ceiling", "translation": [-1.0, 1.5, -1.0], "scale": [4.0, 4.0, 4.0] });
+    let file = with_triangle(Glb::empty(), json!({ "name": "ground" }), mirror);
+    let file = with_triangle(file, ceiling, plaster);
+    let file = with_lamp(file, json!({ "type": "point", "intensity": 683.0 }), [0.2, 0.7, 0.2]);
+    let green = json!({ "type": "point", "intensity": 300.0, "color": [0.2, 1.0, 0.1] });
+    let ball = json!({ "type": "point", "intensity": 500.0, "extras": { "radius_m": 0.05 } });
+    with_lamp(with_lamp(file, green, [0.6, 0.6, 0.1]), ball, [0.3, 0.8, 0.4]).bytes()
 }
 
-/// A triangle of N-SF11 and one of gold, under a lamp with the spectrum of illuminant A and one without a spectrum.
-pub fn glasses() -> String {
-    let mut scene = triangle();
-    scene["materials"] = json!([
-        {"name": "flint", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.0},
-         "extensions": {"KHR_materials_transmission": {"transmissionFactor": 1.0},
-                        "KHR_materials_volume": {"thicknessFactor": 0.1}},
-         "extras": {"glass": "N-SF11"}},
-        {"name": "leaf", "pbrMetallicRoughness": {"roughnessFactor": 0.0}, "extras": {"metal": "gold"}},
-    ]);
-    let mut leaf = scene["meshes"][0].clone();
-    leaf["primitives"][0]["material"] = json!(1);
-    scene["meshes"][0]["primitives"][0]["material"] = json!(0);
-    scene["meshes"] = json!([scene["meshes"][0], leaf]);
-    scene["extensionsUsed"] = json!([
-        "KHR_lights_punctual",
-        "KHR_materials_transmission",
-        "KHR_materials_volume"
-    ]);
-    scene["extensions"] = json!({"KHR_lights_punctual": {"lights": [
-        {"type": "point", "extras": {"spectrum": "A"}},
-        {"type": "point"},
-    ]}});
-    scene["nodes"] = json!([
-        {"mesh": 0, "name": "pane"},
-        {"mesh": 1, "name": "leaf", "translation": [0.0, 0.5, 0.0]},
-        {"translation": [0.0, 1.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 0}}},
-        {"translation": [0.0, 2.0, 0.0], "extensions": {"KHR_lights_punctual": {"light": 1}}},
-    ]);
-    scene["scenes"] = json!([{"nodes": [0, 1, 2, 3]}]);
-    scene.to_string()
+/// A triangle of N-SF11 and one of gold, under a lamp with a spectrum and one without.
+pub fn glasses(spectrum: &str) -> Vec<u8> {
+    let flint = json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0, "roughnessFactor": 0.0 },
+        "extensions": { "KHR_materials_transmission": { "transmissionFactor": 1.0 },
+                        "KHR_materials_volume": { "thicknessFactor": 0.1 } },
+        "extras": { "glass": "N-SF11" } });
+    let gold = json!({ "pbrMetallicRoughness": { "roughnessFactor": 0.0 }, "extras": { "metal": "gold" } });
+    let file = with_triangle(Glb::empty(), json!({ "name": "pane" }), flint);
+    let file = with_triangle(file, json!({ "name": "leaf", "translation": [0.0, 0.5, 0.0] }), gold);
+    let coloured = json!({ "type": "point", "extras": { "spectrum": spectrum } });
+    let file = with_lamp(file, coloured, [0.0, 1.0, 0.0]);
+    with_lamp(file, json!({ "type": "point" }), [0.0, 2.0, 0.0]).bytes()
 }
 
 /// A Radiance image of 2 × 1 pixels of 1 W/(m² sr): 128 · 2^(129 − 136) in each channel.
@@ -126,37 +72,19 @@ pub fn grey_sky() -> Vec<u8> {
     bytes
 }
 
-fn triangle() -> Value {
-    let positions: [f32; 9] = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0];
-    let bytes: Vec<u8> = positions.iter().flat_map(|value| value.to_le_bytes()).collect();
-    json!({
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [0]}],
-        "nodes": [{"mesh": 0, "name": "floor"}],
-        "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "count": 3, "type": "VEC3",
-                       "min": [0.0, 0.0, 0.0], "max": [1.0, 0.0, 1.0]}],
-        "bufferViews": [{"buffer": 0, "byteLength": bytes.len()}],
-        "buffers": [{"byteLength": bytes.len(),
-                     "uri": format!("data:application/octet-stream;base64,{}", encode(&bytes))}],
-    })
+/// With a horizontal triangle on a node.
+fn with_triangle(mut file: Glb, mut node: Value, material: Value) -> Glb {
+    let positions = file.push_floats(&[0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0], 3);
+    let material = file.push("materials", material);
+    let attributes = json!({ "POSITION": positions });
+    node["mesh"] = json!(file.push_mesh(json!({ "attributes": attributes, "material": material })));
+    file.push_root(node);
+    file
 }
 
-/// Base64 (RFC 4648) of whole triples of bytes.
-mod base64 {
-    const ALPHABET: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-
-    pub fn encode(bytes: &[u8]) -> String {
-        assert!(bytes.len().is_multiple_of(3), "no padding is written");
-        bytes
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .flat_map(|&[a, b, c]| {
-                let word = u32::from_be_bytes([0, a, b, c]);
-                [18, 12, 6, 0].map(|shift| char::from(ALPHABET[(word >> shift) as usize & 63]))
-            })
-            .collect()
-    }
+fn with_lamp(file: Glb, light: Value, place: [f64; 3]) -> Glb {
+    let mut file = file.with_light("lamp", light);
+    let nodes = file.json["nodes"].as_array_mut().expect("a list");
+    nodes.last_mut().expect("the lamp's")["translation"] = json!(place);
+    file
 }

@@ -83,21 +83,22 @@ pub fn diffuse(albedo: LinearSrgb) -> Material {
     }
 }
 
-/// A texture of 2×2 texels of different colours, u to the right and v down.
-pub fn four_colours() -> Texture {
+/// A texture of rows of `width` texels.
+pub fn image(width: u32, rgba: Vec<[u8; 4]>, wrap: Wrap) -> Texture {
     Texture {
-        name: "four".into(),
-        width: 2,
-        height: 2,
-        rgba: vec![
-            [255, 0, 0, 255],
-            [0, 255, 0, 255],
-            [0, 0, 255, 255],
-            [255, 255, 255, 255],
-        ],
-        wrap: [Wrap::ClampToEdge; 2],
+        name: "image".into(),
+        width,
+        height: rgba.len() as u32 / width,
+        rgba,
+        wrap: [wrap; 2],
         is_nearest: false,
     }
+}
+
+/// A texture of 2×2 texels of different colours, u to the right and v down.
+pub fn four_colours() -> Texture {
+    let colours = [[255, 0, 0, 255], [0, 255, 0, 255], [0, 0, 255, 255], [255, 255, 255, 255]];
+    image(2, colours.to_vec(), Wrap::ClampToEdge)
 }
 
 /// Texture 0 with TEXCOORD_0.

@@ -137,18 +137,7 @@ impl Glb {
 
     /// The same with `buffers` as in the JSON.
     pub fn bytes_as_stated(&self) -> Vec<u8> {
-        let mut text = self.json.to_string().into_bytes();
-        text.resize(text.len().next_multiple_of(4), b' ');
-        let mut body = Vec::new();
-        for (kind, chunk) in [(b"JSON", &text), (b"BIN\0", &self.binary)] {
-            body.extend((chunk.len() as u32).to_le_bytes());
-            body.extend(kind);
-            body.extend(chunk);
-        }
-        let mut bytes = b"glTF\x02\0\0\0".to_vec();
-        bytes.extend((body.len() as u32 + 12).to_le_bytes());
-        bytes.extend(body);
-        bytes
+        assembled(self.json.to_string().into_bytes(), self.binary.clone())
     }
 
     /// Loads the file.
@@ -179,6 +168,24 @@ impl Glb {
     pub fn refusal(&self) -> String {
         self.load().expect_err("has to be refused").to_string()
     }
+}
+
+/// A `.glb` file of a JSON text and a binary part, with lengths that fit.
+pub fn assembled(mut text: Vec<u8>, mut binary: Vec<u8>) -> Vec<u8> {
+    text.resize(text.len().next_multiple_of(4), b' ');
+    binary.resize(binary.len().next_multiple_of(4), 0);
+    let length = |bytes: &[u8]| (bytes.len() as u32).to_le_bytes();
+    let json = [&length(&text)[..], b"JSON", &text].concat();
+    let data = [&length(&binary)[..], b"BIN\0", &binary].concat();
+    let whole = 12 + json.len() as u32 + data.len() as u32;
+    [b"glTF\x02\0\0\0", &whole.to_le_bytes()[..], &json, &data].concat()
+}
+
+/// The JSON text of a `.glb` file, and its binary part.
+pub fn parts_of(file: &[u8]) -> Option<(&[u8], &[u8])> {
+    let word = |at: usize| Some(u32::from_le_bytes(file.get(at..at + 4)?.try_into().ok()?) as usize);
+    let json_end = 20 + word(12)?;
+    Some((file.get(20..json_end)?, file.get(json_end + 8..).unwrap_or_default()))
 }
 
 /// Loads bytes as a `.glb` file.

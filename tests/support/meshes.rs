@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 use nephroid::scene::Mesh;
+pub use nephroid::scene::builtin::shapes::cuboid;
 
 /// A parallelogram with a corner and two sides. It faces −(side_u × side_v), so that u × v = −normal as on the floors
 /// of the reference scenes. TEXCOORD_0 runs from 0 to 1 along the sides.
@@ -78,23 +79,6 @@ pub fn sphere(centre: DVec3, radius: f64, columns: usize, rows: usize) -> Mesh {
         .iter()
         .map(|position| (*position - centre).normalize())
         .collect();
-    mesh
-}
-
-/// A box with separate faces, facing outwards.
-pub fn cuboid(low: DVec3, high: DVec3) -> Mesh {
-    let size = high - low;
-    let (x, y, z) = (DVec3::X * size.x, DVec3::Y * size.y, DVec3::Z * size.z);
-    let faces = [
-        quad(low + y, x, z),
-        quad(low + z, x, -z),
-        quad(low + z, -z, y),
-        quad(low + x, z, y),
-        quad(low, x, y),
-        quad(low + x + z, -x, y),
-    ];
-    let mut mesh = faces.into_iter().reduce(joined).expect("six faces");
-    (mesh.uv0, mesh.uv1) = (None, None);
     mesh
 }
 

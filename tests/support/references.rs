@@ -21,8 +21,6 @@ pub struct Reference {
     pub floor_w: f64,
     /// Flux that leaves the scene [W], if the solver reports it.
     pub escaped_w: Option<f64>,
-    /// Whether the light is a sun, whose irradiance does not depend on the size of the scene.
-    pub has_sun: bool,
 }
 
 const fn reference(
@@ -39,7 +37,6 @@ const fn reference(
         by_splats,
         floor_w,
         escaped_w,
-        has_sun: false,
     }
 }
 
@@ -49,13 +46,6 @@ pub fn references() -> [Reference; 7] {
         (1.5e5, 0.02),
         Some((1e5, 0.10)),
         (1.090_823, Some(0.092_578 + 0.125_041)),
-    );
-    let pool = reference(("pool", "S3"), (1e4, 0.012), None, (3.770_999, None));
-    let nephroid = reference(
-        ("nephroid", "S8"),
-        (1.2e5, 0.01),
-        Some((3e5, 0.06)),
-        (0.966_650, Some(0.832_455)),
     );
     [
         reference(
@@ -68,7 +58,7 @@ pub fn references() -> [Reference; 7] {
             mean_difference: 0.05,
             ..ball
         },
-        Reference { has_sun: true, ..pool },
+        reference(("pool", "S3"), (1e4, 0.012), None, (3.770_999, None)),
         reference(
             ("mirror", "S5"),
             (1e5, 0.01),
@@ -82,43 +72,36 @@ pub fn references() -> [Reference; 7] {
             (6.490_964, None),
         ),
         reference(("paraboloid", "S7"), (3e4, 0.01), None, (0.502_656, None)),
-        Reference {
-            has_sun: true,
-            ..nephroid
-        },
+        reference(
+            ("nephroid", "S8"),
+            (1.2e5, 0.01),
+            Some((3e5, 0.06)),
+            (0.966_650, Some(0.832_455)),
+        ),
     ]
 }
 
 impl Reference {
-    /// Asserts that a bake of the scene, scaled by `size`, agrees with the solver: the map to a relative RMSE, the
-    /// flux to a relative error.
-    pub fn check(&self, result: &Bake, scene: &Scene, size: f64, (most, share): (f64, f64)) {
+    /// Asserts that a bake agrees with the solver: the map to a relative RMSE, the flux to a relative error.
+    pub fn check(&self, result: &Bake, scene: &Scene, (most, share): (f64, f64)) {
         let name = self.builtin;
-        let irradiance = if self.has_sun { 1.0 } else { 1.0 / (size * size) };
         let image = caustic(map_of(result, scene, "floor"));
-        let image: Vec<f64> = image.iter().map(|e| e / irradiance).collect();
-        let expected = reference_map(self.file);
-        let off = relative_rmse(&image, &expected).expect("a reference with light");
+        let off = relative_rmse(&image, &reference_map(self.file)).expect("a reference with light");
         assert!(off <= most, "{name}: relative RMSE {off}");
         assert_eq!(energy_fault(result), None, "{name}");
         let energy = &result.ledgers[0].energy_w;
-        let scale = irradiance * size * size;
         let what = format!("{name}: watts on the floor");
-        assert_close(energy.deposited, self.floor_w * scale, share, &what);
+        assert_close(energy.deposited, self.floor_w, share, &what);
         if let Some(escaped_w) = self.escaped_w {
-            let off_w = (energy.escaped - escaped_w * scale).abs();
-            assert!(
-                off_w <= 0.005 * energy.emitted,
-                "{name}: escaped {} W",
-                energy.escaped
-            );
+            let off_w = (energy.escaped - escaped_w).abs();
+            assert!(off_w <= 0.005 * energy.emitted, "{name}: escaped {} W", energy.escaped);
         }
     }
 
     /// Asserts that wavefronts agree with the solver, also on average over the texels, with few rays.
     pub fn check_wavefronts(&self, result: &Bake, scene: &Scene) {
         let name = self.builtin;
-        self.check(result, scene, 1.0, (self.by_wavefronts.1, 0.001));
+        self.check(result, scene, (self.by_wavefronts.1, 0.001));
         let image = caustic(map_of(result, scene, "floor"));
         let mean = average_relative_difference(&image, &reference_map(self.file));
         let mean = mean.expect("a reference with light");

@@ -10,7 +10,7 @@ use nephroid::illumination::{Chart, IlluminationMap, Layer, parametrise};
 use nephroid::light_pass::direct::{DirectLayer, bake_direct};
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
-use nephroid::scene::{Camera, Light, LightKind, LightSize, Material, Mesh, Object, Scene, SurfaceKind};
+use nephroid::scene::{Camera, Light, LightKind, LightSize, Material, Mesh, Object, Scene, SurfaceKind, Wave};
 use nephroid::settings::LayerKind;
 use nephroid::transport::Tracer;
 use nephroid::units::{Irradiance, RadiantIntensity};
@@ -74,6 +74,17 @@ pub fn sun(direction: DVec3, normal_irradiance: f64) -> Light {
         direction: direction.normalize(),
         normal_irradiance: Irradiance(normal_irradiance),
     })
+}
+
+/// A wave that stands still.
+pub fn wave(amplitude_m: f64, wavelength_m: f64, direction: DVec3, phase_rad: f64) -> Wave {
+    Wave {
+        amplitude_m,
+        wavelength_m,
+        direction: direction.normalize(),
+        phase_rad,
+        period_s: 0.0,
+    }
 }
 
 /// The chart of an object in a tracer's scene.

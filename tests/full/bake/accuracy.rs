@@ -1,17 +1,12 @@
 //! Errors without a reference, against errors against one: a bake of the same mesh with many times the rays.
 
-use glam::{DQuat, DVec3};
 use nephroid::bake::forecast::{forecast, stood_at};
 use nephroid::bake::{Bake, StopReason};
 use nephroid::illumination::visible::visible_error;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Mesh, Scene};
+use nephroid::scene::Scene;
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, RayPlacement};
-use nephroid::units::{Flux, Irradiance};
-use rand_pcg::Pcg64Mcg;
-use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use crate::bake::common::{CAUSTIC_AND_DIRECT, caustic_like, same_map, torus, towards, turned, with_layers};
+use crate::bake::common::{caustic_like, same_map, towards};
 use support::random_scenes;
 use support::tools::{at, bake, builtin_scene, caustic, photons, settings};
 
@@ -131,73 +126,6 @@ fn texel_fault(name: &str, truth: &Bake) -> Option<String> {
     })
 }
 
-/// One of many scenes: a floor, something specular over it, a lamp.
-fn random_scene(seed: u64) -> Scene {
-    let mut random = Pcg64Mcg::seed_from_u64(0x5eed ^ seed << 8);
-    let mut unit = || (random.next_u64() >> 11) as f64 * (-53_f64).exp2();
-    let mut scene = parts::reference_scene(1.0);
-    let mut around = |low: f64, high: f64| low + (high - low) * unit();
-    let centre = DVec3::new(around(-0.4, 0.4), around(0.35, 0.8), around(-0.4, 0.4));
-    let size = around(0.12, 0.3);
-    let turn = DQuat::from_rotation_y(around(0.0, 6.0)) * DQuat::from_rotation_x(around(0.9, 1.6));
-    let kind = around(0.0, 6.0) as u32;
-    let mesh = match kind {
-        0 | 1 => shapes::sphere(centre, size, 4),
-        2 => shapes::rectangle(centre, turn * DVec3::X * size, turn * DVec3::Z * size),
-        3 => torus(centre, turn, size),
-        4 => bowl(centre, turn, size),
-        _ => {
-            let half = DVec3::new(size, 0.4 * size, 0.7 * size);
-            shapes::cuboid(centre - half, centre + half)
-        }
-    };
-    let material = match kind {
-        1 | 2 | 4 => parts::mirror(),
-        _ => parts::dielectric("glass", 1.3 + 0.5 * around(0.0, 1.0)),
-    };
-    parts::add(&mut scene, "caster", mesh, material);
-    let from = DVec3::new(around(-0.9, 0.9), around(1.6, 2.6), around(-0.9, 0.9));
-    scene.lights.push(if around(0.0, 1.0) < 0.7 {
-        parts::point_light("lamp", from, Flux(10.0))
-    } else {
-        parts::sun("sun", -from, Irradiance(1.0))
-    });
-    scene.name = format!("random {seed}, kind {kind}");
-    scene
-}
-
-/// A half of a hollow sphere, open upwards before it is turned.
-fn bowl(centre: DVec3, turn: DQuat, radius: f64) -> Mesh {
-    shapes::sheet(96, 32, |u, v| {
-        let (sine, cosine) = turned(u);
-        let (down, out) = f64::sin_cos((0.02 + 0.98 * v) * std::f64::consts::FRAC_PI_2);
-        let outward = DVec3::new(cosine * down, -out, sine * down);
-        (centre + turn * outward * radius, turn * -outward)
-    })
-}
-
-#[test]
-fn random_scenes_within_a_factor_of_two() {
-    let (mut ratios, mut faults) = (Vec::new(), Vec::new());
-    for seed in 0..50 {
-        let scene = random_scene(seed);
-        let result = bake(scene.clone(), &at(4e3, SIDE));
-        let Some(estimate) = result.estimated_relative_rmse else {
-            continue;
-        };
-        let error = true_error(&result, &bake(scene.clone(), &at(6.4e4, SIDE)));
-        ratios.push(error / estimate);
-        if !(0.5..=2.0).contains(&(error / estimate)) {
-            faults.push(format!("{}: true {error}, estimated {estimate}", scene.name));
-        }
-    }
-    ratios.sort_by(f64::total_cmp);
-    // Half of these errors are above 20 %: the light of a bowl, say, on a floor that most of it misses.
-    assert!(ratios.len() >= 45, "{} scenes are lit", ratios.len());
-    assert!(faults.len() <= 2, "{faults:#?}");
-    assert!(ratios[0] > 0.33 && ratios[ratios.len() - 1] < 3.0, "{ratios:?}");
-}
-
 /// Relative RMSE and visible error against two independent bakes whose own noise cancels: that of the product of both
 /// differences has no mean.
 fn errors_against(result: &Bake, truths: &[Bake; 2]) -> [f64; 2] {
@@ -310,27 +238,6 @@ fn most_texels_lie_within_their_error() {
         // Blur adds to the noise that this is about.
         assert!((0.55..=0.8).contains(&share), "{name}: {share}");
     }
-}
-
-/// The error of a sum is that of its parts together, and direct light, which is no estimate, has none.
-#[test]
-fn errors_of_lights_add_up() {
-    let scene = builtin_scene("ring");
-    let mut twice = scene.clone();
-    twice.lights.push(twice.lights[0].clone());
-    let settings = at(2_000.0, 32);
-    let one = bake(scene.clone(), &settings);
-    let errors = |result: &Bake| result.maps[0].error.clone().expect("an estimate");
-    let single = errors(&one);
-    assert!(single.iter().any(|error| *error > 0.0));
-    for (own, both) in single.iter().zip(errors(&bake(twice, &settings))) {
-        let expected = own * std::f32::consts::SQRT_2;
-        assert!((both - expected).abs() <= 1e-5 * expected, "{both} for {own}");
-    }
-    let lit = bake(scene, &with_layers(&CAUSTIC_AND_DIRECT, settings));
-    assert_eq!(errors(&lit), single);
-    let estimate = |result: &Bake| result.estimated_relative_rmse.expect("an estimate");
-    assert!((estimate(&lit) / estimate(&one) - 1.0).abs() < 1e-6);
 }
 
 /// Two weak beams beside a lamp that is far stronger: one of them a ball draws together on a texel or two, where it is

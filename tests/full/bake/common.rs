@@ -123,11 +123,6 @@ pub fn assert_fresh(session: &mut Baker, settings: &BakeSettings, what: &str) ->
     (now, fresh)
 }
 
-pub fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    pool.expect("threads").install(work)
-}
-
 /// Relative RMSE of the floor's caustic against brute force, without the latter's noise, which must not hide more than
 /// `most_noise`; and the watts of both.
 pub fn off_brute_force(result: &Bake, scene: &Scene, rays: u64, most_noise: f64) -> (f64, [f64; 2]) {

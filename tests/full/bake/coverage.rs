@@ -9,7 +9,6 @@ use nephroid::light_pass::receiver_maps::ReceiverMaps;
 use nephroid::light_pass::wavefront::coverage::{CoverageReport, FluxTriangle, deposit_triangles};
 use proptest::prelude::*;
 
-use crate::bake::common::with_threads;
 use crate::bake::tiles;
 
 /// Counts of a triangle in most tests: enough for the counts to be as good as real numbers.
@@ -242,18 +241,6 @@ proptest! {
         let across = grey([[0.0, b[0]], [a[1], 8.0], inside]);
         deposit((8, 8), &[grey(corners), grey([a, b, inside]), across, grey([a, inside, inside])]);
     }
-
-    #[test]
-    fn order_of_corners_changes_next_to_nothing(corners in prop::array::uniform3(point(-2.0, 10.0))) {
-        let [a, b, c] = corners;
-        let (one, _) = deposit((8, 8), &[grey([a, b, c])]);
-        for corners in [[a, c, b], [b, a, c], [b, c, a], [c, a, b], [c, b, a]] {
-            let (other, _) = deposit((8, 8), &[grey(corners)]);
-            for (x, y) in one.texels().iter().zip(other.texels()) {
-                prop_assert!((x[0] - y[0]).abs() <= 2, "{x:?} {y:?}");
-            }
-        }
-    }
 }
 
 #[test]
@@ -290,15 +277,6 @@ fn a_line_carries_a_tent() {
     }
 }
 
-/// Fractions 1/4 to 3/4 of a tent are inside.
-#[test]
-fn a_slanted_line_leaves_a_part_outside() {
-    let corners = [[-2.0, -2.0], [6.0, 6.0], [2.0, 2.0]];
-    let (flux, report) = deposit((4, 4), &[grey(corners)]);
-    assert_eq!(report.outside[0], i128::from(FLUX / 4));
-    assert_eq!(flux.texels()[5][0], flux.texels()[10][0]);
-}
-
 #[test]
 fn beside_the_map_and_nowhere_is_booked() {
     let all = [i128::from(FLUX); 3];
@@ -319,120 +297,6 @@ fn beside_the_map_and_nowhere_is_booked() {
         let once = flux.map(i128::from);
         let twice = once.map(|count| 2 * count);
         assert_eq!((report.outside, report.non_finite), (twice, once), "in tiles");
-    }
-}
-
-#[test]
-fn one_triangle_over_everything_is_flat() {
-    let flux = 1 << 60;
-    let over = |far: f64| {
-        let corners = [[-far, -far], [far, -far], [0.0, far]];
-        deposit((64, 64), &[triangle(corners, [flux; 3])])
-    };
-    // 4096 texels of 2·10²⁴: nothing of 2⁶⁰ counts.
-    let (_, report) = over(1e12);
-    assert!(report.deposited[0] <= 1 << 20, "{report:?}");
-    let (map, _) = over(1e4);
-    let expected = flux as f64 / 2e8;
-    for texel in map.texels() {
-        let off = (texel[0] as f64 / expected - 1.0).abs();
-        assert!(off < 1e-6, "{texel:?} {expected}");
-    }
-}
-
-/// A pseudo-random number in [0, 1) for an index.
-fn hash(index: u64) -> f64 {
-    let mut x = index.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    (x >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-/// A crooked triangulation of the rectangle of `size`, `cells` each way, with a flux of `density` counts per texel of area.
-fn tiling(size: (usize, usize), cells: (usize, usize), density: f64) -> Vec<FluxTriangle> {
-    let shift = |along: usize, count: usize, seed: usize| {
-        let is_inside = along > 0 && along < count;
-        f64::from(u8::from(is_inside)) * 0.3 * (hash(seed as u64) - 0.5)
-    };
-    let corner = |i: usize, j: usize| {
-        let seed = 2 * (j * (cells.0 + 1) + i);
-        DVec2::new(
-            (i as f64 + shift(i, cells.0, seed)) * size.0 as f64 / cells.0 as f64,
-            (j as f64 + shift(j, cells.1, seed + 1)) * size.1 as f64 / cells.1 as f64,
-        )
-    };
-    let in_cell = |cell: usize| {
-        let (i, j) = (cell % cells.0, cell / cells.0);
-        let [a, b, c, d] = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1)].map(|(i, j)| corner(i, j));
-        [[a, b, c], [a, c, d]]
-    };
-    let triangles = (0..cells.0 * cells.1).flat_map(in_cell);
-    let with_flux = |corners: [DVec2; 3]| FluxTriangle {
-        corners,
-        flux: [(density * area(&corners)).round() as i64; 3],
-        island: 0,
-    };
-    triangles.map(with_flux).collect()
-}
-
-#[test]
-fn a_tiling_with_even_flux_is_flat() {
-    for cells in [(3, 2), (20, 17), (90, 110)] {
-        let size = (48, 56);
-        let density = 1e10;
-        let triangles = tiling(size, cells, density);
-        let (flux, report) = deposit(size, &triangles);
-        assert_eq!(report.outside, [0; 3]);
-        // Rounded fluxes, and two roundings per triangle and texel.
-        let per_texel = 4.0 + triangles.len() as f64 / (size.0 * size.1) as f64;
-        for texel in flux.texels() {
-            assert!(
-                (texel[0] as f64 - density).abs() < 12.0 * per_texel,
-                "{texel:?} in {cells:?}"
-            );
-        }
-    }
-}
-
-/// Triangles of many sizes, on and beside a map.
-fn mixture(size: (usize, usize), count: usize) -> Vec<FluxTriangle> {
-    (0..count as u64)
-        .map(|index| {
-            let random = |k: u64| hash(100 * index + k);
-            let centre = DVec2::new(random(0) * size.0 as f64, random(1) * size.1 as f64);
-            let extent = 10f64.powf(3.0 * random(2) - 1.3);
-            FluxTriangle {
-                corners: [3, 5, 7].map(|k| centre + extent * (DVec2::new(random(k), random(k + 1)) - 0.5)),
-                flux: [9, 10, 11].map(|k| {
-                    if index % 3 == 0 {
-                        FLUX
-                    } else {
-                        (random(k) * 1e9) as i64
-                    }
-                }),
-                island: (index % 2) as u32,
-            }
-        })
-        .collect()
-}
-
-#[test]
-fn threads_calls_and_order_change_nothing() {
-    let size = (96, 70);
-    let in_tiles = tiles::chart(Some(tiles::mixed()));
-    for (chart, size) in [
-        (full_chart(size), size),
-        (gappy_chart(size), size),
-        (in_tiles, tiles::SIZE),
-    ] {
-        let mut triangles = mixture(size, 30_000);
-        let expected = with_threads(1, || deposit_on(&chart, &triangles, triangles.len()));
-        for threads in [2, 4, 7] {
-            let found = with_threads(threads, || deposit_on(&chart, &triangles, triangles.len()));
-            assert!(found == expected, "{threads} threads");
-        }
-        triangles.reverse();
-        assert!(deposit_on(&chart, &triangles, 997) == expected, "in parts");
     }
 }
 
@@ -477,17 +341,4 @@ fn an_island_gets_nothing_of_another() {
     let sums = columns(&flux);
     assert!(sums[..8].iter().all(|&sum| sum == 0), "{sums:?}");
     assert_eq!(report.deposited[0], i128::from(FLUX));
-}
-
-#[test]
-fn wide_gaps_keep_flux_on_its_island() {
-    let size = (300, 200);
-    let corners = [[-300.0, -1.0], [900.0, -1.0], [300.0, 700.0]];
-    let (_, full) = deposit(size, &[grey(corners)]);
-    let (flux, report) = deposit_on(&gappy_chart(size), &[grey(corners)], 1);
-    assert_eq!((report.deposited, report.unplaced), (full.deposited, [0; 3]));
-    let sums = columns(&flux);
-    assert!(sums[100..].iter().all(|&sum| sum == 0));
-    // What would have lain beside the island is on its border.
-    assert!(sums[99] > 190 * sums[50], "{sums:?}");
 }

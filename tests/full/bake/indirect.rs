@@ -8,7 +8,6 @@ use nephroid::bake::{Bake, Baker};
 use nephroid::illumination::{Chart, IlluminationMap, Receiver};
 use nephroid::light_pass::indirect::{MIN_PASSES, Network};
 use nephroid::optics::LinearSrgb;
-use nephroid::plan::Effect;
 use nephroid::progress::Control;
 use nephroid::scene::{Light, LightKind, Material, Mesh, Scene, SurfaceKind, Volume};
 use nephroid::settings::{BakeSettings, LayerKind};
@@ -316,25 +315,6 @@ fn same_bits_for_any_threads_and_any_past() {
     let fresh = bake(dimmed, &settings(&LIT, 32, 0.06));
     assert!(fresh.counts.gather_rays < finer.counts.gather_rays);
     assert!(all_bits(&coarser) == all_bits(&fresh), "another past");
-}
-
-/// Alone, beside the direct layer, and not at all.
-#[test]
-fn indirect_light_comes_where_asked_for() {
-    let [lone, both, direct] =
-        [&LIT[1..], &LIT, &LIT[..1]].map(|layers| bake(small_room(), &settings(layers, 32, 0.1)));
-    assert_eq!(lone.maps.len(), both.maps.len());
-    for (lone, both) in lone.maps.iter().zip(&both.maps) {
-        assert_eq!(lone.layers.len(), 1);
-        assert_eq!(layer(lone, LayerKind::Indirect), layer(both, LayerKind::Indirect));
-        assert_eq!(lone.error, both.error);
-    }
-    assert!(lone.estimated_relative_rmse.is_some_and(|error| error > 0.0));
-    assert!(both.plan.is_on(Effect::Indirect) && both.counts.gather_rays > 0);
-    assert!(!direct.plan.is_on(Effect::Indirect));
-    assert_eq!(direct.counts.gather_rays, 0);
-    let mut maps = direct.maps.iter();
-    assert!(maps.all(|map| map.layer(LayerKind::Indirect).is_none()));
 }
 
 #[test]

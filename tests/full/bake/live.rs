@@ -556,39 +556,3 @@ fn what_the_light_decides_is_refused() {
         assert_eq!(refused.location, option);
     }
 }
-
-#[test]
-fn what_is_not_all_of_a_bake_is_refused() {
-    let (scene, settings) = (builtin_scene("ring"), at(2000.0, 16));
-    let all = shards(&scene, &settings, 3);
-    let damaged = |change: fn(&mut Vec<Vec<u8>>)| {
-        let mut shards = all.clone();
-        change(&mut shards[1].passes);
-        shards
-    };
-    let cases = [
-        (all[..2].to_vec(), "in no shard, or in two"),
-        ([&all[..], &all[..1]].concat(), "in no shard, or in two"),
-        (damaged(|passes| passes.truncate(1)), "does not hold the passes"),
-        (
-            damaged(|passes| passes.push(Vec::new())),
-            "does not hold the passes",
-        ),
-        (damaged(|passes| passes.reverse()), ""),
-        (damaged(|passes| passes[0].truncate(30)), "damaged"),
-        (damaged(|passes| passes[0].clear()), "damaged"),
-        (
-            damaged(|passes| {
-                let half = passes[1].len() / 2;
-                passes[1][half] ^= 1;
-            }),
-            "damaged",
-        ),
-    ];
-    for (shards, word) in cases {
-        let error = merge(&scene, &settings, shards).expect_err(word);
-        assert!(error.what.contains(word), "{error}");
-    }
-    let other = merge(&scene, &at(2000.0, 17), all).expect_err("maps of another size");
-    assert!(other.what.contains("damaged"), "{other}");
-}

@@ -1,7 +1,7 @@
 //! What can send no light to a diffuse surface costs nothing after the plan, and changes not a bit.
 
 use glam::DVec3;
-use nephroid::bake::{Bake, StopReason};
+use nephroid::bake::Bake;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
@@ -132,37 +132,6 @@ fn check_item_buffers(alone: &Bake, among: &Bake) {
     assert!(buffers[0].hidden_cells > 10, "the wall hides the balls");
     assert_eq!(buffers[1].tests, 0, "a sealed lamp is not looked around from");
     assert!(buffers[9].hidden_cells > 10, "the plate hides the ring");
-}
-
-#[test]
-fn forced_on_everything_is_looked_for() {
-    let mut settings = at(4_000.0, 64);
-    let auto = bake(crowded(), &settings);
-    settings.effects = EffectSwitches::default().with(Effect::LightPass, EffectSwitch::On);
-    let forced = bake(crowded(), &settings);
-    assert!(forced.counts.rays > auto.counts.rays);
-    assert!(forced.counts.segments > auto.counts.segments);
-    assert!(
-        all_bits(&auto) == all_bits(&forced),
-        "what is looked for in vain changes nothing"
-    );
-}
-
-#[test]
-fn nothing_to_do_takes_nothing() {
-    let ring = builtin_scene("ring");
-    let mut dark = ring.clone();
-    dark.lights.clear();
-    let (mut dull, mut nowhere) = (ring.clone(), ring);
-    dull.objects.retain(|object| object.name == "floor");
-    nowhere.objects.retain(|object| object.name != "floor");
-    for (case, scene) in [("dark", dark), ("dull", dull), ("nowhere", nowhere)] {
-        let result = bake(scene, &settings(1e4, 64));
-        assert_eq!((result.counts.rays, result.counts.segments), (0, 0), "{case}");
-        assert!(result.maps.is_empty(), "{case}");
-        assert_eq!(result.stop_reason, StopReason::NothingToDo, "{case}");
-        assert!(!result.plan.is_on(Effect::LightPass), "{case}");
-    }
 }
 
 /// A wall with a crack between its halves, wide enough for light or not there at all.

@@ -1,25 +1,18 @@
-//! Maps in tiles: how much memory they save and what that costs; their sizes, levels on the way, and layers light by
-//! light.
-
-use std::sync::Arc;
+//! Maps in tiles: how much memory they save and what that costs; direct light beside caustics, and levels on the way.
 
 use glam::{DQuat, DVec3};
 use nephroid::bake::{BYTES_PER_TEXEL, Bake};
-use nephroid::export::exr::decode;
-use nephroid::export::map_folder::MapFolder;
 use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
 use nephroid::settings::{BakeSettings, LayerKind};
-use nephroid::units::{Flux, Irradiance};
+use nephroid::units::Flux;
 
 use crate::bake::common::{
-    CAUSTIC_AND_DIRECT, assert_same, automatic, rmse, run, session, sized, torus, towards, with_layers,
+    CAUSTIC_AND_DIRECT, assert_same, automatic, rmse, session, sized, torus, towards, with_layers,
 };
-use support::meshes::floor;
-use support::tools::{at, bake, builtin_scene, caustic, energy_fault, map_of, set, settings};
+use support::tools::{at, bake, builtin_scene, caustic, energy_fault, map_of, set};
 
 fn auto(density_per_sr: f64) -> BakeSettings {
     automatic(at(density_per_sr, 1))
@@ -58,15 +51,6 @@ fn floor_size(scene: &Scene, result: &Bake) -> (usize, usize) {
 
 fn estimate(result: &Bake) -> f64 {
     result.estimated_relative_rmse.expect("an estimate")
-}
-
-#[test]
-fn a_ball_takes_a_tenth_of_a_dense_map() {
-    let result = bake(builtin_scene("ball"), &auto(2.5e4));
-    let (taken, dense) = memory(&result);
-    assert!(taken * 10 <= dense, "{taken} of {dense} bytes");
-    assert_eq!(result.warnings, []);
-    assert_eq!(energy_fault(&result), None);
 }
 
 #[test]
@@ -119,25 +103,6 @@ fn a_tenth_of_the_memory_costs_what_it_says() {
     }
 }
 
-#[test]
-fn however_little_memory_there_are_maps() {
-    for (name, layers) in [
-        ("mirror", &[LayerKind::Caustic][..]),
-        ("showroom", &CAUSTIC_AND_DIRECT),
-    ] {
-        let settings = set(with_layers(layers, at(1e3, 512)), |s| s.memory_bytes = 20_000);
-        let result = bake(builtin_scene(name), &settings);
-        assert!(!result.maps.is_empty(), "{name}");
-        assert_eq!(energy_fault(&result), None, "{name}");
-        let mut warnings = result.warnings.iter();
-        assert!(
-            warnings.any(|warning| warning.location == "--memory"),
-            "{name}: {:?}",
-            result.warnings
-        );
-    }
-}
-
 /// Neither threads change a bit of maps in tiles, nor tiles the direct light, but for what larger texels leave out.
 #[test]
 fn tiles_keep_bits_and_direct_light() {
@@ -158,56 +123,6 @@ fn tiles_keep_bits_and_direct_light() {
     );
 }
 
-/// A plate above a floor of 4 m, in parallel light.
-fn plate_in_the_sun(direction: DVec3) -> Scene {
-    let mut scene = parts::reference_scene(2.0);
-    let plate = floor(0.4, 0.5);
-    parts::add(
-        &mut scene,
-        "plate",
-        plate,
-        parts::matte("plate", LinearSrgb::grey(0.5)),
-    );
-    scene.lights.push(parts::sun("sun", direction, Irradiance(1.0)));
-    scene
-}
-
-/// Maps of direct light are fine where shadows end, whatever was baked before.
-#[test]
-fn shadows_end_within_small_texels() {
-    let settings = automatic(with_layers(&[LayerKind::Direct], towards(0.1, 1)));
-    let scene = plate_in_the_sun(DVec3::new(0.1, -1.0, 0.2));
-    let fresh = bake(scene.clone(), &settings);
-    let map = map_of(&fresh, &scene, "floor");
-    assert!(map.chart.layout.is_some());
-    let dense = map.dense();
-    let (width, height) = (dense.width(), dense.height());
-    assert!(
-        4.0 / width as f64 <= 4.0 * 2_f64.sqrt() / 1_600.0 * 1.5,
-        "{width} texels"
-    );
-    let direct = dense.layer(LayerKind::Direct).expect("the layer");
-    // Under the plate's middle, which is shown 5 cm and 10 cm off.
-    let row = (height as f64 * (2.1 / 4.0)) as usize;
-    let e: Vec<f32> = direct.irradiance[row * width..(row + 1) * width]
-        .iter()
-        .map(|e| e[0])
-        .collect();
-    let brightest = e.iter().copied().fold(0.0, f32::max);
-    let between = e
-        .iter()
-        .filter(|e| (0.02..0.98).contains(&(**e / brightest)))
-        .count();
-    let dark = e.iter().filter(|e| **e < 0.5 * brightest).count() as f64 * 4.0 / width as f64;
-    assert!((dark - 0.8).abs() < 0.01, "{dark} m of shadow");
-    assert!(between <= 6, "{between} texels between light and shadow");
-
-    let mut session = session(&plate_in_the_sun(DVec3::new(-0.4, -1.0, 0.0)));
-    run(&mut session, &settings);
-    session.set_scene(Arc::new(scene)).expect("an edit");
-    assert_same(&run(&mut session, &settings), &fresh, "after another sun");
-}
-
 /// Texels of automatic maps for a target.
 fn texels_for(name: &str, target: f64, layers: &[LayerKind]) -> usize {
     let settings = automatic(with_layers(layers, towards(target, 1)));
@@ -216,34 +131,10 @@ fn texels_for(name: &str, target: f64, layers: &[LayerKind]) -> usize {
 }
 
 #[test]
-fn drafts_have_coarser_maps_than_previews() {
-    for name in ["ball", "pool"] {
-        let [draft, preview] = [0.1, 0.03].map(|target| texels_for(name, target, &[LayerKind::Caustic]));
-        assert!(2 * draft < preview, "{name}: {draft} of {preview} texels");
-    }
-}
-
-#[test]
 fn a_coarse_caustic_keeps_direct_light_fine() {
     let both = texels_for("mirror", 0.9, &CAUSTIC_AND_DIRECT);
     let direct = texels_for("mirror", 0.9, &[LayerKind::Direct]);
     assert!(both >= direct, "{both} texels with the caustic, {direct} without");
-}
-
-#[test]
-fn automatic_maps_grow_with_the_density() {
-    let scene = builtin_scene("ring");
-    let mut last = 0;
-    for density in [1e3, 1.6e4, 2.56e5] {
-        let result = bake(scene.clone(), &automatic(settings(density, 0)));
-        let map = map_of(&result, &scene, "floor");
-        assert!(map.width() > last, "{} after {last} texels", map.width());
-        assert_eq!(map.width(), map.height(), "the floor is square");
-        // No coarser than the footprints: a texel for every ray, about.
-        assert!((map.width() * map.height()) as u64 >= result.counts.splats / 4);
-        assert_eq!(energy_fault(&result), None);
-        last = map.width();
-    }
 }
 
 #[test]
@@ -275,52 +166,4 @@ fn whole_pictures_come_before_the_last() {
         "all but the first have an estimate"
     );
     assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
-}
-
-#[test]
-fn each_light_has_its_part_of_each_layer() {
-    let mut scene = builtin_scene("mirror");
-    let second = parts::point_light("second lamp", DVec3::new(0.1, 1.0, -0.2), Flux(30.0));
-    scene.lights.push(second);
-    let settings = set(with_layers(&CAUSTIC_AND_DIRECT, at(5_000.0, 32)), |s| {
-        s.per_light = true
-    });
-    let result = bake(scene.clone(), &settings);
-    let map = map_of(&result, &scene, "floor");
-    let part = |light: usize, kind: LayerKind| {
-        let mut parts = result.light_layers.iter();
-        let found =
-            parts.find(|part| (part.light, part.receiver, part.kind) == (light, map.chart.receiver, kind));
-        &found.expect("a part").irradiance
-    };
-    for layer in &map.layers {
-        let [first, second] = [0, 1].map(|light| part(light, layer.kind));
-        for (texel, whole) in layer.irradiance.iter().enumerate() {
-            let sum = first[texel][1] + second[texel][1];
-            let off = (sum - whole[1]).abs();
-            assert!(off <= 1e-5 * whole[1].max(1e-3), "{:?} {texel}", layer.kind);
-        }
-    }
-    assert!(bake(scene.clone(), &at(5_000.0, 32)).light_layers.is_empty());
-
-    let folder = tempfile::tempdir().expect("a folder");
-    let target = MapFolder::open(folder.path(), false).expect("a place");
-    let manifest = target.write(&scene, &settings, &result).expect("written");
-    let mut entries = manifest.maps.iter();
-    let entry = entries.find(|entry| entry.surface == "floor").expect("the floor");
-    let names: Vec<&str> = entry.lights.iter().map(|part| part.channels.as_str()).collect();
-    let expected = [
-        "caustic.light",
-        "caustic.second-lamp",
-        "direct.light",
-        "direct.second-lamp",
-    ];
-    assert_eq!(names, expected);
-    let bytes = std::fs::read(folder.path().join(&entry.file)).expect("a file");
-    let image = decode(&bytes, "map").expect("an image");
-    let green: Vec<f32> = part(1, LayerKind::Caustic).iter().map(|rgb| rgb[1]).collect();
-    assert_eq!(
-        image.channel("caustic.second-lamp.G").expect("its channel"),
-        &green[..]
-    );
 }

@@ -4,17 +4,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use nephroid::bake::Bake;
-use nephroid::geometry::Ray;
 use nephroid::illumination::Side;
-use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::optics::glass::Glass;
-use nephroid::optics::spectrum::{Spectrum, Xyz, illuminant, xyz_bar};
-use nephroid::optics::wavelength::VISIBLE;
-use nephroid::optics::{LinearSrgb, Metal, Nanometres};
+use nephroid::optics::spectrum::{Spectrum, Xyz, illuminant};
+use nephroid::optics::{LinearSrgb, Nanometres};
 use nephroid::scene::builtin::{parts, shapes};
 use nephroid::scene::{LoadOptions, Scene};
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, Wavelengths};
-use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::{Flux, Irradiance};
 
 use crate::bake::common::sized;
@@ -71,24 +67,8 @@ fn ball_of(text: &str) -> Scene {
     scene
 }
 
-/// Root mean square difference of all channels over the mean.
-fn difference(a: &[[f32; 3]], b: &[[f32; 3]]) -> f64 {
-    let pairs = a.as_flattened().iter().zip(b.as_flattened());
-    let squares: f64 = pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum();
-    let sum: f64 = a.as_flattened().iter().map(|a| f64::from(*a)).sum();
-    assert!(sum > 0.0, "a map with light");
-    (squares * 3.0 * a.len() as f64).sqrt() / sum
-}
-
 fn brightest(texels: &[[f32; 3]]) -> f32 {
     texels.iter().map(|texel| texel[1]).fold(0.0, f32::max)
-}
-
-#[test]
-fn next_to_no_dispersion_is_none() {
-    let [without, with] = ["abbe:1.5,1e12", "abbe:1.5,2e7"].map(|text| floor(&ball_of(text), &settings(128)));
-    let off = difference(&without, &with);
-    assert!(off < 1e-4, "{off}");
 }
 
 #[test]
@@ -191,40 +171,6 @@ fn shared_prism() -> Option<(Scene, Vec<[f64; 6]>)> {
 }
 
 #[test]
-fn rays_leave_a_prism_where_snell_says() {
-    let Some((scene, table)) = shared_prism() else {
-        return;
-    };
-    let tracer = Tracer::new(Arc::new(scene));
-    let direction = DVec3::new(0.907_518_796_638_282_2, 0.420_011_468_591_280_8, 0.0).normalize();
-    let entry = DVec3::new(-0.015, 1.0 + 0.015 / 3.0_f64.sqrt(), 0.0);
-    let mut worst = [0.0_f64; 2];
-    for [nm, exit_x, exit_y, dir_x, dir_y, wall_y] in table {
-        let at = tracer.at_wavelength(Nanometres(nm));
-        let mut ray = Ray {
-            origin: entry - direction * 0.005 - tracer.scene().origin_world,
-            direction,
-        };
-        let mut media = MediumStack::default();
-        for _ in 0..2 {
-            let hit = at.closest_hit(&ray).expect("the prism");
-            let branch = at
-                .interact(&hit, ray.direction, &media)
-                .transmission
-                .expect("light goes through");
-            (ray, media) = (branch.ray, branch.media);
-        }
-        let exit = ray.origin + tracer.scene().origin_world;
-        let at_wall = exit.y + (1.5 - exit.x) * ray.direction.y / ray.direction.x;
-        worst[0] = worst[0].max((ray.direction - DVec3::new(dir_x, dir_y, 0.0)).length());
-        worst[1] = worst[1]
-            .max((at_wall - wall_y).abs())
-            .max((exit.x - exit_x).hypot(exit.y - exit_y));
-    }
-    assert!(worst[0] < 1e-5 && worst[1] < 1e-5, "{worst:?}");
-}
-
-#[test]
 fn each_wavelength_lands_in_its_texel() {
     let Some((scene, table)) = shared_prism() else {
         return;
@@ -307,33 +253,6 @@ fn kept_bands_add_up_to_their_colour() {
     }
 }
 
-#[test]
-fn one_wavelength_parts_nothing() {
-    for estimator in [Estimator::Wavefront, Estimator::Splat] {
-        let texels = floor(&ball_of("N-SF11"), &sampled(1, estimator, 64));
-        let most = 1e-4 * brightest(&texels);
-        let mut channels = texels.iter();
-        assert!(channels.all(|[r, g, b]| (r - g).abs() < most && (b - g).abs() < most));
-    }
-}
-
-#[test]
-fn more_wavelengths_come_nearer_to_all() {
-    let scene = ball_of("N-SF11");
-    let whole = floor(&scene, &settings(64));
-    let error = |settings: &BakeSettings| difference(&whole, &floor(&scene, settings));
-    let errors = [1, 4, 16].map(|count| error(&sampled(count, Estimator::Wavefront, 64)));
-    assert!(errors[1] < errors[0] && errors[2] < 0.3 * errors[0], "{errors:?}");
-    // Splats over the whole spectrum see the same colours, as far as kernels are sharp.
-    let [all, one] = [Wavelengths::Continuous, Wavelengths::Fixed(1)].map(|wavelengths| {
-        error(&set(
-            at_wavelengths(wavelengths, sampled(1, Estimator::Splat, 64)),
-            |s| s.density_per_sr = 4e5,
-        ))
-    });
-    assert!(all < 0.5 * one, "{all} of all wavelengths, {one} of one");
-}
-
 /// Around the focus of a ball, light of all wavelengths at once against that of many traced one by one. The ball's
 /// silhouette cuts cells here, and their light reaches far: what is wrong at a border shows.
 #[test]
@@ -357,126 +276,4 @@ fn all_wavelengths_are_as_many_alone() {
     let rms = [0, 1, 2].map(rms);
     // A ray traced again a bracket beside its border moves red by 45 % here; ten wavelengths are off by about 1 % themselves.
     assert!(rms.iter().all(|rms| *rms < 0.03), "{rms:?}");
-}
-
-#[test]
-fn plain_glass_traces_no_wavelengths() {
-    let scene = ball_of("cauchy:1.5,0");
-    assert!(!scene.materials.iter().any(|material| material.is_dispersive()));
-    for estimator in [Estimator::Wavefront, Estimator::Splat] {
-        let [a, b] = [Wavelengths::Continuous, Wavelengths::Fixed(13)].map(|wavelengths| {
-            let settings = at_wavelengths(wavelengths, sampled(1, estimator, 64));
-            bake(scene.clone(), &settings)
-        });
-        assert_eq!(a.counts.rays, b.counts.rays);
-        assert_eq!(caustic(&a, &scene, "floor"), caustic(&b, &scene, "floor"));
-    }
-}
-
-#[test]
-fn a_prism_throws_a_spectrum_without_bands() {
-    let scene = builtin_scene("prism");
-    let wall = |wavelengths: Wavelengths| {
-        let fine = set(settings(512), |s| s.density_per_sr = 1e8);
-        caustic(
-            &bake(scene.clone(), &at_wavelengths(wavelengths, fine)),
-            &scene,
-            "wall",
-        )
-    };
-    let split = wall(Wavelengths::Fixed(128));
-    let norm = |values: &mut dyn Iterator<Item = f32>| -> f64 {
-        values.map(|value| f64::from(value).powi(2)).sum::<f64>().sqrt()
-    };
-    let whole = norm(&mut split.as_flattened().iter().copied());
-    let [continuous, three] = [Wavelengths::Continuous, Wavelengths::Fixed(3)].map(|way| {
-        let found = wall(way);
-        let pairs = found.as_flattened().iter().zip(split.as_flattened());
-        norm(&mut pairs.map(|(a, b)| a - b)) / whole
-    });
-    assert!(three > 1.0, "three lines are no spectrum");
-    assert!(continuous < 0.15, "{continuous}");
-}
-
-/// Of the beam to the plates' normal.
-const TILT_RAD: f64 = 0.1;
-const CEILING_HALF_M: f64 = 1.0;
-const GLASS: &str = "N-SF11";
-
-fn gold() -> &'static Metal {
-    Metal::by_name("gold").expect("a metal")
-}
-
-/// A narrow beam of one luminous-equivalent watt down onto a pane over a plate of gold, beneath a ceiling.
-fn gold_under_glass(spectrum: &Arc<Spectrum>) -> Scene {
-    let mut scene = Scene::default();
-    let mut plate = parts::mirror();
-    plate.set_metal(gold());
-    parts::add(
-        &mut scene,
-        "plate",
-        shapes::floor([-3.0, 3.0], [-3.0, 3.0], 0.0),
-        plate,
-    );
-    let pane = shapes::cuboid(DVec3::new(-3.0, 0.1, -3.0), DVec3::new(3.0, 0.2, 3.0));
-    parts::add(&mut scene, "pane", pane, parts::glass(GLASS));
-    let half = CEILING_HALF_M;
-    let ceiling = shapes::rectangle(DVec3::Y * 1.5, DVec3::X * half, DVec3::Z * half);
-    let grey = parts::matte("ceiling", LinearSrgb::grey(0.5));
-    parts::add(&mut scene, "ceiling", ceiling, grey);
-    let down = DVec3::new(TILT_RAD.sin(), -TILT_RAD.cos(), 0.0);
-    scene
-        .lights
-        .push(parts::beam("lamp", DVec3::Y, down, 0.02, Flux(1.0)));
-    scene.lights[0].set_spectrum(Arc::clone(spectrum));
-    scene
-}
-
-/// What comes to the ceiling of each luminous-equivalent watt that comes to the pane [W per channel].
-fn to_ceiling(spectrum: &Arc<Spectrum>, wavelengths: Wavelengths) -> LinearSrgb {
-    let side = 64;
-    let settings = set(at_wavelengths(wavelengths, settings(side)), |s| {
-        s.branch_threshold = Some(1e-5)
-    });
-    let scene = gold_under_glass(spectrum);
-    let result = bake(scene, &settings);
-    let texel_m2 = (2.0 * CEILING_HALF_M / side as f64).powi(2);
-    let maps = result.maps.iter().filter(|map| map.chart.object() == 2);
-    let layers = maps.filter_map(|map| map.layer(LayerKind::Caustic));
-    let texels = layers.flat_map(|layer| &layer.irradiance);
-    let sum = texels.fold(LinearSrgb::BLACK, |sum, texel| {
-        sum + LinearSrgb::from(texel.map(f64::from)) * texel_m2
-    });
-    sum / result.ledgers[0].energy_w.emitted
-}
-
-/// Gold under a pane that parts light: all that a pane and a metal send back, whose many reflections form a geometric series each.
-fn sent_back(wavelength: Nanometres) -> f64 {
-    let glass = Glass::parse(GLASS).expect("a glass");
-    let interface = dielectric_reflectance(TILT_RAD.cos(), glass.dispersion.index(wavelength));
-    let (pane, through) = (
-        2.0 * interface / (1.0 + interface),
-        (1.0 - interface) / (1.0 + interface),
-    );
-    let metal = gold().reflectance(TILT_RAD.cos(), wavelength);
-    pane + through * through * metal / (1.0 - pane * metal)
-}
-
-#[test]
-fn gold_under_glass_reflects_by_wavelength() {
-    for name in ["D65", "LED-B1", "line:500"] {
-        let spectrum = lamp(name);
-        let xyz = spectrum.integral_times(VISIBLE, |wavelength| {
-            xyz_bar(wavelength).map(|channel| channel * sent_back(wavelength))
-        });
-        let expected = Xyz::from(xyz).to_linear_srgb();
-        for (wavelengths, tolerance) in [(Wavelengths::Continuous, 0.012), (Wavelengths::Fixed(24), 0.004)] {
-            let found = to_ceiling(&spectrum, wavelengths);
-            let error = (found - expected).map(f64::abs).max_channel();
-            assert!(
-                error < tolerance * expected.max_channel(),
-                "{name}: {found:?} for {expected:?}"
-            );
-        }
-    }
 }

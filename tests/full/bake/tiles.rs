@@ -10,7 +10,6 @@ use nephroid::illumination::tiles::{SIDE, TileLayout};
 use nephroid::illumination::{Chart, tiles};
 use nephroid::light_pass::wavefront::coverage::{CoverageReport, FluxTriangle};
 
-use crate::bake::common::with_threads;
 use crate::bake::coverage::{deposit_on, full_chart, sum};
 
 /// Tiles of which none is square but the first.
@@ -83,26 +82,6 @@ fn deposited(layout: Option<TileLayout>, triangles: &[FluxTriangle]) -> (Vec<Flu
 }
 
 #[test]
-fn places_of_texels_agree() {
-    let layout = mixed();
-    let mut seen = vec![0; layout.texel_count()];
-    for row in 0..SIZE.1 {
-        let texels: Vec<usize> = layout.row_texels(row).collect();
-        assert_eq!(texels.len(), SIZE.0);
-        for (column, texel) in texels.into_iter().enumerate() {
-            assert_eq!(texel, layout.texel(column, row));
-            seen[texel] += 1;
-        }
-    }
-    for tile in layout.tiles() {
-        let texels = 1 << (2 * tile.level);
-        assert!(seen[tile.texels].iter().all(|&count| count == texels));
-    }
-    let levels: Vec<u8> = layout.tiles().map(|tile| tile.level).collect();
-    assert!((0..=4).all(|level| levels.contains(&level)), "{levels:?}");
-}
-
-#[test]
 fn the_finest_tiles_hold_what_a_map_holds() {
     let triangles = triangles(4_000);
     let layout = layout_of(|_| 0);
@@ -136,19 +115,6 @@ fn mixed_tiles_hold_sums_of_finer_texels() {
     }
     let mut pairs = tiled.as_flattened().iter().zip(sums.as_flattened());
     assert!(pairs.all(|(own, sum)| (own - sum).abs() < 100_000));
-}
-
-#[test]
-fn triangles_within_leave_nothing_outside() {
-    let size = DVec2::new(SIZE.0 as f64, SIZE.1 as f64);
-    let inside = |triangle: &FluxTriangle| {
-        let is_on = |corner: &DVec2| corner.cmpge(DVec2::ZERO).all() && corner.cmple(size).all();
-        triangle.corners.iter().all(is_on)
-    };
-    let triangles: Vec<FluxTriangle> = triangles(4_000).into_iter().filter(inside).collect();
-    assert!(triangles.len() > 2_000);
-    let (_, report) = deposited(Some(mixed()), &triangles);
-    assert_eq!(report.outside, [0; 3]);
 }
 
 #[test]
@@ -282,15 +248,6 @@ fn tiles_are_smoothed_as_one_map() {
 }
 
 #[test]
-fn no_spread_changes_nothing() {
-    for spread in [0.0, -1.0, f64::NAN] {
-        let mut flux = speckled(20, 30);
-        smooth(&mut flux, None, spread);
-        assert_eq!(flux, speckled(20, 30));
-    }
-}
-
-#[test]
 fn points_spread_by_the_variance() {
     let (width, height) = (128, 112);
     // The last two go by way of a coarser map, in which places are rounded: the mean of points at all of them.
@@ -325,64 +282,5 @@ fn points_spread_by_the_variance() {
             spread < 3.0 || (peak / gaussian - 1.0).abs() < if places == 1 { 0.04 } else { 0.06 },
             "{peak} {gaussian}"
         );
-    }
-}
-
-#[test]
-fn even_flux_stays_even_and_all_evens_out() {
-    let mut flux = FluxAccumulator::new(40, 25);
-    flux.texels_mut().fill([1_000_000; 3]);
-    smooth(&mut flux, None, 3.0);
-    assert!(
-        flux.texels()
-            .iter()
-            .flatten()
-            .all(|count| (count - 1_000_000).abs() <= 1)
-    );
-    let mut flux = speckled(40, 25);
-    let mean = sums(&flux)[0] / 1000;
-    smooth(&mut flux, None, 1000.0);
-    for texel in flux.texels() {
-        assert!(
-            (texel[0] - mean).abs() <= 2 + mean / 1_000_000,
-            "{texel:?} {mean}"
-        );
-    }
-}
-
-#[test]
-fn borders_mirror() {
-    // A wide map that mirrors a narrow one at its right border smooths to the narrow one's result there.
-    let (width, height, reach) = (12, 10, 12);
-    let narrow = speckled(width, height);
-    let mut wide = FluxAccumulator::new(3 * width, height);
-    for (index, texel) in wide.texels_mut().iter_mut().enumerate() {
-        let (column, row) = (index % (3 * width), index / (3 * width));
-        let place = (column + width) % (2 * width);
-        *texel = narrow.texels()[row * width + place.min(2 * width - 1 - place)];
-    }
-    let (mut narrow, mut wide) = (narrow, wide);
-    smooth(&mut narrow, None, 2.0);
-    smooth(&mut wide, None, 2.0);
-    for (index, a) in narrow.texels().iter().enumerate() {
-        let b = wide.texels()[index / width * 3 * width + reach + index % width];
-        for (a, b) in a.iter().zip(b) {
-            assert!((a - b).abs() <= 4 + (b >> 40), "{a} {b}");
-        }
-    }
-}
-
-#[test]
-fn any_number_of_threads_gives_the_same() {
-    let smoothed = |threads: usize| {
-        with_threads(threads, || {
-            let mut flux = speckled(64, 50);
-            smooth(&mut flux, None, 1.7);
-            flux
-        })
-    };
-    let one = smoothed(1);
-    for threads in [2, 4, 7] {
-        assert!(smoothed(threads) == one, "{threads} threads");
     }
 }

@@ -1,17 +1,15 @@
 //! The wavefront estimator against an independent solver, and by its counters; and real files made by others
 //! (`../shared/scenes`, where it is there), baked without a fault.
 
-use glam::{DMat3, DVec3};
-use nephroid::bake::Bake;
 use nephroid::effect::Effect;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::{LoadOptions, Scene};
 
-use crate::bake::common::{floor, rmse, towards};
+use crate::bake::common::floor;
 use support::references::references;
-use support::tools::{at, bake, builtin_scene, energy_fault, map_of, photons, set, settings, transformed};
-use support::{assert_close, hard_scenes, or_skip, project_file, reference_map, shared_or_skip};
+use support::tools::{at, bake, builtin_scene, energy_fault, map_of, photons};
+use support::{assert_close, or_skip, project_file, shared_or_skip};
 
 /// The others are in the quick tests.
 #[test]
@@ -29,42 +27,6 @@ fn few_rays_agree_with_the_solver() {
             let texel_m = map_of(&result, &scene, "floor").chart.texel_area_m2(0).sqrt();
             check_far_field(&floor(&result, &scene), texel_m);
         }
-    }
-}
-
-/// As a lamp's irradiance falls with the square of the size, and a sun's does not.
-#[test]
-fn splats_of_moved_scenes_agree() {
-    let rotation = DMat3::from_axis_angle(DVec3::new(0.3, -0.8, 0.52).normalize(), 1.234);
-    let size = 3.7;
-    let references = references();
-    let plain = ["mirror", "slab", "nephroid"];
-    for reference in references.iter().filter(|it| plain.contains(&it.builtin)) {
-        let scene = transformed(builtin_scene(reference.builtin), rotation, size, DVec3::ZERO);
-        let (density, most) = reference.by_splats.expect("held to it");
-        let result = bake(scene.clone(), &settings(density, 256));
-        reference.check(&result, &scene, size, (most, 0.005));
-    }
-}
-
-#[test]
-fn the_solvers_files_agree_with_its_maps() {
-    for reference in references()
-        .iter()
-        .filter(|reference| reference.by_splats.is_some())
-    {
-        let Some(path) = shared_or_skip(&format!("oracle/{}.glb", reference.file)) else {
-            continue;
-        };
-        let path = path.to_str().expect("a readable path");
-        let scene = Scene::load(path, &LoadOptions::default()).expect("a valid file");
-        let (density, most) = reference.by_wavefronts;
-        reference.check(
-            &bake(scene.clone(), &at(density, 256)),
-            &scene,
-            1.0,
-            (most, 0.005),
-        );
     }
 }
 
@@ -103,92 +65,6 @@ fn check_far_field(image: &[f64], texel_m: f64) {
         }
         let what = format!("ring {inner:.2} to {outer:.2} m");
         assert_close(flux / area, expected / whole, 0.05, &what);
-    }
-}
-
-/// Errors of the meshes themselves (of the solver's own files; a little is left for the deposit).
-#[test]
-fn more_rays_find_the_meshs_own_error() {
-    for (name, reference, density, mesh) in [
-        ("ring", "S1", 1e5, 0.0014),
-        ("pool", "S3", 1e5, 0.007),
-        ("paraboloid", "S7", 3e5, 0.0014),
-    ] {
-        let scene = builtin_scene(name);
-        let [coarse, fine] = [density / 10.0, density].map(|density| {
-            let result = bake(scene.clone(), &at(density, 256));
-            rmse(&floor(&result, &scene), &reference_map(reference))
-        });
-        assert!(
-            fine <= 1.3 * mesh || fine < 0.5 * coarse,
-            "{name}: {coarse} only falls to {fine}"
-        );
-    }
-}
-
-#[test]
-fn what_refinement_leaves_open_shrinks() {
-    let [coarse, fine] = [1e3, 3e4].map(|density| {
-        let result = bake(builtin_scene("ball"), &at(density, 64));
-        let energy = result.ledgers[0].energy_w;
-        energy.truncated.quadrature.abs() / energy.emitted
-    });
-    assert!(
-        fine < 2e-3 && fine < coarse,
-        "{coarse} of the emitted flux, then {fine}"
-    );
-}
-
-/// Given up below the threshold, over what arrived.
-fn left_out(result: &Bake) -> f64 {
-    let energy = &result.ledgers[0].energy_w;
-    energy.truncated.threshold / energy.deposited
-}
-
-/// Branches too weak to matter are not traced: how weak follows the target, and their watts are booked.
-#[test]
-fn a_tighter_target_follows_weaker_branches() {
-    let targets = [0.1, 0.03, 0.01];
-    let shares = targets.map(|target| {
-        let result = bake(builtin_scene("ball"), &towards(target, 64));
-        assert_eq!(energy_fault(&result), None);
-        let share = left_out(&result);
-        assert!(share > 0.0, "something is always too weak");
-        assert!(share < 0.1 * target, "{share} at a target of {target}");
-        share
-    });
-    assert!(shares.windows(2).all(|pair| pair[1] < pair[0]), "{shares:?}");
-    // Rays of splats are always the same, their segments are not.
-    let splats = targets.map(|target| {
-        let settings = set(settings(4_000.0, 64), |s| {
-            s.branch_threshold = Some(towards(target, 64).path_threshold())
-        });
-        let result = bake(builtin_scene("ball"), &settings);
-        (result.counts.rays, result.counts.segments, left_out(&result))
-    });
-    for pair in splats.windows(2) {
-        assert_eq!(pair[0].0, pair[1].0);
-        assert!(pair[0].1 < pair[1].1 && pair[0].2 > pair[1].2, "{splats:?}");
-    }
-}
-
-#[test]
-fn a_named_threshold_is_taken_as_it_is() {
-    let named = set(towards(0.01, 64), |s| s.branch_threshold = Some(0.02));
-    assert_eq!(named.path_threshold().to_bits(), 0.02_f64.to_bits());
-    assert!(towards(0.1, 64).path_threshold() > towards(0.01, 64).path_threshold());
-}
-
-#[test]
-fn a_floor_of_two_objects_takes_the_same_light() {
-    for name in ["ring", "pool"] {
-        let whole = builtin_scene(name);
-        let cut = hard_scenes::with_cut_floor(whole.clone());
-        let [whole, cut] = [whole, cut].map(|scene| bake(scene, &at(1e4, 128)));
-        assert_eq!(energy_fault(&cut), None, "{name}");
-        assert_eq!(cut.maps.len(), 2, "{name}");
-        let deposited = |result: &Bake| result.ledgers[0].energy_w.deposited;
-        assert_close(deposited(&cut), deposited(&whole), 5e-4, name);
     }
 }
 

@@ -12,6 +12,7 @@ use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 use serde_json::{Value, json};
 
+use support::glb::{self, assembled};
 use support::keep_bytes;
 
 /// Damage by a seed: the same for the same one.
@@ -226,7 +227,7 @@ impl Damage {
             _ => self.json(&mut document),
         }
         match binary {
-            Some(binary) => assembled(&document, binary),
+            Some(binary) => assembled(document.to_string().into_bytes(), binary),
             None => document.to_string().into_bytes(),
         }
     }
@@ -240,7 +241,7 @@ impl Damage {
                 // What is longer or shorter is refused before it is looked at.
                 let mut damaged = self.bytes(&binary);
                 damaged.resize(binary.len(), 0);
-                assembled(&document, damaged)
+                assembled(document.to_string().into_bytes(), damaged)
             }
             _ => self.bytes(file),
         }
@@ -252,23 +253,8 @@ fn parts_of(file: &[u8]) -> Option<(Value, Option<Vec<u8>>)> {
     if !file.starts_with(b"glTF") {
         return Some((serde_json::from_slice(file).ok()?, None));
     }
-    let word = |at: usize| Some(u32::from_le_bytes(file.get(at..at + 4)?.try_into().ok()?) as usize);
-    let json_end = 20 + word(12)?;
-    let document = serde_json::from_slice(file.get(20..json_end)?).ok()?;
-    let binary = file.get(json_end + 8..).unwrap_or_default().to_vec();
-    Some((document, Some(binary)))
-}
-
-/// A binary file with lengths that fit, so that what is within is looked at.
-fn assembled(document: &Value, mut binary: Vec<u8>) -> Vec<u8> {
-    let mut text = document.to_string().into_bytes();
-    text.resize(text.len().next_multiple_of(4), b' ');
-    binary.resize(binary.len().next_multiple_of(4), 0);
-    let length = |bytes: &[u8]| (bytes.len() as u32).to_le_bytes();
-    let json = [&length(&text)[..], b"JSON", &text].concat();
-    let data = [&length(&binary)[..], b"BIN\0", &binary].concat();
-    let whole = 12 + json.len() as u32 + data.len() as u32;
-    [b"glTF\x02\0\0\0", &whole.to_le_bytes()[..], &json, &data].concat()
+    let (text, binary) = glb::parts_of(file)?;
+    Some((serde_json::from_slice(text).ok()?, Some(binary.to_vec())))
 }
 
 /// Counts the bytes that are allocated, on all threads: bakes have several.

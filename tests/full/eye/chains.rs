@@ -78,21 +78,6 @@ fn without_chains_clear_bodies_are_left_out() {
 }
 
 #[test]
-fn without_chains_mirrors_show_what_they_emit() {
-    let emitted = LinearSrgb::new(0.5, 0.25, 0.125);
-    let lit = Lit::under(Material {
-        emitted_radiance: emitted,
-        ..surface(SurfaceKind::Mirror, 1.5)
-    });
-    let view = looking([0.0, 1.0, 3.0], [0.0, 1.0, 0.0], 0.1);
-    let (picture, rays) = lit.seen(&view, EffectSwitch::Off);
-    assert_eq!(rays.chain_rays, 0);
-    for pixel in picture.radiance {
-        assert_eq!(pixel.map(f64::from), emitted.to_array());
-    }
-}
-
-#[test]
 fn without_chains_polish_shows_its_diffuse_part() {
     let wall = quad(DVec3::new(-1.0, -1.0, 0.0), DVec3::Y * 2.0, DVec3::X * 2.0);
     let polish = surface(SurfaceKind::Mixed, 1.5);

@@ -1,7 +1,5 @@
 //! What the eye sees through glass that parts wavelengths.
 
-use std::sync::Arc;
-
 use glam::{DMat3, DVec3};
 use nephroid::effect::{Effect, EffectSwitch};
 use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings};
@@ -9,9 +7,8 @@ use nephroid::eye_pass::wavelengths::{
     MAX_PER_PICTURE, SeenWavelength, bands, of_picture, share_below, shift_of_sample,
 };
 use nephroid::eye_pass::{Picture, View};
-use nephroid::optics::spectrum::Xyz;
 use nephroid::optics::wavelength::VISIBLE;
-use nephroid::optics::{Glass, LinearSrgb, Nanometres};
+use nephroid::optics::{LinearSrgb, Nanometres};
 use nephroid::plan::{self, EffectLine};
 use nephroid::scene::builtin::prism::{GLASS, Prism};
 use nephroid::scene::builtin::{parts, shapes};
@@ -79,22 +76,6 @@ fn every_set_of_wavelengths_adds_up_to_one() {
 }
 
 #[test]
-fn each_wavelength_of_white_has_its_colour() {
-    // Chromaticities of the spectral locus (CIE 018:2019) at the middle of a narrow band.
-    for (nm, expected) in [
-        (450.0, [0.156_641, 0.017_705]),
-        (520.0, [0.074_302, 0.833_803]),
-        (600.0, [0.627_037, 0.372_491]),
-    ] {
-        let band = share_below(Nanometres(nm + 0.5)) - share_below(Nanometres(nm - 0.5));
-        let colour = LinearSrgb::from((band * DVec3::ONE).to_array());
-        let found = Xyz::from(colour).chromaticity().expect("it is light");
-        let is_near = |axis: usize| (found[axis] - expected[axis]).abs() < 2e-3;
-        assert!(is_near(0) && is_near(1), "{nm}: {found:?}");
-    }
-}
-
-#[test]
 fn mean_of_many_pictures_nears_all_wavelengths() {
     // What is seen of light that passes below some wavelength.
     let off = |limit: f64, pictures: u32| {
@@ -143,24 +124,6 @@ fn white_stays_white_through_a_dispersive_slab() {
             let off = (f64::from(*channel) / 3.0 - 1.0).abs();
             assert!(off < 1e-3, "{wavelengths}: {channel}");
         }
-    }
-}
-
-#[test]
-fn glass_that_hardly_parts_shows_one_index() {
-    let mut material = Material {
-        base_colour: LinearSrgb::new(0.9, 0.5, 0.2),
-        ..parts::dielectric("glass", 1.5)
-    };
-    material.set_glass(Arc::new(Glass::with_abbe_number(1.5, 1e9)));
-    assert!(material.is_dispersive());
-    let plate = shapes::rectangle(DVec3::new(0.4, 1.0, -2.0), DVec3::X, DVec3::Y);
-    let backdrop = shining(LinearSrgb::new(0.1, 1.0, 4.0));
-    let scene = tracer(vec![(ball(), material), (plate, backdrop)], vec![]);
-    let ahead = looking([0.0, 1.5, 3.0], [0.0, 1.0, 0.0], [2.0, 0.3, 0.05]);
-    let [one, many] = [0, 7].map(|wavelengths| seen(&scene, &ahead, wavelengths, 1).0);
-    for (a, b) in one.radiance.iter().flatten().zip(many.radiance.iter().flatten()) {
-        assert!((a - b).abs() <= 1e-5, "{a} {b}");
     }
 }
 

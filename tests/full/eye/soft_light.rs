@@ -5,9 +5,6 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use nephroid::illumination::Side;
-use nephroid::light_pass::direct::bake_direct;
-use nephroid::optics::LinearSrgb;
-use nephroid::progress::Control;
 use nephroid::scene::{Environment, Light, LightKind, LightSize, Material, Mesh, PanelShape};
 use nephroid::transport::Tracer;
 use nephroid::units::Radiance;
@@ -339,26 +336,4 @@ fn lamp_on_its_receiver_stays_finite() {
             }
         }
     }
-}
-
-#[test]
-fn same_bytes_for_any_number_of_threads() {
-    let sky = Environment::new(2, 2, vec![[1.0, 0.5, 0.2], [0.3; 3], [0.0; 3], [0.1; 3]]);
-    let ball = sphere(DVec3::new(0.0, 0.4, 0.0), 0.3, 24, 12);
-    let lamps = vec![panel(0.2, 1.5, 1.0, PanelShape::Disc), sky_light(1.0)];
-    let mut scene = scene(vec![matte(floor(1.0, 0.0)), matte(ball)], lamps);
-    scene.environment = sky.map(Arc::new);
-    scene.lights[0].colour = LinearSrgb::new(1.0, 0.5, 0.25);
-    let tracer = Tracer::new(Arc::new(scene));
-    let charts = [chart(&tracer, 0, 24, 24), chart(&tracer, 1, 32, 32)];
-    let [one, three] = [1, 3].map(|threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let charts: Vec<_> = charts.iter().map(|chart| (chart, None)).collect();
-        let bake = || bake_direct(&tracer, &tracer.scene().lights, &charts, &(), &Control::default());
-        let layers = pool.expect("threads").install(bake).into_iter();
-        layers
-            .map(|layer| (layer.irradiance, layer.shadow_rays))
-            .collect::<Vec<_>>()
-    });
-    assert_eq!(one, three);
 }

@@ -304,24 +304,6 @@ fn device_shows_what_the_cpu_shows() {
     assert!(faults.is_empty(), "{faults:#?}");
 }
 
-/// Light that goes to and fro within a slab adds up to the transmittance of all orders, of which the device follows
-/// those of two surfaces both ways.
-#[test]
-fn slab_lets_through_between_one_and_all_orders() {
-    let mut slab = floor_scene(diffuse(LinearSrgb::WHITE));
-    let body = shapes::cuboid(DVec3::new(-1.0, 0.25, -1.0), DVec3::new(2.0, 0.5, 2.0));
-    parts::add(&mut slab, "slab", body, parts::dielectric("water", 1.33));
-    let mut rig = or_skip!(Rig::new(&slab, &even([1.0; 3])));
-    let r = nephroid::optics::fresnel::dielectric_reflectance(1.0, 1.33);
-    let once = lambert(1.0, 1.0) * (1.0 - r) * (1.0 - r);
-    let found = f64::from(rig.picture(&from_above(65)).radiance[65 * 32 + 32][0]);
-    let all_orders = once / (1.0 - r * r);
-    assert!(
-        (once * 0.999..=all_orders * 1.001).contains(&found),
-        "{found}, {once}"
-    );
-}
-
 #[test]
 fn chains_keep_to_their_laws() {
     for law in chain_laws::all() {

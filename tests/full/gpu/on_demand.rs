@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use nephroid::effect::EffectSwitch;
+use nephroid::eye_pass::View;
 use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings};
-use nephroid::eye_pass::renderer::{MapStyle, Renderer};
-use nephroid::eye_pass::{ToneMap, View};
+use nephroid::eye_pass::renderer::Renderer;
 use nephroid::illumination::IlluminationMap;
 use nephroid::optics::LinearSrgb;
-use nephroid::plan;
-use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Camera, Material, Scene, SurfaceKind};
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::scene::{Material, Scene, SurfaceKind};
 use nephroid::transport::Tracer;
 
 use crate::gpu::rig::{Rig, or_skip};
@@ -105,36 +104,6 @@ fn specular_pipelines_wait_for_such_a_view() {
 }
 
 #[test]
-fn objects_of_one_kind_share_pipelines() {
-    let (mut scene, maps) = hall();
-    for z in [-2.0, -1.0, 0.0, 1.0, 2.0] {
-        let ball = shapes::sphere(DVec3::new(4.0, 0.3, z), 0.1, 2);
-        parts::add(&mut scene, "another", ball, parts::dielectric("glass", 1.3));
-    }
-    let mut rig = or_skip!(Rig::new(&scene, &maps));
-    rig.picture(&to_specular());
-    assert_eq!(rig.renderer.counts().specular_pipelines, 3);
-}
-
-#[test]
-fn forced_on_all_is_made_at_once() {
-    let (Some(mut forced), Some(mut auto)) = (rig(), rig()) else {
-        return;
-    };
-    forced.set_chains(EffectSwitch::On);
-    let at_once = made(&forced.renderer);
-    for view in [to_matte(), to_specular(), to_matte()] {
-        assert!(bits(&forced.picture(&view)) == bits(&auto.picture(&view)));
-    }
-    assert_eq!(made(&auto.renderer), at_once);
-    // In a matte scene that is nothing specular.
-    let matte = floor_scene(diffuse(LinearSrgb::WHITE));
-    let mut rig = Rig::new(&matte, &[]).expect("there is a device");
-    rig.set_chains(EffectSwitch::On);
-    assert_eq!(made(&rig.renderer), (1, 0, 0));
-}
-
-#[test]
 fn switched_off_everything_is_given_up() {
     let (Some(mut rig), view) = (rig(), to_specular()) else {
         return;
@@ -179,14 +148,6 @@ fn switched_off_everything_is_given_up() {
 }
 
 #[test]
-fn maps_as_they_are_need_nothing_specular() {
-    let mut rig = or_skip!(rig());
-    rig.renderer.set_map_style(MapStyle::AsItIs);
-    rig.picture(&to_specular());
-    assert_eq!(made(&rig.renderer), (1, 0, 0));
-}
-
-#[test]
 fn new_maps_reach_mirrors_out_of_view() {
     let mut rig = or_skip!(rig());
     rig.picture(&to_specular());
@@ -198,68 +159,5 @@ fn new_maps_reach_mirrors_out_of_view() {
         rig.set_maps(&maps);
         rig.picture(&to_specular());
         assert_eq!(rig.renderer.counts().specular_pipelines, 3, "{} maps", maps.len());
-    }
-}
-
-fn tells_time(rig: &Rig) -> bool {
-    rig.gpu
-        .device
-        .features()
-        .contains(wgpu::Features::TIMESTAMP_QUERY)
-}
-
-#[test]
-fn each_tone_map_has_a_pipeline() {
-    let mut rig = or_skip!(rig());
-    for (tone_map, pipelines) in [(ToneMap::None, 2), (ToneMap::Neutral, 3), (ToneMap::None, 3)] {
-        rig.drawn(&View {
-            tone_map,
-            ..to_matte()
-        });
-        assert_eq!(rig.renderer.counts().pipelines, pipelines, "{tone_map:?}");
-    }
-    rig.gpu.wait().expect("no fault");
-    rig.renderer.collect_times(rig.gpu);
-    let times = rig.renderer.counts().gpu_ms;
-    assert_eq!(times.is_some(), tells_time(&rig));
-    let is_time = |ms: f64| ms > 0.0 && ms.is_finite();
-    assert!(times.is_none_or(|times| is_time(times.tone_mapping)), "{times:?}");
-}
-
-#[test]
-fn device_tells_how_long_it_took() {
-    let mut rig = or_skip!(rig());
-    assert_eq!(rig.renderer.counts().gpu_ms, None, "nothing was drawn");
-    for (view, has_specular) in [(to_matte(), false), (to_specular(), true)] {
-        rig.picture(&view);
-        let times = rig.renderer.counts().gpu_ms;
-        assert_eq!(times.is_some(), tells_time(&rig));
-        let Some(times) = times else { continue };
-        let sum = times.opaque + times.specular;
-        assert!(times.opaque >= 0.0 && sum > 0.0 && sum.is_finite(), "{times:?}");
-        assert!(has_specular || times.specular == 0.0, "{times:?}");
-        assert_eq!(times.tone_mapping, 0.0, "radiance is read back as it is");
-    }
-}
-
-#[test]
-fn built_in_scenes_look_the_same_on_auto_and_on() {
-    for name in builtin::NAMES {
-        let scene = builtin::build(name).expect("listed");
-        let (Some(mut auto), Some(mut on)) = (Rig::new(&scene, &[]), Rig::new(&scene, &[])) else {
-            return;
-        };
-        on.set_chains(EffectSwitch::On);
-        let camera = &scene.cameras[0];
-        for forward in [camera.forward, -camera.forward] {
-            let mut view = to_matte();
-            view.camera = Camera {
-                forward,
-                ..camera.clone()
-            };
-            assert!(bits(&auto.picture(&view)) == bits(&on.picture(&view)), "{name}");
-            let line = plan::chains(&scene, Some((&view.camera, 1.5)), EffectSwitch::Auto);
-            assert_eq!(drawn(&auto.renderer).1 > 0, line.on, "{name}: {}", line.reason);
-        }
     }
 }

@@ -150,8 +150,11 @@ fn compare(scene: Scene, count: usize) {
     let verdicts = judge.all(&rays, &answers);
     let of = |kind: Verdict| verdicts.iter().filter(|verdict| **verdict == kind).count();
     if let Some(first) = verdicts.iter().position(|verdict| *verdict == Verdict::Wrong) {
-        let (ray, answer) = (&rays[first], &answers[first]);
-        panic!("{} are wrong, the first: {ray:?}, {answer:?}", of(Verdict::Wrong));
+        let (name, ray, answer) = (&scene.name, &rays[first], &answers[first]);
+        panic!(
+            "{name}: {} are wrong, the first: {ray:?}, {answer:?}",
+            of(Verdict::Wrong)
+        );
     }
     assert!(of(Verdict::Met) > count / 4, "{} hits", of(Verdict::Met));
     // The comparison sees answers of other rays, and distances off by a thousandth.
@@ -171,17 +174,9 @@ fn compare(scene: Scene, count: usize) {
 }
 
 #[test]
-fn rays_through_the_showroom_meet_the_same() {
+fn rays_meet_what_they_meet_on_the_cpu() {
     compare(builtin_scene("showroom"), 340_000);
-}
-
-#[test]
-fn rays_at_a_bumpy_sphere_meet_the_same() {
     compare(bumpy_sphere(), 330_000);
-}
-
-#[test]
-fn rays_among_slivers_far_away_meet_the_same() {
     compare(awkward(), 330_000);
 }
 

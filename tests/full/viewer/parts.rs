@@ -2,9 +2,7 @@
 //! other programs change, files of theirs that are edited and saved, and frames that are written.
 
 use std::fs;
-use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 use egui::accesskit::Role;
 use egui::pos2;
@@ -14,10 +12,7 @@ use nephroid::eye_pass::{ToneMap, View};
 use nephroid::geometry::Ray;
 use nephroid::optics::LinearSrgb;
 use nephroid::optics::spectrum::xyz::IDENTITY;
-use nephroid::scene::load::save;
-use nephroid::scene::{
-    Camera, Edit, Light, LightEdit, LightKind, LoadOptions, MaterialEdit, Motion, builtin, turntable,
-};
+use nephroid::scene::{Camera, Edit, Light, LightEdit, LightKind, MaterialEdit, Motion, builtin, turntable};
 use nephroid::settings::{BakeSettings, Estimator, Sigma};
 use nephroid::transport::Tracer;
 use nephroid::viewer::ViewerOptions;
@@ -27,10 +22,9 @@ use nephroid::viewer::exporting::{ExportState, Exporter};
 use nephroid::viewer::files::FilesOptions;
 use nephroid::viewer::filming::FilmJob;
 use nephroid::viewer::new_light::{NewLight, ViewTarget};
-use serde_json::Value;
 
 use super::fixtures::{
-    act, added, bake, change, edited, folder, intensity, model, options, read, scene, set, until, wait_for,
+    act, added, bake, change, edited, folder, model, options, read, scene, set, until, wait_for,
 };
 use super::headless::{Headless, SCREEN, splats};
 use super::scene_file;
@@ -57,40 +51,17 @@ fn shooting(frames: usize) -> FilmJob {
 }
 
 #[test]
-fn frames_are_written_and_can_be_stopped() {
+fn filming_can_be_stopped() {
     let folder = folder();
-    let news = Arc::new(AtomicUsize::new(0));
-    let of_thread = Arc::clone(&news);
-    let mut exporter = Exporter::new(&Wake::new(move || {
-        of_thread.fetch_add(1, Ordering::SeqCst);
-    }));
-    exporter.film(shooting(3), folder.path().to_owned());
-    assert_eq!(exporter.state, ExportState::Filming { done: 0, total: 3 });
-    wait_for("the film", || exporter.poll());
-    let path = match &exporter.state {
-        ExportState::Done(path) => path.clone(),
-        ExportState::Failed(sentence) if sentence.contains("adapter") => {
-            return support::skip("frames from the window", sentence);
-        }
-        other => panic!("{other:?}"),
-    };
-    assert!(news.load(Ordering::SeqCst) >= 4, "each frame, and the end");
-    assert!(path.ends_with("nephroid-test-turntable-0001"), "{path:?}");
-    let files = fs::read_dir(&path).expect("a folder");
-    let mut names: Vec<_> = files.map(|file| file.expect("a file").file_name()).collect();
-    names.sort();
-    assert_eq!(names, ["frame-00001.png", "frame-00002.png", "frame-00003.png"]);
-    let frame = image::open(path.join(&names[0])).expect("a PNG").to_rgb8();
-    assert_eq!(frame.dimensions(), (48, 32));
-    assert_eq!(
-        frame.get_pixel(0, 0).0,
-        [255; 3],
-        "nothing is before the background"
-    );
-    assert!(frame.pixels().any(|pixel| pixel.0 != [255; 3]), "the scene is");
-
-    // One that is stopped says so.
+    let mut exporter = Exporter::new(&Wake::new(|| ()));
     exporter.film(shooting(10_000), folder.path().to_owned());
+    assert_eq!(
+        exporter.state,
+        ExportState::Filming {
+            done: 0,
+            total: 10_000
+        }
+    );
     std::thread::sleep(std::time::Duration::from_millis(300));
     exporter.stop();
     wait_for("the end", || exporter.poll());
@@ -279,60 +250,4 @@ fn nothing_is_cut_off_or_overlaps() {
             panel.assert_layout();
         }
     }
-}
-
-/// What an edit may touch; every other member of a file is to stay.
-const TOUCHED: [&str; 5] = ["nodes", "materials", "extensions", "extensionsUsed", "buffers"];
-
-#[test]
-fn real_files_are_saved_with_edits() {
-    let sources = support::or_skip!(support::shared_or_skip("scenes"));
-    let folder = folder();
-    let target = folder.path().join("saved.glb");
-    let sources = fs::read_dir(sources).expect("a readable folder");
-    let mut sources: Vec<_> = sources.map(|entry| entry.expect("an entry").path()).collect();
-    sources.retain(|path| path.extension().is_some_and(|extension| extension == "glb"));
-    let saved = sources.iter().filter(|source| is_saved(source, &target)).count();
-    // Some hold what no edit may change.
-    assert!(saved > sources.len() / 2, "{saved} of {}", sources.len());
-}
-
-/// Edits the first of everything, saves and reads back.
-fn is_saved(source: &Path, target: &Path) -> bool {
-    let loaded = read(source);
-    let mut edits = vec![
-        Edit::Material(0, MaterialEdit::Roughness(0.375)),
-        Edit::Material(0, MaterialEdit::Ior(1.75)),
-        Edit::Place(0, Motion::turned(0.0, DVec3::new(0.125, 0.25, -0.5))),
-    ];
-    let double = loaded
-        .lights
-        .first()
-        .map(|light| intensity(0, 2.0 * light.kind.strength()));
-    edits.extend(double.filter(|edit| edit.apply(&loaded).is_ok()));
-    let scene = edited(&loaded, &edits);
-    if save(target, &loaded, &scene, &LoadOptions::default()).is_err() {
-        return false;
-    }
-    let read = read(target);
-    let extent_m = scene.bounds().map_or(1.0, |(low, high)| (high - low).length());
-    let shift = read.origin_world - scene.origin_world;
-    for (a, b) in read.objects.iter().zip(&scene.objects) {
-        let mut corners = a
-            .mesh_in_scene()
-            .positions
-            .iter()
-            .zip(&b.mesh_in_scene().positions);
-        assert!(corners.all(|(a, b)| (*a + shift).distance(*b) < 1e-9 * extent_m));
-    }
-    assert_eq!(read.lights.len(), scene.lights.len());
-    let [before, after] = [source, target].map(|path| -> Value {
-        let text = scene_file::text_of(path);
-        serde_json::from_str(text.trim_end_matches(['\0', ' '])).expect("it is JSON")
-    });
-    for (name, value) in before.as_object().expect("an object") {
-        let is_same = TOUCHED.contains(&name.as_str()) || after[name] == *value;
-        assert!(is_same, "{name} of {}", source.display());
-    }
-    true
 }

@@ -3,11 +3,9 @@
 use glam::DVec3;
 use image::RgbImage;
 use nephroid::scene::builtin;
-use nephroid::viewer::panel::WIDTH;
 use serde_json::Value;
 
-use super::scene_file;
-use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, picture, pixel_of};
+use support::desktop::{ALIKE, Screen, Viewer, difference, picture, pixel_of};
 use support::or_skip;
 
 /// The caustic alone, refined until its error is small: several levels, and a bake of seconds, so that no window is so slow
@@ -92,71 +90,7 @@ fn handles_and_lamps_are_pulled_and_undone() {
     undo(&mut viewer);
     viewer.screenshot_that("is as before", |shot| difference(&before, shot) < ALIKE);
 
-    // The error takes the place of the light, with a legend, and goes again.
-    viewer.choose_view("error");
-    let false_colours = viewer.screenshot_that("shows errors", |shot| difference(&before, shot) > 0.1);
-    let coloured = |shot: &RgbImage| {
-        let spread = |rgb: [u8; 3]| {
-            rgb.iter()
-                .max()
-                .zip(rgb.iter().min())
-                .map_or(0, |(most, least)| most - least)
-        };
-        picture(shot).filter(|(.., rgb)| spread(*rgb) > 20).count()
-    };
-    assert_eq!(coloured(&before), 0, "the light is white");
-    assert!(coloured(&false_colours) > 20_000, "{}", coloured(&false_colours));
-    viewer.choose_view("light");
-    viewer.screenshot_that("shows light again", |shot| difference(&before, shot) < ALIKE);
     viewer.close();
-}
-
-/// A file without light, as a person meets it: the program's sun, a light of one's own, turned, removed and brought back, and
-/// why it is bright where it is brightest.
-#[test]
-fn dark_file_is_lit_and_its_spot_explained() {
-    let screen = or_skip!(Screen::start());
-    let folder = tempfile::tempdir().expect("a folder");
-    let dark = scene_file::glb(folder.path(), "dark", "0");
-    let coarse = "--max-error 20% --map-resolution 64";
-    let mut viewer = Viewer::open(&screen, &format!("{} {coarse}", dark.display()));
-    viewer.wait_for_bake();
-    let under_sun = viewer.screenshot();
-    viewer.open_sections(&["Scene"]);
-    viewer.click("Button", "Add spot");
-    viewer.wait_for("edit", is_edit_of("LightList"));
-    viewer.wait_for("picked", |event| event["name"] == "spot");
-    viewer.wait_for("done", |_| true);
-    viewer.screenshot_that("shows its light", |shot| difference(&under_sun, shot) > 0.03);
-
-    viewer.click("Button", "Aim light");
-    let (x, y) = ((WIDTH as i32 + SIZE.0 as i32) / 2, SIZE.1 as i32 / 2);
-    viewer.pull(&[(x, y), (x, y + 40)]);
-    viewer.wait_for("edit", is_edit_of("LightDirection(2)"));
-    viewer.let_go();
-    viewer.wait_for("done", |_| true);
-
-    viewer.forget();
-    viewer.click("Button", "Remove light");
-    viewer.wait_for("edit", is_edit_of("LightList"));
-    viewer.wait_for("done", |_| true);
-    viewer.hands("key ctrl+z");
-    viewer.wait_for("undone", |undone| undone["what"] == "removal of `spot`");
-    viewer.wait_for("done", |_| true);
-
-    viewer.hands("key p");
-    viewer.click("CheckBox", "hits");
-    viewer.click("CheckBox", "patches");
-    let has = |told: &Value, what: &str| told[what].as_u64() > Some(0);
-    viewer.wait_for("sketched", |told| has(told, "landings") && has(told, "patches"));
-    viewer.click("Button", "Brightest spot");
-    let told = viewer.wait_for("probe", |told| told["paths"].is_array());
-    assert!(told["texel"]["illuminance_lx"].as_f64() > Some(0.0), "{told:#}");
-    let shares = told["paths"].as_array().into_iter().flatten();
-    let sum: f64 = shares.filter_map(|path| path["share"].as_f64()).sum();
-    assert!((sum - 1.0).abs() < 0.05, "{told:#}");
-    let (stderr, _) = viewer.close();
-    assert!(stderr.contains("the scene has no light, so a sun"), "{stderr}");
 }
 
 /// What is clicked in the picture is what is told of, and what the panel changes.
@@ -167,7 +101,7 @@ fn glass_ball_is_probed_and_bends_otherwise() {
         &screen,
         "builtin:ball --estimator wavefront --density 20000 --map-resolution 128 --layers caustic,direct",
     );
-    let (first, _) = viewer.wait_for_bake();
+    viewer.wait_for_bake();
     probe(&mut viewer);
     viewer.hands("key p");
 
@@ -186,16 +120,6 @@ fn glass_ball_is_probed_and_bends_otherwise() {
     viewer.let_go();
     viewer.wait_for("done", |_| true);
     viewer.screenshot_that("bends otherwise", |shot| difference(&before, shot) > 0.01);
-
-    // More rays are traced where more are asked for.
-    viewer.centre("Slider", "Ray density [rays/sr]");
-    let slider = viewer.on_slider("Ray density [rays/sr]", [0.2, 0.3]);
-    viewer.pull(&slider);
-    let density = |event: &Value| event["settings"]["density_per_sr"].as_f64();
-    let set = viewer.wait_for("settings", |set| density(set) > density(&first));
-    viewer.let_go();
-    let done = viewer.wait_for("done", |done| density(done) >= density(&set));
-    assert!(done["rays"].as_u64() > Some(0), "{done}");
     viewer.close();
 }
 
@@ -216,35 +140,11 @@ fn probe(viewer: &mut Viewer<'_>) {
             "{probe}"
         );
     }
-    let texel = &probe["texel"];
     let paths = probe["paths"].as_array().expect("paths");
-    let is_over_glass = |path: &&Value| {
-        path["vertices_m"]
-            .as_array()
-            .is_some_and(|places| !places.is_empty())
-    };
-    let over_glass: Vec<f64> = paths
-        .iter()
-        .filter(is_over_glass)
-        .map(|path| number(&path["irradiance_w_m2"]))
-        .collect();
-    assert!(!over_glass.is_empty(), "{probe}");
-    let (sum, caustic) = (
-        over_glass.iter().sum::<f64>(),
-        number(&texel["irradiance_w_m2"]["caustic"]),
-    );
-    let most = 3.0 * number(&texel["error_w_m2"]) + 0.02 * caustic;
-    assert!((sum - caustic).abs() < most, "{sum}: {probe}");
+    let vertices = |path: &Value| path["vertices_m"].as_array().map_or(0, Vec::len);
+    assert!(paths.iter().any(|path| vertices(path) > 0), "{probe}");
     let shares: f64 = paths.iter().map(|path| number(&path["share"])).sum();
     assert!((shares - 1.0).abs() < 1e-9, "nothing else lights it: {probe}");
-    let lx = number(&texel["illuminance_lx"]);
-    let total: f64 = texel["irradiance_w_m2"]
-        .as_object()
-        .expect("layers")
-        .values()
-        .map(number)
-        .sum();
-    assert!((lx - 683.0 * total).abs() < 1e-6 * lx, "{probe}");
 
     // Lines in a colour that nothing else has, from high above the floor down to the point.
     let is_line = |[r, g, b]: [u8; 3]| r > 200 && (120..230).contains(&g) && b < 120;

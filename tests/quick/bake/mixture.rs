@@ -3,10 +3,10 @@
 use nephroid::optics::Glass;
 use nephroid::scene::{Glow, Variation};
 use nephroid::units::Radiance;
-use support::floors::texture_reference;
+use support::floors::{image, texture_reference};
 use support::meshes::{floor, quad};
 use support::scenes::{chart, direct, flux_w, light, scene};
-use support::tools::{bake, bits, caustic, energy_fault, photons};
+use support::tools::{bake, caustic, energy_fault, photons};
 
 use crate::prelude::*;
 
@@ -18,14 +18,8 @@ const SQUARE: usize = 64;
 /// A chessboard of two texels, or all of one.
 fn board(of: impl Fn(bool) -> [u8; 4]) -> Texture {
     let is_light = |texel: usize| (texel % TEXELS / SQUARE + texel / TEXELS / SQUARE).is_multiple_of(2);
-    Texture {
-        name: "board".into(),
-        width: TEXELS as u32,
-        height: TEXELS as u32,
-        rgba: (0..TEXELS * TEXELS).map(|texel| of(is_light(texel))).collect(),
-        wrap: [Wrap::ClampToEdge; 2],
-        is_nearest: false,
-    }
+    let rgba = (0..TEXELS * TEXELS).map(|texel| of(is_light(texel)));
+    image(TEXELS as u32, rgba.collect(), Wrap::ClampToEdge)
 }
 
 /// A plate of the material, with the image, between a floor and a ceiling under which a lamp hangs.
@@ -111,7 +105,6 @@ fn boards_are_half_of_each_kind() {
         let scene = |of: &dyn Fn(bool) -> [u8; 4]| lit(material.clone(), board(of));
         let mixed = fluxes(&scene(&|is_light| if is_light { light } else { dark }));
         let [bright, dim] = [light, dark].map(|all| fluxes(&scene(&|_| all)));
-        println!("{what}: {mixed:?} of {bright:?} and {dim:?}");
         for (place, flux_w) in mixed.into_iter().enumerate() {
             let expected_w = 0.5 * (bright[place] + dim[place]);
             // Four standard errors of two hundred thousand photons.
@@ -146,7 +139,6 @@ fn shadows_of_boards_are_half_of_each_kind() {
         let (shut_w, open_w) = (shone_w(1.0, &|_| 255), shone_w(1.0, &|_| 0));
         let mixed_w = shone_w(1.0, &|is_light| if is_light { 255 } else { 0 });
         let quarter_w = shone_w(0.25, &|_| 255);
-        println!("{mixed_w} of {shut_w} and {open_w}, a quarter {quarter_w}");
         near(mixed_w, 0.5 * (shut_w + open_w), 0.01 * open_w, "half of each");
         near(
             quarter_w,
@@ -178,25 +170,6 @@ fn glass_that_varies_disperses() {
     let (plain, by_image) = (lit_by(|glass| glass), lit_by(varied));
     assert!(plain.iter().any(|[red, _, blue]| (red - blue).abs() > 0.2 * red));
     assert!(plain == by_image);
-}
-
-#[test]
-fn boards_do_not_depend_on_threads() {
-    let material = varied(Material {
-        transmission: 1.0,
-        roughness: 0.4,
-        ..Material::default()
-    });
-    let image = board(|is_light| if is_light { [255; 4] } else { [0, 99, 255, 255] });
-    let scene = lit(material, image);
-    let baked = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let result = pool
-            .expect("threads")
-            .install(|| bake(scene.clone(), &photons(3e4, 32)));
-        result.maps.iter().map(bits).collect::<Vec<_>>()
-    };
-    assert!(baked(1) == baked(3));
 }
 
 /// Flux on a floor under a lamp of radiance 10 W/(m² sr) where its image is white [W].
@@ -249,7 +222,6 @@ fn glowing_boards_are_half_of_each_kind() {
     let (light, dark) = ([255; 4], [99, 99, 99, 255]);
     let mixed_w = shone_by(Some(board(|is_light| if is_light { light } else { dark })));
     let [bright_w, dim_w] = [light, dark].map(|all| shone_by(Some(board(|_| all))));
-    println!("{mixed_w} of {bright_w} and {dim_w}, evenly {}", shone_by(None));
     near(bright_w, shone_by(None), 1e-9 * bright_w, "a white image is none");
     near(
         dim_w / bright_w,

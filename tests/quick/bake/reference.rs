@@ -32,7 +32,7 @@ fn splats_agree_with_the_solver() {
         };
         let scene = builtin_scene(reference.builtin);
         let result = bake(scene.clone(), &settings(density, 256));
-        reference.check(&result, &scene, 1.0, (most, 0.005));
+        reference.check(&result, &scene, (most, 0.005));
     }
 }
 

@@ -55,9 +55,9 @@ fn contents_effects_and_what_presets_take() {
 #[test]
 fn lights_have_kind_size_and_strength() {
     let sandbox = Sandbox::new();
-    sandbox.write("lamps.gltf", files::lamps_with_extent());
+    sandbox.write("lamps.glb", files::lamps_with_extent());
     sandbox.write("sky.hdr", files::grey_sky());
-    let inspect = "inspect lamps.gltf --environment sky.hdr --map-resolution 16";
+    let inspect = "inspect lamps.glb --environment sky.hdr --map-resolution 16";
     let report = sandbox.succeed(&format!("{inspect} --json")).json();
     let lights = report["lights"].as_array().expect("lights");
     let kinds: Vec<&str> = lights.iter().filter_map(|light| light["kind"].as_str()).collect();
@@ -92,8 +92,8 @@ fn rays_follow_the_density_and_switches_are_told() {
 #[test]
 fn glasses_metals_and_spectra_are_told() {
     let sandbox = Sandbox::new();
-    sandbox.write("glasses.gltf", files::glasses());
-    let inspect = "inspect glasses.gltf --map-resolution 16";
+    sandbox.write("glasses.glb", files::glasses("A"));
+    let inspect = "inspect glasses.glb --map-resolution 16";
     let report = sandbox.succeed(&format!("{inspect} --json")).json();
     let glass = &report["materials"][0]["glass"];
     assert!(
@@ -118,9 +118,9 @@ fn glasses_metals_and_spectra_are_told() {
                  spectrum `A` of 2856 K, 360 to 830 nm, | lm/W | dispersion: ";
     assert_tells(&sandbox, inspect, words);
     // Light of one colour alone has the largest efficacy there is: 683 lm/W at 555 nm.
-    sandbox.write("line.gltf", files::glasses().replace("\"A\"", "\"line:555\""));
+    sandbox.write("line.glb", files::glasses("line:555"));
     let report = sandbox
-        .succeed("inspect line.gltf --json --map-resolution 16")
+        .succeed("inspect line.glb --json --map-resolution 16")
         .json();
     let spectrum = &report["lights"][0]["spectrum"];
     near(number(&spectrum["lumens_per_watt"]), 683.0, 1.0, "lm/W");
@@ -152,22 +152,6 @@ fn measures_of_known_pairs() {
             let [found, expected] = [&report[name], expected].map(|value| value.as_f64().expect(name));
             near(found, expected, 1e-12, name);
         }
-    }
-}
-
-#[test]
-fn turned_or_moved_maps_do_not_pass() {
-    let sandbox = Sandbox::new();
-    let value = |column: usize, row: usize| (1 + column + 10 * row) as f32;
-    sandbox.write_pfm("map.pfm", 7, 3, value);
-    sandbox.write_pfm("flipped.pfm", 7, 3, |column, row| value(column, 2 - row));
-    sandbox.write_pfm("mirrored.pfm", 7, 3, |column, row| value(6 - column, row));
-    sandbox.write_pfm("shifted.pfm", 7, 3, |column, row| value((column + 1) % 7, row));
-    for wrong in ["flipped", "mirrored", "shifted"] {
-        let run = sandbox.run(&format!("compare {wrong}.pfm map.pfm --max-rmse 1"));
-        assert_eq!(run.code, 1, "{wrong}");
-        assert!(run.stderr.contains("above the limit"), "{}", run.stderr);
-        assert!(run.stdout.contains("relative RMSE"), "{}", run.stdout);
     }
 }
 

@@ -151,24 +151,10 @@ fn bake_prints_the_manifest_that_it_writes() {
 }
 
 #[test]
-fn a_bake_tells_its_forecast() {
-    let sandbox = Sandbox::new();
-    let bake = "bake builtin:ring -o out --error-metric rmse --max-error 0.5% --map-resolution 64 --json";
-    let manifest = sandbox.succeed(bake).json();
-    let forecast = &manifest["forecast"];
-    let rays = |part: &str| number(&forecast[part]["rays"]);
-    assert!(rays("made_at") > 0.0 && rays("expected") >= rays("made_at"));
-    assert_eq!(rays("actual"), number(&manifest["counts"]["rays"]));
-    let ratio = rays("actual") / rays("expected");
-    assert!((0.2..5.0).contains(&ratio), "{forecast}");
-    assert!(manifest["course"].as_array().expect("points").len() >= 2);
-}
-
-#[test]
 fn merged_shards_are_the_bake_bit_by_bit() {
     let sandbox = Sandbox::new();
-    sandbox.write("lamps.gltf", files::mirror_under_lamps());
-    let bake = "bake lamps.gltf --density 4000 --map-resolution 24 --layers caustic,direct --per-light";
+    sandbox.write("lamps.glb", files::mirror_under_lamps());
+    let bake = "bake lamps.glb --density 4000 --map-resolution 24 --layers caustic,direct --per-light";
     sandbox.succeed(&format!("{bake} -o whole"));
     for number in [1, 2] {
         let shard = sandbox.succeed(&format!("{bake} --shard {number}/2 -o part{number} --json"));
@@ -176,10 +162,10 @@ fn merged_shards_are_the_bake_bit_by_bit() {
         assert_eq!(sandbox.files(format!("part{number}")), ["shard.json", "sums.bin"]);
     }
     // The scene was moved meanwhile.
-    std::fs::rename(sandbox.path("lamps.gltf"), sandbox.path("moved.gltf")).expect("it can be moved");
+    std::fs::rename(sandbox.path("lamps.glb"), sandbox.path("moved.glb")).expect("it can be moved");
     let gone = sandbox.run("merge part2 part1 -o merged");
-    gone.failed_in_one_sentence(1, &["lamps.gltf", "there is no such file"]);
-    sandbox.succeed("merge part2 part1 -o merged --scene moved.gltf");
+    gone.failed_in_one_sentence(1, &["lamps.glb", "there is no such file"]);
+    sandbox.succeed("merge part2 part1 -o merged --scene moved.glb");
     let [whole, merged] = ["whole", "merged"].map(|folder| sandbox.manifest(folder));
     for name in ["ledgers", "energy_w", "error"] {
         assert_eq!(whole[name], merged[name], "{name}");
@@ -198,7 +184,7 @@ fn merged_shards_are_the_bake_bit_by_bit() {
     let late = sums.len() - 40;
     sums[late] ^= 0x10;
     sandbox.write("part2/sums.bin", sums);
-    let torn = sandbox.run("merge part2 part1 -o torn --scene moved.gltf");
+    let torn = sandbox.run("merge part2 part1 -o torn --scene moved.glb");
     torn.failed_in_one_sentence(1, &["part2", "damaged", "again"]);
 }
 

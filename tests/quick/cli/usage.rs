@@ -263,7 +263,7 @@ fn other_bad_usage_is_refused() {
 #[test]
 fn ends_of_ranges_are_taken() {
     let sandbox = Sandbox::new();
-    sandbox.write("dark.gltf", files::dark_triangle());
+    sandbox.write("dark.glb", files::dark_triangle());
     for options in [
         "--density 1",
         "--density 1e12 --map-resolution 16384x1",
@@ -275,7 +275,7 @@ fn ends_of_ranges_are_taken() {
         "--estimator splat --kernel cone --kernel-sampling point --footprint fixed --item-buffer cube",
         "--estimator splat --preset final",
     ] {
-        sandbox.succeed(&format!("inspect dark.gltf {options}"));
+        sandbox.succeed(&format!("inspect dark.glb {options}"));
     }
 }
 
@@ -337,38 +337,38 @@ fn unwritable_outputs_are_found_at_once() {
 #[test]
 fn an_export_does_not_replace_its_scene() {
     let sandbox = Sandbox::new();
-    sandbox.write("matte.gltf", files::lit_matte_triangle());
-    sandbox.succeed("bake matte.gltf -o out --layers direct --density 1e3 --map-resolution 16");
+    sandbox.write("matte.glb", files::lit_matte_triangle());
+    sandbox.succeed("bake matte.glb -o out --layers direct --density 1e3 --map-resolution 16");
     fs::create_dir(sandbox.path("sub")).expect("it can be made");
-    let itself = sandbox.run("export out -o sub/../matte.gltf");
+    let itself = sandbox.run("export out -o sub/../matte.glb");
     itself.failed_in_one_sentence(2, &["scene itself"]);
     refused(&sandbox, "export out -o missing/a.glb", "missing");
     refused(&sandbox, "export out --scene builtin:ring", "geometry");
-    let scene = fs::read_to_string(sandbox.path("matte.gltf")).expect("it is there");
+    let scene = fs::read(sandbox.path("matte.glb")).expect("it is there");
     assert_eq!(scene, files::lit_matte_triangle());
 }
 
 #[test]
 fn a_scene_without_light_names_the_remedy() {
     let sandbox = Sandbox::new();
-    sandbox.write("dark.gltf", files::dark_triangle());
-    refused(&sandbox, "bake dark.gltf -o out", "dark.gltf | --default-light");
-    assert_eq!(sandbox.files("."), ["dark.gltf"]);
-    let run = sandbox.succeed("bake dark.gltf -o out --default-light");
+    sandbox.write("dark.glb", files::dark_triangle());
+    refused(&sandbox, "bake dark.glb -o out", "dark.glb | --default-light");
+    assert_eq!(sandbox.files("."), ["dark.glb"]);
+    let run = sandbox.succeed("bake dark.glb -o out --default-light");
     says(run.stderr.trim_end(), "warning: | sun");
     assert!(run.stdout.contains("none: "), "{}", run.stdout);
     assert_eq!(sandbox.manifest("out")["maps"], json!([]));
     // A sky is light enough.
     sandbox.write("sky.hdr", files::grey_sky());
-    let run = sandbox.succeed("bake dark.gltf -o out --environment sky.hdr");
+    let run = sandbox.succeed("bake dark.glb -o out --environment sky.hdr");
     assert!(!run.stderr.contains("sun"), "{}", run.stderr);
 }
 
 #[test]
 fn nothing_specular_is_no_error() {
     let sandbox = Sandbox::new();
-    sandbox.write("matte.gltf", files::lit_matte_triangle());
-    let manifest = sandbox.succeed("bake matte.gltf -o out --json").json();
+    sandbox.write("matte.glb", files::lit_matte_triangle());
+    let manifest = sandbox.succeed("bake matte.glb -o out --json").json();
     assert_eq!(manifest["maps"], json!([]));
     assert_eq!(manifest["stop_reason"], "nothing_to_do");
     assert_eq!(manifest["partial"], false);

@@ -10,7 +10,7 @@ use nephroid::scene::open_document;
 
 use super::{Baked, LUMENS_PER_WATT, boxes, linear_of_srgb};
 use crate::prelude::*;
-use support::glb::{load_bytes, load_path};
+use support::glb::{assembled, load_bytes, load_path, parts_of};
 
 const LAYERS: [LayerKind; 2] = [LayerKind::Caustic, LayerKind::Direct];
 
@@ -44,12 +44,10 @@ struct Exported {
 
 impl Exported {
     fn new(bytes: Vec<u8>) -> Self {
-        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes")) as usize;
-        assert_eq!((&bytes[..4], word(8)), (&b"glTF"[..], bytes.len()));
-        let json_end = 20 + word(12);
-        assert_eq!(&bytes[json_end + 4..json_end + 8], b"BIN\0");
-        let json: Value = serde_json::from_slice(&bytes[20..json_end]).expect("it is JSON");
-        let mut binary = bytes[json_end + 8..].to_vec();
+        let (text, binary) = parts_of(&bytes).expect("it is whole");
+        assert_eq!(assembled(text.to_vec(), binary.to_vec()), bytes);
+        let json: Value = serde_json::from_slice(text).expect("it is JSON");
+        let mut binary = binary.to_vec();
         let stated = json["buffers"][0]["byteLength"].as_u64().expect("a length") as usize;
         assert_eq!(stated.next_multiple_of(4), binary.len());
         binary.truncate(stated);

@@ -7,7 +7,7 @@ use nephroid::scene::Volume;
 use nephroid::units::RadiantIntensity;
 
 use crate::prelude::*;
-use support::meshes::{cuboid, floor, joined, moved, quad, sphere};
+use support::meshes::{cuboid, floor, joined, moved, quad};
 use support::scenes::{chart, diffuse, direct, flux_w, light, middles, point_light, sun, surface, tracer};
 
 /// The floor |x|, |z| ≤ 1 under lamps.
@@ -298,38 +298,6 @@ fn gutters_are_filled() {
         assert_eq!(e[0], if is_near { 1.0 } else { 0.0 }, "texel {texel}");
     }
     assert!((flux_w(&chart, &layer) - area).abs() < 1e-5);
-}
-
-#[test]
-fn same_bytes_for_any_number_of_threads() {
-    let ball = sphere(dvec3(0.0, 0.5, 0.0), 0.3, 24, 12);
-    let lamps = vec![
-        point_light(dvec3(0.2, 1.7, 0.1), 1.0),
-        sun(dvec3(0.2, -1.0, 0.3), 1.0),
-    ];
-    let tracer = tracer(
-        vec![(floor(1.0, 0.0), diffuse(0.5)), (ball, diffuse(0.5))],
-        lamps.clone(),
-    );
-    let charts = [chart(&tracer, 0, 50, 50), chart(&tracer, 1, 64, 64)];
-    let bake = || {
-        let layers = bake_direct(
-            &tracer,
-            &lamps,
-            &[(&charts[0], None), (&charts[1], None)],
-            &(),
-            &Control::default(),
-        );
-        let layers = layers
-            .into_iter()
-            .map(|layer| (layer.irradiance, layer.shadow_rays));
-        layers.collect::<Vec<_>>()
-    };
-    let one = super::on_threads(1, bake);
-    assert!(one[0].1 > 8 * 50 * 50, "the ball's shadow is looked at twice");
-    for threads in [2, 4] {
-        assert_eq!(one, super::on_threads(threads, bake));
-    }
 }
 
 #[test]

@@ -2,7 +2,6 @@
 //! refused in a sentence, and the rest is drawn.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 use naga::back::pipeline_constants::process_overrides;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
@@ -237,55 +236,6 @@ fn every_program_and_specialisation_is_valid() {
         let is_valid = validator().validate_resolved_overrides(&resolved);
         is_valid.unwrap_or_else(|error| panic!("{found:?}: {error:?}"));
     }
-}
-
-#[test]
-fn every_override_and_fragment_is_specialised() {
-    let all = specialisations();
-    for (name, module) in modules() {
-        let overrides = module.overrides.iter();
-        let overrides: BTreeSet<_> = overrides.filter_map(|(_, found)| found.name.as_deref()).collect();
-        let of_program = || all.iter().filter(|found| found.program == name);
-        for found in of_program() {
-            let given: BTreeSet<_> = found.constants.iter().map(|(name, _)| *name).collect();
-            assert_eq!(given, overrides, "{found:?}");
-        }
-        let stages = module.entry_points.iter();
-        let stages = stages.filter(|stage| stage.stage == ShaderStage::Fragment);
-        let stages: BTreeSet<_> = stages.map(|stage| stage.name.as_str()).collect();
-        assert_eq!(
-            stages,
-            of_program().map(|found| found.entry_point).collect(),
-            "{name}"
-        );
-        // A question that has one answer needs no override.
-        for wanted in overrides {
-            let values = of_program().flat_map(|found| &found.constants);
-            let values = values.filter(|(name, _)| *name == wanted);
-            let values: BTreeSet<_> = values.map(|(_, value)| value.to_string()).collect();
-            assert!(values.len() > 1, "{name}: {wanted} is always {values:?}");
-        }
-    }
-}
-
-#[test]
-fn every_shader_file_is_part_of_a_program() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("shaders");
-    let within = |folder: &Path| {
-        let entries = std::fs::read_dir(folder).expect("shaders/ holds folders only");
-        let paths = entries.map(|entry| entry.expect("readable").path());
-        paths.collect::<Vec<_>>()
-    };
-    let files = within(&root).into_iter().flat_map(|folder| within(&folder));
-    let name = |path: std::path::PathBuf| {
-        let name = path.strip_prefix(&root).expect("below it").with_extension("");
-        name.to_string_lossy().into_owned()
-    };
-    let files: BTreeSet<String> = files.map(name).collect();
-    let programs = programs();
-    let used = programs.iter().flat_map(|program| program.sources);
-    assert!(!files.is_empty());
-    assert_eq!(files, used.map(|source| source.name.to_owned()).collect());
 }
 
 /// Names of the structs in a module's buffers, those within arrays and other structs included.

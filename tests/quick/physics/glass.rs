@@ -5,7 +5,6 @@ use nephroid::optics::wavelength::{C_LINE, D_LINE, F_LINE, VISIBLE};
 
 use super::visible;
 use crate::prelude::*;
-use support::shared_or_skip;
 
 /// The glass of the prism in the references.
 const FLINT: &str = "635577";
@@ -166,18 +165,6 @@ fn prism_has_the_indices_of_its_reference() {
     ] {
         near(index(nm) / expected, 1.0, 1e-10, nm);
     }
-    let Some(path) = shared_or_skip("oracle/S4_table.csv") else {
-        return;
-    };
-    let table = std::fs::read_to_string(path).expect("a readable table");
-    for row in table.lines().skip(1) {
-        let mut fields = row
-            .split(',')
-            .map(|field| field.parse::<f64>().expect("a number"));
-        let [nm, expected] = [(); 2].map(|()| fields.next().expect("two columns"));
-        near(index(nm) / expected, 1.0, 1e-10, nm);
-    }
-    assert!(table.lines().count() > 31);
 }
 
 #[test]

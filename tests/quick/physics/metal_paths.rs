@@ -1,13 +1,13 @@
 //! Metals where light meets them: by wavelength where it has one, by colour where it has three channels.
 
 use nephroid::optics::fresnel::{dielectric_reflectance, metal_reflectance};
-use nephroid::optics::spectrum::{Spectrum, WavelengthSampler, Xyz, illuminant, xyz_bar};
+use nephroid::optics::spectrum::{Spectrum, WavelengthSampler, illuminant, xyz_bar};
 use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{ColourBasis, Metal};
 
 use super::metals::metal;
 use crate::prelude::*;
-use support::floors::texture_reference;
+use support::floors::{image, texture_reference};
 
 const WAVELENGTHS: u32 = 1024;
 
@@ -115,36 +115,6 @@ fn colours_count_in_channels() {
 }
 
 #[test]
-fn reflected_colour_is_the_mean_over_wavelengths() {
-    for name in ["gold", "copper", "silver"] {
-        let tracer = tracer(name);
-        // Lines and a discharge lamp's bands are where three channels say nothing.
-        for lamp_name in ["D65", "A", "FL11", "LED-B1", "line:589.3", "line:470"] {
-            let lamp = illuminant(lamp_name).expect("a lamp");
-            let expected = integrated(&lamp, |wavelength| metal(name).reflectance(1.0, wavelength));
-            let found = followed(&lamp, |wavelength| {
-                share(&tracer.at_wavelength(wavelength), 1.0).r
-            });
-            near(found, expected, 1e-4, (name, lamp_name));
-        }
-    }
-    let daylight = illuminant("D65").expect("a lamp");
-    let tracer = tracer("gold");
-    for cos in [1.0, 0.5] {
-        let found = followed(&daylight, |wavelength| {
-            share(&tracer.at_wavelength(wavelength), cos).r
-        });
-        // D65's tables are white to some 1e-4.
-        near(
-            Xyz::from(found).to_linear_srgb(),
-            metal("gold").reflectance_srgb(cos),
-            5e-4,
-            cos,
-        );
-    }
-}
-
-#[test]
 fn factor_under_a_lamp_gives_its_colour() {
     for metal in Metal::all() {
         let tracer = tracer(metal.name());
@@ -162,14 +132,8 @@ fn factor_under_a_lamp_gives_its_colour() {
 #[test]
 fn textures_dim_a_metal_at_a_wavelength() {
     let mut scene = plate("gold");
-    scene.textures.push(Arc::new(Texture {
-        name: "dirt".into(),
-        width: 1,
-        height: 1,
-        rgba: vec![[230, 150, 60, 255]],
-        wrap: [Wrap::Repeat; 2],
-        is_nearest: false,
-    }));
+    let dirt = image(1, vec![[230, 150, 60, 255]], Wrap::Repeat);
+    scene.textures.push(Arc::new(dirt));
     scene.materials[0].base_colour_texture = Some(texture_reference());
     let tracer = Tracer::new(Arc::new(scene));
     let kept = [230, 150, 60].map(LinearSrgb::decode_channel);

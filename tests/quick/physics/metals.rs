@@ -56,25 +56,6 @@ fn unabsorbing_metal_is_a_dielectric() {
 }
 
 #[test]
-fn p_polarised_light_has_a_least_reflectance() {
-    for metal in Metal::all() {
-        let (n, k) = metal.index(Nanometres(650.0));
-        let at = |degrees: u32| conductor_reflectance_sp(f64::from(degrees).to_radians().cos(), n, k);
-        let p = |degrees: u32| at(degrees)[1];
-        let least = (0..=90).min_by(|a, b| p(*a).total_cmp(&p(*b))).expect("angles");
-        // A pseudo-Brewster angle: steep, and the reflectance there is not 0.
-        assert!((60..90).contains(&least), "{}: {least}°", metal.name());
-        assert!(p(least) > 0.5 && p(least) < p(0), "{}", metal.name());
-        let s = (0..=90).map(|degrees| at(degrees)[0]);
-        assert!(
-            s.is_sorted(),
-            "{}: s-polarised light reflects more and more",
-            metal.name()
-        );
-    }
-}
-
-#[test]
 fn metals_reflect_as_measured() {
     // G. Hass, in American Institute of Physics Handbook, 3rd edition (1972), 6g: evaporated films, per cent, at these
     // wavelengths (0: not compared). Gold and copper are compared away from their edges, where a few nanometres matter.
@@ -99,6 +80,7 @@ fn tables_cover_the_visible() {
     assert_eq!(metal("gold").index(Nanometres(548.6)), (0.43, 2.455));
     assert_eq!(metal("SILVER").index(Nanometres(659.5)), (0.05, 4.483));
     assert_eq!(metal("copper").index(Nanometres(548.6)), (1.02, 2.577));
+    assert_eq!(metal("aluminum"), metal("aluminium"));
     for metal in Metal::all() {
         for nm in (3600..=8300).map(|tenth| f64::from(tenth) / 10.0) {
             let [(n, k), (next_n, next_k)] = [nm, nm + 0.1].map(|nm| metal.index(Nanometres(nm)));
@@ -108,29 +90,4 @@ fn tables_cover_the_visible() {
             assert!((n, k) != (next_n, next_k), "{} at {nm}", metal.name());
         }
     }
-}
-
-#[test]
-fn metals_have_their_colours() {
-    let [gold, copper, silver, aluminium] =
-        ["gold", "copper", "silver", "aluminum"].map(|name| metal(name).reflectance_srgb(1.0));
-    for LinearSrgb { r, g, b } in [gold, copper] {
-        assert!(r > g && g > b && b > 0.0, "{r} {g} {b}");
-    }
-    assert!(gold.g > 1.5 * gold.b, "gold is yellow");
-    assert!(copper.r > 1.25 * copper.g, "copper is red");
-    for LinearSrgb { r, g, b } in [silver, aluminium] {
-        assert!((r / b - 1.0).abs() < 0.05 && g > 0.9, "{r} {g} {b}");
-    }
-    for metal in Metal::all() {
-        near(
-            metal.reflectance_srgb(0.0),
-            LinearSrgb::WHITE,
-            1e-12,
-            "at grazing incidence",
-        );
-    }
-    let error = Metal::by_name("golt").expect_err("no metal");
-    assert_eq!(error.known.split(',').next(), Some("Gold"));
-    says(error.at("--metal"), "no metal is named `golt`");
 }

@@ -4,10 +4,9 @@
 use std::f64::consts::TAU;
 
 use nephroid::light_pass::emitter::EmitterKind;
-use nephroid::optics::fresnel::{dielectric_reflectance, thin_wall_reflectance};
+use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::transport::microfacets::Facet;
 use nephroid::transport::{EffectSet, Event, Interaction, SurfaceHit};
-use nephroid::units::{Area, Irradiance, RadiantIntensity, SolidAngle};
 
 use crate::prelude::*;
 use support::scenes::middles;
@@ -42,21 +41,6 @@ fn smooth(surface: SurfaceKind, polish: f64) -> Material {
         roughness: 0.0,
         ior: 1.5,
         ..Material::default()
-    }
-}
-
-/// Polish and panes reflect by their contrast with what is around them.
-#[test]
-fn under_water_contrast_counts() {
-    let direction = dvec3(0.4, -1.0, 0.2).normalize();
-    let within = MediumStack::default().entered(1);
-    let (cosine, eta) = (-direction.y, 1.5 / 1.333);
-    for (surface, expected) in [
-        (SurfaceKind::Mixed, dielectric_reflectance(cosine, eta)),
-        (SurfaceKind::ThinWall, thin_wall_reflectance(cosine, eta)),
-    ] {
-        let shares = met(smooth(surface, 1.0), direction, &within);
-        near(shares.reflection.expect("some").share.g, expected, 1e-12, surface);
     }
 }
 
@@ -278,30 +262,4 @@ fn lights_have_their_falloff() {
     // Half-way in the cosine a quarter is left: the square of 1/2.
     let cosine = 0.5 * (0.3f64.cos() + 0.5f64.cos());
     near(soft.falloff(off_axis(cosine.acos())), 0.25, 1e-12, "half-way");
-}
-
-#[test]
-fn units_multiply_lawfully() {
-    let flux = RadiantIntensity(2.0) * SolidAngle(4.0 * PI);
-    near(flux.0, 8.0 * PI, 1e-12, "into the whole sphere");
-    // On a sphere of 3 m around it that is I/r².
-    near((flux / Area(4.0 * PI * 9.0)).0, 2.0 / 9.0, 1e-15, "on a sphere");
-    near(
-        Irradiance(PI).diffuse_radiance(1.0).0,
-        1.0,
-        1e-15,
-        "a white Lambert surface",
-    );
-}
-
-proptest! {
-    #![proptest_config(support::law(4096))]
-
-    #[test]
-    fn falloff_falls(outer in 0.05..1.57f64, share in 0.0..1.0f64, a in 0.0..3.1f64, b in 0.0..3.1f64) {
-        let light = spot(outer * share, outer);
-        let (near, far) = (light.falloff(off_axis(a.min(b))), light.falloff(off_axis(a.max(b))));
-        prop_assert!((0.0..=1.0).contains(&near) && (0.0..=1.0).contains(&far));
-        prop_assert!(near >= far);
-    }
 }

@@ -4,15 +4,9 @@ use nephroid::scene::builtin::pool;
 use nephroid::transport::bend;
 
 use crate::prelude::*;
+use support::scenes::wave;
 
 fn waves() -> Waves {
-    let wave = |amplitude_m, wavelength_m, direction: DVec3, phase_rad| Wave {
-        amplitude_m,
-        wavelength_m,
-        direction: direction.normalize(),
-        phase_rad,
-        period_s: 0.0,
-    };
     Waves::new(vec![
         wave(0.02, 0.7, DVec3::X, 1.0),
         wave(0.01, 0.9, dvec3(0.2, 0.5, -1.0), 2.0),

@@ -5,7 +5,7 @@ use glam::DAffine3;
 use nephroid::scene::open_document;
 
 use crate::prelude::*;
-use support::glb::{load_bytes, load_path};
+use support::glb::{assembled, load_bytes, load_path, parts_of};
 
 fn golden(name: &str) -> Vec<u8> {
     let path = format!("{}/tests/goldens/gltf/{name}", env!("CARGO_MANIFEST_DIR"));
@@ -146,13 +146,9 @@ fn damaged_meshopt_is_refused() {
 
 /// A file with a text of its document replaced wherever it stands.
 fn changed(glb: &[u8], what: &str, with: &str) -> Vec<u8> {
-    let length = u32::from_le_bytes(glb[12..16].try_into().expect("four bytes")) as usize;
-    let text = String::from_utf8_lossy(&glb[20..20 + length]).replace(what, with);
-    Glb {
-        json: parsed(&text),
-        binary: glb[28 + length..].to_vec(),
-    }
-    .bytes_as_stated()
+    let (text, binary) = parts_of(glb).expect("it is whole");
+    let text = String::from_utf8_lossy(text).replace(what, with);
+    assembled(text.into_bytes(), binary.to_vec())
 }
 
 #[test]

@@ -6,6 +6,7 @@ use nephroid::units::{Flux, Irradiance, Radiance, RadiantIntensity};
 
 use crate::prelude::*;
 use support::floors::four_colours;
+use support::scenes::wave;
 
 /// A scene with a floor (object 0), a glass ball (object 1), an image, a lamp (light 0), a sun (1), a spot (2), a panel (3),
 /// the floor as a lamp (4) and an environment (5).
@@ -44,14 +45,7 @@ fn scene() -> Scene {
 }
 
 fn ripples() -> Waves {
-    let wave = Wave {
-        amplitude_m: 0.001,
-        wavelength_m: 0.1,
-        direction: DVec3::X,
-        phase_rad: 0.3,
-        period_s: 0.0,
-    };
-    Waves::new(vec![wave]).expect("a gentle wave")
+    Waves::new(vec![wave(0.001, 0.1, DVec3::X, 0.3)]).expect("a gentle wave")
 }
 
 fn strength(light: usize, strength: f64) -> Edit {
@@ -189,30 +183,6 @@ fn roughness_changes_the_class() {
 }
 
 #[test]
-fn objects_turn_about_their_middle() {
-    // Of any length: made unit.
-    let turn = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2) * 3.0;
-    let edit = moved(0, turn, dvec3(0.0, 0.25, 0.0));
-    let edited = edit.apply(&scene()).expect("it is in range");
-    let (low, high) = edited.objects[0].mesh_in_scene().bounds().expect("a floor");
-    near(low, dvec3(0.0, -0.35, -0.6), 1e-12, "low");
-    near(high, dvec3(0.0, 0.85, 0.6), 1e-12, "high");
-    for normal in &edited.objects[0].mesh_in_scene().normals {
-        near(*normal, DVec3::NEG_X, 1e-12, "normal");
-    }
-}
-
-#[test]
-fn edits_of_a_control_share_a_target() {
-    assert_eq!(strength(0, 1.0).target(), strength(0, 2.0).target());
-    assert_eq!(strength(0, 1.0).target(), "LightPower(0)");
-    let mut targets: Vec<_> = edits().iter().map(Edit::target).collect();
-    targets.dedup();
-    // Only the two movements share one.
-    assert_eq!(targets.len(), edits().len() - 1);
-}
-
-#[test]
 fn edits_out_of_range_are_refused() {
     let scene = scene();
     let nan = f64::NAN;
@@ -255,6 +225,9 @@ fn edits_out_of_range_are_refused() {
         (turned(0.0, 0.0), "rotation"),
         (turned(nan, 1.0), "rotation"),
         (ior(9, 1.5), "material 9"),
+        // A sky would still be seen.
+        (Edit::RemoveLight(5), "large"),
+        (Edit::RemoveLight(9), ""),
     ] {
         let error = edit.apply(&scene).expect_err("it is out of range");
         assert_eq!(error.kind, ErrorKind::Usage);

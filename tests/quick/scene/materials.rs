@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_4};
 use nephroid::scene::AlphaMask;
 
 use crate::prelude::*;
+use support::floors::image;
 
 fn material(json: Value) -> (Material, Scene) {
     let scene = Glb::triangle().with_material(json).scene();
@@ -94,6 +95,11 @@ fn values_out_of_range_are_brought_back() {
         let (read, scene) = material(json!({ "extensions": { "KHR_materials_ior": { "ior": ior } } }));
         assert_eq!(read.ior, 1.5);
         warns(&scene, &format!("{words} | was read as 1.5"));
+    }
+    for distance in [0.0, -1.0] {
+        let volume = json!({ "thicknessFactor": 0.1, "attenuationDistance": distance });
+        let (_, scene) = material(json!({ "extensions": { "KHR_materials_volume": volume } }));
+        warns(&scene, "attenuation distance | was read as infinite");
     }
     let (read, scene) = material(json!({
         "name": "m",
@@ -655,14 +661,7 @@ fn what_alpha_blends_is_there_in_part() {
 /// glTF 2.0, 3.9.4: a surface is there where alpha is greater than or equal to the cutoff.
 #[test]
 fn masks_keep_what_reaches_their_cutoff() {
-    let dim = Texture {
-        name: "a fifth".into(),
-        width: 1,
-        height: 1,
-        rgba: vec![[255, 255, 255, 51]],
-        wrap: [Wrap::Repeat; 2],
-        is_nearest: false,
-    };
+    let dim = image(1, vec![[255, 255, 255, 51]], Wrap::Repeat);
     let dim = Some((&dim, DVec2::splat(0.5)));
     for (cutoff, factor, image, there) in [
         (0.5, 0.5, None, true),

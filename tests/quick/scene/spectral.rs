@@ -4,14 +4,13 @@ use nephroid::bake::Baker;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::error::Result;
 use nephroid::optics::Metal;
-use nephroid::optics::glass::{Dispersion, catalogue};
+use nephroid::optics::glass::catalogue;
 use nephroid::optics::spectrum::{Spectrum, illuminant};
 use nephroid::optics::wavelength::{C_LINE, D_LINE, F_LINE};
 use nephroid::plan::EffectLine;
 
 use crate::prelude::*;
 use support::glb::load_path;
-use support::shared_or_skip;
 
 const SMOOTH: &str = r#"{"metallicFactor": 0, "roughnessFactor": 0}"#;
 
@@ -313,30 +312,6 @@ fn lamps_may_be_measured_in_a_table() {
     }
     let refusal = lamp(json!({ "spectrum": 6500 }), Value::Null).refusal();
     says(refusal, "light `lamp`: its `spectrum` is not text");
-}
-
-#[test]
-fn collection_of_dispersive_balls_is_read() {
-    let Some(path) = shared_or_skip("scenes/DispersionTest.glb") else {
-        return;
-    };
-    let scene = load_path(&path, &LoadOptions::default()).expect("a sound file");
-    // Its materials are named by index and by column.
-    let columns = [("D1", 0.0), ("D2", 0.5), ("D3", 1.0), ("D4", 2.0), ("D5", 5.0)];
-    let mut read = 0;
-    for material in &scene.materials {
-        let Some((_, dispersion)) = columns.iter().find(|(column, _)| material.name.ends_with(column)) else {
-            continue;
-        };
-        read += 1;
-        // A body of n = 1 is not there at any wavelength.
-        let disperses = *dispersion > 0.0 && material.ior > 1.0;
-        assert_eq!(material.is_dispersive(), disperses, "{}", material.name);
-        let stated = material.glass.as_ref().map(|glass| glass.dispersion);
-        let expected = (*dispersion > 0.0).then(|| Dispersion::from_gltf(material.ior, *dispersion));
-        assert_eq!(stated, expected, "{}", material.name);
-    }
-    assert_eq!(read, 25, "five indices by five dispersions");
 }
 
 fn undone(scene: &Scene, edit: &Edit) -> (Scene, Scene) {

@@ -8,6 +8,7 @@ use nephroid::viewer::files::{MAX_RECENT as MOST, Recent, typed};
 
 use super::fixtures::read;
 use super::*;
+use support::scenes::wave;
 
 fn model() -> (Model, tempfile::TempDir) {
     let folder = folder();
@@ -144,16 +145,9 @@ fn panel_opens_paths_and_builtin_scenes() {
 
 /// Everything that can be edited of the scene, without a look at what stands in its file.
 fn edits() -> Vec<Edit> {
-    let wave = Wave {
-        amplitude_m: 0.01,
-        wavelength_m: 0.25,
-        direction: DVec3::X,
-        phase_rad: 0.5,
-        period_s: 0.0,
-    };
     let moved = |object, yaw_rad, way| Edit::Place(object, Motion::turned(yaw_rad, way));
     let light = |edit| Edit::Light(0, edit);
-    let waves = Some(Waves::new(vec![wave]).expect("it is one"));
+    let waves = Some(Waves::new(vec![wave(0.01, 0.25, DVec3::X, 0.5)]).expect("it is one"));
     vec![
         light(LightEdit::Strength(2.5)),
         light(LightEdit::Position(dvec3(0.25, 2.0, 0.5))),

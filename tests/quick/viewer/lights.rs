@@ -1,16 +1,12 @@
 //! Lights that are added and removed in the window, the brightest spot, and where light lands, as it is drawn over the
 //! picture.
 
-use std::collections::HashSet;
-
 use nephroid::illumination::{Chart, Receiver};
-use nephroid::light_pass::sketch::{PathPreview, SketchLimits, sketch};
+use nephroid::light_pass::sketch::{SketchLimits, sketch};
 use nephroid::scene::load::save;
 use nephroid::units::Flux;
-use nephroid::viewer::background::Wake;
 use nephroid::viewer::brightest;
 use nephroid::viewer::new_light::ViewTarget;
-use nephroid::viewer::sketching::PreviewTask;
 
 use super::fixtures::added;
 use super::*;
@@ -80,22 +76,6 @@ fn kept_changes_lead_to_the_same_lights() {
     // A file that was saved with them needs none of it.
     assert_eq!(read.iter().filter(|change| change.is_done_in(&now)).count(), 2);
     assert!(!read.iter().any(|change| change.is_done_in(&loaded)));
-}
-
-#[test]
-fn impossible_changes_of_lights_are_refused() {
-    let mut scene = fixtures::scene();
-    scene.lights[0].kind = LightKind::Environment { scale: 1.0 };
-    let mut dark = lamp("dark");
-    dark.colour = LinearSrgb::BLACK;
-    for (edit, named) in [
-        // A sky would still be seen.
-        (Edit::RemoveLight(0), "lamp"),
-        (Edit::RemoveLight(9), ""),
-        (added(dark), ""),
-    ] {
-        says(edit.apply(&scene).expect_err("it is impossible"), named);
-    }
 }
 
 fn read(path: &Path, default_light: bool) -> Scene {
@@ -283,48 +263,4 @@ fn flat_mirrors_send_light_as_from_an_image() {
         let within = met.cmpge(low - margin).all() && met.cmple(high + margin).all();
         assert!((0.0..=1.0).contains(&share) && within, "{landing:?} over {met}");
     }
-}
-
-/// Four times the cells have patches of a quarter of the size.
-#[test]
-fn finer_lattices_have_smaller_patches() {
-    let tracer = tracer("ball");
-    let sketched = |cells: usize| sketch(&tracer, SketchLimits { cells, ..LIMITS }, &Control::default());
-    let (coarse, fine) = (sketched(1500), sketched(6000));
-    let times = fine.rays as f64 / coarse.rays as f64;
-    assert!(times > 3.0 && times < 5.0, "{times}");
-    let bits = |point: DVec3| point.to_array().map(f64::to_bits);
-    let landings = coarse.landings.iter().map(|landing| bits(landing.point));
-    let landings: HashSet<_> = landings.collect();
-    for patch in &coarse.patches {
-        let mut corners = patch.corners.iter();
-        assert!(
-            corners.all(|corner| landings.contains(&bits(*corner))),
-            "{patch:?}"
-        );
-    }
-    let middling = |sketch: &PathPreview| {
-        let sides = sketch.patches.iter();
-        let mut sides: Vec<f64> = sides
-            .map(|patch| patch.corners[0].distance(patch.corners[1]))
-            .collect();
-        sides.sort_by(f64::total_cmp);
-        sides[sides.len() / 2]
-    };
-    let ratio = middling(&coarse) / middling(&fine);
-    assert!((1.5..2.7).contains(&ratio), "{ratio}");
-    let none = Control::default();
-    none.cancel();
-    assert_eq!(sketch(&tracer, LIMITS, &none).rays, 0);
-}
-
-#[test]
-fn found_once_for_the_same_surfaces() {
-    let surfaces = tracer("ring");
-    let mut sketcher = PreviewTask::new(&Wake::new(|| ()));
-    wait_for("the sketch", || sketcher.follow(&surfaces, LIMITS));
-    let found = Arc::clone(sketcher.shown().expect("it was found"));
-    assert!(!sketcher.follow(&surfaces, LIMITS) && !found.landings.is_empty());
-    sketcher.forget();
-    assert!(sketcher.shown().is_none());
 }

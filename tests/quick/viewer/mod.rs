@@ -39,7 +39,7 @@ use nephroid::scene::changes::Change;
 use nephroid::scene::load::save;
 use nephroid::settings::{Estimator, MIN_MAX_ERROR, Sigma};
 use nephroid::viewer::ViewerOptions;
-use nephroid::viewer::command::{Choices, Command, CompareCommand, FilmCommand};
+use nephroid::viewer::command::{Choices, Command, FilmCommand};
 use nephroid::viewer::edits::EditedScene;
 use nephroid::viewer::exporting::{Export, ExportState};
 use nephroid::viewer::gizmo::GizmoTarget;

@@ -1,7 +1,5 @@
 //! The window's state, with real bakes and without a window.
 
-use nephroid::viewer::background::Wake;
-
 use super::fixtures::chosen;
 use super::*;
 
@@ -254,12 +252,4 @@ fn given_maps_are_shown_without_a_bake() {
     set_at(&mut model, now, |it| it.settings.seed = 3);
     act_at(&mut model, now + QUIET);
     assert!(model.state.is_baking());
-}
-
-#[test]
-fn a_log_that_cannot_be_written_is_told() {
-    let file = tempfile::NamedTempFile::new().expect("a file");
-    let options = with(options("ring"), |it| it.event_log = Some(file.path().join("x")));
-    let error = Model::new(&options, &Wake::new(|| ())).expect_err("a file is no folder");
-    says(error, "event log cannot be written");
 }

@@ -3,11 +3,9 @@
 
 use nephroid::bake::CostPoint;
 use nephroid::bake::forecast::forecast;
-use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::viewer::pace::Pace;
 use nephroid::viewer::panel::accuracy::course::{Curve, Frame};
-use nephroid::viewer::panel::frame_graph::{columns, scale_ms};
-use nephroid::viewer::timing::{FrameTimes, Latencies, PICTURES, Percentiles};
+use nephroid::viewer::timing::{FrameTimes, Latencies, Percentiles};
 
 use super::*;
 
@@ -50,15 +48,6 @@ fn traced_scale_follows_the_frame_time() {
     assert_eq!(slow.walking().traced_scale, 0.25);
     // A calm view is fine again.
     assert_eq!(settled(slow, 3.0).walking().traced_scale, 2.0);
-}
-
-#[test]
-fn untraced_and_resting_pictures_teach_nothing() {
-    let mut pace = settled(Pace::default(), 100.0);
-    let before = (pace.walking(), pace.resting());
-    pace.learn(ms(500.0, 0.0), pace.walking());
-    pace.learn(ms(1.0, 900.0), EyeQuality::STILL);
-    assert_eq!((pace.walking(), pace.resting()), before);
 }
 
 #[test]
@@ -133,19 +122,6 @@ fn events_of_a_busy_window_count_from_when_they_can_have_come() {
     assert_eq!(latencies.while_baking().map(|told| told.count), Some(1));
 }
 
-#[test]
-fn only_the_last_waits_are_remembered() {
-    let mut latencies = Latencies::default();
-    let now = Instant::now();
-    for index in 0..10_100_u32 {
-        latencies.begin_turn(now);
-        latencies.meet(now, true);
-        latencies.show(now + if index < 100 { 500 * MS } else { MS });
-    }
-    let told = latencies.while_baking().expect("many");
-    assert_eq!((told.count, told.max_ms.round()), (10_000, 1.0));
-}
-
 fn of<const N: usize>(pictures: [[f64; 3]; N]) -> FrameTimes {
     let mut times = FrameTimes::default();
     for [opaque, specular, tone_mapping] in pictures {
@@ -163,44 +139,6 @@ fn with_times(times: Option<FrameTimes>) -> Headless {
     panel.tell(|model| model.picture.frame_times = times);
     panel.open_part("Frame time");
     panel
-}
-
-#[test]
-fn oldest_pictures_are_forgotten() {
-    let mut ramp = [[0.0; 3]; PICTURES + 30];
-    for (index, picture) in ramp.iter_mut().enumerate() {
-        picture[0] = index as f64;
-    }
-    let times = of(ramp);
-    assert_eq!(times.iter().len(), PICTURES);
-    let ends = [times.iter().next(), times.newest()].map(|ms| ms.map(|ms| ms.opaque));
-    assert_eq!(ends, [Some(30.0), Some(149.0)]);
-    assert_eq!(of([[1.0, 2.0, 3.0], [4.0, 0.0, 0.5]]).longest_ms(), 6.0);
-    assert_eq!(FrameTimes::default().longest_ms(), 0.0);
-}
-
-#[test]
-fn scale_holds_the_longest_picture() {
-    let longest = [0.0, 0.1, 0.11, 3.0, 16.7, 51.0, 1e9];
-    for (longest, scale) in longest.into_iter().zip([0.1, 0.1, 0.2, 5.0, 20.0, 100.0, 1e5]) {
-        near(scale_ms(longest) / scale, 1.0, 1e-12, longest);
-    }
-}
-
-#[test]
-fn passes_are_stacked_newest_at_the_right() {
-    let rect = Rect::from_min_max(pos2(10.0, 100.0), pos2(10.0 + PICTURES as f32, 180.0));
-    let columns = columns(&of([[2.0, 4.0, 1.0], [1.0, 0.0, 30.0]]), 8.0, rect);
-    // Eight milliseconds are eighty points; what is beyond the scale ends at the top.
-    let expected = [
-        (128.0, [(160.0, 180.0), (120.0, 160.0), (110.0, 120.0)]),
-        (129.0, [(170.0, 180.0), (170.0, 170.0), (100.0, 170.0)]),
-    ];
-    let expected = expected.map(|(left, bars)| {
-        bars.map(|(top, bottom)| Rect::from_min_max(pos2(left, top), pos2(left + 1.0, bottom)))
-    });
-    assert_eq!(columns, expected);
-    assert_eq!(columns[1][0].right(), rect.right());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use nephroid::settings::{Footprint, ItemBufferKind, Kernel, Preset, RayPlacement
 use nephroid::viewer::panel::accuracy::target::preset_of;
 
 use super::headless::Gesture::{Check, Choose, Drag, Radio, Type};
-use super::headless::{Gesture, SCREEN, SECTIONS, edit_power};
+use super::headless::{Gesture, SCREEN, edit_power};
 use super::*;
 
 /// The smallest window, on a dense screen.
@@ -447,49 +447,6 @@ fn values_have_a_button_that_resets_them() {
     }
     assert_eq!(resets(&panel), first);
     assert_eq!(*panel.settings(), splats());
-}
-
-#[test]
-fn keyboard_alone_changes_values() {
-    let mut panel = panel();
-    panel.focus(Role::Slider, "Sigma [radii²]");
-    panel.strike(Key::ArrowRight);
-    assert!(matches!(panel.settings().sigma, Sigma::Constant(sigma) if sigma > 1.0));
-    panel.focus(Role::ComboBox, "Estimator");
-    for (key, expected) in [
-        (Key::ArrowUp, Estimator::Photon),
-        (Key::ArrowUp, Estimator::Wavefront),
-        (Key::ArrowUp, Estimator::Auto),
-        // The first stays.
-        (Key::ArrowUp, Estimator::Auto),
-        (Key::ArrowDown, Estimator::Wavefront),
-    ] {
-        panel.strike(key);
-        assert_eq!(panel.settings().estimator, expected, "{key:?}");
-    }
-    // From the list, by the button that sets it back, to the first layer, which Space switches.
-    panel.strike(Key::Tab);
-    panel.strike(Key::Tab);
-    assert!(panel.named(Role::CheckBox, "caustic").is_focused());
-    panel.strike(Key::Space);
-    assert_eq!(panel.settings().layers, [LayerKind::Direct]);
-}
-
-#[test]
-fn sections_keep_their_order_and_open() {
-    let mut panel = Headless::baked(splats(), SCREEN);
-    let tops: Vec<f32> = SECTIONS
-        .iter()
-        .map(|(name, _)| panel.named(Role::DisclosureTriangle, name).rect().top())
-        .collect();
-    assert!(tops.is_sorted() && tops[0] > 0.0 && tops[6] < 720.0, "{tops:?}");
-    for (section, _) in SECTIONS {
-        let before = panel.controls().len();
-        panel.open(section);
-        assert_ne!(panel.controls().len(), before, "{section}");
-        panel.open(section);
-        assert_eq!(panel.controls().len(), before, "{section}");
-    }
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
+use support::glb::{assembled, parts_of};
 
 /// Two squares of four corners: positions, then normals, then two triangles.
 fn binary() -> Vec<u8> {
@@ -77,20 +78,7 @@ pub fn gltf(folder: &Path, name: &str, candela: &str) -> PathBuf {
 /// `NAME.glb`.
 pub fn glb(folder: &Path, name: &str, candela: &str) -> PathBuf {
     let path = folder.join(format!("{name}.glb"));
-    let padded = |mut bytes: Vec<u8>, with: u8| {
-        bytes.resize(bytes.len().next_multiple_of(4), with);
-        bytes
-    };
-    let json = padded(json_text(candela, None).into_bytes(), b' ');
-    let binary = padded(binary(), 0);
-    let mut bytes = b"glTF\x02\0\0\0".to_vec();
-    let whole = 12 + 8 + json.len() + 8 + binary.len();
-    bytes.extend((whole as u32).to_le_bytes());
-    for (kind, chunk) in [(b"JSON", &json), (b"BIN\0", &binary)] {
-        bytes.extend((chunk.len() as u32).to_le_bytes());
-        bytes.extend(kind);
-        bytes.extend(chunk);
-    }
+    let bytes = assembled(json_text(candela, None).into_bytes(), binary());
     fs::write(&path, bytes).expect("it is written");
     path
 }
@@ -98,8 +86,8 @@ pub fn glb(folder: &Path, name: &str, candela: &str) -> PathBuf {
 /// The text of a `.glb`'s JSON chunk.
 pub fn text_of(path: &Path) -> String {
     let bytes = fs::read(path).expect("it is there");
-    let length = u32::from_le_bytes(bytes[12..16].try_into().expect("four bytes")) as usize;
-    String::from_utf8(bytes[20..20 + length].to_vec()).expect("it is text")
+    let (text, _) = parts_of(&bytes).expect("it is whole");
+    String::from_utf8(text.to_vec()).expect("it is text")
 }
 
 /// What somebody's editor leaves while it writes.

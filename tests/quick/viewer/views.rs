@@ -7,10 +7,9 @@ use nephroid::optics::spectrum::{Hue, Xyz, dominant, xyz_bar};
 use nephroid::viewer::comparison_view::SavedMaps;
 use nephroid::viewer::exposure::AutoExposure;
 use nephroid::viewer::false_colours::{
-    ERROR_RANGE, RANGE_NM, difference_maps, error_colour, error_maps, has_errors, wavelength_colour,
-    wavelength_maps,
+    RANGE_NM, difference_maps, error_colour, error_maps, has_errors, wavelength_colour, wavelength_maps,
 };
-use nephroid::viewer::flat_map::{MapCrop, ShownPixels, read, show, thumbnail};
+use nephroid::viewer::flat_map::{MapCrop, ShownPixels, show};
 use nephroid::viewer::views::{IrradianceUnit, MapSurvey, ScaleChoice};
 
 use super::fixtures::map;
@@ -102,22 +101,6 @@ fn reference_tells_its_relative_rmse() {
     assert!(SavedMaps::kept(panel.model.scene(), &[]).is_err());
 }
 
-#[test]
-fn comparison_begins_and_ends_by_buttons() {
-    let mut panel = panel();
-    panel.open("Compare");
-    panel.press("Keep as before");
-    assert_eq!(panel.asked(), [Command::Compare(CompareCommand::Keep)]);
-    assert!(panel.is_disabled(Role::Button, "End comparison"));
-    let maps = [two_texels(0, [[1.0; 3], [1.0; 3]])];
-    let mut reference = SavedMaps::kept(panel.model.scene(), &maps).expect("there are maps");
-    reference.compare(&maps);
-    panel.tell(|model| model.reference = Some(reference));
-    panel.assert_says(&["differs from before by 0 %"]);
-    panel.press("End comparison");
-    assert_eq!(panel.asked(), [Command::Compare(CompareCommand::End)]);
-}
-
 /// A texel's display codes, to the rounding of one code.
 fn assert_shows(map: &IlluminationMap, texel: usize, codes: [u8; 3]) {
     let found = map.total()[texel].map(f64::from);
@@ -137,18 +120,6 @@ fn errors_show_relative_to_the_mean() {
     assert!(Arc::ptr_eq(&shown[0].chart, &maps[1].chart));
     for (texel, relative) in [(0, 0.1), (1, 0.01)] {
         assert_shows(&shown[0], texel, error_colour(relative));
-    }
-}
-
-#[test]
-fn error_colours_are_logarithmic_to_their_ends() {
-    let (colour, (low, high)) = (error_colour, ERROR_RANGE);
-    assert_eq!(colour(0.0), colour(low));
-    assert_eq!(colour(1e9), colour(high));
-    assert_eq!(colour(f64::NAN), colour(high), "no number is no accuracy");
-    let step = |step| colour(low * (high / low).powf(f64::from(step) / 20.0));
-    for index in 0..20 {
-        assert_ne!(step(index), step(index + 1), "every step shows");
     }
 }
 
@@ -232,40 +203,6 @@ fn pixel(shown: &ShownPixels, x: usize, y: usize) -> (u8, u8) {
 }
 
 #[test]
-fn thumbnail_keeps_shape_and_brightness() {
-    let shown = thumbnail(&map());
-    assert_eq!(shown.size, [64, 32], "four texels by two");
-    // One pixel of each column: 0, 3, 6 and 9 W/m².
-    let row: Vec<_> = (0..4).map(|column| pixel(&shown, 16 * column + 8, 20)).collect();
-    assert!(row.iter().all(|(_, opacity)| *opacity == 255));
-    assert!(
-        row[0].0 == 0 && row[1].0 > 40 && row.is_sorted_by(|a, b| a < b),
-        "{row:?}"
-    );
-    for x in 0..64 {
-        let same_texel = pixel(&shown, x - x % 16, 31);
-        assert_eq!(pixel(&shown, x, 0), same_texel);
-    }
-}
-
-#[test]
-fn nothing_is_beside_a_map() {
-    let part = MapCrop {
-        left: -2.0,
-        top: -1.0,
-        texels_per_pixel: 1.0,
-    };
-    let shown = show(&map(), part, [8, 4], 0.0);
-    for (x, y) in (0..32).map(|index| (index % 8, index / 8)) {
-        let is_inside = (2..6).contains(&x) && (1..3).contains(&y);
-        assert_eq!(pixel(&shown, x, y).1 == 255, is_inside, "{x}, {y}");
-    }
-    for (x, y) in [(-0.01, 0.0), (0.0, -0.01), (4.0, 0.0), (0.0, 2.0)] {
-        assert_eq!(read(&map(), x, y), None, "{x}, {y}");
-    }
-}
-
-#[test]
 fn a_pixel_of_many_texels_is_their_mean() {
     let part = |texels_per_pixel| MapCrop {
         left: 0.0,
@@ -287,17 +224,6 @@ fn a_pixel_of_many_texels_is_their_mean() {
         assert!(found.abs_diff(expected) <= 1, "{found} instead of {expected}");
     }
     assert!(pixel(&coarse, 1, 0).0 > pixel(&coarse, 0, 0).0);
-}
-
-#[test]
-fn reading_tells_layers_and_error() {
-    let reading = read(&map(), 3.5, 1.2).expect("it is on the map");
-    assert_eq!((reading.texel, reading.error_w_per_m2), ([3, 1], Some(0.25)));
-    let [(LayerKind::Caustic, caustic), (LayerKind::Direct, direct)] = reading.layers_w_per_m2[..] else {
-        panic!("{reading:?}")
-    };
-    // Grey light is its own luminance.
-    near([caustic, direct], [6.0, 3.0], 1e-9, "layers");
 }
 
 const FRAME: Duration = Duration::from_millis(50);

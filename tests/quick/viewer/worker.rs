@@ -23,16 +23,11 @@ fn result(rays: u64, partial: bool) -> Bake {
     result
 }
 
-fn named(name: &str, density_per_sr: f64) -> BakeRequest {
-    let scene = with(Scene::default(), |it| it.name = name.into());
+pub fn asked(density_per_sr: f64) -> BakeRequest {
     BakeRequest {
-        scene: Arc::new(scene),
+        scene: Arc::new(Scene::default()),
         settings: with(BakeSettings::splat(), |it| it.density_per_sr = density_per_sr),
     }
-}
-
-pub fn asked(density_per_sr: f64) -> BakeRequest {
-    named("", density_per_sr)
 }
 
 /// Works by a script: the density tells it what to do.
@@ -55,9 +50,6 @@ pub const STUBBORN: f64 = 5000.0;
 /// Hands out levels of 1 and 2 rays, the second once the gate opened, and is done when it opens again. Ignores
 /// cancelling.
 const IN_LEVELS: f64 = 6000.0;
-/// Answers with as many rays as its scene's name has letters.
-const NAMED: f64 = 7000.0;
-
 impl LevelBaker for Scripted {
     fn set_scene(&mut self, scene: Arc<Scene>) -> Result<()> {
         self.scene = scene;
@@ -102,7 +94,6 @@ impl LevelBaker for Scripted {
                 level(result(2, false));
                 wait();
             }
-            NAMED => return Ok(result(self.scene.name.len() as u64, false)),
             _ => {}
         }
         Ok(result(rays, false))
@@ -297,19 +288,6 @@ fn levels_of_replaced_bakes_are_dropped() {
     // Its second level is dropped; that it was complete all the same may be shown.
     let last = bench.worker.take_level();
     assert!(last.is_none_or(|last| last.is_final && last.level == 2));
-}
-
-#[test]
-fn each_request_brings_its_scene() {
-    let bench = bench();
-    for name in ["four", "seven77", "four"] {
-        bench.worker.request(named(name, NAMED));
-        assert_eq!(bench.settled(), BakeState::Done);
-        let baked = bench.worker.take_level().expect("there are maps");
-        assert_eq!(baked.result.counts.rays, name.len() as u64);
-        assert_eq!(baked.request.scene.name, name);
-    }
-    assert_eq!(bench.made.load(Ordering::SeqCst), 1, "one session for all scenes");
 }
 
 #[test]

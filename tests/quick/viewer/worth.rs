@@ -291,16 +291,3 @@ fn effects_are_switched() {
     assert_eq!(effects.get(Effect::Reflection), EffectSwitch::On);
     assert_eq!(effects.get(Effect::Refraction), EffectSwitch::Off);
 }
-
-#[test]
-fn long_reasons_stay_within_the_panel() {
-    let reason = "`a body of glass with a very long name that goes on` is lit by `a lamp with one as long`";
-    let panel = panel(Effect::ALL.map(|effect| line(effect, true, reason)).to_vec());
-    let roles = [Role::RadioButton, Role::Label, Role::Button];
-    for node in panel
-        .nodes()
-        .filter(|node| roles.contains(&node.accesskit_node().role()))
-    {
-        assert!(Headless::is_inside(node.rect()), "{node:?}");
-    }
-}

@@ -150,7 +150,7 @@ impl Case {
                     settings.threads = settings.threads.max(1);
                     let result = bake(scene.clone(), &settings);
                     if open.is_none() {
-                        first = described(&scene);
+                        first = scene.name.clone();
                     }
                     open = Some(energy_residual(&result).max(open.unwrap_or(0.0)));
                     carried = if is_carried { by_carriers(&scene, &settings) } else { Vec::new() };
@@ -179,26 +179,6 @@ impl Case {
         }
         rows
     }
-}
-
-/// Name of a scene, or else a list of its contents.
-fn described(scene: &Scene) -> String {
-    if !scene.name.is_empty() {
-        return scene.name.clone();
-    }
-    let objects = scene.objects.iter().map(|object| &object.name);
-    let mut counts: Vec<(&String, usize)> = Vec::new();
-    for name in objects.chain(scene.lights.iter().map(|light| &light.name)) {
-        match counts.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, count)) => *count += 1,
-            None => counts.push((name, 1)),
-        }
-    }
-    let words = counts.into_iter().take(6).map(|(name, count)| match count {
-        1 => name.clone(),
-        _ => format!("{count} × {name}"),
-    });
-    words.collect::<Vec<_>>().join(", ")
 }
 
 /// Largest relative error in the energy balance of the ledgers, or between ledgers and maps. Infinite if a value is
