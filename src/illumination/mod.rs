@@ -16,6 +16,7 @@ pub mod seams;
 pub mod side;
 pub mod smoothing;
 pub mod tiles;
+pub mod uv_file;
 pub mod visible;
 
 pub use chart::{Chart, UvSet};

@@ -5,9 +5,9 @@ use serde::Deserialize;
 use serde_json::Map;
 
 use super::animation::Animations;
+use super::context::LoadContext;
 use super::extras::Extras;
 use super::pose::Poses;
-use super::report::Report;
 use super::{extensions, faults, glossiness, names};
 use crate::error::{Error, Result};
 
@@ -39,18 +39,18 @@ pub struct NodeTransform {
 ///
 /// # Errors
 /// Text that is not JSON, another version than glTF 2, an unsupported required extension, a value of the wrong type.
-pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
+pub fn parse(json: &[u8], load: &mut LoadContext) -> Result<Document> {
     let mut value: Value = serde_json::from_slice(json).map_err(|error| broken_json(json, &error))?;
     let Some(file) = value.as_object_mut() else {
         return Err(unlike_gltf("its JSON is not an object"));
     };
-    check_version(file, report)?;
+    check_version(file, load)?;
     let required = strings(file, "extensionsRequired")?;
-    extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
+    extensions::check(&required, &strings(file, "extensionsUsed")?, load)?;
     let poses = Poses::of(file);
     let animations = Animations::of(file);
-    prepare(file, report);
-    make_glass_clear(file, report);
+    prepare(file, load);
+    make_glass_clear(file, load);
     let extras = Extras::of(&value);
     remove_extras(&mut value);
 
@@ -59,7 +59,7 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
         None => Vec::new(),
     };
     let root: Root = serde_json::from_value(value).map_err(|error| unlike_gltf(&error.to_string()))?;
-    faults::report(&root, report);
+    faults::warn(&root, load);
     Ok(Document {
         root,
         transforms,
@@ -93,7 +93,7 @@ fn unlike_gltf(why: &str) -> Error {
     )
 }
 
-fn check_version(file: &Map<String, Value>, report: &mut Report) -> Result<()> {
+fn check_version(file: &Map<String, Value>, load: &mut LoadContext) -> Result<()> {
     let asset = file.get("asset");
     let text = |key: &str| asset.and_then(|asset| asset.get(key)).and_then(Value::as_str);
     let Some(version) = text("version") else {
@@ -107,7 +107,7 @@ fn check_version(file: &Map<String, Value>, report: &mut Report) -> Result<()> {
     match (parts(version), parts(needed)) {
         (Some((2, minor)), Some((2, needed_minor))) if text("minVersion").is_none() || needed_minor == 0 => {
             if minor > 0 {
-                report.warn(
+                load.warn(
                     "asset",
                     format!("is of version 2.{minor}, read as 2.0"),
                     "check the picture",
@@ -134,11 +134,11 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
 
 /// Removes animations, skins and morph targets, so that faults in them cannot stop a scene; converts outdated
 /// materials; and adds fields that the typed reader requires although glTF does not.
-fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
+fn prepare(file: &mut Map<String, Value>, load: &mut LoadContext) {
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
         let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
         let owner = format!("material `{}`", names::name(name.as_ref(), "material", index));
-        glossiness::convert(material, &owner, report);
+        glossiness::convert(material, &owner, load);
     }
     file.remove("animations");
     let mut is_bent = file.remove("skins").is_some();
@@ -153,13 +153,13 @@ fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
         }
     }
     if is_bent {
-        report.warn(
+        load.warn(
             "skins and morph targets",
             "are read at rest",
             "pose the scene where it was made",
         );
     }
-    name_variants(file, report);
+    name_variants(file, load);
     for scene in objects(file.get_mut("scenes")) {
         scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
     }
@@ -172,7 +172,7 @@ fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
     }
 }
 
-fn name_variants(file: &Map<String, Value>, report: &mut Report) {
+fn name_variants(file: &Map<String, Value>, load: &mut LoadContext) {
     let extensions = file.get("extensions");
     let stated = extensions.and_then(|all| all.get(extensions::VARIANTS)?.get("variants")?.as_array());
     let name = |variant: &Value| variant.get("name")?.as_str().map(str::to_owned);
@@ -183,7 +183,7 @@ fn name_variants(file: &Map<String, Value>, report: &mut Report) {
         .map(|(index, variant)| names::name(name(variant).as_ref(), "variant", index))
         .collect();
     if !names.is_empty() {
-        report.warn(
+        load.warn(
             "materials",
             format!("have variants, which are left out ({})", names.join(", ")),
             "the default materials were read",
@@ -193,7 +193,7 @@ fn name_variants(file: &Map<String, Value>, report: &mut Report) {
 
 /// Reads a transmissive material without a metallic factor as a dielectric: glTF's default, metal, would block all
 /// light.
-fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
+fn make_glass_clear(file: &mut Map<String, Value>, load: &mut LoadContext) {
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
         let extensions = material.get("extensions");
         let transmission = extensions.and_then(|all| all.get("KHR_materials_transmission"));
@@ -211,7 +211,7 @@ fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
             .or_insert_with(|| Value::Object(Map::new()));
         if let Some(pbr) = pbr.as_object_mut() {
             pbr.insert("metallicFactor".into(), Value::from(0.0));
-            report.warn(
+            load.warn(
                 format!("material `{}`", names::name(name.as_ref(), "material", index)),
                 "transmits light and states no metallic factor; it was read as glass",
                 "state a metallic factor of 0",

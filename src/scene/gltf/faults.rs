@@ -5,11 +5,11 @@ use gltf::json::Root;
 use gltf::json::path::Path;
 use gltf::json::validation::{Error, Validate};
 
+use super::context::LoadContext;
 use super::guard;
-use super::report::Report;
 
 /// Reports violations in the typed JSON.
-pub fn report(root: &Root, report: &mut Report) {
+pub fn warn(root: &Root, load: &mut LoadContext) {
     let mut found = Vec::new();
     // Validation panics on some broken references.
     let finished = guard::without_panic(|| {
@@ -36,13 +36,9 @@ pub fn report(root: &Root, report: &mut Report) {
             Error::Oversize => "is too large",
             Error::Unsupported => "is not supported",
         };
-        report.warn(path, what, "export the file again if something is missing");
+        load.warn_damaged(path, what);
     }
     if finished.is_none() {
-        report.warn(
-            "JSON",
-            "has references that lead nowhere",
-            "export the file again",
-        );
+        load.warn_damaged("JSON", "has references that lead nowhere");
     }
 }
