@@ -3,9 +3,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::effects::EffectSet;
 use super::microfacets::{self, Facet, MicrofacetEvent};
-use super::{MediumStack, SurfaceHit, Tracer};
+use super::{EffectSet, MediumStack, SurfaceHit, Tracer};
 use crate::geometry::Ray;
 use crate::optics::{LinearSrgb, fresnel, refraction};
 use crate::scene::material::SMOOTH_ROUGHNESS;

@@ -10,7 +10,7 @@ use serde_json::Map;
 use super::accessor::{Formats, Reader};
 use super::context::LoadContext;
 use super::document::Document;
-use super::names;
+use super::extras;
 use super::nodes::{self, PlacedNode};
 use super::pose::Maybe;
 use crate::error::Error;
@@ -72,7 +72,7 @@ impl Animations {
                 );
                 continue;
             };
-            let name = names::name(animation.name.as_ref(), "animation", index);
+            let name = extras::name(animation.name.as_deref(), "animation", index);
             let owner = format!("animation `{name}`");
             for channel in &animation.channels {
                 let read = node_of(channel, document)

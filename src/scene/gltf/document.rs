@@ -1,5 +1,10 @@
-//! The JSON of a file as typed data, without the parts that are not read.
+//! The JSON of a file as typed data, without the parts that are not read. Violations of the specification are reported as
+//! warnings; those that affect what is read stop the loading where the faulty part is needed.
 
+use std::fmt::Display;
+
+use gltf::json::path::Path;
+use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{Root, Value};
 use serde::Deserialize;
 use serde_json::Map;
@@ -8,7 +13,7 @@ use super::animation::Animations;
 use super::context::LoadContext;
 use super::extras::Extras;
 use super::pose::Poses;
-use super::{extensions, faults, glossiness, names};
+use super::{extensions, extras, glossiness, guard};
 use crate::error::{Error, Result};
 
 /// The typed JSON, with node transforms in double precision.
@@ -55,11 +60,11 @@ pub fn parse(json: &[u8], load: &mut LoadContext) -> Result<Document> {
     remove_extras(&mut value);
 
     let transforms = match value.get("nodes") {
-        Some(nodes) => Vec::deserialize(nodes).map_err(|error| unlike_gltf(&error.to_string()))?,
+        Some(nodes) => Vec::deserialize(nodes).map_err(unlike_gltf)?,
         None => Vec::new(),
     };
-    let root: Root = serde_json::from_value(value).map_err(|error| unlike_gltf(&error.to_string()))?;
-    faults::warn(&root, load);
+    let root: Root = serde_json::from_value(value).map_err(unlike_gltf)?;
+    warn_of_faults(&root, load);
     Ok(Document {
         root,
         transforms,
@@ -70,27 +75,19 @@ pub fn parse(json: &[u8], load: &mut LoadContext) -> Result<Document> {
 }
 
 fn broken_json(json: &[u8], error: &serde_json::Error) -> Error {
-    if json.trim_ascii_start().starts_with(b"{") {
-        Error::failure(
-            "JSON",
-            format!("is broken ({error})"),
-            "repair it or export it again",
-        )
-    } else {
-        Error::failure(
-            "JSON",
-            format!("this is not a glTF file ({error})"),
-            "name a .glb or .gltf file",
-        )
+    match json.trim_ascii_start() {
+        [b'{', ..] => Error::failure("JSON", format!("is broken ({error})"), REPAIR),
+        _ => {
+            let what = format!("this is not a glTF file ({error})");
+            Error::failure("JSON", what, "name a .glb or .gltf file")
+        }
     }
 }
 
-fn unlike_gltf(why: &str) -> Error {
-    Error::failure(
-        "JSON",
-        format!("does not follow glTF 2.0 ({why})"),
-        "repair it or export it again",
-    )
+const REPAIR: &str = "repair it or export it again";
+
+fn unlike_gltf(why: impl Display) -> Error {
+    Error::failure("JSON", format!("does not follow glTF 2.0 ({why})"), REPAIR)
 }
 
 fn check_version(file: &Map<String, Value>, load: &mut LoadContext) -> Result<()> {
@@ -127,7 +124,7 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
     match file.get(key) {
         None => Ok(Vec::new()),
         Some(list) => {
-            Vec::deserialize(list).map_err(|_| unlike_gltf(&format!("`{key}` is not a list of names")))
+            Vec::deserialize(list).map_err(|_| unlike_gltf(format!("`{key}` is not a list of names")))
         }
     }
 }
@@ -136,8 +133,7 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
 /// materials; and adds fields that the typed reader requires although glTF does not.
 fn prepare(file: &mut Map<String, Value>, load: &mut LoadContext) {
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
-        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
-        let owner = format!("material `{}`", names::name(name.as_ref(), "material", index));
+        let owner = owner(material, index);
         glossiness::convert(material, &owner, load);
     }
     file.remove("animations");
@@ -175,13 +171,11 @@ fn prepare(file: &mut Map<String, Value>, load: &mut LoadContext) {
 fn name_variants(file: &Map<String, Value>, load: &mut LoadContext) {
     let extensions = file.get("extensions");
     let stated = extensions.and_then(|all| all.get(extensions::VARIANTS)?.get("variants")?.as_array());
-    let name = |variant: &Value| variant.get("name")?.as_str().map(str::to_owned);
-    let names: Vec<String> = stated
-        .into_iter()
-        .flatten()
-        .enumerate()
-        .map(|(index, variant)| names::name(name(variant).as_ref(), "variant", index))
-        .collect();
+    let variants = stated.into_iter().flatten().enumerate();
+    let name = |(index, variant): (usize, &Value)| {
+        extras::name(variant.get("name").and_then(Value::as_str), "variant", index)
+    };
+    let names: Vec<String> = variants.map(name).collect();
     if !names.is_empty() {
         load.warn(
             "materials",
@@ -205,19 +199,24 @@ fn make_glass_clear(file: &mut Map<String, Value>, load: &mut LoadContext) {
         if factor.and_then(Value::as_f64).is_none_or(|factor| factor <= 0.0) || pbr.is_some_and(states) {
             continue;
         }
-        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
+        let owner = owner(material, index);
         let pbr = material
             .entry("pbrMetallicRoughness")
             .or_insert_with(|| Value::Object(Map::new()));
         if let Some(pbr) = pbr.as_object_mut() {
             pbr.insert("metallicFactor".into(), Value::from(0.0));
             load.warn(
-                format!("material `{}`", names::name(name.as_ref(), "material", index)),
+                owner,
                 "transmits light and states no metallic factor; it was read as glass",
                 "state a metallic factor of 0",
             );
         }
     }
+}
+
+fn owner(material: &Map<String, Value>, index: usize) -> String {
+    let name = material.get("name").and_then(Value::as_str);
+    format!("material `{}`", extras::name(name, "material", index))
 }
 
 fn objects(list: Option<&mut Value>) -> impl Iterator<Item = &mut Map<String, Value>> {
@@ -235,5 +234,40 @@ fn remove_extras(value: &mut Value) {
             fields.values_mut().for_each(remove_extras);
         }
         _ => {}
+    }
+}
+
+/// Reports violations in the typed JSON.
+fn warn_of_faults(root: &Root, load: &mut LoadContext) {
+    let mut found = Vec::new();
+    // Validation panics on some broken references.
+    let finished = guard::without_panic(|| {
+        root.validate(root, Path::new, &mut |path, error| {
+            found.push((path().to_string(), error))
+        });
+    });
+    for (path, error) in found {
+        // Extensions have been checked already, against those that this program reads.
+        if path.starts_with("extensionsRequired") {
+            continue;
+        }
+        // Accessors may lack a buffer view (all zero), and textures a plain image (WebP).
+        let may_miss = path.ends_with("bufferView") || path.ends_with("source");
+        // Bounds are computed, whatever the file states.
+        let unread = path.ends_with(".min") || path.ends_with(".max");
+        if unread || error == Fault::Missing && may_miss {
+            continue;
+        }
+        let what = match error {
+            Fault::IndexOutOfBounds => "refers to something that does not exist",
+            Fault::Invalid => "has a value that glTF does not allow",
+            Fault::Missing => "is missing",
+            Fault::Oversize => "is too large",
+            Fault::Unsupported => "is not supported",
+        };
+        load.warn_damaged(path, what);
+    }
+    if finished.is_none() {
+        load.warn_damaged("JSON", "has references that lead nowhere");
     }
 }

@@ -131,5 +131,5 @@ fn remedy(extension: &str) -> &'static str {
 }
 
 fn printable(name: &str) -> String {
-    super::names::name(Some(&name.to_owned()), "extension", 0)
+    super::extras::name(Some(name), "extension", 0)
 }

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 use super::buffers::Buffers;
 use super::context::LoadContext;
-use super::{guard, names, uri};
+use super::{extras, guard, uri};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::Texture;
@@ -220,7 +220,7 @@ impl<'a> Images<'a> {
     }
 
     fn name(&self, image: usize) -> String {
-        names::name(self.root.images[image].name.as_ref(), "image", image)
+        extras::name(self.root.images[image].name.as_deref(), "image", image)
     }
 
     fn decode(&mut self, image: usize, load: &mut LoadContext) -> Result<Arc<RgbaImage>> {

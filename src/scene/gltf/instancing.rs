@@ -9,8 +9,8 @@ use super::accessor::{Formats, Reader};
 use super::buffers::Buffers;
 use super::context::{LoadContext, damaged};
 use super::document::{Document, NodeTransform};
+use super::extras;
 use super::glb::Glb;
-use super::names;
 use crate::error::Result;
 
 pub const NAME: &str = "EXT_mesh_gpu_instancing";
@@ -57,7 +57,7 @@ pub fn read(root: &Root, buffers: &Buffers, load: &mut LoadContext) -> Result<Ve
         let Some(stated) = stated(node) else {
             continue;
         };
-        let name = names::name(node.name.as_ref(), "node", index);
+        let name = extras::name(node.name.as_deref(), "node", index);
         let owner = format!("node `{name}`");
         let broken = |what: String| damaged(&owner, what);
         let attributes = Attributes::deserialize(stated)

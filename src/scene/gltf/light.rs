@@ -11,8 +11,8 @@ use gltf::json::validation::Checked;
 
 use super::context::LoadContext;
 use super::document::Document;
+use super::extras::{widen, widen_all};
 use super::nodes::PlacedNode;
-use super::numbers::{widen, widen_all};
 use super::{area_light, extras, spectrum};
 use crate::error::Result;
 use crate::optics::LinearSrgb;

@@ -11,10 +11,10 @@ use gltf::json::{Index, Value};
 
 use super::context::LoadContext;
 use super::document::Document;
+use super::extras::widen;
 use super::images::Images;
-use super::numbers::widen;
 use super::substance::{self, Composition};
-use super::{coat, extensions, names, spectrum, waves};
+use super::{coat, extensions, extras, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::material::METAL_ROUGHNESS_LIMIT;
@@ -81,7 +81,7 @@ pub fn read_all(
     images.decode_ahead(sources.iter().flat_map(textures), load)?;
     let mut materials = Vec::with_capacity(sources.len());
     for (index, source) in sources.iter().enumerate() {
-        let name = names::name(source.name.as_ref(), "material", index);
+        let name = extras::name(source.name.as_deref(), "material", index);
         let mut reading = MaterialReader::new((document, index), folder, images, load);
         materials.push(reading.read(name)?);
     }
@@ -133,7 +133,7 @@ impl<'a, 'b> MaterialReader<'a, 'b> {
         load: &'a mut LoadContext,
     ) -> Self {
         let source = &document.root.materials[index];
-        let name = names::name(source.name.as_ref(), "material", index);
+        let name = extras::name(source.name.as_deref(), "material", index);
         Self {
             owner: format!("material `{name}`"),
             source,
@@ -462,7 +462,7 @@ impl<'a> MaterialReader<'a, '_> {
             if ![coat::NAME, substance::NAME].contains(&key.as_str())
                 && let Some(loss) = extensions::loss(key, stated)
             {
-                ignored.push((names::name(Some(key), "extension", 0), loss));
+                ignored.push((extras::name(Some(key), "extension", 0), loss));
             }
         }
         for (what, loss) in ignored {

@@ -11,9 +11,9 @@ use gltf::json::texture::{Info, Texture};
 use gltf::json::validation::Checked;
 use serde::Deserialize;
 
+use super::extras::widen;
 use super::factors::{FactorImage, Factors};
 use super::material::{MaterialReader, linear};
-use super::numbers::widen;
 use super::spectrum;
 use crate::error::Result;
 use crate::optics::LinearSrgb;

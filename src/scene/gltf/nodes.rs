@@ -9,8 +9,8 @@ use gltf::json::{Index, Node, Root, Value};
 
 use super::context::{LoadContext, damaged};
 use super::document::{Document, NodeTransform};
-use super::names;
-use super::numbers::widen;
+use super::extras;
+use super::extras::widen;
 use crate::error::{Error, Result};
 use crate::scene::Camera;
 
@@ -54,7 +54,7 @@ pub fn place(document: &Document, load: &mut LoadContext) -> Result<Vec<PlacedNo
                 "is referred to but does not exist",
             ));
         };
-        let name = names::name(node.name.as_ref(), "node", index);
+        let name = extras::name(node.name.as_deref(), "node", index);
         if std::mem::replace(&mut reached[index], true) {
             load.warn(
                 format!("node `{name}`"),

@@ -10,7 +10,7 @@ use super::context::{LoadContext, damaged};
 use super::nodes::PlacedNode;
 use super::pose::PrimitiveInstance;
 use super::primitive::{self, Primitives};
-use super::{material, names};
+use super::{extras, material};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::watertight::{has_volume, is_closed};
@@ -118,7 +118,7 @@ fn take_copies(objects: &[Object], load: &mut LoadContext) -> Result<()> {
 fn owner(mesh: &mesh::Mesh, mesh_index: usize, primitive: usize) -> String {
     format!(
         "mesh `{}`, primitive {primitive}",
-        names::name(mesh.name.as_ref(), "mesh", mesh_index)
+        extras::name(mesh.name.as_deref(), "mesh", mesh_index)
     )
 }
 
