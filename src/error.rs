@@ -67,6 +67,13 @@ impl Error {
         }
     }
 
+    /// The same error, found elsewhere.
+    #[must_use]
+    pub fn at(self, location: impl Into<String>) -> Self {
+        let location = shortened(location.into());
+        Self { location, ..self }
+    }
+
     /// The work was cancelled before it produced a result.
     pub fn cancelled(location: impl Into<String>) -> Self {
         Self {

@@ -315,7 +315,7 @@ fn middle_of(lamp: &Spectrum, band: &SpectralBand) -> Option<Nanometres> {
 
 /// A light's own spectrum, or a smooth one for its colour. A sky gets a white one, which its colours by direction
 /// scale.
-fn lamp_of(light: &Light) -> std::result::Result<Arc<Spectrum>, crate::optics::spectrum::SpectrumError> {
+fn lamp_of(light: &Light) -> Result<Arc<Spectrum>> {
     match (&light.spectrum, &light.kind) {
         (Some(spectrum), _) => Ok(Arc::clone(spectrum)),
         (None, LightKind::Environment { .. }) => Ok(Arc::new(illuminant("D65")?)),

@@ -55,7 +55,7 @@ impl BakeArguments {
     /// # Errors
     /// Bad usage; input, output or a bake that fails; a cancelled shard.
     pub fn run(&self, console: &Console) -> Result<()> {
-        let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads()?)?;
+        let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads())?;
         if self.shard.is_some() {
             bake::shards::check(&settings)?;
         }
@@ -228,7 +228,7 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
         );
     }
     if let Some(report) = &result.forecast {
-        line("forecast", told(report));
+        line("forecast", forecast_text(report));
     }
     if let Some(next) = next_target(result, manifest.settings.estimator) {
         line("next", next.in_words());
@@ -262,7 +262,7 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
 }
 
 /// The forecast from when the error was first known, and the actual cost.
-fn told(report: &ForecastReport) -> String {
+fn forecast_text(report: &ForecastReport) -> String {
     let (made_at, actual) = (&report.made_at, &report.actual);
     format!(
         "{}, was expected at {:.1} %; it took {:.2} s, {} rays",

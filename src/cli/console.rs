@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
+use serde_json::{Value, json};
 #[cfg(unix)]
 use signal_hook::consts::SIGXFSZ;
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -191,6 +192,13 @@ fn print_stderr(line: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{line}");
 }
 
+/// Adds the fields of a structure to an object.
+pub fn extend(report: &mut Value, fields: &impl Serialize) {
+    if let (Value::Object(report), Value::Object(fields)) = (report, json!(fields)) {
+        report.extend(fields);
+    }
+}
+
 /// Formats named values, one per line.
 pub fn in_lines(lines: &[(&str, String)]) -> String {
     lines
@@ -232,7 +240,7 @@ impl StageBar {
         let is_due = last.is_none_or(|(told, at)| told != stage || at.elapsed() >= BETWEEN_LINES);
         if is_due || done == total {
             *last = Some((stage, Instant::now()));
-            let line = serde_json::json!({ "stage": stage.name(), "done": done, "total": total });
+            let line = json!({ "stage": stage.name(), "done": done, "total": total });
             print_stderr(&line.to_string());
         }
     }

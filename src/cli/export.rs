@@ -23,9 +23,6 @@ use super::console::Console;
 use super::options::RunOptions;
 use super::values::{self, Named};
 
-/// Exposures beyond this are mistakes [stops].
-const MAX_STOPS: f64 = 64.0;
-
 /// Share of lit texels that are white in an unlit picture, if no exposure is given.
 const WHITE_SHARE: f64 = 0.01;
 
@@ -118,18 +115,28 @@ pub struct ExportArguments {
     #[arg(long, hide_short_help = true)]
     mips: bool,
     /// glb, png: light that may clip for finer steps [default: 0.5%]
-    #[arg(long, value_name = "PERCENT", hide_short_help = true, value_parser = share, allow_hyphen_values = true)]
+    #[arg(long, value_name = "PERCENT", hide_short_help = true, value_parser = part_of_light, allow_hyphen_values = true)]
     cut: Option<f64>,
     /// Multiply light by 2^STOPS (textures, and --as unlit)
     #[arg(
         long,
         value_name = "STOPS",
         hide_short_help = true,
+        value_parser = values::within(-values::MAX_STOPS..=values::MAX_STOPS, "stops"),
         allow_negative_numbers = true
     )]
     exposure: Option<f64>,
     #[command(flatten)]
     pub run: RunOptions,
+}
+
+/// Parses a share below the whole.
+fn part_of_light(text: &str) -> std::result::Result<f64, String> {
+    let part = share(text)?;
+    (0.0..1.0)
+        .contains(&part)
+        .then_some(part)
+        .ok_or_else(|| "give 0 % to below 100 %".into())
 }
 
 /// Result of a .glb for `--json`.
@@ -163,24 +170,6 @@ impl ExportArguments {
     }
 
     fn validate(&self) -> Result<()> {
-        if let Some(stops) = self.exposure
-            && !(-MAX_STOPS..=MAX_STOPS).contains(&stops)
-        {
-            return Err(Error::usage(
-                "--exposure",
-                format!("{stops} is outside of -{MAX_STOPS} to {MAX_STOPS} stops"),
-                "give a number of stops such as 2",
-            ));
-        }
-        if let Some(cut) = self.cut
-            && !(0.0..1.0).contains(&cut)
-        {
-            return Err(Error::usage(
-                "--cut",
-                format!("{cut} is outside 0 % to below 100 %"),
-                "give a share such as 0.5%",
-            ));
-        }
         self.refuse_what_does_not_apply()?;
         let bits: &[u32] = match self.format {
             "glb" => &[8, 16],
@@ -424,7 +413,7 @@ fn exposure_of(scene: &Scene, maps: &[IlluminationMap]) -> f64 {
     }
     sent.sort_unstable_by(|a, b| b.total_cmp(a));
     let white = sent[(WHITE_SHARE * sent.len() as f64) as usize] * std::f64::consts::FRAC_1_PI;
-    (-white.log2()).clamp(-MAX_STOPS, MAX_STOPS)
+    (-white.log2()).clamp(-values::MAX_STOPS, values::MAX_STOPS)
 }
 
 fn glb_text(file: &str, report: &GlbReport) -> String {

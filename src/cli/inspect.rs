@@ -17,7 +17,7 @@ use nephroid::settings::LayerKind;
 use serde_json::{Value, json};
 
 use super::bake_options::BakeOptions;
-use super::console::{Console, bytes, in_lines};
+use super::console::{Console, bytes, extend, in_lines};
 use super::loaded::LoadedScene;
 use super::options::{RunOptions, SceneOptions};
 
@@ -45,7 +45,7 @@ impl InspectArguments {
     /// # Errors
     /// Bad usage; a scene that cannot be read; settings that do not fit it.
     pub fn run(&self, console: &Console) -> Result<()> {
-        let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads()?)?;
+        let settings = self.bake.settings(&[LayerKind::Caustic], self.run.threads())?;
         let options = self.scene_options.load_options(true);
         let scene = &LoadedScene::load(&self.scene, &options, false, console)?.scene;
         let survey = Baker::new(scene.clone())?.survey(&settings, console.control())?;
@@ -58,13 +58,13 @@ impl InspectArguments {
             }
         }
         plan.effects.push(chains);
-        let (report, lines) = told(scene, &survey, &plan);
+        let (report, lines) = report(scene, &survey, &plan);
         console.print_result(&in_lines(&lines), &report)
     }
 }
 
 /// The result as JSON and as text.
-fn told(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
+fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
     let mut lines = vec![("scene", scene.source.clone())];
     let bounds = scene.bounds();
     if let Some((low, high)) = bounds {
@@ -126,9 +126,7 @@ fn told(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
         let forecast = known.forecast.as_ref();
         lines.push((known.preset.name(), preset_line(forecast)));
         let mut report = json!({"preset": known.preset});
-        if let (Value::Object(report), Value::Object(forecast)) = (&mut report, json!(forecast)) {
-            report.extend(forecast);
-        }
+        extend(&mut report, &forecast);
         report
     });
     let presets: Vec<Value> = presets.collect();

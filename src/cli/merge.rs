@@ -41,7 +41,7 @@ impl MergeArguments {
     /// # Errors
     /// Shards that are damaged, missing or of different bakes; another scene; output that cannot be written.
     pub fn run(&self, console: &Console) -> Result<()> {
-        let threads = self.run.threads()?;
+        let threads = self.run.threads();
         let shards = ShardSet::open(&self.shards)?;
         let (shards_wall_s, shards_cpu_s) = shards.seconds();
         let manifest = shards.manifest().clone();

@@ -9,10 +9,13 @@ use nephroid::scene::camera_path::MAX_FRAMES;
 
 use super::values;
 
+/// Latest moment [s]: a day.
+const MAX_TIME_S: f64 = 86_400.0;
+
 #[derive(Debug, Default, Args)]
 pub struct MomentOptions {
     /// Moment of a scene that moves
-    #[arg(long, value_name = "SECONDS", value_parser = values::time_s)]
+    #[arg(long, value_name = "SECONDS", value_parser = values::within(0.0..=MAX_TIME_S, "seconds"))]
     time: Option<f64>,
     /// So many moments, one after the other
     #[arg(long, value_name = "N", value_parser = values::within(1..=MAX_FRAMES, "frames"))]
@@ -23,7 +26,7 @@ pub struct MomentOptions {
         value_name = "F",
         requires = "frames",
         default_value = "24",
-        value_parser = values::fps,
+        value_parser = values::within(0.01..=1000.0, "frames a second"),
         hide_short_help = true
     )]
     fps: f64,

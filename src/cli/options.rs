@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use nephroid::error::{Error, Result};
 use nephroid::scene::LoadOptions;
 
 use super::bake_options;
@@ -65,7 +64,7 @@ pub enum ProgressForm {
 #[derive(Debug, Args)]
 pub struct RunOptions {
     /// Worker threads [default: one per core]
-    #[arg(long, value_name = "N", hide_short_help = true)]
+    #[arg(long, value_name = "N", value_parser = values::within(1..=MAX_THREADS, "threads"), hide_short_help = true)]
     pub threads: Option<usize>,
     /// No progress bar
     #[arg(long, hide_short_help = true)]
@@ -86,19 +85,8 @@ pub struct RunOptions {
 
 impl RunOptions {
     /// Requested threads; 0 = one per core.
-    ///
-    /// # Errors
-    /// Zero threads, or too many.
-    pub fn threads(&self) -> Result<usize> {
-        match self.threads {
-            None => Ok(0),
-            Some(threads) if (1..=MAX_THREADS).contains(&threads) => Ok(threads),
-            Some(threads) => Err(Error::usage(
-                "--threads",
-                format!("{threads} is outside 1 to {MAX_THREADS}"),
-                "give a number in that range",
-            )),
-        }
+    pub fn threads(&self) -> usize {
+        self.threads.unwrap_or(0)
     }
 }
 

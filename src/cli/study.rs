@@ -366,7 +366,7 @@ impl StudyRun<'_> {
     }
 
     fn effects(self, study: &EffectsArguments) -> Result<()> {
-        let threads = self.common.run.threads()?;
+        let threads = self.common.run.threads();
         let settings = study.bake.settings(&[LayerKind::Caustic], threads)?;
         if settings.max_time_s.is_some() {
             return Err(Error::usage(
@@ -453,7 +453,7 @@ impl StudyRun<'_> {
         let bar = self.console.bar();
         let bench = Bench {
             quick: self.common.quick,
-            threads: self.common.run.threads()?,
+            threads: self.common.run.threads(),
             progress: &bar,
             control: self.console.control(),
         };
@@ -506,11 +506,11 @@ impl StudyRun<'_> {
             format!("map {} of {}, noise {noise:.3} %\n", map.file, map.surface)
         });
         let lines: String = lines.collect();
-        let told = noise.map_or("nothing arrived".into(), |noise| {
+        let noise_text = noise.map_or("nothing arrived".into(), |noise| {
             format!("noise {:.3} % of the mean over all maps", 100.0 * noise)
         });
         let text = format!(
-            "folder {}\n{lines}{rays} rays, {cpu_s:.2} s of CPU, {told}",
+            "folder {}\n{lines}{rays} rays, {cpu_s:.2} s of CPU, {noise_text}",
             output.display()
         );
         let report = json!({
@@ -529,7 +529,7 @@ impl StudyRun<'_> {
     fn settings(self, size: &SizeOption, side: usize) -> Result<BakeSettings> {
         Ok(BakeSettings {
             map_resolution: size.or_square(side),
-            threads: self.common.run.threads()?,
+            threads: self.common.run.threads(),
             ..BakeSettings::default()
         })
     }

@@ -1,17 +1,22 @@
 //! Parsers of option values.
 
+use std::fmt::Display;
 use std::ops::RangeInclusive;
+use std::str::FromStr;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::settings::options;
 use strum::VariantArray;
 
-/// Parser of a whole number in a range.
-pub fn within(
-    range: RangeInclusive<usize>,
+/// Parser of a number in a range.
+pub fn within<T>(
+    range: RangeInclusive<T>,
     things: &'static str,
-) -> impl Fn(&str) -> Result<usize, String> + Clone + Send + Sync {
+) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
+where
+    T: FromStr + PartialOrd + Display + Clone + Send + Sync,
+{
     move |text| {
         let number = text.parse().ok().filter(|number| range.contains(number));
         number.ok_or_else(|| format!("give {} to {} {things}", range.start(), range.end()))
@@ -70,31 +75,18 @@ where
     PossibleValuesParser::new(names.collect::<Vec<&'static str>>()).try_map(|name| options::named(&name))
 }
 
-/// Latest moment of a moving scene [s]: a day.
-const MAX_TIME_S: f64 = 86_400.0;
-
-/// Parses a moment [s].
-pub fn time_s(text: &str) -> Result<f64, String> {
-    let time_s = text.parse().ok().filter(|time| (0.0..=MAX_TIME_S).contains(time));
-    time_s.ok_or_else(|| format!("give 0 to {MAX_TIME_S} seconds"))
-}
-
-/// Parses frames per second.
-pub fn fps(text: &str) -> Result<f64, String> {
-    let fps = text.parse().ok().filter(|fps| (0.01..=1000.0).contains(fps));
-    fps.ok_or_else(|| "give 0.01 to 1000 frames a second".to_string())
-}
+/// Largest exposure, either way; beyond it, numbers are mistakes [stops].
+pub const MAX_STOPS: f64 = 64.0;
 
 /// Parses `auto` or a number of stops, −64 to 64.
 pub fn exposure(text: &str) -> Result<Exposure, String> {
     if text == "auto" {
         return Ok(Exposure::Auto);
     }
-    text.parse()
-        .ok()
-        .filter(|stops| (-64.0..=64.0).contains(stops))
+    let stops = within(-MAX_STOPS..=MAX_STOPS, "stops");
+    stops(text)
         .map(Exposure::Stops)
-        .ok_or_else(|| "give `auto` or a number of stops from -64 to 64".to_string())
+        .map_err(|why| format!("{why}, or `auto`"))
 }
 
 /// Exposure of a picture.

@@ -1,6 +1,5 @@
 //! A folder of maps: `maps/NNNN_slug.exr`, their generated coordinates, and the manifest, written last.
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use super::manifest::{self, BandChannel, LightChannels, Manifest, MapEntry};
@@ -75,14 +74,8 @@ impl MapFolder {
         let path = self.path().join(manifest::FILE_NAME);
         let json = files::to_json(&manifest, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;
-        let written: HashSet<&str> = manifest.files().collect();
-        let mut previous = self.previous.iter();
-        previous
-            .try_for_each(|file| match written.contains(file.as_str()) {
-                true => Ok(()),
-                false => files::remove_file(&self.path().join(file)),
-            })
-            .map(|()| manifest.clone())
+        files::remove_outdated(self.path(), &self.previous, manifest.files())?;
+        Ok(manifest)
     }
 
     fn write_map(
@@ -196,15 +189,10 @@ fn light_slug(scene: &Scene, light: usize) -> String {
 /// Whether a path in a manifest is one that a bake writes: `maps/NAME`, or `maps/NAME/NAME` for a frame, with no way
 /// out of the folder.
 pub(super) fn is_map_file(file: &str) -> bool {
-    let is_name = |name: &str| {
-        let mut bytes = name.bytes();
-        let is_plain = bytes.all(|byte| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte));
-        !name.is_empty() && !name.starts_with('.') && is_plain
-    };
     let Some(within) = file.strip_prefix("maps/") else {
         return false;
     };
-    within.split('/').count() <= 2 && within.split('/').all(is_name)
+    within.split('/').count() <= 2 && within.split('/').all(files::is_plain_name)
 }
 
 #[cfg(test)]

@@ -15,8 +15,8 @@ mod quantity;
 pub mod sequence;
 pub mod shards;
 pub mod textures;
-pub mod uv_file;
 pub mod web;
 
+pub use crate::illumination::uv_file;
 pub use float_image::FloatImage;
 pub use quantity::{DEFAULT_CUT, Quantity};

@@ -1,5 +1,6 @@
 //! Output folders, tested for writing before any long work.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
@@ -139,6 +140,20 @@ pub fn remove_file(path: &Path) -> Result<()> {
         )),
         _ => Ok(()),
     }
+}
+
+/// Removes the files of an earlier run in a folder that were not written again.
+///
+/// # Errors
+/// A file that cannot be removed.
+pub fn remove_outdated<'a>(
+    folder: &Path,
+    previous: &[String],
+    written: impl Iterator<Item = &'a str>,
+) -> Result<()> {
+    let written: HashSet<&str> = written.collect();
+    let mut outdated = previous.iter().filter(|file| !written.contains(file.as_str()));
+    outdated.try_for_each(|file| remove_file(&folder.join(file)))
 }
 
 fn unwritable(path: &Path, error: &io::Error) -> Error {

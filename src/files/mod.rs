@@ -14,7 +14,7 @@ pub mod cache;
 mod folder;
 
 pub use folder::StagedFolder;
-pub use folder::{OutputFolder, check_output_file, remove_file};
+pub use folder::{OutputFolder, check_output_file, remove_file, remove_outdated};
 
 /// Length of a file [bytes].
 ///
@@ -202,6 +202,12 @@ pub fn slug(name: &str, otherwise: &str) -> String {
     } else {
         slug.into()
     }
+}
+
+/// Whether a name holds only letters, digits and `_-.`, without a dot in front: it leads nowhere else.
+pub fn is_plain_name(name: &str) -> bool {
+    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte);
+    !name.is_empty() && !name.starts_with('.') && name.bytes().all(is_plain)
 }
 
 /// Encodes pixels as PNG, row by row. The error is a clause, for a size that is wrong or too large.

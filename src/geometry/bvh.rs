@@ -1,15 +1,13 @@
-//! The triangle hierarchy for rays, built by obvhs in single precision.
+//! The triangle hierarchy for rays, built by obvhs in single precision, and the same packed for devices.
 
+use super::Ray;
+use super::wide::{WideBvh, WideRay};
 use glam::{DVec3, Vec3A};
 use obvhs::{
     BvhBuildParams,
     aabb::Aabb,
     bvh2::{Bvh2, builder::build_bvh2},
 };
-
-use super::Ray;
-use super::packed::{self, PackedBvh, PackedNode};
-use super::wide::{WideBvh, WideRay};
 
 /// Boxes are widened by this fraction of the scene's size, so that the rounding of the single-precision box test cannot
 /// lose a hit: origin, direction and slab distances err by at most some 2⁻²⁰ of the size.
@@ -147,7 +145,7 @@ impl TriangleBvh {
                 .map(|corners| corners.map(|corner| local(corner).to_array()))
                 .collect(),
             triangles: self.bvh.primitive_indices.clone(),
-            depth: packed::depth(&nodes),
+            depth: depth(&nodes),
             nodes,
         }
     }
@@ -265,4 +263,46 @@ impl<'a> Node<'a> {
 
 pub(super) fn to_single(v: DVec3) -> Vec3A {
     Vec3A::new(v.x as f32, v.y as f32, v.z as f32)
+}
+
+/// A node: its box and its contents.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PackedNode {
+    /// Minimum corner, local.
+    pub low: [f32; 3],
+    /// First slot of a leaf, or first of the two adjacent children of an inner node.
+    pub first: u32,
+    /// Maximum corner, local.
+    pub high: [f32; 3],
+    /// Triangles of a leaf; 0 for inner nodes.
+    pub count: u32,
+}
+
+/// Nodes and triangles in the coordinates of a [`Frame`]. The margin of the boxes covers all
+/// rounding of single precision.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PackedBvh {
+    /// The root is first; empty without triangles.
+    pub nodes: Vec<PackedNode>,
+    /// Corners of the triangle in each slot, local.
+    pub corners: Vec<[[f32; 3]; 3]>,
+    /// Index of the triangle in each slot, in the order given to [`TriangleBvh::build`].
+    pub triangles: Vec<u32>,
+    /// Largest number of ancestors of a node.
+    pub depth: usize,
+}
+
+/// Number of ancestors of the deepest node.
+fn depth(nodes: &[PackedNode]) -> usize {
+    let mut deepest = 0;
+    let mut waiting: Vec<(usize, usize)> = nodes.first().map(|_| (0, 0)).into_iter().collect();
+    while let Some((index, above)) = waiting.pop() {
+        deepest = deepest.max(above);
+        let node = &nodes[index];
+        if node.count == 0 {
+            let first = node.first as usize;
+            waiting.extend([(first, above + 1), (first + 1, above + 1)]);
+        }
+    }
+    deepest
 }

@@ -5,23 +5,22 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::polygon::clipped;
+use super::{bits, numbered};
 
 /// Minimum and maximum corner of a box [m].
 pub type Bounds = (DVec3, DVec3);
 
-/// Whether a mesh is watertight: every edge belongs to two triangles that traverse it in opposite directions. Vertices
-/// at equal positions count as one; triangles with a repeated vertex are ignored.
+/// Whether a mesh is watertight: every edge belongs to two triangles that traverse it in opposite directions.
 pub fn is_closed(positions: &[DVec3], triangles: &[[u32; 3]]) -> bool {
-    let mut welded: HashMap<[u64; 3], u32> = HashMap::with_capacity(positions.len());
-    let place = |position: &DVec3| (*position + DVec3::ZERO).to_array().map(f64::to_bits);
-    let ids: Vec<u32> = positions
-        .iter()
-        .map(|position| {
-            let next = welded.len() as u32;
-            *welded.entry(place(position)).or_insert(next)
-        })
-        .collect();
-    // Per edge, from its lower to its higher vertex: forward and backward traversals.
+    let mut traversals = edge_traversals(positions, triangles).peekable();
+    traversals.peek().is_some() && traversals.all(|times| times == (1, 1))
+}
+
+/// How often triangles traverse each edge of a mesh, forwards and backwards. Vertices at equal positions count as one;
+/// triangles with a repeated vertex are ignored.
+pub fn edge_traversals(positions: &[DVec3], triangles: &[[u32; 3]]) -> impl Iterator<Item = (u32, u32)> {
+    let ids = numbered(positions.iter().copied().map(bits));
+    // From the lower to the higher vertex.
     let mut edges: HashMap<(u32, u32), (u32, u32)> = HashMap::with_capacity(2 * triangles.len());
     for triangle in triangles {
         let [a, b, c] = triangle.map(|vertex| ids[vertex as usize]);
@@ -33,7 +32,7 @@ pub fn is_closed(positions: &[DVec3], triangles: &[[u32; 3]]) -> bool {
             *(if from < to { forwards } else { backwards }) += 1;
         }
     }
-    !edges.is_empty() && edges.values().all(|&times| times == (1, 1))
+    edges.into_values()
 }
 
 /// Winding number of a closed surface around a point: the solid angles of its triangles over 4π (van Oosterom and

@@ -50,12 +50,7 @@ struct Sums {
 /// # Errors
 /// Two maps of one surface, neither of whose sizes divides the other.
 pub fn difference(with: &[IlluminationMap], without: &[IlluminationMap]) -> Result<Difference> {
-    let mut pairs: BTreeMap<Receiver, [Option<&IlluminationMap>; 2]> = BTreeMap::new();
-    for (side, maps) in [with, without].into_iter().enumerate() {
-        for map in maps {
-            pairs.entry(map.chart.receiver).or_default()[side] = Some(map);
-        }
-    }
+    let pairs = by_receiver([with, without]);
     let mut found = Difference {
         maps: Vec::with_capacity(pairs.len()),
         with_w: 0.0,
@@ -63,7 +58,7 @@ pub fn difference(with: &[IlluminationMap], without: &[IlluminationMap]) -> Resu
         relative_rmse: None,
     };
     let mut sums = Sums::default();
-    for [with, without] in pairs.into_values() {
+    for [with, without] in pairs {
         let dense = [with, without].map(|map| map.map(IlluminationMap::dense));
         let sides = dense.each_ref().map(|map| map.as_ref().map(|map| Side::of(map)));
         let [with_w, without_w] = sides
@@ -78,6 +73,17 @@ pub fn difference(with: &[IlluminationMap], without: &[IlluminationMap]) -> Resu
         found.relative_rmse = Some((sums.squares / sums.area_m2).sqrt() / mean);
     }
     Ok(found)
+}
+
+/// The maps of each receiver in two bakes.
+pub fn by_receiver(bakes: [&[IlluminationMap]; 2]) -> Vec<[Option<&IlluminationMap>; 2]> {
+    let mut pairs: BTreeMap<Receiver, [Option<&IlluminationMap>; 2]> = BTreeMap::new();
+    for (side, maps) in bakes.into_iter().enumerate() {
+        for map in maps {
+            pairs.entry(map.chart.receiver).or_default()[side] = Some(map);
+        }
+    }
+    pairs.into_values().collect()
 }
 
 /// A map's luminance [W/m²].

@@ -13,12 +13,11 @@ pub mod map;
 pub mod parametrisation;
 pub mod resolution;
 pub mod seams;
-pub mod side;
 pub mod smoothing;
 pub mod tiles;
+pub mod uv_file;
 pub mod visible;
 
-pub use chart::{Chart, UvSet};
+pub use chart::{Chart, Receiver, Side, UvSet};
 pub use map::{IlluminationMap, Layer};
 pub use parametrisation::{Parametrisation, parametrise};
-pub use side::{Receiver, Side};

@@ -70,7 +70,11 @@ impl LinearSrgb {
 
     /// Decodes an 8-bit sRGB channel (IEC 61966-2-1) to linear light [0, 1].
     pub fn decode_channel(encoded: u8) -> f64 {
-        let value = f64::from(encoded) / 255.0;
+        Self::decode(f64::from(encoded) / 255.0)
+    }
+
+    /// The same for an encoded channel in [0, 1].
+    pub fn decode(value: f64) -> f64 {
         if value <= 0.040_45 {
             value / 12.92
         } else {

@@ -10,9 +10,7 @@ use super::conductor::conductor_reflectance;
 use super::spectrum::xyz::colour_under_d65;
 use super::spectrum::{Spectrum, xyz_bar};
 use super::wavelength::VISIBLE;
-use super::{ColourBasis, LinearSrgb, Nanometres};
-use super::{key, nearest};
-use crate::error::Error;
+use super::{ColourBasis, LinearSrgb, Nanometres, key, unknown};
 
 /// Name and table of each metal: wavelength [nm], n, k; from below 360 to above 830 nm (see assets/SOURCES.md).
 const TABLES: [(&str, &str); 4] = [
@@ -46,23 +44,6 @@ pub struct Metal {
     rows: Vec<[f64; 3]>,
 }
 
-/// A name that no metal has.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("no metal is named `{name}`; there are {known}")]
-pub struct UnknownMetal {
-    /// The name asked for.
-    pub name: String,
-    /// The most similar names.
-    pub known: String,
-}
-
-impl UnknownMetal {
-    /// As a usage error of the command.
-    pub fn at(self, location: impl Into<String>) -> Error {
-        Error::usage(location, self.to_string(), "choose one of them")
-    }
-}
-
 impl Metal {
     pub fn all() -> &'static [Self] {
         &METALS
@@ -71,8 +52,8 @@ impl Metal {
     /// Gold, silver, copper or aluminium (aluminum), case-insensitive.
     ///
     /// # Errors
-    /// [`UnknownMetal`] with the nearest names.
-    pub fn by_name(name: &str) -> Result<&'static Self, UnknownMetal> {
+    /// An unknown name, with the nearest known ones.
+    pub fn by_name(name: &str) -> crate::error::Result<&'static Self> {
         let wanted = key(name);
         let wanted = if wanted == "aluminum" {
             "aluminium"
@@ -80,10 +61,8 @@ impl Metal {
             &wanted
         };
         let found = METALS.iter().find(|metal| key(metal.name) == wanted);
-        found.ok_or_else(|| UnknownMetal {
-            name: name.into(),
-            known: nearest(name, METALS.iter().map(|metal| metal.name)),
-        })
+        let names = METALS.iter().map(|metal| metal.name);
+        found.ok_or_else(|| unknown("metal", name, names, "choose one of them"))
     }
 
     /// Serialises a metal by its name.

@@ -17,12 +17,21 @@ pub use glass::Glass;
 pub use metal::Metal;
 pub use wavelength::Nanometres;
 
+use crate::error::Error;
+
 /// Letters and digits of a name in lower case: `N-BK7`, `n bk7` and `nbk7` are equal.
 fn key(name: &str) -> String {
     name.chars()
         .filter(|c| c.is_alphanumeric())
         .flat_map(char::to_lowercase)
         .collect()
+}
+
+/// The usage error for a name that nothing of a kind has, with the most similar known names.
+fn unknown<'a>(kind: &str, name: &str, known: impl Iterator<Item = &'a str>, remedy: &str) -> Error {
+    let nearest = nearest(name, known);
+    let what = format!("no {kind} is named `{name}`; the nearest names are {nearest}");
+    Error::usage(kind, what, remedy)
 }
 
 /// The three known names most similar to a text, nearest first, for a sentence: `A, B or C`.

@@ -1,11 +1,10 @@
 //! Adjacency of the triangles of a mesh.
 
-use std::collections::HashMap;
-
 use glam::DVec3;
 use rayon::slice::ParallelSliceMut;
 
 use super::InScene;
+use crate::geometry::numbered;
 
 /// No neighbour across this edge, or no unique one.
 const BORDER: u32 = u32::MAX;
@@ -26,7 +25,9 @@ impl Adjacency {
     /// there.
     pub fn of<'a>(mesh: impl Into<InScene<'a>>) -> Self {
         let mesh = mesh.into();
-        let vertices = weld(mesh.positions());
+        // Single precision, as in files, since computed positions may differ by rounding.
+        let single = |position: DVec3| (position + DVec3::ZERO).as_vec3().to_array().map(f32::to_bits);
+        let vertices = numbered(mesh.positions().map(single));
         let mut edges: Vec<HalfEdge> = Vec::with_capacity(3 * mesh.triangle_count());
         for (index, triangle) in mesh.triangles().enumerate() {
             let welded = triangle.map(|vertex| vertices[vertex as usize]);
@@ -59,18 +60,4 @@ impl Adjacency {
     pub fn around(&self, triangle: usize) -> impl Iterator<Item = usize> {
         (0..3).filter_map(move |edge| Some(self.beyond(triangle, edge)?.0))
     }
-}
-
-/// For every vertex, the first one at the same position.
-fn weld(positions: impl Iterator<Item = DVec3>) -> Vec<u32> {
-    let mut first_at: HashMap<[u32; 3], u32> = HashMap::new();
-    positions
-        .enumerate()
-        .map(|(index, position)| {
-            // Single precision, as in files, since computed positions may differ by rounding. Adding zero turns −0 into
-            // +0.
-            let key = (position + DVec3::ZERO).as_vec3().to_array().map(f32::to_bits);
-            *first_at.entry(key).or_insert(index as u32)
-        })
-        .collect()
 }

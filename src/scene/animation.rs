@@ -196,7 +196,7 @@ impl Scene {
         if let Some(clip) = &self.clip {
             scene.carry(clip, &clip.moved(time_s));
         }
-        scene.lift();
+        scene.displace_by_waves();
         scene
     }
 
@@ -237,13 +237,13 @@ impl Scene {
     }
 
     /// Displaces the vertices of `swells` by their waves.
-    pub fn lift(&mut self) {
+    pub fn displace_by_waves(&mut self) {
         for (object, flat) in &self.swells {
             let Some(object) = self.objects.get_mut(*object) else {
                 continue;
             };
             let waves = self.materials[object.material].waves.as_ref();
-            let mesh = lifted(flat, waves, object.world_from_object());
+            let mesh = displaced_mesh(flat, waves, object.world_from_object());
             if **object.mesh() != mesh {
                 object.reshape(Arc::new(mesh));
             }
@@ -252,7 +252,7 @@ impl Scene {
 }
 
 /// Surface at rest with its vertices displaced along their normals.
-fn lifted(flat: &Mesh, waves: Option<&Waves>, scene_from_mesh: &DAffine3) -> Mesh {
+fn displaced_mesh(flat: &Mesh, waves: Option<&Waves>, scene_from_mesh: &DAffine3) -> Mesh {
     let mut mesh = flat.clone();
     let Some(waves) = waves else { return mesh };
     for (position, normal) in mesh.positions.iter_mut().zip(&flat.normals) {

@@ -18,13 +18,13 @@ pub struct Change {
 impl Change {
     /// Edits since loading, in the order of lights, removals of lights, materials and objects. Removals come after the
     /// other edits of lights and from the last index down, so that all indices stay valid.
-    pub fn between(loaded: &Scene, edited: &Scene) -> Vec<Self> {
+    pub fn diff(loaded: &Scene, edited: &Scene) -> Vec<Self> {
         let mut changes = Vec::new();
         let mut push = |of: &str, edit| changes.push(Self { of: of.into(), edit });
         for (index, now) in edited.lights.iter().enumerate() {
             match edited.original_light_index(index) {
                 Some(place) => {
-                    for edit in LightEdit::between(&loaded.lights[place], now) {
+                    for edit in LightEdit::diff(&loaded.lights[place], now) {
                         push(&now.name, Edit::Light(place, edit));
                     }
                 }
@@ -35,7 +35,7 @@ impl Change {
             push(&loaded.lights[light].name, Edit::RemoveLight(light));
         }
         for (index, (was, now)) in loaded.materials.iter().zip(&edited.materials).enumerate() {
-            for edit in MaterialEdit::between(was, now) {
+            for edit in MaterialEdit::diff(was, now) {
                 push(&now.name, Edit::Material(index, edit));
             }
         }

@@ -196,7 +196,12 @@ impl LightKind {
 
     /// Direction of travel of the light of a spot or sun.
     pub fn direction(&self) -> Option<DVec3> {
-        match *self {
+        let mut kind = *self;
+        kind.direction_mut().copied()
+    }
+
+    pub(super) fn direction_mut(&mut self) -> Option<&mut DVec3> {
+        match self {
             Self::Spot { direction, .. } | Self::Sun { direction, .. } => Some(direction),
             _ => None,
         }
@@ -204,7 +209,12 @@ impl LightKind {
 
     /// Position or centre [m]; `None` for lights without a single place.
     pub fn position(&self) -> Option<DVec3> {
-        match *self {
+        let mut kind = *self;
+        kind.position_mut().copied()
+    }
+
+    pub(super) fn position_mut(&mut self) -> Option<&mut DVec3> {
+        match self {
             Self::Point { position, .. } | Self::Spot { position, .. } => Some(position),
             Self::Panel { centre, .. } => Some(centre),
             Self::Sun { .. } | Self::Surface { .. } | Self::Environment { .. } => None,
@@ -218,22 +228,14 @@ impl LightKind {
 
     /// The light moved and turned by a transform; panels are scaled too.
     pub fn carried(mut self, carrying: &DAffine3) -> Self {
-        match &mut self {
-            Self::Point { position, .. } => *position = carrying.transform_point3(*position),
-            Self::Spot {
-                position, direction, ..
-            } => {
-                *position = carrying.transform_point3(*position);
-                *direction = turned(*direction, carrying);
-            }
-            Self::Sun { direction, .. } => *direction = turned(*direction, carrying),
-            Self::Panel {
-                centre, across, down, ..
-            } => {
-                *centre = carrying.transform_point3(*centre);
-                [*across, *down] = [*across, *down].map(|axis| carrying.transform_vector3(axis));
-            }
-            Self::Surface { .. } | Self::Environment { .. } => {}
+        if let Some(position) = self.position_mut() {
+            *position = carrying.transform_point3(*position);
+        }
+        if let Some(direction) = self.direction_mut() {
+            *direction = turned(*direction, carrying);
+        }
+        if let Self::Panel { across, down, .. } = &mut self {
+            [*across, *down] = [*across, *down].map(|axis| carrying.transform_vector3(axis));
         }
         self
     }

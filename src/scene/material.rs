@@ -1,14 +1,12 @@
-//! Materials, as glTF's metallic-roughness model and its extensions state them, and the class that transport treats
-//! each as.
+//! Materials, as glTF's metallic-roughness model and its extensions state them, the class that transport treats each as,
+//! and the mixture of classes at a point of one that varies.
 
-use std::sync::Arc;
-
-use glam::DVec2;
-
-use super::{NormalMap, Texture, TextureRef, Variation, Waves};
+use super::{NormalMap, Texture, TextureRef, Waves};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::wavelength::D_LINE;
 use crate::optics::{Glass, LinearSrgb, Metal, Nanometres};
+use glam::DVec2;
+use std::sync::Arc;
 
 /// Largest roughness (glTF's, α = roughness²) at which the coat over a diffuse body reflects; rougher surfaces are pure
 /// Lambert.
@@ -291,5 +289,56 @@ impl AlphaMask {
     pub fn is_there(&self, texture: Option<(&Texture, DVec2)>) -> bool {
         let alpha = texture.map_or(1.0, |(texture, uv)| texture.alpha(uv));
         self.factor * alpha >= self.cutoff
+    }
+}
+
+/// Variation of a material over a surface.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variation {
+    /// Red, green and blue, in linear light, multiply transmission, roughness and metallic.
+    pub image: TextureRef,
+    /// Class of the surface: [`SurfaceKind::Varied`] unless all points are of one class.
+    pub surface: SurfaceKind,
+}
+
+/// Composition of a surface at a point; `metal`, `clear`, `body` and `hole` are shares that sum to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mixture {
+    /// Roughness, common to all parts.
+    pub roughness: f64,
+    /// Specular metal.
+    pub metal: f64,
+    /// Transmissive, as an interface or a pane.
+    pub clear: f64,
+    /// Diffuse.
+    pub body: f64,
+    /// Absent (alpha).
+    pub hole: f64,
+    /// Share of the body that is coated.
+    pub polish: f64,
+}
+
+impl Material {
+    /// Composition where a texture multiplies the factors by `factors`, in the order of [`Variation::image`], and the
+    /// base colour texture has this alpha.
+    pub fn mixture(&self, factors: LinearSrgb, alpha: f64) -> Mixture {
+        let there = self.coverage.map_or(1.0, |factor| factor * alpha);
+        let roughness = self.roughness * factors.g;
+        let metallic = self.metallic * factors.b;
+        let is_shiny = roughness <= METAL_ROUGHNESS_LIMIT;
+        let metal = if is_shiny { there * metallic } else { 0.0 };
+        let clear = there * (1.0 - metallic) * self.transmission * factors.r;
+        Mixture {
+            roughness,
+            metal,
+            clear,
+            body: (there - metal - clear).max(0.0),
+            hole: 1.0 - there,
+            polish: if roughness <= SPECULAR_ROUGHNESS_LIMIT {
+                self.polish
+            } else {
+                0.0
+            },
+        }
     }
 }

@@ -54,8 +54,7 @@ impl Mesh {
 
     /// Unit normal of a triangle from its winding; zero for a degenerate triangle.
     pub fn face_normal(&self, triangle: usize) -> DVec3 {
-        let [a, b, c] = self.corners(triangle);
-        (b - a).cross(c - a).normalize_or_zero()
+        InScene::from(self).face_normal(triangle)
     }
 
     /// Bounding box, as minimum and maximum corner [m]; `None` without vertices.
@@ -132,14 +131,14 @@ impl Placement {
     // Not inlined, to keep it out of loops over meshes without a placement.
     #[inline(never)]
     pub fn corners(&self, corners: &[DVec3; 3]) -> [DVec3; 3] {
-        self.turned(corners.map(|corner| self.position(corner)))
+        self.wound(corners.map(|corner| self.position(corner)))
     }
 
     fn position(&self, position: DVec3) -> DVec3 {
         self.world_from_object.transform_point3(position)
     }
 
-    fn turned<T>(&self, [a, b, c]: [T; 3]) -> [T; 3] {
+    fn wound<T>(&self, [a, b, c]: [T; 3]) -> [T; 3] {
         if self.is_mirrored { [a, c, b] } else { [a, b, c] }
     }
 
@@ -167,7 +166,7 @@ impl Placement {
             triangles: mesh
                 .triangles
                 .iter()
-                .map(|&triangle| self.turned(triangle))
+                .map(|&triangle| self.wound(triangle))
                 .collect(),
         };
         let mut around: Option<Vec<DVec3>> = None;
@@ -209,7 +208,7 @@ impl<'a> InScene<'a> {
     pub fn triangle(&self, triangle: usize) -> [u32; 3] {
         let vertices = self.mesh.triangles[triangle];
         self.placement
-            .map_or(vertices, |placement| placement.turned(vertices))
+            .map_or(vertices, |placement| placement.wound(vertices))
     }
 
     /// Vertex indices of all triangles.

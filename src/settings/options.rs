@@ -445,8 +445,8 @@ impl OptionInfo {
 
 /// Names of an enumeration's values with their documentation.
 fn names<T: VariantArray + EnumMessage + Into<&'static str> + Copy>() -> Vec<(&'static str, &'static str)> {
-    let told = |value: &T| ((*value).into(), value.get_documentation().unwrap_or_default());
-    T::VARIANTS.iter().map(told).collect()
+    let named = |value: &T| ((*value).into(), value.get_documentation().unwrap_or_default());
+    T::VARIANTS.iter().map(named).collect()
 }
 
 /// The variant of this name.

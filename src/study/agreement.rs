@@ -2,6 +2,7 @@
 
 use crate::illumination::IlluminationMap;
 use crate::illumination::compare::TexelPair;
+use crate::illumination::difference::by_receiver;
 use crate::optics::LinearSrgb;
 use crate::settings::LayerKind;
 
@@ -23,21 +24,16 @@ pub fn pair_texels<T: Copy + Default>(
     references: &[IlluminationMap],
     values: fn(&IlluminationMap) -> Vec<T>,
 ) -> Option<Vec<(T, T, f64)>> {
-    let of_surface = |map: &IlluminationMap, among: &'_ [IlluminationMap]| {
-        let receiver = map.chart.receiver;
-        among.iter().position(|other| other.chart.receiver == receiver)
-    };
-    let is_alone = |map: &&IlluminationMap| of_surface(map, maps).is_none();
     let mut pairs = Vec::new();
-    for map in maps.iter().chain(references.iter().filter(is_alone)) {
-        let counterpart = |among: &[IlluminationMap]| match of_surface(map, among).map(|index| &among[index])
-        {
-            Some(other) if (other.width(), other.height()) != (map.width(), map.height()) => None,
-            Some(other) => Some(values(other)),
-            None => Some(vec![T::default(); map.width() * map.height()]),
-        };
-        let (images, references) = (counterpart(maps)?, counterpart(references)?);
-        let dense = map.dense();
+    for sides in by_receiver([maps, references]) {
+        let own = sides[0].or(sides[1])?;
+        let size = |map: &IlluminationMap| (map.width(), map.height());
+        if sides.iter().flatten().any(|map| size(map) != size(own)) {
+            return None;
+        }
+        let dark = || vec![T::default(); own.width() * own.height()];
+        let [images, references] = sides.map(|map| map.map_or_else(dark, values));
+        let dense = own.dense();
         for (texel, (image, reference)) in images.into_iter().zip(references).enumerate() {
             let area_m2 = dense.chart.texel_area_m2(texel);
             if area_m2 > 0.0 {

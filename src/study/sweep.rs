@@ -202,7 +202,7 @@ pub const ARD: Column = column("ard", |m| {
     m.agreed(|a| Cell::Share(a.average_relative_difference))
 });
 /// max(I) / max(R).
-pub const PEAK_RATIO: Column = column("peak_ratio", |m| m.agreed(|a| a.peak_ratio.into()));
+pub const PEAK_RATIO: Column = column("peak_ratio", |m| m.agreed(|a| (a.peak / a.reference_peak).into()));
 /// mean(I) / mean(R).
 pub const FLUX_RATIO: Column = column("flux_ratio", |m| m.agreed(|a| a.flux_ratio.into()));
 /// Kind of the reference R.

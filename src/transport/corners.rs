@@ -1,10 +1,11 @@
 //! Sharp edges of a mesh (borders and creases), and its sharp corners, where they turn. A silhouette follows the edges
 //! and kinks at the corners.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 
+use crate::geometry::{bits, numbered};
 use crate::scene::InScene;
 
 /// Cosine of the angle of a turn above which a border counts as smooth.
@@ -51,23 +52,18 @@ impl WeldedMesh {
         if mesh.triangle_count() > MAX_TRIANGLES {
             return None;
         }
-        let bits = |v: DVec3| (v + DVec3::ZERO).to_array().map(f64::to_bits);
-        let mut places: HashMap<[u64; 3], usize> = HashMap::new();
+        let point_of = numbered(mesh.positions().map(bits));
         let mut points: Vec<DVec3> = Vec::new();
-        let point_of: Vec<usize> = mesh
-            .positions()
-            .map(|position| {
-                *places.entry(bits(position)).or_insert_with(|| {
-                    points.push(position);
-                    points.len() - 1
-                })
-            })
-            .collect();
+        for (position, point) in mesh.positions().zip(&point_of) {
+            if *point as usize == points.len() {
+                points.push(position);
+            }
+        }
         let mut sides: Vec<Vec<DVec3>> = vec![Vec::new(); points.len()];
         let mut edges: BTreeMap<(usize, usize), JoinedEdge> = BTreeMap::new();
         for (triangle, vertices) in mesh.triangles().enumerate() {
             let normal = mesh.face_normal(triangle);
-            let corners = vertices.map(|vertex| point_of[vertex as usize]);
+            let corners = vertices.map(|vertex| point_of[vertex as usize] as usize);
             for (i, &corner) in corners.iter().enumerate() {
                 if sides[corner].iter().all(|side| side.dot(normal) < SAME_SIDE) {
                     sides[corner].push(normal);

@@ -130,7 +130,7 @@ impl Tracer {
             };
             return at_hit.map(|derivative| RayDerivative {
                 origin: derivative.origin,
-                direction: facet.turned_derivative(
+                direction: facet.scattered_derivative(
                     (incident, derivative.direction),
                     (branch.normal, normal_change_of(&derivative)),
                     turn,

@@ -3,9 +3,8 @@
 
 use glam::{DVec2, DVec3};
 
-use super::effects::EffectSet;
 use super::microfacets::{self, Facet, MicrofacetEvent};
-use super::{MediumStack, SurfaceHit, Tracer};
+use super::{EffectSet, MediumStack, SurfaceHit, Tracer};
 use crate::geometry::Ray;
 use crate::optics::{LinearSrgb, fresnel, refraction};
 use crate::scene::material::SMOOTH_ROUGHNESS;
@@ -143,13 +142,13 @@ impl HitFrame {
     }
 
     /// Scatters at a microfacet, always to the correct side of the triangle. `None` for total internal reflection.
-    fn turned_by(&self, facet: Facet, incident: DVec3, turn: MicrofacetEvent) -> Option<ScatteredDirection> {
-        let side = if turn == MicrofacetEvent::Reflected {
+    fn at_facet(&self, facet: Facet, incident: DVec3, event: MicrofacetEvent) -> Option<ScatteredDirection> {
+        let side = if event == MicrofacetEvent::Reflected {
             1.0
         } else {
             -1.0
         };
-        let direction = facet.turned(incident, self.shading, turn)?;
+        let direction = facet.scattered(incident, self.shading, event)?;
         Some(ScatteredDirection {
             direction: microfacets::out_of(direction, self.geometric, side),
             normal: self.shading,
@@ -161,13 +160,13 @@ impl HitFrame {
     fn reflected(&self, incident: DVec3) -> ScatteredDirection {
         let by_micro = self
             .micro
-            .and_then(|facet| self.turned_by(facet, incident, MicrofacetEvent::Reflected));
-        if let Some(turned) = by_micro {
-            return turned;
+            .and_then(|facet| self.at_facet(facet, incident, MicrofacetEvent::Reflected));
+        if let Some(scattered) = by_micro {
+            return scattered;
         }
         let direction = refraction::reflect(incident, self.shading);
         if direction.dot(self.geometric) > 0.0 {
-            self.turned(direction)
+            self.about_shading(direction)
         } else {
             ScatteredDirection {
                 direction: refraction::reflect(incident, self.geometric),
@@ -181,11 +180,11 @@ impl HitFrame {
     /// `None` for total internal reflection.
     fn refracted(&self, incident: DVec3, eta: f64) -> Option<ScatteredDirection> {
         if let Some(facet) = self.micro {
-            return self.turned_by(facet, incident, MicrofacetEvent::Refracted { eta });
+            return self.at_facet(facet, incident, MicrofacetEvent::Refracted { eta });
         }
         let direction = refraction::refract(incident, self.shading, eta)?;
         if direction.dot(self.geometric) < 0.0 {
-            Some(self.turned(direction))
+            Some(self.about_shading(direction))
         } else {
             Some(ScatteredDirection {
                 direction: refraction::refract(incident, self.geometric, eta)?,
@@ -199,12 +198,12 @@ impl HitFrame {
     fn passed(&self, incident: DVec3) -> ScatteredDirection {
         let by_micro = self
             .micro
-            .and_then(|facet| self.turned_by(facet, incident, MicrofacetEvent::ThroughThinWall));
-        by_micro.unwrap_or_else(|| self.turned(incident))
+            .and_then(|facet| self.at_facet(facet, incident, MicrofacetEvent::ThroughThinWall));
+        by_micro.unwrap_or_else(|| self.about_shading(incident))
     }
 
     /// A direction that scattered about `shading`.
-    fn turned(&self, direction: DVec3) -> ScatteredDirection {
+    fn about_shading(&self, direction: DVec3) -> ScatteredDirection {
         ScatteredDirection {
             direction,
             normal: self.shading,
@@ -222,7 +221,7 @@ pub struct Meeting<'a> {
     hit: &'a SurfaceHit,
     incident: DVec3,
     media: &'a MediumStack,
-    facing: HitFrame,
+    frame: HitFrame,
     /// Reflected fraction; `None` without reflection.
     pub reflected: Option<LinearSrgb>,
     /// Transmitted fraction; `None` without transmission.
@@ -247,7 +246,7 @@ enum BehindSurface {
     /// The far side of the uncovered part of a surface.
     Hole,
     Medium {
-        turned: ScatteredDirection,
+        scattered: ScatteredDirection,
         media: MediumStack,
         ior_ratio: f64,
     },
@@ -257,54 +256,60 @@ impl Meeting<'_> {
     #[inline]
     pub fn reflection(&self) -> Option<Branch> {
         let share = self.reflected?;
-        let turned = self.facing.reflected(self.incident);
-        Some(Branch {
-            ray: self.hit.spawn(turned.direction),
+        let event = match self.through {
+            BehindSurface::Unreachable => Event::TotalInternalReflection,
+            _ => Event::Reflection,
+        };
+        Some(self.branch(
+            &self.frame.reflected(self.incident),
             share,
-            event: match self.through {
-                BehindSurface::Unreachable => Event::TotalInternalReflection,
-                _ => Event::Reflection,
-            },
-            media: *self.media,
-            ior_ratio: 1.0,
-            normal: turned.normal,
-            by: turned.by,
-        })
+            event,
+            (self.media, 1.0),
+        ))
+    }
+
+    fn branch(
+        &self,
+        to: &ScatteredDirection,
+        share: LinearSrgb,
+        event: Event,
+        (media, ior_ratio): (&MediumStack, f64),
+    ) -> Branch {
+        Branch {
+            ray: self.hit.spawn(to.direction),
+            share,
+            event,
+            media: *media,
+            ior_ratio,
+            normal: to.normal,
+            by: to.by,
+        }
     }
 
     #[inline]
     pub fn transmission(&self) -> Option<Branch> {
         let share = self.transmitted?;
-        let passed;
-        let (turned, event, media, ior_ratio) = match &self.through {
+        let straight = (self.media, 1.0);
+        Some(match &self.through {
             BehindSurface::Nothing | BehindSurface::Unreachable => return None,
             BehindSurface::Hole => {
-                passed = self.facing.turned(self.incident);
-                (&passed, Event::Passage, self.media, 1.0)
+                let passed = self.frame.about_shading(self.incident);
+                self.branch(&passed, share, Event::Passage, straight)
             }
             BehindSurface::ThinWall => {
-                passed = self.facing.passed(self.incident);
-                (&passed, Event::ThinTransmission, self.media, 1.0)
+                let passed = self.frame.passed(self.incident);
+                self.branch(&passed, share, Event::ThinTransmission, straight)
             }
             BehindSurface::Medium {
-                turned,
+                scattered,
                 media,
                 ior_ratio,
-            } => (turned, Event::Refraction, media, *ior_ratio),
-        };
-        Some(Branch {
-            ray: self.hit.spawn(turned.direction),
-            share,
-            event,
-            media: *media,
-            ior_ratio,
-            normal: turned.normal,
-            by: turned.by,
+            } => self.branch(scattered, share, Event::Refraction, (media, *ior_ratio)),
         })
     }
 
     /// Adds a reflected fraction, or books it as switched off if reflection is off.
-    fn sends_back(&mut self, effects: EffectSet, share: LinearSrgb) {
+    fn add_reflection(&mut self, effects: EffectSet, share: LinearSrgb) {
         if effects.reflection {
             self.reflected = Some(self.reflected.map_or(share, |before| before + share));
         } else {
@@ -321,7 +326,7 @@ impl Meeting<'_> {
     }
 
     /// Transmits what is not reflected; the tint's loss is absorbed.
-    fn lets_through(&mut self, effects: EffectSet, reflectance: f64, tint: impl FnOnce() -> LinearSrgb) {
+    fn add_transmission(&mut self, effects: EffectSet, reflectance: f64, tint: impl FnOnce() -> LinearSrgb) {
         let beneath = LinearSrgb::grey(1.0 - reflectance);
         if effects.transmission {
             let share = tint() * (1.0 - reflectance);
@@ -387,7 +392,7 @@ impl Tracer {
             hit,
             incident,
             media,
-            facing: HitFrame::new(hit, incident, micro),
+            frame: HitFrame::new(hit, incident, micro),
             reflected: None,
             transmitted: None,
             deposit: LinearSrgb::BLACK,
@@ -399,18 +404,18 @@ impl Tracer {
         match material.surface {
             SurfaceKind::Diffuse => meeting.deposit = LinearSrgb::WHITE,
             SurfaceKind::Mirror => {
-                let cos_incident = meeting.facing.cos_incident(incident);
+                let cos_incident = meeting.frame.cos_incident(incident);
                 let share = self.metal_share(effects, hit, material, cos_incident);
                 meeting.absorbed = LinearSrgb::WHITE - share;
-                meeting.sends_back(effects, share);
+                meeting.add_reflection(effects, share);
             }
             SurfaceKind::Mixed => {
                 let eta = material.ior / media.ior(self.scene());
-                let cos_incident = meeting.facing.cos_incident(incident);
+                let cos_incident = meeting.frame.cos_incident(incident);
                 let reflectance = fresnel::dielectric_reflectance(cos_incident, eta);
                 let share = LinearSrgb::grey(material.polish * reflectance);
                 meeting.deposit = LinearSrgb::WHITE - share;
-                meeting.sends_back(effects, share);
+                meeting.add_reflection(effects, share);
             }
             SurfaceKind::ThinWall => self.meet_thin_wall(effects, material, &mut meeting),
             SurfaceKind::Dielectric => self.meet_dielectric(effects, material, &mut meeting),
@@ -428,11 +433,11 @@ impl Tracer {
             hit, incident, media, ..
         } = meeting;
         let eta = material.ior / media.ior(self.scene());
-        let cos_incident = meeting.facing.cos_incident(incident);
+        let cos_incident = meeting.frame.cos_incident(incident);
         let reflectance = fresnel::thin_wall_reflectance(cos_incident, eta);
         meeting.through = BehindSurface::ThinWall;
-        meeting.sends_back(effects, LinearSrgb::grey(reflectance));
-        meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
+        meeting.add_reflection(effects, LinearSrgb::grey(reflectance));
+        meeting.add_transmission(effects, reflectance, || self.tint(effects, hit, material));
     }
 
     /// Splits each fraction of a mixture as its surface class does. No mixture is both clear and partly uncovered.
@@ -449,21 +454,21 @@ impl Tracer {
             meeting.scale(mixture.clear);
         } else if mixture.hole > 0.0 {
             meeting.through = BehindSurface::Hole;
-            meeting.lets_through(effects, 0.0, || LinearSrgb::WHITE);
+            meeting.add_transmission(effects, 0.0, || LinearSrgb::WHITE);
             meeting.scale(mixture.hole);
         }
-        let cos_incident = meeting.facing.cos_incident(incident);
+        let cos_incident = meeting.frame.cos_incident(incident);
         if mixture.metal > 0.0 {
             let share = self.metal_share(effects, hit, material, cos_incident);
             meeting.absorbed += (LinearSrgb::WHITE - share) * mixture.metal;
-            meeting.sends_back(effects, share * mixture.metal);
+            meeting.add_reflection(effects, share * mixture.metal);
         }
         let eta = material.ior / media.ior(self.scene());
         let polish = mixture.polish * fresnel::dielectric_reflectance(cos_incident, eta);
         meeting.leaving = Some(LinearSrgb::grey(1.0 - polish));
         meeting.deposit = LinearSrgb::grey(mixture.body * (1.0 - polish));
         if mixture.body * polish > 0.0 {
-            meeting.sends_back(effects, LinearSrgb::grey(mixture.body * polish));
+            meeting.add_reflection(effects, LinearSrgb::grey(mixture.body * polish));
         }
     }
 
@@ -471,7 +476,7 @@ impl Tracer {
         let &mut Meeting {
             hit, incident, media, ..
         } = meeting;
-        let is_front = meeting.facing.front;
+        let is_front = meeting.frame.front;
         let beyond = if is_front {
             media.entered(hit.object)
         } else {
@@ -487,20 +492,20 @@ impl Tracer {
             (media.ior(self.scene()), beyond.ior(self.scene()))
         };
         let eta = ior_far / ior_near;
-        let Some(turned) = meeting.facing.refracted(incident, eta) else {
+        let Some(scattered) = meeting.frame.refracted(incident, eta) else {
             meeting.through = BehindSurface::Unreachable;
-            return meeting.sends_back(effects, LinearSrgb::WHITE);
+            return meeting.add_reflection(effects, LinearSrgb::WHITE);
         };
         meeting.through = BehindSurface::Medium {
-            turned,
+            scattered,
             media: beyond,
             ior_ratio: ior_near / ior_far,
         };
-        let reflectance = fresnel::dielectric_reflectance(meeting.facing.cos_incident(incident), eta);
+        let reflectance = fresnel::dielectric_reflectance(meeting.frame.cos_incident(incident), eta);
         if reflectance > 0.0 {
-            meeting.sends_back(effects, LinearSrgb::grey(reflectance));
+            meeting.add_reflection(effects, LinearSrgb::grey(reflectance));
         }
-        meeting.lets_through(effects, reflectance, || self.tint(effects, hit, material));
+        meeting.add_transmission(effects, reflectance, || self.tint(effects, hit, material));
     }
 
     /// Base colour at a hit, with its texture where textures are on.

@@ -80,9 +80,9 @@ impl Facet {
     }
 
     /// Scattered direction; `None` for total internal reflection.
-    pub fn turned(&self, incident: DVec3, normal: DVec3, turn: MicrofacetEvent) -> Option<DVec3> {
+    pub fn scattered(&self, incident: DVec3, normal: DVec3, event: MicrofacetEvent) -> Option<DVec3> {
         let micro = self.normal(incident, normal);
-        let (direction, side) = match turn {
+        let (direction, side) = match event {
             MicrofacetEvent::Reflected => (refraction::reflect(incident, micro), 1.0),
             MicrofacetEvent::Refracted { eta } => (refraction::refract(incident, micro, eta)?, -1.0),
             MicrofacetEvent::ThroughThinWall => {
@@ -93,13 +93,13 @@ impl Facet {
         Some(out_of(direction, normal, side))
     }
 
-    /// Derivative of [`Self::turned`] from those of the incident direction and the normal, by central differences:
+    /// Derivative of [`Self::scattered`] from those of the incident direction and the normal, by central differences:
     /// accurate to some 1e-10 for smooth functions in double precision.
-    pub fn turned_derivative(
+    pub fn scattered_derivative(
         &self,
         (incident, incident_change): (DVec3, DVec3),
         (normal, normal_change): (DVec3, DVec3),
-        turn: MicrofacetEvent,
+        event: MicrofacetEvent,
     ) -> DVec3 {
         let size = incident_change.length().max(normal_change.length());
         // Catches NaN too.
@@ -110,7 +110,7 @@ impl Facet {
         let at = |step: f64| {
             let incident = (incident + incident_change * step).normalize();
             let normal = (normal + normal_change * step).normalize();
-            self.turned(incident, normal, turn)
+            self.scattered(incident, normal, event)
         };
         match (at(step), at(-step)) {
             (Some(after), Some(before)) => (after - before) / (2.0 * step),

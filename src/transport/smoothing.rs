@@ -5,6 +5,7 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
+use crate::geometry::{bits, numbered};
 use crate::scene::Mesh;
 
 /// Normals at a shared position that agree to this much per component are equal [1].
@@ -18,14 +19,7 @@ pub fn smoothing_groups(mesh: &Mesh) -> Vec<u32> {
         groups.join(b, c);
     }
     join_split_vertices(mesh, &mut groups);
-    let mut numbers = HashMap::new();
-    mesh.triangles
-        .iter()
-        .map(|&[a, ..]| {
-            let next = numbers.len() as u32;
-            *numbers.entry(groups.root(a)).or_insert(next)
-        })
-        .collect()
+    numbered(mesh.triangles.iter().map(|&[a, ..]| groups.root(a)))
 }
 
 /// Merges vertices of equal position and normal that other attributes (texture coordinates) split. Split vertices lie
@@ -35,7 +29,6 @@ fn join_split_vertices(mesh: &Mesh, groups: &mut Groups) {
     if (0..mesh.positions.len() as u32).all(|vertex| groups.root(vertex) == first) {
         return;
     }
-    let bits = |v: DVec3| (v + DVec3::ZERO).to_array().map(f64::to_bits);
     let rounded = |v: DVec3| v.to_array().map(|x| (x / NORMAL_STEP).round() as i64);
     let mut seen = HashMap::new();
     for (vertex, (position, normal)) in mesh.positions.iter().zip(&mesh.normals).enumerate() {

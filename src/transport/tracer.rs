@@ -50,6 +50,9 @@ struct Shape {
 }
 
 /// Shape data of a specular object.
+/// Shapes of an object, the second of a specular one.
+type KnownShape = (Arc<Shape>, Option<Arc<SpecularShape>>);
+
 #[derive(Debug)]
 struct SpecularShape {
     normals: NormalField,
@@ -114,18 +117,34 @@ impl Tracer {
     /// `max_copied`: see [`instances::MAX_COPIED`].
     pub(super) fn sharing(scene: Arc<Scene>, max_copied: usize) -> Self {
         let hierarchy = Arc::new(Hierarchy::new(&scene, max_copied));
-        let specular = (0..scene.objects.len())
-            .into_par_iter()
-            .map(|object| Self::specular_shape(&scene, &hierarchy, object))
-            .collect();
+        Self::assemble(scene, hierarchy, true, |_| None)
+    }
+
+    /// `known` gives the shape of an object that is the same as before.
+    fn assemble(
+        scene: Arc<Scene>,
+        hierarchy: Arc<Hierarchy>,
+        has_bumps: bool,
+        known: impl Fn(usize) -> Option<KnownShape> + Sync,
+    ) -> Self {
+        let shape = |object: usize| {
+            let (shape, specular) = known(object).unwrap_or_default();
+            let is_specular = scene.material_of(object).surface.is_specular();
+            let specular = specular.filter(|_| is_specular);
+            (
+                shape,
+                specular.or_else(|| Self::specular_shape(&scene, &hierarchy, object)),
+            )
+        };
+        let (shapes, specular) = (0..scene.objects.len()).into_par_iter().map(shape).unzip();
         Self {
             has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
             has_partial: is_any(&scene, |material| material.coverage.is_some()),
-            shapes: scene.objects.iter().map(|_| Arc::default()).collect(),
+            shapes,
             scene,
             hierarchy,
             specular,
-            has_bumps: true,
+            has_bumps,
             wavelength: None,
             traversed: None,
         }
@@ -142,35 +161,16 @@ impl Tracer {
         if count != self.scene.objects.len() {
             return Self::new(scene);
         }
-        let hierarchy = if (0..count).all(is_same) {
+        let is_known: Vec<bool> = (0..count).map(is_same).collect();
+        let hierarchy = if is_known.iter().all(|is_known| *is_known) {
             Arc::clone(&self.hierarchy)
         } else {
             Arc::new(self.hierarchy.edited(&self.scene, &scene))
         };
-        let shape = |object: usize| match is_same(object) {
-            true => Arc::clone(&self.shapes[object]),
-            false => Arc::default(),
-        };
-        let specular = (0..count)
-            .into_par_iter()
-            .map(|object| match &self.specular[object] {
-                Some(shape) if is_same(object) && scene.material_of(object).surface.is_specular() => {
-                    Some(Arc::clone(shape))
-                }
-                _ => Self::specular_shape(&scene, &hierarchy, object),
-            })
-            .collect();
-        Self {
-            has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
-            has_partial: is_any(&scene, |material| material.coverage.is_some()),
-            shapes: (0..count).map(shape).collect(),
-            scene,
-            hierarchy,
-            specular,
-            has_bumps: self.has_bumps,
-            wavelength: None,
-            traversed: None,
-        }
+        let known = |object: usize| (Arc::clone(&self.shapes[object]), self.specular[object].clone());
+        Self::assemble(scene, hierarchy, self.has_bumps, |object| {
+            is_known[object].then(|| known(object))
+        })
     }
 
     /// The same scene with the unperturbed normals of its meshes.

@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::{Bits, Carrier, GlbOptions};
+use super::{Bits, Carrier, ExportedMap, GlbOptions};
 use crate::error::{Error, Result};
 use crate::export::quantity::{Quantity, white};
 use crate::files;
@@ -14,20 +14,6 @@ use crate::units::LUMENS_PER_WATT;
 
 /// Distance from a triangle within which texels take its colours [texels].
 const MARGIN_TEXELS: f64 = 2.0;
-
-/// A map as an image.
-pub struct LightImage {
-    /// The encoded file.
-    pub png: Vec<u8>,
-    /// Value of the image's white, > 0.
-    pub white: f64,
-    /// Texels with a channel above white.
-    pub cut_texels: usize,
-    /// Share of the light above white.
-    pub cut_share: f64,
-    /// Texels with a channel below 0.
-    pub negative_texels: usize,
-}
 
 /// The light in a map's image, per texel of a dense map, in the unit of the export.
 pub fn light_of(
@@ -137,16 +123,16 @@ fn spread(chart: &Chart, corners: [DVec2; 3], triangle: usize, nearest: &mut [Ne
     }
 }
 
-/// Encodes the texels of [`light_of`] as an image of a size [texels].
+/// Encodes the texels of [`light_of`] as a PNG of a size [texels], and reports what it holds.
 ///
 /// # Errors
-/// A size that the format cannot hold; `name` is named in the error.
+/// A size that the format cannot hold.
 pub fn encode(
     light: &[LinearSrgb],
     (width, height): (usize, usize),
     options: GlbOptions,
-    name: &str,
-) -> Result<LightImage> {
+    exported: &mut ExportedMap,
+) -> Result<Vec<u8>> {
     let white = match options.carrier {
         Carrier::Unlit => 1.0,
         Carrier::LightMap | Carrier::Emissive | Carrier::Beside => {
@@ -165,22 +151,20 @@ pub fn encode(
         .iter()
         .map(|light| light.to_array().map(|value| (value / white).clamp(0.0, 1.0)))
         .collect();
-    let bytes = match options.bits {
-        Bits::Eight => png::<image::Rgb<u8>>(diffused(&relative, width), (width, height), name)?,
+    exported.intensity = white;
+    exported.cut_texels = count(&|value| value > white);
+    exported.cut_share = if all > 0.0 { above / all } else { 0.0 };
+    exported.negative_texels = count(&|value| value < 0.0);
+    let name = &exported.surface;
+    match options.bits {
+        Bits::Eight => png::<image::Rgb<u8>>(diffused(&relative, width), (width, height), name),
         Bits::Sixteen => {
             let code =
                 |value: &f64| (LinearSrgb::encode_channel(*value) * f64::from(u16::MAX)).round() as u16;
             let codes = relative.as_flattened().iter().map(code).collect();
-            png::<image::Rgb<u16>>(codes, (width, height), name)?
+            png::<image::Rgb<u16>>(codes, (width, height), name)
         }
-    };
-    Ok(LightImage {
-        png: bytes,
-        white,
-        cut_texels: count(&|value| value > white),
-        cut_share: if all > 0.0 { above / all } else { 0.0 },
-        negative_texels: count(&|value| value < 0.0),
-    })
+    }
 }
 
 fn png<P>(codes: Vec<P::Subpixel>, (width, height): (usize, usize), name: &str) -> Result<Vec<u8>>

@@ -272,8 +272,8 @@ fn add_map(
         return Ok(exported);
     }
     let light = images::light_of(map, layers, scene, options);
-    let image = images::encode(&light, (map.width(), map.height()), options, &object.name)?;
-    let image_index = glb.push_png(&format!("{} light", object.name), &image.png);
+    let png = images::encode(&light, (map.width(), map.height()), options, &mut exported)?;
+    let image_index = glb.push_png(&format!("{} light", object.name), &png);
     let sampler = glb.push(
         "/samplers",
         json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 }),
@@ -284,13 +284,9 @@ fn add_map(
         glb,
         (object.node, object.primitive),
         texture,
-        image.white,
+        exported.intensity,
         options,
     );
-    exported.intensity = image.white;
-    exported.cut_texels = image.cut_texels;
-    exported.cut_share = image.cut_share;
-    exported.negative_texels = image.negative_texels;
     Ok(exported)
 }
 

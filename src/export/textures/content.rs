@@ -94,24 +94,18 @@ impl Content {
     pub fn parts(self, stored: &StoredMap) -> Result<(Vec<TextureLight>, Option<Warning>)> {
         let map = &stored.map;
         let kinds: Vec<LayerKind> = map.layers.iter().map(|layer| layer.kind).collect();
+        let part = |layers: Vec<LayerKind>, key: &str, irradiance| TextureLight {
+            layers,
+            light: None,
+            key: key.into(),
+            irradiance,
+        };
         let layer = |kind: LayerKind| {
-            map.layer(kind).map(|layer| TextureLight {
-                layers: vec![kind],
-                light: None,
-                key: kind.name().into(),
-                irradiance: layer.irradiance.clone(),
-            })
+            let layer = map.layer(kind)?;
+            Some(part(vec![kind], kind.name(), layer.irradiance.clone()))
         };
         match self {
-            Self::Sum => {
-                let sum = TextureLight {
-                    layers: kinds,
-                    light: None,
-                    key: String::new(),
-                    irradiance: map.total(),
-                };
-                Ok((vec![sum], None))
-            }
+            Self::Sum => Ok((vec![part(kinds, "", map.total())], None)),
             Self::Layer(kind) => Ok((layer(kind).into_iter().collect(), None)),
             Self::EachLayer => Ok((kinds.into_iter().filter_map(layer).collect(), None)),
             Self::EachLight => {

@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use super::atlas::AtlasOptions;
 use super::ktx2::{self, Packing};
-use super::shared_exponent::RGBE;
+use super::shared_exponent::{RGB9E5, RGBE};
 use super::texels::Texels;
-use super::{png16, radiance};
+use super::{bc6h, png16, radiance};
 use crate::error::{Error, Result};
 use crate::export::{FloatImage, Quantity, exr};
 
@@ -86,25 +86,28 @@ pub struct Encoded {
 }
 
 impl Encoding {
+    /// Extension of file names, name in messages, and largest value.
+    fn traits(self) -> (&'static str, &'static str, f32) {
+        match self {
+            Self::Half => ("exr", "a half float", f16::MAX.to_f32()),
+            Self::Float => ("exr", "a float", f32::MAX),
+            Self::Png16 { .. } => ("png", "a PNG", 1.0),
+            Self::Radiance => ("hdr", "a Radiance file", RGBE.most),
+            Self::Ktx2 { packing, .. } => match packing {
+                Packing::Rgb9e5 => ("ktx2", "Rgb9e5", RGB9E5.most),
+                Packing::Bc6h => ("ktx2", "BC6H", bc6h::MOST),
+            },
+        }
+    }
+
     /// Extension of file names.
     pub fn extension(self) -> &'static str {
-        match self {
-            Self::Half | Self::Float => "exr",
-            Self::Png16 { .. } => "png",
-            Self::Radiance => "hdr",
-            Self::Ktx2 { .. } => "ktx2",
-        }
+        self.traits().0
     }
 
     /// Largest value that the format holds.
     pub fn most(self) -> f32 {
-        match self {
-            Self::Half => f16::MAX.to_f32(),
-            Self::Float => f32::MAX,
-            Self::Png16 { .. } => 1.0,
-            Self::Radiance => RGBE.most,
-            Self::Ktx2 { packing, .. } => packing.most(),
-        }
+        self.traits().2
     }
 
     /// Layout of an atlas; no two maps share a compression block.
@@ -120,24 +123,6 @@ impl Encoding {
             most_side,
             gutter,
             grid,
-        }
-    }
-
-    /// Name in messages.
-    fn name(self) -> &'static str {
-        match self {
-            Self::Half => "a half float",
-            Self::Float => "a float",
-            Self::Png16 { .. } => "a PNG",
-            Self::Radiance => "a Radiance file",
-            Self::Ktx2 {
-                packing: Packing::Rgb9e5,
-                ..
-            } => "Rgb9e5",
-            Self::Ktx2 {
-                packing: Packing::Bc6h,
-                ..
-            } => "BC6H",
         }
     }
 
@@ -177,7 +162,7 @@ impl Encoding {
 
     /// Refuses values that would be clamped, except above a chosen white.
     fn check_range(self, texels: &Texels, notes: &FileMetadata<'_>) -> Result<()> {
-        let (most, peak) = (self.most(), texels.peak());
+        let ((_, name, most), peak) = (self.traits(), texels.peak());
         if matches!(self, Self::Png16 { .. }) || peak <= most {
             return Ok(());
         }
@@ -191,8 +176,7 @@ impl Encoding {
         Err(Error::failure(
             notes.location,
             format!(
-                "{count} of its texels are above {most}, the most that {} holds, the brightest at {peak}",
-                self.name()
+                "{count} of its texels are above {most}, the most that {name} holds, the brightest at {peak}"
             ),
             format!("choose {or_floats}another unit or --exposure {stops}"),
         ))

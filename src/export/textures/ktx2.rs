@@ -27,14 +27,6 @@ pub enum Packing {
 }
 
 impl Packing {
-    /// Largest value that the format holds.
-    pub fn most(self) -> f32 {
-        match self {
-            Self::Rgb9e5 => RGB9E5.most,
-            Self::Bc6h => bc6h::MOST,
-        }
-    }
-
     fn format(self) -> Format {
         match self {
             Self::Rgb9e5 => Format::E5B9G9R9_UFLOAT_PACK32,

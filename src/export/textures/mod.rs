@@ -338,15 +338,8 @@ impl TextureFolder {
     fn commit(self, index: &TextureIndex) -> Result<()> {
         let path = self.path().to_path_buf();
         self.staged.commit()?;
-        let written: Vec<&str> = index.textures.iter().flat_map(TextureEntry::files).collect();
-        for outdated in self
-            .previous
-            .iter()
-            .filter(|file| !written.contains(&file.as_str()))
-        {
-            files::remove_file(&path.join(outdated))?;
-        }
-        Ok(())
+        let written = index.textures.iter().flat_map(TextureEntry::files);
+        files::remove_outdated(&path, &self.previous, written)
     }
 }
 
@@ -375,9 +368,8 @@ fn files_of_ours(path: &Path) -> Option<Vec<String>> {
 
 /// Whether a name in an index is one that an export writes, with no way out of the folder.
 fn is_texture_file(name: &str) -> bool {
-    let is_plain = |byte: u8| byte.is_ascii_alphanumeric() || b"_-.".contains(&byte);
     let ends = [".exr", ".png", ".hdr", ".ktx2", ".uv"];
-    !name.starts_with('.') && name.bytes().all(is_plain) && ends.iter().any(|end| name.ends_with(end))
+    files::is_plain_name(name) && ends.iter().any(|end| name.ends_with(end))
 }
 
 #[cfg(test)]

@@ -87,8 +87,7 @@ fn value(code: u16, transfer: Transfer) -> f64 {
     let share = f64::from(code) / WHITE;
     match transfer {
         Transfer::Linear => share,
-        Transfer::Srgb if share <= 0.040_45 => share / 12.92,
-        Transfer::Srgb => ((share + 0.055) / 1.055).powf(2.4),
+        Transfer::Srgb => LinearSrgb::decode(share),
     }
 }
 

@@ -112,7 +112,7 @@ impl Polygon {
     }
 
     /// Range of coordinates on an axis.
-    fn range(&self, axis: usize) -> (f64, f64) {
+    pub(super) fn range(&self, axis: usize) -> (f64, f64) {
         self.corners()
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), corner| {

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::coverage::{cells, rows, twice_signed_area};
+use super::coverage::{Polygon, cells, rows, twice_signed_area};
 use super::plane::Frame;
 use crate::scene::Mesh;
 
@@ -148,7 +148,8 @@ fn mark(triangle: [DVec2; 3], side: usize, hits: &mut [u8]) {
     });
     let scaled = triangle.map(|corner| corner * scale);
     for row in rows(scaled, side) {
-        let (left, right) = span(&scaled, row as f64, row as f64 + 1.0);
+        let strip = Polygon::triangle(scaled).clipped(1, row as f64, row as f64 + 1.0);
+        let (left, right) = strip.range(0);
         for column in cells(left, right, side) {
             let sample = (DVec2::new(column as f64, row as f64) + jitter(column, row)) / scale;
             if edges
@@ -160,27 +161,6 @@ fn mark(triangle: [DVec2; 3], side: usize, hits: &mut [u8]) {
             }
         }
     }
-}
-
-/// Range of columns that a triangle overlaps between two horizontal lines.
-fn span(triangle: &[DVec2; 3], top: f64, bottom: f64) -> (f64, f64) {
-    let (mut left, mut right) = (f64::INFINITY, f64::NEG_INFINITY);
-    let mut reach = |x: f64| {
-        left = left.min(x);
-        right = right.max(x);
-    };
-    for i in 0..3 {
-        let (a, b) = (triangle[i], triangle[(i + 1) % 3]);
-        if (top..=bottom).contains(&a.y) {
-            reach(a.x);
-        }
-        for line in [top, bottom] {
-            if (a.y < line) != (b.y < line) {
-                reach(a.x + (b.x - a.x) * ((line - a.y) / (b.y - a.y)));
-            }
-        }
-    }
-    (left, right)
 }
 
 /// Position of a sample within its cell: the irrational steps of the R2 sequence keep samples off the lines of a

@@ -1,11 +1,11 @@
 //! Unwraps a curved surface: charts by uvunwrap, packed with gutters.
 
-use std::collections::HashMap;
-
 use glam::DVec2;
 use uvunwrap::{Density, MeshInput, Options};
 
 use crate::files::cache::{self, ContentHash};
+use crate::geometry::numbered;
+use crate::illumination::uv_file;
 use crate::scene::Mesh;
 
 /// Uncovered texels around every chart: a bilinear lookup at a border reads one of them.
@@ -21,7 +21,7 @@ const DISTORTION: f32 = 1.5;
 const MIN_KEPT: usize = 2000;
 
 /// To be incremented whenever the coordinates of a mesh change: with a new version of uvunwrap or other options.
-const LAYOUT_VERSION: u64 = 2;
+const LAYOUT_VERSION: u64 = 3;
 
 /// Range of the map side that charts are packed for [texels].
 const SIDES: (usize, usize) = (16, 8192);
@@ -33,12 +33,13 @@ pub fn unwrap(mesh: &Mesh, side: usize) -> Option<Vec<[DVec2; 3]>> {
         return lay_out(mesh, side);
     }
     let name = format!("{:016x}.uv", content_hash(mesh, side));
-    let bytes = (mesh.triangles.len() * size_of::<[[f32; 2]; 3]>()) as u64;
-    if let Some(known) = cache::load(&name, bytes).and_then(|bytes| decode(&bytes, mesh.triangles.len())) {
+    let triangles = mesh.triangles.len();
+    let known = cache::load(&name, uv_file::size_bytes(triangles));
+    if let Some(known) = known.and_then(|bytes| uv_file::decode(&bytes, triangles, &name).ok()) {
         return Some(known);
     }
     let made = lay_out(mesh, side)?;
-    cache::store(&name, &encode(&made));
+    cache::store(&name, &uv_file::encode(&made));
     Some(made)
 }
 
@@ -58,37 +59,6 @@ fn content_hash(mesh: &Mesh, side: usize) -> u64 {
     hash.value()
 }
 
-/// Little-endian, in single precision, as they were generated.
-fn encode(corner_uvs: &[[DVec2; 3]]) -> Vec<u8> {
-    let corners = corner_uvs.iter().flatten();
-    corners
-        .flat_map(|uv| uv.as_vec2().to_array().map(f32::to_le_bytes))
-        .flatten()
-        .collect()
-}
-
-/// `None` unless the bytes hold this many triangles in the unit square.
-fn decode(bytes: &[u8], triangles: usize) -> Option<Vec<[DVec2; 3]>> {
-    let (numbers, rest) = bytes.as_chunks::<4>();
-    let numbers: Vec<f64> = numbers
-        .iter()
-        .map(|bytes| f64::from(f32::from_le_bytes(*bytes)))
-        .collect();
-    let (corners, left) = numbers.as_chunks::<6>();
-    let is_sound = rest.is_empty()
-        && left.is_empty()
-        && corners.len() == triangles
-        && numbers.iter().all(|number| (0.0..=1.0).contains(number));
-    let triangle = |n: &[f64; 6]| {
-        [
-            DVec2::new(n[0], n[1]),
-            DVec2::new(n[2], n[3]),
-            DVec2::new(n[4], n[5]),
-        ]
-    };
-    is_sound.then(|| corners.iter().map(triangle).collect())
-}
-
 /// Vertices per position above which splits are no seams: the file splits vertices everywhere for normals or
 /// coordinates.
 const MAX_SPLIT: f64 = 1.5;
@@ -98,17 +68,18 @@ const MAX_SPLIT: f64 = 1.5;
 fn welded(mesh: &Mesh, local: impl Fn(&glam::DVec3) -> [f32; 3]) -> (Vec<[f32; 3]>, Vec<u32>) {
     let split: Vec<[f32; 3]> = mesh.positions.iter().map(local).collect();
     let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    let (mut positions, mut known) = (Vec::new(), HashMap::new());
-    let mut vertex_at = |position: &[f32; 3]| {
-        // Turns −0 into +0.
-        *known
-            .entry(position.map(|value| (value + 0.0).to_bits()))
-            .or_insert_with(|| {
-                positions.push(*position);
-                positions.len() as u32 - 1
-            })
-    };
-    let vertices: Vec<u32> = split.iter().map(&mut vertex_at).collect();
+    // Adding zero turns −0 into +0.
+    let vertices = numbered(
+        split
+            .iter()
+            .map(|position| position.map(|value| (value + 0.0).to_bits())),
+    );
+    let mut positions = Vec::new();
+    for (position, vertex) in split.iter().zip(&vertices) {
+        if *vertex as usize == positions.len() {
+            positions.push(*position);
+        }
+    }
     if (split.len() as f64) < MAX_SPLIT * positions.len() as f64 {
         return (split, indices);
     }

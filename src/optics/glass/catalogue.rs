@@ -2,9 +2,9 @@
 
 use std::sync::LazyLock;
 
-use super::{Dispersion, Glass, GlassError};
-use crate::optics::Nanometres;
-use crate::optics::{key, nearest};
+use super::{Dispersion, Glass};
+use crate::error::Result;
+use crate::optics::{Nanometres, key, unknown};
 
 struct Entry {
     glass: Glass,
@@ -29,15 +29,13 @@ pub fn all() -> impl Iterator<Item = &'static Glass> {
 /// published digit. Other old names are unknown, as those glasses differ from the new ones.
 ///
 /// # Errors
-/// [`GlassError::UnknownName`] with the nearest names.
-pub fn find(name: &str) -> Result<Glass, GlassError> {
+/// An unknown name, with the nearest known ones.
+pub fn find(name: &str) -> Result<Glass> {
     let wanted = key(name);
     let is_it = |entry: &&Entry| names(entry).any(|known| key(known) == wanted);
     let found = ENTRIES.iter().find(is_it).map(|entry| entry.glass.clone());
-    found.ok_or_else(|| GlassError::UnknownName {
-        name: name.into(),
-        nearest: nearest(name, ENTRIES.iter().flat_map(names)),
-    })
+    let remedy = "choose one of them, a six-digit glass number or a formula";
+    found.ok_or_else(|| unknown("glass", name, ENTRIES.iter().flat_map(names), remedy))
 }
 
 fn names(entry: &Entry) -> impl Iterator<Item = &str> {

@@ -4,7 +4,8 @@ use std::ops::RangeInclusive;
 
 use serde::{Deserialize, Serialize};
 
-use super::GlassError;
+use super::{FINITE, refused};
+use crate::error::Result;
 use crate::optics::Nanometres;
 use crate::optics::wavelength::{C_LINE, D_LINE, F_LINE, VISIBLE};
 
@@ -75,21 +76,22 @@ impl Dispersion {
     /// The same formula, if its constants are plausible for a transparent material.
     ///
     /// # Errors
-    /// [`GlassError::Value`] for a constant that is not finite or an Abbe number that is not above 0,
-    /// [`GlassError::Resonance`] where the index is infinite at a visible wavelength, [`GlassError::Index`] where
-    /// n_d is not from 1 to 10.
-    pub fn checked(self) -> Result<Self, GlassError> {
+    /// A constant that is not finite; an Abbe number that is not above 0; an infinite index at a visible wavelength; n_d
+    /// not from 1 to 10.
+    pub fn checked(self) -> Result<Self> {
         let (formula, constants) = self.constants();
+        let wrong = |value: f64| refused(format!("{value} cannot be a constant of {formula}"), FINITE);
         if let Some(value) = constants.iter().copied().find(|value| !value.is_finite()) {
-            return Err(GlassError::Value { formula, value });
+            return Err(wrong(value));
         }
         match self {
-            Self::Abbe { v_d, .. } if v_d <= 0.0 => return Err(GlassError::Value { formula, value: v_d }),
+            Self::Abbe { v_d, .. } if v_d <= 0.0 => return Err(wrong(v_d)),
             Self::Sellmeier { b, c_um2, .. } => {
                 let resonances = b.iter().zip(c_um2).filter(|(b, c)| **b != 0.0 && *c >= 0.0);
                 let mut places = resonances.map(|(_, c)| Nanometres(1e3 * c.sqrt()));
-                if let Some(Nanometres(wavelength_nm)) = places.find(|place| VISIBLE.contains(place)) {
-                    return Err(GlassError::Resonance { wavelength_nm });
+                if let Some(Nanometres(nm)) = places.find(|place| VISIBLE.contains(place)) {
+                    let remedy = "give resonances (C, in µm²) outside of 360 to 830 nm";
+                    return Err(refused(format!("the index is infinite at {nm:.1} nm"), remedy));
                 }
             }
             _ => {}
@@ -98,7 +100,8 @@ impl Dispersion {
         if (1.0..=MAX_INDEX).contains(&n_d) {
             Ok(self)
         } else {
-            Err(GlassError::Index { n_d })
+            let remedy = "give constants for wavelengths in µm whose index is from 1 to 10";
+            Err(refused(format!("the index at 587.56 nm is {n_d}"), remedy))
         }
     }
 

@@ -5,14 +5,12 @@ use std::ops::RangeInclusive;
 use serde::{Deserialize, Serialize};
 
 use super::Nanometres;
-use crate::error::Warning;
+use crate::error::{Error, Result, Warning};
 
 pub mod catalogue;
 pub mod dispersion;
-pub mod error;
 
 pub use dispersion::Dispersion;
-pub use error::GlassError;
 
 /// A transparent material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -79,6 +77,13 @@ impl Glass {
     }
 }
 
+/// Remedy for constants that are no numbers.
+const FINITE: &str = "give finite numbers between commas";
+
+fn refused(what: String, remedy: &str) -> Error {
+    Error::usage("glass", what, remedy)
+}
+
 /// Constants of each formula, for messages.
 const ABBE: &str = "n_d and V_d";
 const CAUCHY: &str = "A, B and perhaps C, in µm";
@@ -90,8 +95,8 @@ impl Glass {
     /// `abbe:1.523,58.8`, `cauchy:A,B[,C]`, `sellmeier:B1,B2,B3,C1,C2,C3`, `herzberger:A,B,C,D`.
     ///
     /// # Errors
-    /// [`GlassError`], with the most similar names for an unknown one.
-    pub fn parse(text: &str) -> Result<Self, GlassError> {
+    /// What is wrong, with the most similar names for an unknown one.
+    pub fn parse(text: &str) -> Result<Self> {
         let text = text.trim();
         if let Some((formula, constants)) = text.split_once(':') {
             return Ok(Self::of_user(text, by_formula(formula.trim(), constants.trim())?));
@@ -112,13 +117,12 @@ impl Glass {
     }
 }
 
-fn by_formula(formula: &str, text: &str) -> Result<Dispersion, GlassError> {
+fn by_formula(formula: &str, text: &str) -> Result<Dispersion> {
     let constants: Option<Vec<f64>> = text.split(',').map(|field| field.trim().parse().ok()).collect();
     let constants = constants.unwrap_or_default();
-    let wrong = |formula, takes| GlassError::Constants {
-        formula,
-        constants: text.into(),
-        takes,
+    let wrong = |formula: &str, takes: &str| {
+        let what = format!("`{text}` are not constants for {formula}, which takes {takes}");
+        refused(what, FINITE)
     };
     let dispersion = match (formula.to_ascii_lowercase().as_str(), constants.as_slice()) {
         ("abbe", &[n_d, v_d]) => Dispersion::Abbe { n_d, v_d },
@@ -135,9 +139,8 @@ fn by_formula(formula: &str, text: &str) -> Result<Dispersion, GlassError> {
         ("herzberger", &[a, b, c, d]) => Dispersion::Herzberger { a, b, c, d },
         ("herzberger", _) => return Err(wrong("herzberger", HERZBERGER)),
         _ => {
-            return Err(GlassError::UnknownFormula {
-                formula: formula.into(),
-            });
+            let what = format!("no formula is named `{formula}`");
+            return Err(refused(what, "choose abbe, cauchy, sellmeier or herzberger"));
         }
     };
     dispersion.checked()
@@ -146,9 +149,15 @@ fn by_formula(formula: &str, text: &str) -> Result<Dispersion, GlassError> {
 /// Dispersion of a glass number: 523588 means n_d = 1.523 and V_d = 58.8.
 ///
 /// # Errors
-/// [`GlassError::NotANumber`] for anything but six digits, and for an Abbe number of 000.
-pub fn parse(text: &str) -> Result<Dispersion, GlassError> {
-    let wrong = || GlassError::NotANumber { number: text.into() };
+/// Anything but six digits; an Abbe number of 000.
+pub fn parse(text: &str) -> Result<Dispersion> {
+    let wrong = || {
+        let what = format!("`{text}` is not a glass number of six digits");
+        refused(
+            what,
+            "write n_d - 1 and V_d in three digits each, as 517642 for N-BK7",
+        )
+    };
     if text.len() != 6 || !text.bytes().all(|byte| byte.is_ascii_digit()) {
         return Err(wrong());
     }

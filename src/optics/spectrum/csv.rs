@@ -1,6 +1,7 @@
 //! Spectra as CSV with two columns: wavelength [nm], value.
 
-use super::{Spectrum, SpectrumError};
+use super::{Spectrum, refused};
+use crate::error::Result;
 use crate::optics::Nanometres;
 
 /// Reads the spectrum of a lamp from the text of a CSV file.
@@ -10,9 +11,8 @@ use crate::optics::Nanometres;
 /// more.
 ///
 /// # Errors
-/// [`SpectrumError`] with the line at fault; [`SpectrumError::Dark`] and [`SpectrumError::Invisible`] where the lamp
-/// has no visible light.
-pub fn read_lamp(text: &str) -> Result<Spectrum, SpectrumError> {
+/// What is wrong, with the line at fault; a lamp without visible light.
+pub fn read_lamp(text: &str) -> Result<Spectrum> {
     let mut knots = Vec::new();
     let mut lines = Vec::new();
     let mut may_be_headings = true;
@@ -28,15 +28,14 @@ pub fn read_lamp(text: &str) -> Result<Spectrum, SpectrumError> {
             }
             None if may_be_headings => {}
             None => {
-                return Err(SpectrumError::NotARow {
-                    line: index + 1,
-                    text: content.into(),
-                });
+                let what = format!("line {}: `{content}` is not a wavelength and a value", index + 1);
+                let remedy = "write two columns, wavelength in nm and value, between commas";
+                return Err(refused(what, remedy));
             }
         }
         may_be_headings = false;
     }
-    let spectrum = Spectrum::new(knots).map_err(|error| with_line(error, &lines))?;
+    let spectrum = Spectrum::of_lines(knots, |row| lines[row])?;
     spectrum.check_visible()?;
     Ok(spectrum)
 }
@@ -48,17 +47,6 @@ fn row(content: &str) -> Option<(Nanometres, f64)> {
         .split(separator)
         .map(|field| field.trim().parse::<f64>().ok());
     Some((Nanometres(fields.next()??), fields.next()??))
-}
-
-/// Replaces the row number of an error by its line in the file.
-fn with_line(mut error: SpectrumError, lines: &[usize]) -> SpectrumError {
-    if let SpectrumError::NotFinite { line, .. }
-    | SpectrumError::Negative { line, .. }
-    | SpectrumError::NotIncreasing { line, .. } = &mut error
-    {
-        *line = lines[*line - 1];
-    }
-    error
 }
 
 /// Rows of a built-in table of numbers, without its headings.

@@ -4,9 +4,9 @@ use std::sync::LazyLock;
 
 use super::csv::columns;
 use super::temperature::planck;
-use super::{Spectrum, SpectrumError};
-use crate::optics::Nanometres;
-use crate::optics::{key, nearest};
+use super::{Spectrum, refused};
+use crate::error::{Error, Result};
+use crate::optics::{self, Nanometres, key};
 
 /// CIE illuminants with a table or formula of their own, apart from those in [`TABLES`].
 const OWN: [&str; 3] = ["A", "D65", "E"];
@@ -31,8 +31,8 @@ pub fn names() -> impl Iterator<Item = &'static str> {
 /// nm, as published.
 ///
 /// # Errors
-/// [`SpectrumError::UnknownName`] with the most similar names, [`SpectrumError::OutOfRange`] for a number.
-pub fn illuminant(name: &str) -> Result<Spectrum, SpectrumError> {
+/// An unknown name, with the most similar ones; a number out of range.
+pub fn illuminant(name: &str) -> Result<Spectrum> {
     let name = name.trim();
     let relative = match name.split_once(':') {
         Some((kind, number)) => with_number(&key(kind), number).unwrap_or_else(|| Err(unknown(name)))?,
@@ -52,7 +52,7 @@ pub fn d65() -> &'static Spectrum {
     &D65
 }
 
-fn plain(name: &str) -> Result<Spectrum, SpectrumError> {
+fn plain(name: &str) -> Result<Spectrum> {
     match key(name).as_str() {
         "a" => Ok(Spectrum::from_fn(illuminant_a)?.named("A")),
         "d65" => Ok(d65().clone()),
@@ -74,7 +74,7 @@ fn illuminant_a(Nanometres(nm): Nanometres) -> f64 {
 }
 
 /// A lamp of a kind that takes a number; `None` where there is no such kind.
-fn with_number(kind: &str, number: &str) -> Option<Result<Spectrum, SpectrumError>> {
+fn with_number(kind: &str, number: &str) -> Option<Result<Spectrum>> {
     match kind {
         "blackbody" | "planck" => Some(parse(number, KELVIN, "K").and_then(black_body)),
         "line" | "laser" => Some(parse(number, LINE_NM, "nm").and_then(line)),
@@ -82,32 +82,28 @@ fn with_number(kind: &str, number: &str) -> Option<Result<Spectrum, SpectrumErro
     }
 }
 
-fn black_body(kelvin: f64) -> Result<Spectrum, SpectrumError> {
+fn black_body(kelvin: f64) -> Result<Spectrum> {
     let light = Spectrum::from_fn(|wavelength| planck(wavelength, kelvin))?;
     Ok(light.named(&format!("blackbody:{kelvin}")))
 }
 
-fn line(nm: f64) -> Result<Spectrum, SpectrumError> {
+fn line(nm: f64) -> Result<Spectrum> {
     let triangle = [(nm - 1.0, 0.0), (nm, 1.0), (nm + 1.0, 0.0)];
     let light = Spectrum::new(triangle.map(|(nm, value)| (Nanometres(nm), value)).into())?;
     Ok(light.named(&format!("line:{nm}")))
 }
 
-fn parse(text: &str, [least, most]: [f64; 2], unit: &'static str) -> Result<f64, SpectrumError> {
+fn parse(text: &str, [least, most]: [f64; 2], unit: &str) -> Result<f64> {
     let number = text.trim().parse().ok();
     number
         .filter(|number| (least..=most).contains(number))
-        .ok_or_else(|| SpectrumError::OutOfRange {
-            text: text.into(),
-            least,
-            most,
-            unit,
+        .ok_or_else(|| {
+            let what = format!("`{text}` is not a number from {least} to {most} {unit}");
+            refused(what, "choose a number in that range")
         })
 }
 
-fn unknown(name: &str) -> SpectrumError {
-    SpectrumError::UnknownName {
-        name: name.into(),
-        nearest: nearest(name, names()),
-    }
+fn unknown(name: &str) -> Error {
+    let remedy = "choose one of them, blackbody:KELVIN, line:NM or a CSV file";
+    optics::unknown("spectrum", name, names(), remedy)
 }

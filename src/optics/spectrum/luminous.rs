@@ -3,7 +3,8 @@
 use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 
-use super::{Spectrum, SpectrumError, xyz_bar};
+use super::{Spectrum, xyz_bar};
+use crate::error::Result;
 use crate::optics::Nanometres;
 use crate::optics::wavelength::VISIBLE;
 
@@ -35,8 +36,8 @@ impl WavelengthSampler {
     /// By importance for the light of one lamp.
     ///
     /// # Errors
-    /// [`SpectrumError::Dark`] or [`SpectrumError::Invisible`] for a lamp without visible light.
-    pub fn for_lamp(lamp: &Spectrum) -> Result<Self, SpectrumError> {
+    /// A lamp without visible light.
+    pub fn for_lamp(lamp: &Spectrum) -> Result<Self> {
         lamp.check_visible()?;
         let knots_nm = knots_within(lamp.range(), lamp.wavelengths_nm());
         let importance = |nm: &f64| {

@@ -6,7 +6,6 @@
 //! ```
 
 pub mod csv;
-pub mod error;
 pub mod hue;
 pub mod illuminants;
 pub mod luminous;
@@ -15,7 +14,6 @@ pub mod temperature;
 pub mod upsample;
 pub mod xyz;
 
-pub use error::SpectrumError;
 pub use hue::{Hue, dominant};
 pub use illuminants::illuminant;
 pub use luminous::{WavelengthBand, WavelengthSampler};
@@ -23,3 +21,9 @@ pub use table::Spectrum;
 pub use upsample::{Emission, SmoothSpectrum};
 pub use xyz::Xyz;
 pub use xyz::xyz_bar;
+
+use crate::error::Error;
+
+fn refused(what: impl Into<String>, remedy: &str) -> Error {
+    Error::usage("spectrum", what, remedy)
+}

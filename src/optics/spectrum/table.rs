@@ -6,7 +6,8 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use super::luminous::{integrate, knots_within};
-use super::{SpectrumError, Xyz, xyz_bar};
+use super::{Xyz, refused, xyz_bar};
+use crate::error::{Error, Result};
 use crate::optics::Nanometres;
 use crate::optics::wavelength::VISIBLE;
 use crate::units::LUMENS_PER_WATT;
@@ -30,9 +31,9 @@ struct Rows {
 }
 
 impl TryFrom<Rows> for Spectrum {
-    type Error = SpectrumError;
+    type Error = Error;
 
-    fn try_from(rows: Rows) -> Result<Self, SpectrumError> {
+    fn try_from(rows: Rows) -> Result<Self> {
         let spectrum = Self::new(rows.rows)?;
         Ok(match rows.name {
             Some(name) => spectrum.named(&name),
@@ -57,27 +58,35 @@ impl Spectrum {
     /// # Errors
     /// Fewer than two rows, wavelengths that do not increase, or a number that is not finite or negative. The line in
     /// the error is the row, counted from 1.
-    pub fn new(rows: Vec<(Nanometres, f64)>) -> Result<Self, SpectrumError> {
+    pub fn new(rows: Vec<(Nanometres, f64)>) -> Result<Self> {
+        Self::of_lines(rows, |row| row + 1)
+    }
+
+    /// [`Self::new`] for rows of a file, by the line of each for errors.
+    pub(super) fn of_lines(rows: Vec<(Nanometres, f64)>, line: impl Fn(usize) -> usize) -> Result<Self> {
         if rows.len() < 2 {
-            return Err(SpectrumError::TooFewRows { rows: rows.len() });
+            let what = format!(
+                "a spectrum of {} rows says nothing between wavelengths",
+                rows.len()
+            );
+            return Err(refused(what, "give two rows or more"));
         }
-        let mut before_nm = f64::NEG_INFINITY;
-        for (index, (Nanometres(wavelength_nm), value)) in rows.iter().copied().enumerate() {
-            let line = index + 1;
-            if let Some(value) = [wavelength_nm, value].into_iter().find(|x| !x.is_finite()) {
-                return Err(SpectrumError::NotFinite { line, value });
+        let mut before = f64::NEG_INFINITY;
+        for (row, &(Nanometres(nm), value)) in rows.iter().enumerate() {
+            let wrong = |what: String, remedy| Err(refused(format!("line {}: {what}", line(row)), remedy));
+            if let Some(number) = [nm, value].into_iter().find(|x| !(x.is_finite() && *x >= 0.0)) {
+                let fault = if number.is_finite() {
+                    "negative"
+                } else {
+                    "not a finite number"
+                };
+                return wrong(format!("{number} is {fault}"), "give a finite value of 0 or more");
             }
-            if let Some(value) = [wavelength_nm, value].into_iter().find(|x| *x < 0.0) {
-                return Err(SpectrumError::Negative { line, value });
+            if nm <= before {
+                let remedy = "sort the rows by wavelength and name each once";
+                return wrong(format!("{nm} nm does not come after {before} nm"), remedy);
             }
-            if wavelength_nm <= before_nm {
-                return Err(SpectrumError::NotIncreasing {
-                    line,
-                    wavelength_nm,
-                    before_nm,
-                });
-            }
-            before_nm = wavelength_nm;
+            before = nm;
         }
         let (wavelengths_nm, values) = rows
             .into_iter()
@@ -107,7 +116,7 @@ impl Spectrum {
     ///
     /// # Errors
     /// A value that is negative or not finite.
-    pub fn from_fn(f: impl Fn(Nanometres) -> f64) -> Result<Self, SpectrumError> {
+    pub fn from_fn(f: impl Fn(Nanometres) -> f64) -> Result<Self> {
         let knots = knots_within(VISIBLE, &[]);
         Self::new(
             knots
@@ -182,7 +191,7 @@ impl Spectrum {
     ///
     /// # Errors
     /// A product that is negative or not finite.
-    pub fn scaled(&self, factor: f64) -> Result<Self, SpectrumError> {
+    pub fn scaled(&self, factor: f64) -> Result<Self> {
         let rows = self.wavelengths_nm.iter().zip(&self.values);
         let scaled = Self::new(
             rows.map(|(nm, value)| (Nanometres(*nm), value * factor))
@@ -197,8 +206,8 @@ impl Spectrum {
     /// The same light, scaled to a flux in luminous-equivalent watts: ∫ Φ ȳ dλ = `watts`, 683 times that in lm.
     ///
     /// # Errors
-    /// [`SpectrumError::Dark`] or [`SpectrumError::Invisible`] without visible light; a negative or non-finite `watts`.
-    pub fn to_luminous_equivalent(&self, watts: f64) -> Result<Self, SpectrumError> {
+    /// No visible light; a negative or non-finite `watts`.
+    pub fn to_luminous_equivalent(&self, watts: f64) -> Result<Self> {
         self.check_visible()?;
         let luminous = self.xyz().y;
         if luminous.is_normal() {
@@ -217,16 +226,18 @@ impl Spectrum {
     /// Checks that the spectrum has visible light.
     ///
     /// # Errors
-    /// [`SpectrumError::Invisible`] by its wavelengths, [`SpectrumError::Dark`] by its values.
-    pub fn check_visible(&self) -> Result<(), SpectrumError> {
-        let (Nanometres(first_nm), Nanometres(last_nm)) = self.range().into_inner();
-        if last_nm <= VISIBLE.start().0 || first_nm >= VISIBLE.end().0 {
-            return Err(SpectrumError::Invisible { first_nm, last_nm });
+    /// It has none, by its wavelengths or by its values.
+    pub fn check_visible(&self) -> Result<()> {
+        let (Nanometres(first), Nanometres(last)) = self.range().into_inner();
+        if last <= VISIBLE.start().0 || first >= VISIBLE.end().0 {
+            let what =
+                format!("its wavelengths {first} to {last} nm lie outside of the visible 360 to 830 nm");
+            return Err(refused(what, "give wavelengths in nanometres, 360 to 830"));
         }
         if self.xyz().y > 0.0 {
-            Ok(())
-        } else {
-            Err(SpectrumError::Dark)
+            return Ok(());
         }
+        let remedy = "give at least one visible wavelength a value above 0";
+        Err(refused("it has no light between 360 and 830 nm", remedy))
     }
 }

@@ -8,7 +8,8 @@ use std::sync::LazyLock;
 use glam::{DMat3, DVec3};
 
 use super::luminous::{points, visible_knots};
-use super::{Spectrum, SpectrumError, Xyz, illuminants, xyz_bar};
+use super::{Spectrum, Xyz, illuminants, refused, xyz_bar};
+use crate::error::Result;
 use crate::optics::wavelength::VISIBLE;
 use crate::optics::{LinearSrgb, Nanometres};
 
@@ -34,8 +35,8 @@ impl SmoothSpectrum {
     /// neither is the factor at any wavelength.
     ///
     /// # Errors
-    /// [`SpectrumError::NoSuchColour`] for a channel that is negative or not finite.
-    pub fn from_colour(colour: LinearSrgb) -> Result<Self, SpectrumError> {
+    /// A channel that is negative or not finite.
+    pub fn from_colour(colour: LinearSrgb) -> Result<Self> {
         check(colour)?;
         let most = colour.max_channel();
         // Dark colours are scaled up: near the foot of the sigmoid the equations are ill-conditioned.
@@ -80,8 +81,8 @@ impl Emission {
     /// Light with the XYZ of the colour, in the unit of its luminance, such as [W] or [W/m²].
     ///
     /// # Errors
-    /// [`SpectrumError::NoSuchColour`] for a channel that is negative or not finite.
-    pub fn from_colour(colour: LinearSrgb) -> Result<Self, SpectrumError> {
+    /// A channel that is negative or not finite.
+    pub fn from_colour(colour: LinearSrgb) -> Result<Self> {
         check(colour)?;
         let scale = 2.0 * colour.max_channel();
         let coefficients = if scale > 0.0 {
@@ -99,7 +100,7 @@ impl Emission {
     }
 }
 
-fn check(colour: LinearSrgb) -> Result<(), SpectrumError> {
+fn check(colour: LinearSrgb) -> Result<()> {
     let LinearSrgb { r, g, b } = colour;
     let fault = if !colour.is_finite() {
         "is not finite"
@@ -108,7 +109,11 @@ fn check(colour: LinearSrgb) -> Result<(), SpectrumError> {
     } else {
         return Ok(());
     };
-    Err(SpectrumError::NoSuchColour { r, g, b, fault })
+    let what = format!("the colour {r}, {g}, {b} {fault}");
+    Err(refused(
+        what,
+        "give finite channels that no light could contradict",
+    ))
 }
 
 /// −1 at the blue end of the visible range, 1 at the red end.

@@ -2,21 +2,14 @@
 //! solution and are meshes of exactly the surfaces for which it was computed: in `assets/reference/`, or for `prism` by
 //! wavelength in closed form.
 
-mod ball;
-mod basin;
-mod bowl;
 mod cut_glass;
 mod gallery;
-mod mirror;
-mod paraboloid;
 pub mod parts;
 pub mod pool;
 pub mod prism;
-mod ring;
+mod reference;
 pub mod shapes;
 mod showroom;
-mod slab;
-mod spectrum;
 mod water_room;
 
 use super::Scene;
@@ -44,18 +37,18 @@ pub fn build(name: &str) -> Option<Scene> {
     let mut scene = match name {
         "gallery" => gallery::build(),
         "showroom" => showroom::build(),
-        "ring" => ring::ring(),
-        "ball" => ball::build(),
+        "ring" => reference::ring(),
+        "ball" => reference::ball(),
         "pool" => pool::build(),
         "pool-bump" => pool::bumped(pool::AMPLITUDE_M),
         "water-room" => water_room::build(),
-        "mirror" => mirror::build(),
-        "slab" => slab::build(),
-        "paraboloid" => paraboloid::build(),
-        "nephroid" => ring::nephroid(),
+        "mirror" => reference::mirror(),
+        "slab" => reference::slab(),
+        "paraboloid" => reference::paraboloid(),
+        "nephroid" => reference::nephroid(),
         "prism" => prism::build(),
-        "spectrum" => spectrum::build(),
-        "bowl" => bowl::build(),
+        "spectrum" => prism::spectrum(),
+        "bowl" => cut_glass::bowl(),
         _ => return None,
     };
     scene.name = name.into();

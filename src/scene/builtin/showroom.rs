@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::basin::Basin;
-use super::ring::cylinder;
+use super::pool::Basin;
+use super::reference::cylinder;
 use super::{parts, shapes};
 use crate::optics::LinearSrgb;
 use crate::scene::{Camera, Light, Scene};

@@ -24,10 +24,7 @@ pub fn build() -> Scene {
     let mut scene = Scene::default();
     add_room(&mut scene);
     add_pool(&mut scene);
-    scene.lights = vec![
-        lamp(),
-        spot("spot", DVec3::new(2.9, 2.6, -2.0), DVec3::new(-0.5, WATER_M, 0.2)),
-    ];
+    scene.lights = vec![lamp(), spot()];
     scene.cameras = vec![
         parts::look("corner", [2.9, 1.55, 2.0], [-1.2, 0.75, -1.4], 1.0),
         parts::look("ceiling", [0.0, 0.5, 1.9], [0.0, 2.6, -1.2], 1.1),
@@ -50,41 +47,36 @@ fn add_room(scene: &mut Scene) {
         parts::add_with(scene, name, shapes::floor(across, along, 0.0), stone);
     }
     let up = DVec3::Y * (0.5 * HEIGHT_M);
-    for (name, inward, half_along) in [
-        ("wall behind", DVec3::Z * z, DVec3::X * x),
-        ("wall before", DVec3::NEG_Z * z, DVec3::NEG_X * x),
-        ("wall left", DVec3::X * x, DVec3::NEG_Z * z),
-        ("wall right", DVec3::NEG_X * x, DVec3::Z * z),
-    ] {
-        parts::add_with(
-            scene,
-            name,
-            shapes::rectangle(up - inward, half_along, up),
-            plaster,
-        );
-    }
+    add_four_sides(scene, ("wall", plaster), up, ROOM_M, up);
     let ceiling = shapes::rectangle(DVec3::Y * HEIGHT_M, DVec3::X * x, DVec3::Z * z);
     parts::add_with(scene, "ceiling", ceiling, plaster);
+}
+
+/// Adds the vertical sides of a box, which face inwards: its centre, half sides along x and z, and half its height.
+fn add_four_sides(
+    scene: &mut Scene,
+    (name, material): (&str, usize),
+    centre: DVec3,
+    [x, z]: [f64; 2],
+    half_up: DVec3,
+) {
+    for (side, inward, half_along) in [
+        ("behind", DVec3::Z * z, DVec3::X * x),
+        ("before", DVec3::NEG_Z * z, DVec3::NEG_X * x),
+        ("left", DVec3::X * x, DVec3::NEG_Z * z),
+        ("right", DVec3::NEG_X * x, DVec3::Z * z),
+    ] {
+        let mesh = shapes::rectangle(centre - inward, half_along, half_up);
+        parts::add_with(scene, &format!("{name} {side}"), mesh, material);
+    }
 }
 
 fn add_pool(scene: &mut Scene) {
     let tiles = parts::material(scene, parts::matte("tiles", LinearSrgb::new(0.55, 0.72, 0.76)));
     let [x, z] = POOL_M;
     parts::add_with(scene, "floor", shapes::floor([-x, x], [-z, z], BOTTOM_M), tiles);
-    let (middle, up) = (DVec3::Y * (0.5 * BOTTOM_M), DVec3::Y * (-0.5 * BOTTOM_M));
-    for (name, inward, half_along) in [
-        ("side behind", DVec3::Z * z, DVec3::X * x),
-        ("side before", DVec3::NEG_Z * z, DVec3::NEG_X * x),
-        ("side left", DVec3::X * x, DVec3::NEG_Z * z),
-        ("side right", DVec3::NEG_X * x, DVec3::Z * z),
-    ] {
-        parts::add_with(
-            scene,
-            name,
-            shapes::rectangle(middle - inward, half_along, up),
-            tiles,
-        );
-    }
+    let middle = DVec3::Y * (0.5 * BOTTOM_M);
+    add_four_sides(scene, ("side", tiles), middle, POOL_M, -middle);
     let waves = [
         (0.004, [5.0, 2.0], 0.0),
         (0.003, [-4.0, 9.0], 1.0),
@@ -112,16 +104,18 @@ fn lamp() -> Light {
     }
 }
 
-fn spot(name: &str, position: DVec3, target: DVec3) -> Light {
+/// Above the pool.
+fn spot() -> Light {
+    let position = DVec3::new(2.9, 2.6, -2.0);
     let kind = LightKind::Spot {
         position,
-        direction: (target - position).normalize(),
+        direction: (DVec3::new(-0.5, WATER_M, 0.2) - position).normalize(),
         intensity: RadiantIntensity(22.0),
         inner_cone_rad: 0.2,
         outer_cone_rad: 0.36,
     };
     Light {
         colour: LinearSrgb::new(1.16, 0.98, 0.72),
-        ..Light::new(name, kind)
+        ..Light::new("spot", kind)
     }
 }

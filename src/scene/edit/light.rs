@@ -58,13 +58,19 @@ impl LightEdit {
             }
             Self::Position(new) => {
                 let why = "position, as it is a sun";
-                let old = position(&mut light.kind).ok_or_else(|| lacks(why, "set its direction"))?;
+                let old = light
+                    .kind
+                    .position_mut()
+                    .ok_or_else(|| lacks(why, "set its direction"))?;
                 check_place(*new, &owner)?;
                 *old = *new;
             }
             Self::Direction(new) => {
                 let why = "direction, as it shines everywhere alike";
-                let old = direction(&mut light.kind).ok_or_else(|| lacks(why, "set its position"))?;
+                let old = light
+                    .kind
+                    .direction_mut()
+                    .ok_or_else(|| lacks(why, "set its position"))?;
                 *old = unit(*new, &owner)?;
             }
             Self::Colour(colour, spectrum) => {
@@ -76,7 +82,7 @@ impl LightEdit {
     }
 
     /// Edits that turn `was` into `is`.
-    pub(in crate::scene) fn between(was: &Light, is: &Light) -> Vec<Self> {
+    pub(in crate::scene) fn diff(was: &Light, is: &Light) -> Vec<Self> {
         let mut edits = Vec::new();
         if was.kind.strength() != is.kind.strength() {
             edits.push(Self::Strength(is.kind.strength()));
@@ -117,21 +123,6 @@ fn check_size(kind: &LightKind, size: LightSize, owner: &str) -> Result<()> {
     }
     let range = "a radius above 0 m for point lights and spots, an angle above 0 and up to π for suns";
     Err(out_of_range(owner, "size", format!("{size:?}"), range))
-}
-
-fn position(kind: &mut LightKind) -> Option<&mut DVec3> {
-    match kind {
-        LightKind::Point { position, .. } | LightKind::Spot { position, .. } => Some(position),
-        LightKind::Panel { centre, .. } => Some(centre),
-        _ => None,
-    }
-}
-
-fn direction(kind: &mut LightKind) -> Option<&mut DVec3> {
-    match kind {
-        LightKind::Spot { direction, .. } | LightKind::Sun { direction, .. } => Some(direction),
-        _ => None,
-    }
 }
 
 fn check_colour(colour: LinearSrgb, has_spectrum: bool, owner: &str) -> Result<()> {

@@ -91,7 +91,7 @@ impl MaterialEdit {
     }
 
     /// Edits that turn `was` into `is`.
-    pub(in crate::scene) fn between(was: &Material, is: &Material) -> Vec<Self> {
+    pub(in crate::scene) fn diff(was: &Material, is: &Material) -> Vec<Self> {
         let mut edits = Vec::new();
         let is_same_substance = was.ior == is.ior
             && was.glass.as_deref() == is.glass.as_deref()

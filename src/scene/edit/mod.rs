@@ -45,7 +45,7 @@ impl Edit {
             }
             Self::Place(object, motion) => place(&mut edited, *object, motion)?,
         }
-        edited.lift();
+        edited.displace_by_waves();
         Ok(edited)
     }
 
@@ -103,7 +103,7 @@ impl EditState {
                 object.set_motion(*motion, scene.pivot(index));
             }
         }
-        edited.lift();
+        edited.displace_by_waves();
         edited
     }
 }

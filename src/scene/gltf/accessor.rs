@@ -5,7 +5,7 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Root, buffer};
 
 use super::buffers::Buffers;
-use super::report::Budget;
+use super::context::{LoadContext, damaged};
 use crate::error::{Error, Result};
 
 /// Reads the accessors of a file.
@@ -54,7 +54,7 @@ impl Reader<'_> {
         index: Index<Accessor>,
         formats: Formats,
         owner: &str,
-        budget: &mut Budget,
+        load: &mut LoadContext,
     ) -> Result<Vec<[f64; N]>> {
         let accessor = self.get(index, owner)?;
         let is_quantised = self.root.extensions_used.iter().any(|name| name == QUANTISATION);
@@ -76,8 +76,8 @@ impl Reader<'_> {
                 ),
             ));
         };
-        let bytes = self.packed(accessor, N * component.size(), owner, budget)?;
-        budget.take((accessor.count.0).saturating_mul(8 * N as u64), owner)?;
+        let bytes = self.packed(accessor, N * component.size(), owner, load)?;
+        load.take((accessor.count.0).saturating_mul(8 * N as u64), owner)?;
         let numbers = bytes.chunks_exact(component.size());
         let numbers: Vec<f64> = numbers
             .map(|bytes| number(component, is_normalised, bytes))
@@ -99,7 +99,7 @@ impl Reader<'_> {
     ///
     /// # Errors
     /// Those of [`vectors`](Self::vectors).
-    pub fn indices(&self, index: Index<Accessor>, owner: &str, budget: &mut Budget) -> Result<Vec<u32>> {
+    pub fn indices(&self, index: Index<Accessor>, owner: &str, load: &mut LoadContext) -> Result<Vec<u32>> {
         let accessor = self.get(index, owner)?;
         let component = match (&accessor.type_, &accessor.component_type) {
             (Checked::Valid(Type::Scalar), Checked::Valid(component)) => component.0,
@@ -117,7 +117,7 @@ impl Reader<'_> {
                 ),
             ));
         }
-        let bytes = self.packed(accessor, component.size(), owner, budget)?;
+        let bytes = self.packed(accessor, component.size(), owner, load)?;
         Ok(bytes.chunks_exact(component.size()).map(unsigned).collect())
     }
 
@@ -133,7 +133,7 @@ impl Reader<'_> {
         accessor: &Accessor,
         element: usize,
         owner: &str,
-        budget: &mut Budget,
+        load: &mut LoadContext,
     ) -> Result<Vec<u8>> {
         let bytes = accessor.count.0.saturating_mul(element as u64);
         let mut packed = match accessor.buffer_view {
@@ -144,7 +144,7 @@ impl Reader<'_> {
             }
             // Without a view all elements are zero, and only the budget limits their number.
             None => {
-                budget.take(bytes, owner)?;
+                load.take(bytes, owner)?;
                 vec![0; bytes as usize]
             }
         };
@@ -258,5 +258,5 @@ fn unsigned(bytes: &[u8]) -> u32 {
 }
 
 fn broken(owner: &str, what: impl Into<String>) -> Error {
-    Error::failure(owner, what, "export the file again")
+    damaged(owner, what)
 }

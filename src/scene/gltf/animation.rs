@@ -8,11 +8,11 @@ use serde::Deserialize;
 use serde_json::Map;
 
 use super::accessor::{Formats, Reader};
+use super::context::LoadContext;
 use super::document::Document;
-use super::names;
+use super::extras;
 use super::nodes::{self, PlacedNode};
 use super::pose::Maybe;
-use super::report::{Budget, Report};
 use crate::error::Error;
 use crate::scene::{Animated, Clip, ClipNode, Interpolation, Track};
 
@@ -61,38 +61,36 @@ impl Animations {
         document: &Document,
         placed: &[PlacedNode],
         reader: Reader,
-        budget: &mut Budget,
-        report: &mut Report,
+        load: &mut LoadContext,
     ) -> Option<Clip> {
         let mut tracks: HashMap<usize, Vec<Track>> = HashMap::new();
         for (index, animation) in self.animations.iter().enumerate() {
             let Some(animation) = animation.get() else {
-                report.warn(
+                load.warn_damaged(
                     format!("animation {index}"),
                     "is not as glTF has it and is left out",
-                    "export the file again",
                 );
                 continue;
             };
-            let name = names::name(animation.name.as_ref(), "animation", index);
+            let name = extras::name(animation.name.as_deref(), "animation", index);
             let owner = format!("animation `{name}`");
             for channel in &animation.channels {
                 let read = node_of(channel, document)
-                    .and_then(|node| Ok((node, track(animation, channel, reader, &owner, budget)?)));
+                    .and_then(|node| Ok((node, track(animation, channel, reader, &owner, load)?)));
                 match read {
                     Ok((node, track)) => {
                         let of_node = tracks.entry(node).or_default();
                         if of_node.iter().all(|other| other.animated != track.animated) {
                             of_node.push(track);
                         } else {
-                            report.warn(
+                            load.warn(
                                 &owner,
                                 format!("moves node {node} as another animation does, which is played"),
                                 "leave one of them in the file",
                             );
                         }
                     }
-                    Err(why) => report.warn(&owner, why, "export the file again"),
+                    Err(why) => load.warn_damaged(&owner, why),
                 }
             }
         }
@@ -120,7 +118,7 @@ fn track(
     channel: &Channel,
     reader: Reader,
     owner: &str,
-    budget: &mut Budget,
+    load: &mut LoadContext,
 ) -> Result<Track, String> {
     let animated = match channel.target.path.as_str() {
         "translation" => Animated::Translation,
@@ -139,13 +137,13 @@ fn track(
     };
     let (input, output) = (Index::new(sampler.input), Index::new(sampler.output));
     let what = |error: Error| error.what;
-    let times = reader.vectors::<1>(input, Formats::Float, owner, budget);
+    let times = reader.vectors::<1>(input, Formats::Float, owner, load);
     let values = match animated {
         Animated::Rotation => reader
-            .vectors::<4>(output, Formats::FloatOrSigned, owner, budget)
+            .vectors::<4>(output, Formats::FloatOrSigned, owner, load)
             .map(|values| values.into_iter().map(DVec4::from).collect()),
         Animated::Translation | Animated::Scale => reader
-            .vectors::<3>(output, Formats::Float, owner, budget)
+            .vectors::<3>(output, Formats::Float, owner, load)
             .map(|values| {
                 values
                     .into_iter()

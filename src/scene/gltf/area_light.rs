@@ -3,21 +3,16 @@
 //! A light lies in the node's xy plane around its origin and shines along −z. Its size is scaled uniformly, by the
 //! largest scale of the node.
 
-use std::path::Path;
-
 use glam::DVec3;
 use gltf::json::Value;
 use serde::Deserialize;
 
 use super::document::Document;
-use super::light::{Origin, left_out, light_name};
+use super::light::{ReadLight, strength};
 use super::nodes::PlacedNode;
-use super::report::Report;
-use super::spectrum;
-use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::{Light, LightKind, PanelShape};
-use crate::units::{LUMENS_PER_WATT, Radiance};
+use crate::scene::{LightKind, PanelShape};
+use crate::units::Radiance;
 
 pub(super) const NAME: &str = "EXT_lights_area";
 
@@ -63,56 +58,16 @@ impl Default for Rect {
     }
 }
 
-/// Adds the area lights of the placed nodes that have non-zero power, node by node. Unreadable ones are left out with a
-/// warning.
-///
-/// # Errors
-/// Those of [`spectrum::apply`].
-pub fn add_all(
-    lights: &mut Vec<(Light, Origin)>,
-    document: &Document,
-    placed: &[PlacedNode],
-    folder: &Path,
-    report: &mut Report,
-) -> Result<()> {
+/// The area light of a node, if it has one.
+pub(super) fn read(document: &Document, placed: &PlacedNode) -> Option<ReadLight> {
     let root = &document.root;
-    let extension = root
-        .extensions
-        .as_ref()
-        .and_then(|extensions| extensions.others.get(NAME));
-    let sources = extension
-        .and_then(|extension| extension.get("lights"))
-        .and_then(Value::as_array);
-    let sources = sources.map_or(&[][..], Vec::as_slice);
-    for placed in placed {
-        let extensions = root.nodes[placed.node].extensions.as_ref();
-        let Some(on_node) = extensions.and_then(|extensions| extensions.others.get(NAME)) else {
-            continue;
-        };
-        let owner = format!("light `{}`", placed.name);
-        match lamp(on_node, sources, placed) {
-            Ok((index, colour, kind)) => {
-                let mut light = Light {
-                    colour,
-                    ..Light::new(light_name(placed, lights.len()), kind)
-                };
-                let stated = spectrum::stated(document, placed.node, &document.extras.area_lights, index);
-                spectrum::apply(&mut light, stated, folder, &owner, report)?;
-                let (node, list) = (placed.node, NAME);
-                lights.push((light, Origin { node, list, index }));
-            }
-            Err(why) => left_out(report, &owner, &why),
-        }
-    }
-    Ok(())
+    let on_node = root.nodes[placed.node].extensions.as_ref()?.others.get(NAME)?;
+    let list = root.extensions.as_ref().and_then(|all| all.others.get(NAME));
+    let sources = list.and_then(|list| list.get("lights")?.as_array());
+    Some(lamp(on_node, sources.map_or(&[], Vec::as_slice), placed))
 }
 
-/// Index in the file's list, colour and kind of a light.
-fn lamp(
-    on_node: &Value,
-    sources: &[Value],
-    placed: &PlacedNode,
-) -> std::result::Result<(usize, LinearSrgb, LightKind), String> {
+fn lamp(on_node: &Value, sources: &[Value], placed: &PlacedNode) -> ReadLight {
     let index = on_node.get("light").and_then(Value::as_u64);
     let index = index.ok_or("does not say which area light it is")?;
     let missing = || format!("is area light {index}, which does not exist");
@@ -121,16 +76,7 @@ fn lamp(
     let source =
         AreaLightEntry::deserialize(source).map_err(|error| format!("does not follow {NAME} ({error})"))?;
     let colour = LinearSrgb::from(source.color);
-    if !colour.is_finite() || source.color.iter().any(|channel| *channel < 0.0) {
-        return Err("has a colour that is negative or not finite".into());
-    }
-    let radiance = source.intensity / LUMENS_PER_WATT;
-    if !(radiance >= 0.0 && radiance.is_finite()) {
-        return Err(format!("has an intensity of {}", source.intensity));
-    }
-    if radiance * colour.luminance() == 0.0 {
-        return Err("has no power".into());
-    }
+    let radiance = strength(colour, source.intensity)?;
     let (shape, aspect) = match source.kind.or(source.shape).as_deref().unwrap_or("rect") {
         "rect" => (PanelShape::Rectangle, source.rect.aspect),
         "disk" => (PanelShape::Disc, 1.0),

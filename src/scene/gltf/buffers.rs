@@ -6,10 +6,10 @@ use std::path::Path;
 
 use gltf::json::{Index, Value, buffer};
 
+use super::context::{LoadContext, damaged};
 use super::meshopt::Compressed;
-use super::report::{Budget, Report};
 use super::uri;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 #[derive(Debug)]
 pub struct Buffers<'a> {
@@ -37,8 +37,7 @@ impl<'a> Buffers<'a> {
         views: &'a [buffer::View],
         binary: Option<&'a [u8]>,
         folder: &Path,
-        budget: &mut Budget,
-        report: &mut Report,
+        load: &mut LoadContext,
     ) -> Result<Self> {
         let mut data = Vec::with_capacity(all.len());
         let compressed: Vec<_> = views.iter().map(compression).collect();
@@ -56,23 +55,19 @@ impl<'a> Buffers<'a> {
                 continue;
             }
             let bytes: Option<Cow<[u8]>> = match (&buffer.uri, binary) {
-                (Some(uri), _) => Some(uri::read(uri, folder, budget.left(), &owner)?.into()),
+                (Some(uri), _) => Some(uri::read(uri, folder, load.left(), &owner)?.into()),
                 (None, Some(binary)) if index == 0 => Some(binary.into()),
                 (None, _) => None,
             };
             let Some(bytes) = bytes else {
-                report.warn(
-                    owner,
-                    "has no data",
-                    "export the file again if something is missing",
-                );
+                load.warn_damaged(owner, "has no data");
                 data.push(None);
                 continue;
             };
             if matches!(bytes, Cow::Owned(_)) {
-                budget.take(bytes.len() as u64, &owner)?;
+                load.take(bytes.len() as u64, &owner)?;
             }
-            data.push(Some(trimmed(bytes, buffer.byte_length.0, &owner, report)?));
+            data.push(Some(trimmed(bytes, buffer.byte_length.0, &owner, load)?));
         }
         let mut buffers = Self {
             views,
@@ -83,7 +78,7 @@ impl<'a> Buffers<'a> {
             let unpacked = match compressed {
                 None => None,
                 Some(Err(error)) => Some(Err(error.to_string())),
-                Some(Ok(stated)) => Some(buffers.unpack(&stated, index, budget)?),
+                Some(Ok(stated)) => Some(buffers.unpack(&stated, index, load)?),
             };
             buffers.unpacked.push(unpacked);
         }
@@ -94,7 +89,7 @@ impl<'a> Buffers<'a> {
         &self,
         stated: &Compressed,
         view: usize,
-        budget: &mut Budget,
+        load: &mut LoadContext,
     ) -> Result<std::result::Result<Vec<u8>, String>> {
         let Some(data) = self.range(stated.buffer, stated.byte_offset, stated.byte_length) else {
             return Ok(Err("its data does not lie within a buffer".into()));
@@ -102,7 +97,7 @@ impl<'a> Buffers<'a> {
         let Some(bytes) = stated.unpacked_bytes() else {
             return Ok(Err("its size cannot be right".into()));
         };
-        budget.take(bytes, &format!("buffer view {view}"))?;
+        load.take(bytes, &format!("buffer view {view}"))?;
         Ok(stated.unpack(data).ok_or_else(|| "its data is damaged".into()))
     }
 
@@ -118,7 +113,7 @@ impl<'a> Buffers<'a> {
     /// A view that does not exist or does not lie within its buffer.
     pub fn view(&self, view: Index<buffer::View>, owner: &str) -> Result<View<'_>> {
         let index = view.value();
-        let broken = |what: String| Error::failure(owner, what, "export the file again");
+        let broken = |what: String| damaged(owner, what);
         let Some(view) = self.views.get(index) else {
             return Err(broken(format!(
                 "refers to buffer view {index}, which does not exist"
@@ -165,21 +160,24 @@ fn is_fallback(buffer: &buffer::Buffer) -> bool {
 }
 
 /// Exactly the stated bytes of a buffer.
-fn trimmed<'a>(bytes: Cow<'a, [u8]>, stated: u64, owner: &str, report: &mut Report) -> Result<Cow<'a, [u8]>> {
+fn trimmed<'a>(
+    bytes: Cow<'a, [u8]>,
+    stated: u64,
+    owner: &str,
+    load: &mut LoadContext,
+) -> Result<Cow<'a, [u8]>> {
     let held = bytes.len() as u64;
     if held < stated {
-        return Err(Error::failure(
+        return Err(damaged(
             owner,
             format!("holds {held} bytes where the file states {stated}"),
-            "copy or export the file again",
         ));
     }
     // Chunks of a binary file are padded to four bytes.
     if held >= stated + 4 || stated == 0 {
-        report.warn(
+        load.warn_damaged(
             owner,
             format!("holds {held} bytes where the file states {stated}; the rest was ignored"),
-            "export the file again if something is missing",
         );
     }
     let stated = stated as usize;

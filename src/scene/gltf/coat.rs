@@ -29,10 +29,7 @@ impl MaterialReader<'_, '_> {
             return Ok(());
         };
         let Ok(stated) = Coat::deserialize(stated) else {
-            self.warn(
-                "its clearcoat cannot be read and was left out",
-                "export the file again",
-            );
+            self.warn_damaged("its clearcoat cannot be read and was left out");
             return Ok(());
         };
         let mut factor = self.share(stated.clearcoat_factor, "clearcoat factor");
@@ -56,7 +53,7 @@ impl MaterialReader<'_, '_> {
                 "expect it to look and bake as if it were not there",
             );
         }
-        if let Err(why) = put_on(material, factor, roughness) {
+        if let Err(why) = apply_coat(material, factor, roughness) {
             self.warn(why, "expect it to look and bake as if it were not there");
         } else if (material.roughness - roughness).abs() > UNLIKE {
             self.warn(
@@ -87,7 +84,7 @@ struct Coat {
 ///
 /// # Errors
 /// Reason why the coat is left out, to follow the name of the material.
-fn put_on(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
+fn apply_coat(material: &mut Material, factor: f64, roughness: f64) -> std::result::Result<(), String> {
     match material.surface {
         SurfaceKind::Diffuse if roughness > SPECULAR_ROUGHNESS_LIMIT => {
             Err("its clearcoat was left out, as it is rough and hardly shines".into())

@@ -1,6 +1,6 @@
 //! Splits a file into its JSON and binary parts.
 
-use super::report::Report;
+use super::context::{LoadContext, damaged};
 use crate::error::{Error, Result};
 
 /// Parts of a `.glb` or `.gltf` file.
@@ -23,7 +23,7 @@ const BINARY_CHUNK: [u8; 4] = *b"BIN\0";
 ///
 /// # Errors
 /// A binary file that is truncated, has another version, or does not begin with a JSON chunk.
-pub fn split<'a>(bytes: &'a [u8], report: &mut Report) -> Result<Container<'a>> {
+pub fn split<'a>(bytes: &'a [u8], load: &mut LoadContext) -> Result<Container<'a>> {
     if !bytes.starts_with(b"glTF") {
         return Ok(Container {
             json: bytes,
@@ -54,16 +54,15 @@ pub fn split<'a>(bytes: &'a [u8], report: &mut Report) -> Result<Container<'a>> 
         )));
     }
     if length < bytes.len() {
-        report.warn(
+        load.warn_damaged(
             "GLB header",
             format!("{} bytes after the stated end were ignored", bytes.len() - length),
-            "export the file again if something is missing",
         );
     }
-    split_chunks(&bytes[HEADER_BYTES..length], report)
+    split_chunks(&bytes[HEADER_BYTES..length], load)
 }
 
-fn split_chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Result<Container<'a>> {
+fn split_chunks<'a>(mut rest: &'a [u8], load: &mut LoadContext) -> Result<Container<'a>> {
     let Some((JSON_CHUNK, json)) = next_chunk(&mut rest)? else {
         return Err(broken("its first chunk is not JSON"));
     };
@@ -74,11 +73,9 @@ fn split_chunks<'a>(mut rest: &'a [u8], report: &mut Report) -> Result<Container
         match kind {
             BINARY_CHUNK if index == 1 => (binary, others) = (Some(data), rest),
             // The specification has unknown chunks ignored, but these two have a fixed place.
-            BINARY_CHUNK | JSON_CHUNK => report.warn(
-                format!("GLB chunk {index}"),
-                "has no place there and was ignored",
-                "export the file again",
-            ),
+            BINARY_CHUNK | JSON_CHUNK => {
+                load.warn_damaged(format!("GLB chunk {index}"), "has no place there and was ignored")
+            }
             _ => {}
         }
         index += 1;
@@ -117,5 +114,5 @@ fn next_chunk<'a>(rest: &mut &'a [u8]) -> Result<Option<([u8; 4], &'a [u8])>> {
 }
 
 fn broken(what: impl Into<String>) -> Error {
-    Error::failure("GLB", what, "copy or export the file again")
+    damaged("GLB", what)
 }

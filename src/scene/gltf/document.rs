@@ -1,14 +1,19 @@
-//! The JSON of a file as typed data, without the parts that are not read.
+//! The JSON of a file as typed data, without the parts that are not read. Violations of the specification are reported as
+//! warnings; those that affect what is read stop the loading where the faulty part is needed.
 
+use std::fmt::Display;
+
+use gltf::json::path::Path;
+use gltf::json::validation::{Error as Fault, Validate};
 use gltf::json::{Root, Value};
 use serde::Deserialize;
 use serde_json::Map;
 
 use super::animation::Animations;
+use super::context::LoadContext;
 use super::extras::Extras;
 use super::pose::Poses;
-use super::report::Report;
-use super::{extensions, faults, glossiness, names};
+use super::{extensions, extras, glossiness, guard};
 use crate::error::{Error, Result};
 
 /// The typed JSON, with node transforms in double precision.
@@ -39,27 +44,27 @@ pub struct NodeTransform {
 ///
 /// # Errors
 /// Text that is not JSON, another version than glTF 2, an unsupported required extension, a value of the wrong type.
-pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
+pub fn parse(json: &[u8], load: &mut LoadContext) -> Result<Document> {
     let mut value: Value = serde_json::from_slice(json).map_err(|error| broken_json(json, &error))?;
     let Some(file) = value.as_object_mut() else {
         return Err(unlike_gltf("its JSON is not an object"));
     };
-    check_version(file, report)?;
+    check_version(file, load)?;
     let required = strings(file, "extensionsRequired")?;
-    extensions::check(&required, &strings(file, "extensionsUsed")?, report)?;
+    extensions::check(&required, &strings(file, "extensionsUsed")?, load)?;
     let poses = Poses::of(file);
     let animations = Animations::of(file);
-    prepare(file, report);
-    make_glass_clear(file, report);
+    prepare(file, load);
+    make_glass_clear(file, load);
     let extras = Extras::of(&value);
     remove_extras(&mut value);
 
     let transforms = match value.get("nodes") {
-        Some(nodes) => Vec::deserialize(nodes).map_err(|error| unlike_gltf(&error.to_string()))?,
+        Some(nodes) => Vec::deserialize(nodes).map_err(unlike_gltf)?,
         None => Vec::new(),
     };
-    let root: Root = serde_json::from_value(value).map_err(|error| unlike_gltf(&error.to_string()))?;
-    faults::report(&root, report);
+    let root: Root = serde_json::from_value(value).map_err(unlike_gltf)?;
+    warn_of_faults(&root, load);
     Ok(Document {
         root,
         transforms,
@@ -70,30 +75,22 @@ pub fn parse(json: &[u8], report: &mut Report) -> Result<Document> {
 }
 
 fn broken_json(json: &[u8], error: &serde_json::Error) -> Error {
-    if json.trim_ascii_start().starts_with(b"{") {
-        Error::failure(
-            "JSON",
-            format!("is broken ({error})"),
-            "repair it or export it again",
-        )
-    } else {
-        Error::failure(
-            "JSON",
-            format!("this is not a glTF file ({error})"),
-            "name a .glb or .gltf file",
-        )
+    match json.trim_ascii_start() {
+        [b'{', ..] => Error::failure("JSON", format!("is broken ({error})"), REPAIR),
+        _ => {
+            let what = format!("this is not a glTF file ({error})");
+            Error::failure("JSON", what, "name a .glb or .gltf file")
+        }
     }
 }
 
-fn unlike_gltf(why: &str) -> Error {
-    Error::failure(
-        "JSON",
-        format!("does not follow glTF 2.0 ({why})"),
-        "repair it or export it again",
-    )
+const REPAIR: &str = "repair it or export it again";
+
+fn unlike_gltf(why: impl Display) -> Error {
+    Error::failure("JSON", format!("does not follow glTF 2.0 ({why})"), REPAIR)
 }
 
-fn check_version(file: &Map<String, Value>, report: &mut Report) -> Result<()> {
+fn check_version(file: &Map<String, Value>, load: &mut LoadContext) -> Result<()> {
     let asset = file.get("asset");
     let text = |key: &str| asset.and_then(|asset| asset.get(key)).and_then(Value::as_str);
     let Some(version) = text("version") else {
@@ -107,7 +104,7 @@ fn check_version(file: &Map<String, Value>, report: &mut Report) -> Result<()> {
     match (parts(version), parts(needed)) {
         (Some((2, minor)), Some((2, needed_minor))) if text("minVersion").is_none() || needed_minor == 0 => {
             if minor > 0 {
-                report.warn(
+                load.warn(
                     "asset",
                     format!("is of version 2.{minor}, read as 2.0"),
                     "check the picture",
@@ -127,18 +124,17 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
     match file.get(key) {
         None => Ok(Vec::new()),
         Some(list) => {
-            Vec::deserialize(list).map_err(|_| unlike_gltf(&format!("`{key}` is not a list of names")))
+            Vec::deserialize(list).map_err(|_| unlike_gltf(format!("`{key}` is not a list of names")))
         }
     }
 }
 
 /// Removes animations, skins and morph targets, so that faults in them cannot stop a scene; converts outdated
 /// materials; and adds fields that the typed reader requires although glTF does not.
-fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
+fn prepare(file: &mut Map<String, Value>, load: &mut LoadContext) {
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
-        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
-        let owner = format!("material `{}`", names::name(name.as_ref(), "material", index));
-        glossiness::convert(material, &owner, report);
+        let owner = owner(material, index);
+        glossiness::convert(material, &owner, load);
     }
     file.remove("animations");
     let mut is_bent = file.remove("skins").is_some();
@@ -153,13 +149,13 @@ fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
         }
     }
     if is_bent {
-        report.warn(
+        load.warn(
             "skins and morph targets",
             "are read at rest",
             "pose the scene where it was made",
         );
     }
-    name_variants(file, report);
+    name_variants(file, load);
     for scene in objects(file.get_mut("scenes")) {
         scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));
     }
@@ -172,18 +168,16 @@ fn prepare(file: &mut Map<String, Value>, report: &mut Report) {
     }
 }
 
-fn name_variants(file: &Map<String, Value>, report: &mut Report) {
+fn name_variants(file: &Map<String, Value>, load: &mut LoadContext) {
     let extensions = file.get("extensions");
     let stated = extensions.and_then(|all| all.get(extensions::VARIANTS)?.get("variants")?.as_array());
-    let name = |variant: &Value| variant.get("name")?.as_str().map(str::to_owned);
-    let names: Vec<String> = stated
-        .into_iter()
-        .flatten()
-        .enumerate()
-        .map(|(index, variant)| names::name(name(variant).as_ref(), "variant", index))
-        .collect();
+    let variants = stated.into_iter().flatten().enumerate();
+    let name = |(index, variant): (usize, &Value)| {
+        extras::name(variant.get("name").and_then(Value::as_str), "variant", index)
+    };
+    let names: Vec<String> = variants.map(name).collect();
     if !names.is_empty() {
-        report.warn(
+        load.warn(
             "materials",
             format!("have variants, which are left out ({})", names.join(", ")),
             "the default materials were read",
@@ -193,7 +187,7 @@ fn name_variants(file: &Map<String, Value>, report: &mut Report) {
 
 /// Reads a transmissive material without a metallic factor as a dielectric: glTF's default, metal, would block all
 /// light.
-fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
+fn make_glass_clear(file: &mut Map<String, Value>, load: &mut LoadContext) {
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
         let extensions = material.get("extensions");
         let transmission = extensions.and_then(|all| all.get("KHR_materials_transmission"));
@@ -205,19 +199,24 @@ fn make_glass_clear(file: &mut Map<String, Value>, report: &mut Report) {
         if factor.and_then(Value::as_f64).is_none_or(|factor| factor <= 0.0) || pbr.is_some_and(states) {
             continue;
         }
-        let name = material.get("name").and_then(Value::as_str).map(str::to_owned);
+        let owner = owner(material, index);
         let pbr = material
             .entry("pbrMetallicRoughness")
             .or_insert_with(|| Value::Object(Map::new()));
         if let Some(pbr) = pbr.as_object_mut() {
             pbr.insert("metallicFactor".into(), Value::from(0.0));
-            report.warn(
-                format!("material `{}`", names::name(name.as_ref(), "material", index)),
+            load.warn(
+                owner,
                 "transmits light and states no metallic factor; it was read as glass",
                 "state a metallic factor of 0",
             );
         }
     }
+}
+
+fn owner(material: &Map<String, Value>, index: usize) -> String {
+    let name = material.get("name").and_then(Value::as_str);
+    format!("material `{}`", extras::name(name, "material", index))
 }
 
 fn objects(list: Option<&mut Value>) -> impl Iterator<Item = &mut Map<String, Value>> {
@@ -235,5 +234,40 @@ fn remove_extras(value: &mut Value) {
             fields.values_mut().for_each(remove_extras);
         }
         _ => {}
+    }
+}
+
+/// Reports violations in the typed JSON.
+fn warn_of_faults(root: &Root, load: &mut LoadContext) {
+    let mut found = Vec::new();
+    // Validation panics on some broken references.
+    let finished = guard::without_panic(|| {
+        root.validate(root, Path::new, &mut |path, error| {
+            found.push((path().to_string(), error))
+        });
+    });
+    for (path, error) in found {
+        // Extensions have been checked already, against those that this program reads.
+        if path.starts_with("extensionsRequired") {
+            continue;
+        }
+        // Accessors may lack a buffer view (all zero), and textures a plain image (WebP).
+        let may_miss = path.ends_with("bufferView") || path.ends_with("source");
+        // Bounds are computed, whatever the file states.
+        let unread = path.ends_with(".min") || path.ends_with(".max");
+        if unread || error == Fault::Missing && may_miss {
+            continue;
+        }
+        let what = match error {
+            Fault::IndexOutOfBounds => "refers to something that does not exist",
+            Fault::Invalid => "has a value that glTF does not allow",
+            Fault::Missing => "is missing",
+            Fault::Oversize => "is too large",
+            Fault::Unsupported => "is not supported",
+        };
+        load.warn_damaged(path, what);
+    }
+    if finished.is_none() {
+        load.warn_damaged("JSON", "has references that lead nowhere");
     }
 }

@@ -9,9 +9,9 @@ use gltf::json::validation::Checked;
 use serde::Deserialize;
 
 use super::accessor::Reader;
+use super::context::{LoadContext, damaged};
 use super::guard;
-use super::report::Budget;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 pub const NAME: &str = "KHR_draco_mesh_compression";
 
@@ -37,7 +37,7 @@ pub fn unpack(
     reader: Reader,
     primitive: &Primitive,
     owner: &str,
-    budget: &mut Budget,
+    load: &mut LoadContext,
 ) -> Result<Option<Unpacked>> {
     let extensions = primitive.extensions.as_ref();
     let Some(stated) = extensions.and_then(|extensions| extensions.others.get(NAME)) else {
@@ -50,13 +50,13 @@ pub fn unpack(
     }
     let damaged = |why: &str| {
         let what = format!("its Draco data cannot be unpacked ({why})");
-        Error::failure(owner, what, "export the file again")
+        damaged(owner, what)
     };
     let stated = DracoExtension::deserialize(stated).map_err(|error| damaged(&error.to_string()))?;
     let data = reader.buffers.view(Index::new(stated.buffer_view), owner)?.data;
 
     // Decompression takes several times the memory of its result.
-    let most = budget.left() / 4;
+    let most = load.left() / 4;
     let limits = DecodeLimits::default()
         .with_max_points(most / 12)
         .with_max_faces(most / 12)
@@ -72,7 +72,7 @@ pub fn unpack(
         None => return Err(damaged("it breaks off")),
     }
     let bytes = 12 * mesh.num_faces() as u64 + 12 * mesh.num_points() as u64 * stated.attributes.len() as u64;
-    budget.take(bytes, owner)?;
+    load.take(bytes, owner)?;
     Ok(Some(Unpacked {
         mesh,
         attributes: stated.attributes,

@@ -2,7 +2,7 @@
 
 use gltf::json::Value;
 
-use super::report::Report;
+use super::context::LoadContext;
 use super::{draco, glossiness, instancing, meshopt, nodes};
 use crate::error::{Error, Result};
 
@@ -82,7 +82,7 @@ pub fn loss(extension: &str, stated: &Value) -> Option<&'static str> {
 ///
 /// # Errors
 /// A required extension without which the scene cannot be read.
-pub fn check(required: &[String], used: &[String], report: &mut Report) -> Result<()> {
+pub fn check(required: &[String], used: &[String], load: &mut LoadContext) -> Result<()> {
     for extension in required {
         if !READ.contains(&extension.as_str()) && !LEFT_OUT.contains(&extension.as_str()) {
             return Err(Error::failure(
@@ -95,22 +95,20 @@ pub fn check(required: &[String], used: &[String], report: &mut Report) -> Resul
             ));
         }
         if !used.contains(extension) {
-            report.warn(
+            load.warn_damaged(
                 "extensionsRequired",
                 format!("{} is required but not among the used ones", printable(extension)),
-                "export the file again",
             );
         }
     }
     for (index, extension) in used.iter().enumerate() {
         if used[..index].contains(extension) {
-            report.warn(
+            load.warn_damaged(
                 "extensionsUsed",
                 format!("{} is listed twice", printable(extension)),
-                "export the file again",
             );
         } else if !READ.contains(&extension.as_str()) && !is_named_by_materials(extension) {
-            report.warn(
+            load.warn(
                 "extensionsUsed",
                 format!("{} is not supported and was ignored", printable(extension)),
                 "expect the scene to look and bake as if it were not there",
@@ -133,5 +131,5 @@ fn remedy(extension: &str) -> &'static str {
 }
 
 fn printable(name: &str) -> String {
-    super::names::name(Some(&name.to_owned()), "extension", 0)
+    super::extras::name(Some(name), "extension", 0)
 }

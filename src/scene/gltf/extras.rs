@@ -1,8 +1,7 @@
-//! The `extras` of a file, read from the raw JSON before the typed document drops them.
-
-use gltf::json::Value;
+//! Names, numbers and `extras` of a file; the latter are read from the raw JSON before the typed document drops them.
 
 use crate::error::{Error, ErrorKind, Result};
+use gltf::json::Value;
 
 /// Extras of items, in file order; null for an item without any.
 #[derive(Clone, Debug)]
@@ -57,4 +56,26 @@ pub fn of_file(error: Error) -> Error {
         kind: ErrorKind::Failure,
         ..error
     }
+}
+
+/// Name in the file, or else `kind` and index. Control characters are replaced, since they could steer a terminal.
+pub fn name(given: Option<&str>, kind: &str, index: usize) -> String {
+    match given {
+        Some(name) if !name.is_empty() => name
+            .chars()
+            .map(|c| if c.is_control() { '\u{FFFD}' } else { c })
+            .collect(),
+        _ => format!("{kind}{index}"),
+    }
+}
+
+/// The shortest decimal that rounds to this number: the digits of the file, unless these are more than seven. An index
+/// of 1.33 is read as 1.33, not as 1.330000043.
+pub fn widen(value: f32) -> f64 {
+    // Infinity and NaN print as `inf` and `NaN`, which parse too.
+    value.to_string().parse().unwrap_or(f64::from(value))
+}
+
+pub fn widen_all(values: [f32; 3]) -> [f64; 3] {
+    values.map(widen)
 }

@@ -6,6 +6,7 @@ use gltf::json::Value;
 use serde_json::json;
 
 use super::container::{Container, HEADER_BYTES};
+use super::context::damaged;
 use super::uri;
 use crate::error::{Error, Result};
 
@@ -45,7 +46,7 @@ impl Glb {
     pub(super) fn of(file: &Container, folder: &Path, most_bytes: u64) -> Result<Self> {
         let json = serde_json::from_slice(file.json).map_err(|error| {
             let what = format!("is damaged ({error})");
-            Error::failure("JSON", what, "export the file again")
+            damaged("JSON", what)
         })?;
         let mut glb = Self {
             json,

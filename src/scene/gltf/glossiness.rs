@@ -4,7 +4,7 @@ use gltf::json::Value;
 use serde::Deserialize;
 use serde_json::{Map, json};
 
-use super::report::Report;
+use super::context::LoadContext;
 
 pub const NAME: &str = "KHR_materials_pbrSpecularGlossiness";
 
@@ -34,7 +34,7 @@ impl Default for SpecularGlossiness {
 }
 
 /// Converts a material that is stated in this way only to metallic-roughness.
-pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Report) {
+pub fn convert(material: &mut Map<String, Value>, owner: &str, load: &mut LoadContext) {
     let own = material.get("pbrMetallicRoughness").and_then(Value::as_object);
     if own.is_some_and(|own| !own.is_empty()) {
         return;
@@ -44,19 +44,19 @@ pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Repo
         return;
     };
     let Ok(stated) = SpecularGlossiness::deserialize(stated) else {
-        report.warn(
-            owner,
-            "its specular-glossiness cannot be read",
-            "export the file again",
-        );
+        load.warn_damaged(owner, "its specular-glossiness cannot be read");
         return;
     };
     let [red, green, blue, alpha] = stated.diffuse_factor;
     let diffuse = [red, green, blue];
     let specular = stated.specular_factor;
     // With a specular-glossiness texture the factors do not reveal metals; most such materials are dielectrics.
-    let is_told = stated.specular_glossiness_texture.is_null();
-    let metallic = if is_told { metallic(diffuse, specular) } else { 0.0 };
+    let has_only_factors = stated.specular_glossiness_texture.is_null();
+    let metallic = if has_only_factors {
+        metallic(diffuse, specular)
+    } else {
+        0.0
+    };
     let base = |channel: usize| {
         let left = (1.0 - F0) * (1.0 - metallic).max(1e-3);
         let of_diffuse = diffuse[channel] * (1.0 - strongest(specular)) / left;
@@ -64,7 +64,7 @@ pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Repo
         let share = metallic * metallic;
         (of_diffuse * (1.0 - share) + of_specular * share).clamp(0.0, 1.0)
     };
-    let colour = match stated.diffuse_texture.is_null() && is_told {
+    let colour = match stated.diffuse_texture.is_null() && has_only_factors {
         true => [base(0), base(1), base(2)],
         false => diffuse,
     };
@@ -78,8 +78,8 @@ pub fn convert(material: &mut Map<String, Value>, owner: &str, report: &mut Repo
         converted["baseColorTexture"] = stated.diffuse_texture;
     }
     material.insert("pbrMetallicRoughness".into(), converted);
-    if !is_told {
-        report.warn(
+    if !has_only_factors {
+        load.warn(
             owner,
             "its specular-glossiness was read without its texture, with the same roughness everywhere",
             "convert it with `gltf-transform metalrough`",

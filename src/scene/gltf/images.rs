@@ -6,15 +6,15 @@ use std::path::Path;
 use std::sync::Arc;
 
 use basisu::{DecodeFlags, SourceFormat, TargetFormat, Transcoder};
-use gltf::json::texture::{MagFilter, Sampler, WrappingMode};
+use gltf::json::texture::{MagFilter, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Root};
 use image::{ImageFormat, ImageReader, Limits, RgbaImage};
 use rayon::prelude::*;
 
 use super::buffers::Buffers;
-use super::report::{Budget, Report};
-use super::{guard, names, uri};
+use super::context::LoadContext;
+use super::{extras, guard, uri};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::Texture;
@@ -66,19 +66,19 @@ impl<'a> Images<'a> {
     pub fn decode_ahead(
         &mut self,
         textures: impl Iterator<Item = Index<gltf::json::Texture>>,
-        budget: &mut Budget,
+        load: &mut LoadContext,
     ) -> Result<()> {
         let images: BTreeSet<usize> = textures.filter_map(|texture| self.source(texture)).collect();
         let missing = images
             .into_iter()
             .filter(|image| !self.decoded.contains_key(image));
         for images in missing.collect::<Vec<_>>().chunks(rayon::current_num_threads()) {
-            let most_bytes = budget.left() / images.len() as u64;
+            let most_bytes = load.left() / images.len() as u64;
             let read = |image: &usize| Some((*image, self.read(*image, "image", most_bytes).ok()?));
             let decoded: Vec<_> = images.par_iter().filter_map(read).collect();
             for (image, pixels) in decoded {
                 let owner = format!("image `{}`", self.name(image));
-                budget.take(pixels.as_raw().len() as u64, &owner)?;
+                load.take(pixels.as_raw().len() as u64, &owner)?;
                 self.decoded.insert(image, Arc::new(pixels));
             }
         }
@@ -93,30 +93,28 @@ impl<'a> Images<'a> {
         &mut self,
         texture: Index<gltf::json::Texture>,
         owner: &str,
-        budget: &mut Budget,
-        report: &mut Report,
+        load: &mut LoadContext,
     ) -> Result<Option<usize>> {
-        let Some(image) = self.image_index(texture, owner, report) else {
+        let Some(image) = self.image_index(texture, owner, load) else {
             return Ok(None);
         };
-        let wrap = self.wrap(texture);
-        let is_nearest = self.is_nearest(texture);
+        let (wrap, is_nearest) = self.sampling(texture);
         let key = (image, wrap.map(|wrap| wrap as u8), is_nearest);
         if let Some(known) = self.by_source.get(&key) {
             return Ok(Some(*known));
         }
-        let pixels = self.decode(image, budget, report)?;
-        budget.take(pixels.as_raw().len() as u64, &self.name(image))?;
-        self.textures.push(Texture {
+        let pixels = self.decode(image, load)?;
+        let texture = Texture {
             name: self.name(image),
             width: pixels.width(),
             height: pixels.height(),
             rgba: pixels.pixels().map(|pixel| pixel.0).collect(),
             wrap,
             is_nearest,
-        });
-        self.by_source.insert(key, self.textures.len() - 1);
-        Ok(Some(self.textures.len() - 1))
+        };
+        let added = self.add(texture, load)?;
+        self.by_source.insert(key, added);
+        Ok(Some(added))
     }
 
     /// The texels of a glTF texture; `None` where it has no image.
@@ -127,22 +125,21 @@ impl<'a> Images<'a> {
         &mut self,
         texture: Index<gltf::json::Texture>,
         owner: &str,
-        budget: &mut Budget,
-        report: &mut Report,
+        load: &mut LoadContext,
     ) -> Result<Option<Pixels>> {
-        let Some(image) = self.image_index(texture, owner, report) else {
+        let Some(image) = self.image_index(texture, owner, load) else {
             return Ok(None);
         };
-        let pixels = self.decode(image, budget, report)?;
-        Ok(Some((pixels, self.wrap(texture), self.is_nearest(texture))))
+        let (wrap, is_nearest) = self.sampling(texture);
+        Ok(Some((self.decode(image, load)?, wrap, is_nearest)))
     }
 
     /// Adds a texture that is no image of the file; gives its index among the scene's textures.
     ///
     /// # Errors
     /// More memory than the budget has.
-    pub fn add(&mut self, texture: Texture, budget: &mut Budget) -> Result<usize> {
-        budget.take(size_of_val(&texture.rgba[..]) as u64, &texture.name)?;
+    pub fn add(&mut self, texture: Texture, load: &mut LoadContext) -> Result<usize> {
+        load.take(size_of_val(&texture.rgba[..]) as u64, &texture.name)?;
         self.textures.push(texture);
         Ok(self.textures.len() - 1)
     }
@@ -161,13 +158,11 @@ impl<'a> Images<'a> {
         texture: Index<gltf::json::Texture>,
         value: impl Fn([u8; 4]) -> LinearSrgb,
         owner: &str,
-        budget: &mut Budget,
-        report: &mut Report,
+        load: &mut LoadContext,
     ) -> Result<Option<LinearSrgb>> {
-        let Some(image) = self.image_index(texture, owner, report) else {
+        let Some((pixels, ..)) = self.pixels(texture, owner, load)? else {
             return Ok(None);
         };
-        let pixels = self.decode(image, budget, report)?;
         let sum = pixels
             .pixels()
             .fold(LinearSrgb::BLACK, |sum, pixel| sum + value(pixel.0));
@@ -178,11 +173,11 @@ impl<'a> Images<'a> {
         &self,
         texture: Index<gltf::json::Texture>,
         owner: &str,
-        report: &mut Report,
+        load: &mut LoadContext,
     ) -> Option<usize> {
         let found = self.source(texture);
         if found.is_none() {
-            report.warn(
+            load.warn(
                 owner,
                 "refers to an image that does not exist; it was left out",
                 "add the image",
@@ -206,43 +201,37 @@ impl<'a> Images<'a> {
         image.filter(|image| *image < self.root.images.len())
     }
 
-    fn sampler(&self, texture: Index<gltf::json::Texture>) -> Option<&Sampler> {
-        let sampler = self.root.textures.get(texture.value())?.sampler?;
-        self.root.samplers.get(sampler.value())
-    }
-
-    fn is_nearest(&self, texture: Index<gltf::json::Texture>) -> bool {
-        let filter = self
-            .sampler(texture)
-            .and_then(|sampler| sampler.mag_filter.as_ref());
-        filter.is_some_and(|filter| *filter == Checked::Valid(MagFilter::Nearest))
-    }
-
-    fn wrap(&self, texture: Index<gltf::json::Texture>) -> [Wrap; 2] {
-        let sampler = self.sampler(texture);
-        let mode = |mode: &Checked<WrappingMode>| match mode {
+    /// How texels are repeated beyond the image, and whether they are not interpolated.
+    fn sampling(&self, texture: Index<gltf::json::Texture>) -> ([Wrap; 2], bool) {
+        let texture = self.root.textures.get(texture.value());
+        let sampler = texture.and_then(|texture| self.root.samplers.get(texture.sampler?.value()));
+        let Some(sampler) = sampler else {
+            return ([Wrap::Repeat; 2], false);
+        };
+        let wrap = [sampler.wrap_s, sampler.wrap_t].map(|mode| match mode {
             Checked::Valid(WrappingMode::ClampToEdge) => Wrap::ClampToEdge,
             Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::MirroredRepeat,
             Checked::Valid(WrappingMode::Repeat) | Checked::Invalid => Wrap::Repeat,
-        };
-        sampler.map_or([Wrap::Repeat; 2], |sampler| {
-            [mode(&sampler.wrap_s), mode(&sampler.wrap_t)]
-        })
+        });
+        (
+            wrap,
+            sampler.mag_filter == Some(Checked::Valid(MagFilter::Nearest)),
+        )
     }
 
     fn name(&self, image: usize) -> String {
-        names::name(self.root.images[image].name.as_ref(), "image", image)
+        extras::name(self.root.images[image].name.as_deref(), "image", image)
     }
 
-    fn decode(&mut self, image: usize, budget: &mut Budget, report: &mut Report) -> Result<Arc<RgbaImage>> {
+    fn decode(&mut self, image: usize, load: &mut LoadContext) -> Result<Arc<RgbaImage>> {
         if let Some(known) = self.decoded.get(&image) {
             return Ok(known.clone());
         }
         let owner = format!("image `{}`", self.name(image));
-        let pixels = match self.read(image, &owner, budget.left()) {
+        let pixels = match self.read(image, &owner, load.left()) {
             Ok(pixels) => pixels,
             Err(why) => {
-                report.warn(
+                load.warn(
                     owner.clone(),
                     format!("{why}; it was replaced by grey"),
                     "repair the image",
@@ -250,7 +239,7 @@ impl<'a> Images<'a> {
                 RgbaImage::from_pixel(1, 1, image::Rgba([GREY, GREY, GREY, 255]))
             }
         };
-        budget.take(pixels.as_raw().len() as u64, &owner)?;
+        load.take(pixels.as_raw().len() as u64, &owner)?;
         let pixels = Arc::new(pixels);
         self.decoded.insert(image, pixels.clone());
         Ok(pixels)

@@ -7,11 +7,11 @@ use serde_json::json;
 
 use super::accessor::{Formats, Reader};
 use super::buffers::Buffers;
+use super::context::{LoadContext, damaged};
 use super::document::{Document, NodeTransform};
+use super::extras;
 use super::glb::Glb;
-use super::names;
-use super::report::Budget;
-use crate::error::{Error, Result};
+use crate::error::Result;
 
 pub const NAME: &str = "EXT_mesh_gpu_instancing";
 
@@ -50,28 +50,28 @@ fn stated(node: &Node) -> Option<&Value> {
 ///
 /// # Errors
 /// Instance transforms that cannot be read or differ in number; more memory than the budget has left.
-pub fn read(root: &Root, buffers: &Buffers, budget: &mut Budget) -> Result<Vec<Instanced>> {
+pub fn read(root: &Root, buffers: &Buffers, load: &mut LoadContext) -> Result<Vec<Instanced>> {
     let reader = Reader { root, buffers };
     let mut all = Vec::new();
     for (index, node) in root.nodes.iter().enumerate() {
         let Some(stated) = stated(node) else {
             continue;
         };
-        let name = names::name(node.name.as_ref(), "node", index);
+        let name = extras::name(node.name.as_deref(), "node", index);
         let owner = format!("node `{name}`");
-        let broken = |what: String| Error::failure(&owner, what, "export the file again");
+        let broken = |what: String| damaged(&owner, what);
         let attributes = Attributes::deserialize(stated)
             .map_err(|error| broken(format!("its instances cannot be read ({error})")))?;
         let mut read = |index: Option<u32>| {
             let index = index.map(Index::new);
             index
-                .map(|index| reader.vectors::<3>(index, Formats::Float, &owner, budget))
+                .map(|index| reader.vectors::<3>(index, Formats::Float, &owner, load))
                 .transpose()
         };
         let (translations, scales) = (read(attributes.translation)?, read(attributes.scale)?);
         let rotations = attributes.rotation.map(Index::new);
         let rotations = rotations
-            .map(|index| reader.vectors::<4>(index, Formats::FloatOrSigned, &owner, budget))
+            .map(|index| reader.vectors::<4>(index, Formats::FloatOrSigned, &owner, load))
             .transpose()?;
         let counts = [
             translations.as_ref().map(Vec::len),
@@ -84,7 +84,7 @@ pub fn read(root: &Root, buffers: &Buffers, budget: &mut Budget) -> Result<Vec<I
                 "its instances have different numbers of translations, rotations and scales".into(),
             ));
         }
-        budget.take(count as u64 * NODE_BYTES, &owner)?;
+        load.take(count as u64 * NODE_BYTES, &owner)?;
         let transform = |instance: usize| NodeTransform {
             matrix: None,
             translation: translations.as_ref().map(|all| all[instance]),

@@ -1,83 +1,26 @@
-//! Lights of KHR_lights_punctual.
+//! Lights of KHR_lights_punctual and EXT_lights_area. glTF gives punctual lights no size, so it is read from `extras`,
+//! of the node or else of the light: `radius_m` of point lights and spots, `angular_diameter_deg` of suns.
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use std::path::Path;
 
 use glam::DVec3;
+use gltf::json::Value;
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Source, Spot, Type};
 use gltf::json::validation::Checked;
 
+use super::context::LoadContext;
 use super::document::Document;
+use super::extras::{widen, widen_all};
 use super::nodes::PlacedNode;
-use super::numbers::{widen, widen_all};
-use super::report::Report;
-use super::{area_light, sizes, spectrum};
+use super::{area_light, extras, spectrum};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::{Light, LightKind};
+use crate::scene::{Light, LightKind, LightSize};
 use crate::units::{Irradiance, LUMENS_PER_WATT, RadiantIntensity};
 
-/// All lights of a file: punctual lights, then area lights. Unreadable ones are left out with a warning.
-///
-/// # Errors
-/// Those of [`spectrum::apply`].
-pub fn all(
-    document: &Document,
-    placed: &[PlacedNode],
-    folder: &Path,
-    report: &mut Report,
-) -> Result<Vec<(Light, Origin)>> {
-    let mut lights = punctual(document, placed, folder, report)?;
-    area_light::add_all(&mut lights, document, placed, folder, report)?;
-    Ok(lights)
-}
-
-/// Punctual lights of non-zero power of the placed nodes, node by node.
-fn punctual(
-    document: &Document,
-    placed: &[PlacedNode],
-    folder: &Path,
-    report: &mut Report,
-) -> Result<Vec<(Light, Origin)>> {
-    let root = &document.root;
-    let extension = root
-        .extensions
-        .as_ref()
-        .and_then(|extensions| extensions.khr_lights_punctual.as_ref());
-    let sources = extension.map_or(&[][..], |extension| &extension.lights);
-    let on_node = |placed: &PlacedNode| {
-        let extensions = root.nodes[placed.node].extensions.as_ref()?;
-        Some(extensions.khr_lights_punctual.as_ref()?.light.value())
-    };
-    let mut lights = Vec::new();
-    for placed in placed {
-        let Some(index) = on_node(placed) else { continue };
-        let owner = format!("light `{}`", placed.name);
-        let Some(source) = sources.get(index) else {
-            left_out(report, &owner, &format!("is light {index}, which does not exist"));
-            continue;
-        };
-        let kind = match read(source, placed, &owner, report) {
-            Ok(kind) => kind,
-            Err(why) => {
-                left_out(report, &owner, &why);
-                continue;
-            }
-        };
-        let extras = &document.extras;
-        let sizes = [extras.nodes.get(placed.node), extras.lights.get(index)];
-        let mut light = Light {
-            colour: widen_all(source.color).into(),
-            size: sizes::read(sizes, &kind, &owner, report),
-            ..Light::new(light_name(placed, lights.len()), kind)
-        };
-        let stated = spectrum::stated(document, placed.node, &extras.lights, index);
-        spectrum::apply(&mut light, stated, folder, &owner, report)?;
-        let (node, list) = (placed.node, NAME);
-        lights.push((light, Origin { node, list, index }));
-    }
-    Ok(lights)
-}
+/// Extension of punctual lights.
+pub(super) const NAME: &str = "KHR_lights_punctual";
 
 /// Origin of a light in its file.
 #[derive(Clone, Copy, Debug)]
@@ -90,47 +33,107 @@ pub struct Origin {
     pub index: usize,
 }
 
-/// Extension of punctual lights.
-pub(super) const NAME: &str = "KHR_lights_punctual";
+/// Index of a light in its list, its colour and kind; or why it is left out.
+pub(super) type ReadLight = std::result::Result<(usize, LinearSrgb, LightKind), String>;
 
-/// Name of the node; `lightN` without one.
-pub(super) fn light_name(placed: &PlacedNode, index: usize) -> String {
-    let unnamed = placed.name == format!("node{}", placed.node);
-    if unnamed {
-        format!("light{index}")
-    } else {
-        placed.name.clone()
+/// All lights of non-zero power of the placed nodes: punctual ones, then area lights. Unreadable ones are left out with
+/// a warning.
+///
+/// # Errors
+/// Those of [`spectrum::apply`].
+pub fn all(
+    document: &Document,
+    placed: &[PlacedNode],
+    folder: &Path,
+    load: &mut LoadContext,
+) -> Result<Vec<(Light, Origin)>> {
+    let of_file = &document.extras;
+    let mut lights = Vec::new();
+    for (list, of_lights) in [(NAME, &of_file.lights), (area_light::NAME, &of_file.area_lights)] {
+        for placed in placed {
+            let owner = format!("light `{}`", placed.name);
+            let read = match list {
+                NAME => punctual(document, placed, &owner, load),
+                _ => area_light::read(document, placed),
+            };
+            let (index, colour, kind) = match read {
+                None => continue,
+                Some(Ok(read)) => read,
+                Some(Err(why)) => {
+                    let what = format!("{why}; it was left out");
+                    load.warn(owner, what, "repair the light or remove it");
+                    continue;
+                }
+            };
+            let stated = |key: &str| {
+                let of_node = extras::stated(&of_file.nodes, placed.node, key);
+                of_node.or_else(|| extras::stated(of_lights, index, key))
+            };
+            let mut light = Light::new(placed.name_or("light", lights.len()), kind);
+            light.colour = colour;
+            if list == NAME {
+                light.size = size(stated, &light.kind, &owner, load);
+            }
+            if let Some(stated) = stated(spectrum::KEY) {
+                spectrum::apply(&mut light, stated, folder, &owner, load)?;
+            }
+            let node = placed.node;
+            lights.push((light, Origin { node, list, index }));
+        }
     }
+    Ok(lights)
 }
 
-/// Warns of a light that is left out.
-pub(super) fn left_out(report: &mut Report, owner: &str, why: &str) {
-    report.warn(
-        owner,
-        format!("{why}; it was left out"),
-        "repair the light or remove it",
-    );
-}
-
-fn read(
-    source: &Source,
+/// The punctual light of a node, if it has one.
+fn punctual(
+    document: &Document,
     placed: &PlacedNode,
     owner: &str,
-    report: &mut Report,
-) -> std::result::Result<LightKind, String> {
-    let colour = LinearSrgb::from(widen_all(source.color));
+    load: &mut LoadContext,
+) -> Option<ReadLight> {
+    let root = &document.root;
+    let on_node = root.nodes[placed.node].extensions.as_ref()?;
+    let index = on_node.khr_lights_punctual.as_ref()?.light.value();
+    let list = root
+        .extensions
+        .as_ref()
+        .and_then(|all| all.khr_lights_punctual.as_ref());
+    let source = list.and_then(|list| list.lights.get(index));
+    let source = source.ok_or_else(|| format!("is light {index}, which does not exist"));
+    Some(source.and_then(|source| {
+        let colour = LinearSrgb::from(widen_all(source.color));
+        Ok((index, colour, kind(source, colour, placed, owner, load)?))
+    }))
+}
+
+/// Strength of a light, per channel of its colour, from glTF's photometric intensity.
+///
+/// # Errors
+/// Why it cannot be.
+pub(super) fn strength(colour: LinearSrgb, intensity: f64) -> std::result::Result<f64, String> {
     if !colour.is_finite() || colour.to_array().iter().any(|channel| *channel < 0.0) {
         return Err("has a colour that is negative or not finite".into());
     }
-    let strength = widen(source.intensity) / LUMENS_PER_WATT;
+    let strength = intensity / LUMENS_PER_WATT;
     if !(strength >= 0.0 && strength.is_finite()) {
-        return Err(format!("has an intensity of {}", source.intensity));
+        return Err(format!("has an intensity of {intensity}"));
     }
-    if strength * colour.luminance() == 0.0 {
-        return Err("has no power".into());
+    match strength * colour.luminance() {
+        0.0 => Err("has no power".into()),
+        _ => Ok(strength),
     }
+}
+
+fn kind(
+    source: &Source,
+    colour: LinearSrgb,
+    placed: &PlacedNode,
+    owner: &str,
+    load: &mut LoadContext,
+) -> std::result::Result<LightKind, String> {
+    let strength = strength(colour, widen(source.intensity))?;
     if source.range.is_some() {
-        report.warn(
+        load.warn(
             owner,
             "its range was ignored, since light does not end at a distance",
             "lower its intensity instead",
@@ -152,7 +155,7 @@ fn read(
             normal_irradiance: Irradiance(strength),
         }),
         Checked::Valid(Type::Spot) => {
-            let (inner_cone_rad, outer_cone_rad) = cone(source.spot.as_ref(), owner, report);
+            let (inner_cone_rad, outer_cone_rad) = cone(source.spot.as_ref(), owner, load);
             Ok(LightKind::Spot {
                 position,
                 direction: direction()?,
@@ -166,9 +169,9 @@ fn read(
 }
 
 /// Half-angles of a spot [rad] with 0 ≤ inner < outer ≤ π/2.
-fn cone(spot: Option<&Spot>, owner: &str, report: &mut Report) -> (f64, f64) {
+fn cone(spot: Option<&Spot>, owner: &str, load: &mut LoadContext) -> (f64, f64) {
     let Some(spot) = spot else {
-        report.warn(
+        load.warn(
             owner,
             "states no cone; it was given one of 45 degrees",
             "state its angles",
@@ -181,7 +184,7 @@ fn cone(spot: Option<&Spot>, owner: &str, report: &mut Report) -> (f64, f64) {
         outer = FRAC_PI_2;
     }
     if !(outer > 0.0 && outer <= FRAC_PI_2) {
-        report.warn(
+        load.warn(
             owner,
             format!("its outer cone angle of {outer} rad was read as π/4"),
             "use an angle above 0 and at most π/2",
@@ -193,10 +196,49 @@ fn cone(spot: Option<&Spot>, owner: &str, report: &mut Report) -> (f64, f64) {
     }
     // As hard an edge as stated, but of non-zero width, by which falloff can be divided.
     let repaired = if inner >= outer { outer * (1.0 - 1e-6) } else { 0.0 };
-    report.warn(
+    load.warn(
         owner,
         format!("its inner cone angle of {inner} rad was read as {repaired:.4}"),
         "use an angle from 0 to below the outer one",
     );
     (repaired, outer)
+}
+
+/// Extent of a punctual light; 0 means none. Values that are invalid or unsuitable for the kind cause a warning.
+fn size<'a>(
+    stated: impl Fn(&str) -> Option<&'a Value>,
+    kind: &LightKind,
+    owner: &str,
+    load: &mut LoadContext,
+) -> LightSize {
+    const RADIUS: (&str, &str, &str) = ("radius_m", "lamp", "use metres from 0 up");
+    const ANGLE: (&str, &str, &str) = ("angular_diameter_deg", "sun", "use degrees from 0 to 180");
+    let is_sun = matches!(kind, LightKind::Sun { .. });
+    let ((key, kind, range), other) = if is_sun {
+        (ANGLE, RADIUS.0)
+    } else {
+        (RADIUS, ANGLE.0)
+    };
+    if stated(other).is_some() {
+        load.warn(
+            owner,
+            format!("its {other} was ignored"),
+            format!("state {key} for a {kind}"),
+        );
+    }
+    let Some(stated) = stated(key) else {
+        return LightSize::None;
+    };
+    match stated.as_f64() {
+        Some(0.0) => LightSize::None,
+        Some(degrees) if is_sun && degrees > 0.0 && degrees <= 180.0 => LightSize::Angle {
+            diameter_rad: degrees.to_radians(),
+        },
+        Some(radius_m) if !is_sun && radius_m > 0.0 && radius_m.is_finite() => LightSize::Radius { radius_m },
+        _ => {
+            let what = format!("its {key} was ignored, as it is not a size");
+            load.warn(owner, what, range);
+            LightSize::None
+        }
+    }
 }

@@ -9,12 +9,12 @@ use gltf::json::texture::{Info, Texture};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Value};
 
+use super::context::LoadContext;
 use super::document::Document;
+use super::extras::widen;
 use super::images::Images;
-use super::numbers::widen;
-use super::report::{Budget, Report};
 use super::substance::{self, Composition};
-use super::{coat, extensions, extras, names, spectrum, waves};
+use super::{coat, extensions, extras, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::material::METAL_ROUGHNESS_LIMIT;
@@ -43,24 +43,17 @@ pub fn make_solid(thin: &mut Material) {
     thin.is_solid_by_shape = true;
 }
 
-/// A thin wall as clear solid glass.
-pub fn solid_twin(thin: &Material) -> Material {
-    let mut solid = thin.clone();
-    solid.name += " (solid)";
-    make_solid(&mut solid);
-    solid
-}
-
-/// The thin wall of which clear solid glass was made.
-pub fn thin_twin(solid: &Material) -> Material {
-    let mut thin = Material {
-        name: format!("{} (thin)", solid.name),
-        volume: None,
-        is_solid_by_shape: false,
-        ..solid.clone()
+/// A thin wall as clear solid glass, or the thin wall of which such glass was made.
+pub fn twin(own: &Material, is_solid: bool) -> Material {
+    let kind = if is_solid { "solid" } else { "thin" };
+    let mut twin = Material {
+        name: format!("{} ({kind})", own.name),
+        volume: is_solid.then_some(CLEAR),
+        is_solid_by_shape: is_solid,
+        ..own.clone()
     };
-    thin.surface = thin.classified();
-    thin
+    twin.surface = twin.classified();
+    twin
 }
 
 const CLEAR: Volume = Volume {
@@ -82,15 +75,14 @@ pub fn read_all(
     document: &Document,
     folder: &Path,
     images: &mut Images,
-    budget: &mut Budget,
-    report: &mut Report,
+    load: &mut LoadContext,
 ) -> Result<Vec<Material>> {
     let sources = &document.root.materials;
-    images.decode_ahead(sources.iter().flat_map(textures), budget)?;
+    images.decode_ahead(sources.iter().flat_map(textures), load)?;
     let mut materials = Vec::with_capacity(sources.len());
     for (index, source) in sources.iter().enumerate() {
-        let name = names::name(source.name.as_ref(), "material", index);
-        let mut reading = MaterialReader::new((document, index), folder, images, budget, report);
+        let name = extras::name(source.name.as_deref(), "material", index);
+        let mut reading = MaterialReader::new((document, index), folder, images, load);
         materials.push(reading.read(name)?);
     }
     // What is matte needs no normals.
@@ -99,9 +91,9 @@ pub fn read_all(
         .zip(&materials)
         .filter(|(_, material)| material.surface.is_specular());
     let normals = of_shiny.filter_map(|(source, _)| Some(source.normal_texture.as_ref()?.index));
-    images.decode_ahead(normals, budget)?;
+    images.decode_ahead(normals, load)?;
     for (index, material) in materials.iter_mut().enumerate() {
-        let mut reading = MaterialReader::new((document, index), folder, images, budget, report);
+        let mut reading = MaterialReader::new((document, index), folder, images, load);
         material.normal_map = reading.normal_map(material)?;
     }
     Ok(materials)
@@ -126,16 +118,11 @@ pub(super) fn linear([r, g, b, _]: [u8; 4]) -> LinearSrgb {
 pub struct MaterialReader<'a, 'b> {
     pub owner: String,
     pub source: &'a Source,
-    /// From the extras.
-    pub waves: Option<&'a Value>,
-    pub glass: Option<&'a Value>,
-    pub metal: Option<&'a Value>,
-    pub spectrum: Option<&'a Value>,
+    extras: Option<&'a Value>,
     /// Folder of the file.
     pub folder: &'a Path,
     pub images: &'a mut Images<'b>,
-    pub budget: &'a mut Budget,
-    pub report: &'a mut Report,
+    pub load: &'a mut LoadContext,
 }
 
 impl<'a, 'b> MaterialReader<'a, 'b> {
@@ -143,30 +130,27 @@ impl<'a, 'b> MaterialReader<'a, 'b> {
         (document, index): (&'a Document, usize),
         folder: &'a Path,
         images: &'a mut Images<'b>,
-        budget: &'a mut Budget,
-        report: &'a mut Report,
+        load: &'a mut LoadContext,
     ) -> Self {
         let source = &document.root.materials[index];
-        let stated = |key: &str| extras::stated(&document.extras.materials, index, key);
+        let name = extras::name(source.name.as_deref(), "material", index);
         Self {
-            owner: format!(
-                "material `{}`",
-                names::name(source.name.as_ref(), "material", index)
-            ),
+            owner: format!("material `{name}`"),
             source,
-            waves: stated(waves::KEY),
-            glass: stated(substance::GLASS_KEY),
-            metal: stated(substance::METAL_KEY),
-            spectrum: stated(spectrum::KEY),
+            extras: document.extras.materials.get(index),
             folder,
             images,
-            budget,
-            report,
+            load,
         }
     }
 }
 
-impl MaterialReader<'_, '_> {
+impl<'a> MaterialReader<'a, '_> {
+    /// Value in the extras.
+    pub(super) fn stated(&self, key: &str) -> Option<&'a Value> {
+        self.extras?.get(key)
+    }
+
     fn read(&mut self, name: String) -> Result<Material> {
         let none = extension::Material::default();
         let extensions = self.source.extensions.as_ref().unwrap_or(&none);
@@ -198,8 +182,8 @@ impl MaterialReader<'_, '_> {
             polish: 1.0,
             normal_map: None,
             waves: self
-                .waves
-                .and_then(|waves| waves::read(waves, &self.owner, self.report)),
+                .stated(waves::KEY)
+                .and_then(|waves| waves::read(waves, &self.owner, self.load)),
             double_sided: self.source.double_sided,
         };
         self.vary(&mut material, transmission)?;
@@ -229,7 +213,11 @@ impl MaterialReader<'_, '_> {
     }
 
     pub(super) fn warn(&mut self, what: impl Into<String>, remedy: &str) {
-        self.report.warn(self.owner.clone(), what, remedy);
+        self.load.warn(&self.owner, what, remedy);
+    }
+
+    pub(super) fn warn_damaged(&mut self, what: impl Into<String>) {
+        self.load.warn_damaged(&self.owner, what);
     }
 
     /// Clamps a factor to [0, 1]; NaN becomes 0.
@@ -276,9 +264,7 @@ impl MaterialReader<'_, '_> {
         let Some(info) = texture else {
             return Ok(LinearSrgb::WHITE);
         };
-        let mean = self
-            .images
-            .mean(info.index, value, &self.owner, self.budget, self.report)?;
+        let mean = self.images.mean(info.index, value, &self.owner, self.load)?;
         Ok(mean.unwrap_or(LinearSrgb::WHITE))
     }
 
@@ -363,7 +349,7 @@ impl MaterialReader<'_, '_> {
 
     /// Replaces the colour of the emission by the stated spectrum, if any.
     fn emission_spectrum(&mut self, material: &mut Material) -> Result<()> {
-        let Some(stated) = self.spectrum else {
+        let Some(stated) = self.stated(spectrum::KEY) else {
             return Ok(());
         };
         let spectrum = spectrum::read(stated, self.folder, &self.owner)?;
@@ -390,7 +376,8 @@ impl MaterialReader<'_, '_> {
 
     /// Sets glass or metal, from the extras or else from KHR_materials_dispersion.
     fn substance(&mut self, material: &mut Material, extensions: &extension::Material) -> Result<()> {
-        match substance::read(self.glass, self.metal, &self.owner)? {
+        let [glass, metal] = [substance::GLASS_KEY, substance::METAL_KEY].map(|key| self.stated(key));
+        match substance::read(glass, metal, &self.owner)? {
             Some(Composition::Glass(glass)) => material.set_glass(Arc::new(glass)),
             Some(Composition::Metal(metal)) => {
                 if let Some(factor) = material.set_metal(metal) {
@@ -442,10 +429,7 @@ impl MaterialReader<'_, '_> {
         let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
             Checked::Valid(_) => {}
-            Checked::Invalid => self.warn(
-                "its alpha mode is unknown and was read as opaque",
-                "export the file again",
-            ),
+            Checked::Invalid => self.warn_damaged("its alpha mode is unknown and was read as opaque"),
         }
         let mut ignored = Vec::new();
         // What is matte has no highlights, and those of metals are of their colour.
@@ -478,7 +462,7 @@ impl MaterialReader<'_, '_> {
             if ![coat::NAME, substance::NAME].contains(&key.as_str())
                 && let Some(loss) = extensions::loss(key, stated)
             {
-                ignored.push((names::name(Some(key), "extension", 0), loss));
+                ignored.push((extras::name(Some(key), "extension", 0), loss));
             }
         }
         for (what, loss) in ignored {

@@ -11,9 +11,10 @@ use gltf::json::texture::{Info, Texture};
 use gltf::json::validation::Checked;
 use serde::Deserialize;
 
+use super::extras::widen;
 use super::factors::{FactorImage, Factors};
 use super::material::{MaterialReader, linear};
-use super::numbers::widen;
+use super::spectrum;
 use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Variation};
@@ -38,7 +39,7 @@ impl MaterialReader<'_, '_> {
             return Ok(());
         }
         let place = self.place_of("emissive texture", info);
-        if let Some(place) = place.filter(|_| self.spectrum.is_none()) {
+        if let Some(place) = place.filter(|_| self.stated(spectrum::KEY).is_none()) {
             material.emission_texture = self.texture_at(info.index, place)?;
             return Ok(());
         }
@@ -55,9 +56,7 @@ impl MaterialReader<'_, '_> {
         let Some(info) = stated else {
             return Ok(None);
         };
-        let found = self
-            .images
-            .pixels(info.index, &self.owner, self.budget, self.report)?;
+        let found = self.images.pixels(info.index, &self.owner, self.load)?;
         let Some((pixels, wrap, is_nearest)) = found else {
             return Ok(None);
         };
@@ -95,7 +94,7 @@ impl MaterialReader<'_, '_> {
             && surface != SurfaceKind::Diffuse
         {
             let texture = factors.texture(format!("factors of {}", self.owner));
-            let texture = self.images.add(texture, self.budget)?;
+            let texture = self.images.add(texture, self.load)?;
             let image = TextureRef {
                 texture,
                 uv_set,
@@ -165,9 +164,7 @@ impl MaterialReader<'_, '_> {
         index: Index<Texture>,
         (uv_set, uv_transform): (usize, DMat3),
     ) -> Result<Option<TextureRef>> {
-        let texture = self
-            .images
-            .texture(index, &self.owner, self.budget, self.report)?;
+        let texture = self.images.texture(index, &self.owner, self.load)?;
         Ok(texture.map(|texture| TextureRef {
             texture,
             uv_set,
@@ -193,10 +190,7 @@ impl MaterialReader<'_, '_> {
         if uv_transform.is_finite() {
             return Some((uv_set, uv_transform));
         }
-        self.warn(
-            "its texture transform is not finite and was ignored",
-            "export the file again",
-        );
+        self.warn_damaged("its texture transform is not finite and was ignored");
         Some((uv_set, DMat3::IDENTITY))
     }
 
@@ -219,10 +213,7 @@ impl MaterialReader<'_, '_> {
         };
         let scale = widen(stated.scale);
         if !scale.is_finite() {
-            self.warn(
-                "its normal texture has a scale that is not finite and was left out",
-                "export the file again",
-            );
+            self.warn_damaged("its normal texture has a scale that is not finite and was left out");
             return Ok(None);
         }
         let Some(image) = self.texture_at(stated.index, place)? else {
@@ -260,7 +251,7 @@ fn coordinates(tex_coord: u32, transform: Option<&TextureTransform>) -> (usize, 
     let Some(transform) = transform else {
         return (tex_coord as usize, DMat3::IDENTITY);
     };
-    let vector = |[x, y]: [f32; 2]| DVec2::new(widen(x), widen(y));
+    let vector = |stated: [f32; 2]| DVec2::from(stated.map(widen));
     // v runs downwards, so that the extension's counter-clockwise rotation is negative in (u, v).
     let matrix = DMat3::from_scale_angle_translation(
         vector(transform.scale.0),

@@ -7,9 +7,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use context::{LoadContext, damaged};
 use glam::DAffine3;
 use gltf::json::Value;
-use report::{Budget, Report};
 
 use super::{LoadOptions, Scene};
 use crate::error::{Error, Result, Warning};
@@ -23,12 +23,12 @@ mod area_light;
 mod buffers;
 mod coat;
 mod container;
+mod context;
 mod document;
 mod draco;
 mod extensions;
 mod extras;
 mod factors;
-mod faults;
 mod glb;
 mod glossiness;
 pub(super) mod guard;
@@ -38,18 +38,13 @@ mod light;
 mod material;
 mod material_textures;
 mod meshopt;
-mod names;
 mod nodes;
-mod numbers;
 mod pose;
 mod primitive;
-mod report;
 mod save;
-mod sizes;
 mod spectrum;
 mod substance;
 mod surface;
-mod triangles;
 mod uri;
 mod waves;
 mod write;
@@ -87,7 +82,7 @@ pub(super) fn files_of(path: &Path, most_bytes: u64) -> Vec<PathBuf> {
     let Ok(bytes) = files::read_file(path, most_bytes) else {
         return found;
     };
-    let container = container::split(&bytes, &mut Report::default());
+    let container = container::split(&bytes, &mut LoadContext::default());
     let value = container
         .ok()
         .and_then(|container| serde_json::from_slice(container.json).ok());
@@ -114,11 +109,10 @@ fn crashed() -> Error {
 }
 
 fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene> {
-    let mut report = Report::default();
-    let mut budget = Budget::new(options.memory_limit_bytes);
-    budget.take(bytes.len() as u64, "the file")?;
-    let container = container::split(bytes, &mut report)?;
-    let mut document = document::parse(container.json, &mut report)?;
+    let mut load = LoadContext::new(options.memory_limit_bytes);
+    load.take(bytes.len() as u64, "the file")?;
+    let container = container::split(bytes, &mut load)?;
+    let mut document = document::parse(container.json, &mut load)?;
     let folder = path.parent().unwrap_or(Path::new(""));
     let views = document.root.buffer_views.clone();
     let buffers = buffers::Buffers::resolve(
@@ -126,16 +120,15 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         &views,
         container.binary,
         folder,
-        &mut budget,
-        &mut report,
+        &mut load,
     )?;
-    let instanced = instancing::read(&document.root, &buffers, &mut budget)?;
+    let instanced = instancing::read(&document.root, &buffers, &mut load)?;
     instancing::expand_instances(&mut document, &instanced);
 
     let mut images = images::Images::new(&document.root, &buffers, folder);
-    let materials = material::read_all(&document, folder, &mut images, &mut budget, &mut report)?;
+    let materials = material::read_all(&document, folder, &mut images, &mut load)?;
     let mut materials = surface::Materials::new(materials);
-    let placed = nodes::place(&document, &mut report)?;
+    let placed = nodes::place(&document, &mut load)?;
 
     let stands = placed
         .iter()
@@ -157,20 +150,19 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         &placed,
         options.solid_glass,
         &mut materials,
-        &mut budget,
-        &mut report,
+        &mut load,
     )?;
-    materials.warn_of_thin_walls(options.solid_glass, &mut report);
+    materials.warn_of_thin_walls(options.solid_glass, &mut load);
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
-    let lights = light::all(&document, &placed, folder, &mut report)?;
+    let lights = light::all(&document, &placed, folder, &mut load)?;
     let light_nodes = lights.iter().map(|(_, origin)| origin.node).collect();
     scene.lights = lights.into_iter().map(|(light, _)| light).collect();
     add_lights(&mut scene);
-    let (cameras, camera_nodes) = nodes::read_all(&document.root, &placed, &mut report);
+    let (cameras, camera_nodes) = nodes::read_all(&document.root, &placed, &mut load);
     scene.cameras = cameras;
     let animations = &document.animations;
-    let clip = animations.read(&document, &placed, reader, &mut budget, &mut report);
+    let clip = animations.read(&document, &placed, reader, &mut load);
     scene.clip = clip.map(|clip| {
         Arc::new(Clip {
             light_nodes,
@@ -178,10 +170,10 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
             ..clip
         })
     });
-    substance::warn_of_ranges(&scene, &mut report);
+    substance::warn_of_ranges(&scene, &mut load);
     rebase(&mut scene);
-    waves::lift(&mut scene, &document.extras.nodes, &mut report);
-    scene.warnings = report.into_warnings();
+    waves::displace(&mut scene, &document.extras.nodes, &mut load);
+    scene.warnings = load.into_warnings();
     Ok(scene)
 }
 
@@ -267,10 +259,9 @@ pub fn open(scene: &Scene, most_bytes: u64) -> Result<Opened> {
     }
     let file = File::read(Path::new(&scene.source), most_bytes)?;
     if !file.glb.owns_first_buffer() {
-        return Err(Error::failure(
+        return Err(damaged(
             &scene.source,
             "has its first buffer within its text, where nothing can be added",
-            "export the file again",
         ));
     }
     let placed = file.placed.into_iter();
@@ -296,22 +287,21 @@ struct File {
 impl File {
     fn read(path: &Path, most_bytes: u64) -> Result<Self> {
         let bytes = files::read_file(path, most_bytes)?;
-        let mut report = Report::default();
-        let split = container::split(&bytes, &mut report)?;
-        let mut document = document::parse(split.json, &mut report)?;
+        let mut load = LoadContext::default();
+        let split = container::split(&bytes, &mut load)?;
+        let mut document = document::parse(split.json, &mut load)?;
         let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
         let mut glb = Glb::of(&split, &folder, most_bytes)?;
         if instancing::is_used(&document.root) {
-            let mut budget = Budget::new(most_bytes);
+            let mut load = LoadContext::new(most_bytes);
             let root = &document.root;
             let (all, views) = (&root.buffers, &root.buffer_views);
-            let buffers =
-                buffers::Buffers::resolve(all, views, split.binary, &folder, &mut budget, &mut report)?;
-            let instanced = instancing::read(root, &buffers, &mut budget)?;
+            let buffers = buffers::Buffers::resolve(all, views, split.binary, &folder, &mut load)?;
+            let instanced = instancing::read(root, &buffers, &mut load)?;
             instancing::expand_instances(&mut document, &instanced);
             glb.expand_instances(&instanced);
         }
-        let placed = nodes::place(&document, &mut report)?;
+        let placed = nodes::place(&document, &mut load)?;
         Ok(Self {
             glb,
             is_binary: split.is_binary,

@@ -7,10 +7,10 @@ use gltf::json::camera::{Camera as Source, Type};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Node, Root, Value};
 
+use super::context::{LoadContext, damaged};
 use super::document::{Document, NodeTransform};
-use super::names;
-use super::numbers::widen;
-use super::report::Report;
+use super::extras;
+use super::extras::widen;
 use crate::error::{Error, Result};
 use crate::scene::Camera;
 
@@ -23,38 +23,47 @@ pub struct PlacedNode {
     pub world_from_node: DAffine3,
 }
 
+impl PlacedNode {
+    /// Its name in the file; `kind` and index without one.
+    pub fn name_or(&self, kind: &str, index: usize) -> String {
+        if self.name == format!("node{}", self.node) {
+            return format!("{kind}{index}");
+        }
+        self.name.clone()
+    }
+}
+
 /// Visible nodes of the default scene, parents first; without a default scene, of the first one; without scenes, of all
 /// nodes that are no child.
 ///
 /// # Errors
 /// A reference to a node that does not exist; a transform that is not finite.
-pub fn place(document: &Document, report: &mut Report) -> Result<Vec<PlacedNode>> {
+pub fn place(document: &Document, load: &mut LoadContext) -> Result<Vec<PlacedNode>> {
     let root = &document.root;
     let mut reached = vec![false; root.nodes.len()];
     let mut placed = Vec::new();
     // Explicit stack: a chain of a million nodes must not overflow that of the thread.
     let mut waiting: Vec<(usize, DAffine3, bool)> = Vec::new();
-    for node in top_nodes(root, report).into_iter().rev() {
+    for node in top_nodes(root, load).into_iter().rev() {
         waiting.push((node, DAffine3::IDENTITY, false));
     }
     while let Some((index, world_from_parent, is_below_hidden)) = waiting.pop() {
         let Some(node) = root.nodes.get(index) else {
-            return Err(Error::failure(
+            return Err(damaged(
                 format!("node {index}"),
                 "is referred to but does not exist",
-                "export the file again",
             ));
         };
-        let name = names::name(node.name.as_ref(), "node", index);
+        let name = extras::name(node.name.as_deref(), "node", index);
         if std::mem::replace(&mut reached[index], true) {
-            report.warn(
+            load.warn(
                 format!("node `{name}`"),
                 "is its own ancestor or has several parents; it was placed once",
                 "give it one parent",
             );
             continue;
         }
-        let world_from_node = world_from_parent * local(&document.transforms[index], &name, report)?;
+        let world_from_node = world_from_parent * local(&document.transforms[index], &name, load)?;
         if !world_from_node.is_finite() {
             return Err(not_finite(&name));
         }
@@ -76,7 +85,7 @@ pub fn place(document: &Document, report: &mut Report) -> Result<Vec<PlacedNode>
     }
     let unreached = reached.iter().filter(|reached| !**reached).count();
     if root.scenes.is_empty() && unreached > 0 {
-        report.warn(
+        load.warn(
             "nodes",
             format!("{unreached} nodes are their own ancestors; they were left out"),
             "give each one parent",
@@ -96,14 +105,13 @@ fn is_hidden(node: &Node) -> bool {
     stated.and_then(|stated| stated.get("visible")) == Some(&Value::Bool(false))
 }
 
-fn top_nodes(root: &Root, report: &mut Report) -> Vec<usize> {
+fn top_nodes(root: &Root, load: &mut LoadContext) -> Vec<usize> {
     let default = root.scene.map(|scene| scene.value());
     let chosen = default.and_then(|scene| root.scenes.get(scene));
     if let (Some(scene), None) = (default, chosen) {
-        report.warn(
+        load.warn_damaged(
             "scene",
             format!("the default scene {scene} does not exist; the first one was read"),
-            "export the file again",
         );
     }
     let is_child = find_children(root);
@@ -113,7 +121,7 @@ fn top_nodes(root: &Root, report: &mut Report) -> Vec<usize> {
     let listed: Vec<usize> = scene.nodes.iter().map(Index::value).collect();
     for node in &listed {
         if is_child.get(*node) == Some(&true) {
-            report.warn(
+            load.warn(
                 format!("node {node}"),
                 "stands in the scene although it is the child of another node; it was placed by itself",
                 "list only nodes without a parent in the scene",
@@ -138,17 +146,16 @@ fn find_children(root: &Root) -> Vec<bool> {
     is_child
 }
 
-fn local(transform: &NodeTransform, name: &str, report: &mut Report) -> Result<DAffine3> {
+fn local(transform: &NodeTransform, name: &str, load: &mut LoadContext) -> Result<DAffine3> {
     if let Some(matrix) = transform.matrix {
         let matrix = DMat4::from_cols_array(&matrix);
         if !matrix.is_finite() {
             return Err(not_finite(name));
         }
         if matrix.row(3) != glam::DVec4::W {
-            report.warn(
+            load.warn_damaged(
                 format!("node `{name}`"),
                 "its matrix is not affine; its last row was read as 0 0 0 1",
-                "export the file again",
             );
         }
         let columns = [matrix.x_axis, matrix.y_axis, matrix.z_axis].map(|axis| axis.truncate());
@@ -163,10 +170,9 @@ fn local(transform: &NodeTransform, name: &str, report: &mut Report) -> Result<D
     }
     let length = rotation.length();
     if (length - 1.0).abs() > 1e-3 {
-        report.warn(
+        load.warn_damaged(
             format!("node `{name}`"),
             format!("its rotation has the length {length} and was brought to 1"),
-            "export the file again",
         );
     }
     Ok(DAffine3::from_scale_rotation_translation(
@@ -197,22 +203,21 @@ fn unit(rotation: DQuat) -> DQuat {
 pub fn at_rest(document: &Document, node: usize) -> (DAffine3, (DVec3, DQuat, DVec3)) {
     let transform = &document.transforms[node];
     // The transforms of placed nodes are valid.
-    let at_rest = local(transform, "", &mut Report::default()).unwrap_or(DAffine3::IDENTITY);
+    let at_rest = local(transform, "", &mut LoadContext::default()).unwrap_or(DAffine3::IDENTITY);
     let (scale, rotation, translation) = stated(transform);
     (at_rest, (scale, unit(rotation), translation))
 }
 
 fn not_finite(name: &str) -> Error {
-    Error::failure(
+    damaged(
         format!("node `{name}`"),
         "its transform is infinite or not a number",
-        "repair the node or export the file again",
     )
 }
 
 /// Perspective cameras of the placed nodes, with the glTF indices of these. Unreadable ones are left out with a
 /// warning.
-pub fn read_all(root: &Root, placed: &[PlacedNode], report: &mut Report) -> (Vec<Camera>, Vec<usize>) {
+pub fn read_all(root: &Root, placed: &[PlacedNode], load: &mut LoadContext) -> (Vec<Camera>, Vec<usize>) {
     let mut nodes = Vec::new();
     let mut cameras = Vec::new();
     for placed in placed {
@@ -223,16 +228,11 @@ pub fn read_all(root: &Root, placed: &[PlacedNode], report: &mut Report) -> (Vec
         let read = source.ok_or_else(|| format!("is camera {}, which does not exist", index.value()));
         match read.and_then(|source| read_one(source, placed)) {
             Ok(camera) => {
-                let unnamed = placed.name == format!("node{}", placed.node);
-                let name = if unnamed {
-                    format!("camera{}", cameras.len())
-                } else {
-                    placed.name.clone()
-                };
+                let name = placed.name_or("camera", cameras.len());
                 cameras.push(Camera { name, ..camera });
                 nodes.push(placed.node);
             }
-            Err(why) => report.warn(
+            Err(why) => load.warn(
                 format!("camera `{}`", placed.name),
                 format!("{why}; it was left out"),
                 "repair the camera or choose another one",

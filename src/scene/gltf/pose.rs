@@ -8,7 +8,7 @@ use serde::Deserialize;
 use serde_json::Map;
 
 use super::accessor::{Formats, Reader};
-use super::report::Budget;
+use super::context::{LoadContext, damaged};
 use crate::error::{Error, Result};
 use crate::scene::Mesh;
 use crate::scene::mesh::cofactors;
@@ -95,7 +95,7 @@ impl Poses {
     }
 
     /// Whether a primitive is deformed.
-    pub fn bend(&self, place: PrimitiveInstance) -> bool {
+    pub fn is_deformed(&self, place: PrimitiveInstance) -> bool {
         let mesh = self.meshes.get(place.mesh).and_then(Maybe::get);
         let part = mesh.and_then(|mesh| mesh.primitives.get(place.primitive));
         self.has_skin(place.node) || part.is_some_and(|part| !part.targets.is_empty())
@@ -115,7 +115,7 @@ impl Poses {
         mesh: &mut Mesh,
         reader: Reader,
         owner: &str,
-        budget: &mut Budget,
+        load: &mut LoadContext,
     ) -> Result<()> {
         let Some(morphed) = self.meshes.get(place.mesh).and_then(Maybe::get) else {
             return Ok(());
@@ -133,7 +133,7 @@ impl Poses {
                 let Some(index) = target.get(key) else {
                     continue;
                 };
-                let deltas = reader.vectors::<3>(Index::new(*index), Formats::Float, owner, budget)?;
+                let deltas = reader.vectors::<3>(Index::new(*index), Formats::Float, owner, load)?;
                 if deltas.len() != moved.len() {
                     return Err(unlike(owner));
                 }
@@ -155,15 +155,15 @@ impl Poses {
         stands: &HashMap<usize, DAffine3>,
         reader: Reader,
         owner: &str,
-        budget: &mut Budget,
+        load: &mut LoadContext,
     ) -> Result<Vec<DMat4>> {
         let skin = self.node(node).and_then(|node| self.skins.get(node.skin?)?.get());
         let skin = skin.ok_or_else(|| unlike(owner))?;
-        budget.take((skin.joints.len() * size_of::<DMat4>()) as u64, owner)?;
+        load.take((skin.joints.len() * size_of::<DMat4>()) as u64, owner)?;
         let inverse = match skin.inverse_bind_matrices {
             None => vec![DMat4::IDENTITY; skin.joints.len()],
             Some(index) => {
-                let read = reader.vectors::<16>(Index::new(index), Formats::Float, owner, budget)?;
+                let read = reader.vectors::<16>(Index::new(index), Formats::Float, owner, load)?;
                 read.iter().map(DMat4::from_cols_array).collect()
             }
         };
@@ -183,7 +183,7 @@ impl Poses {
 ///
 /// # Errors
 /// Vertices without weights, or with joints that do not exist.
-pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[SkinWeights], owner: &str) -> Result<()> {
+pub fn apply_skin(mesh: &mut Mesh, joints: &[DMat4], influences: &[SkinWeights], owner: &str) -> Result<()> {
     let mut sums = vec![DMat4::ZERO; mesh.positions.len()];
     for (indices, weights) in influences {
         if indices.len() != sums.len() || weights.len() != sums.len() {
@@ -209,9 +209,5 @@ pub fn hang(mesh: &mut Mesh, joints: &[DMat4], influences: &[SkinWeights], owner
 }
 
 fn unlike(owner: &str) -> Error {
-    Error::failure(
-        owner,
-        "its morph targets or its skin do not fit its vertices",
-        "export the file again",
-    )
+    damaged(owner, "its morph targets or its skin do not fit its vertices")
 }

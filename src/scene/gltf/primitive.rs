@@ -11,9 +11,9 @@ use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 
 use super::accessor::{Formats, Reader};
+use super::context::{LoadContext, damaged};
 use super::pose::{Poses, PrimitiveInstance};
-use super::report::{Budget, Report};
-use super::{draco, pose, triangles};
+use super::{draco, pose};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::scene::Mesh;
@@ -33,9 +33,9 @@ const COLOUR_BYTES: u64 = 2 * 12;
 ///
 /// # Errors
 /// Too little is left.
-pub fn take_copy(mesh: &Mesh, owner: &str, budget: &mut Budget) -> Result<()> {
-    budget.take(mesh.positions.len() as u64 * VERTEX_BYTES, owner)?;
-    budget.take(3 * mesh.triangles.len() as u64 * TRIANGLE_BYTES, owner)
+pub fn take_copy(mesh: &Mesh, owner: &str, load: &mut LoadContext) -> Result<()> {
+    load.take(mesh.positions.len() as u64 * VERTEX_BYTES, owner)?;
+    load.take(3 * mesh.triangles.len() as u64 * TRIANGLE_BYTES, owner)
 }
 
 /// Primitives read so far; nodes with the same mesh share them.
@@ -88,13 +88,13 @@ struct Variant {
 
 impl Variant {
     /// Mesh of a primitive, without triangles and vertices that would not be seen.
-    fn of(&self, source: &Mesh, has_normals: bool, owner: &str, report: &mut Report) -> Mesh {
+    fn of(&self, source: &Mesh, has_normals: bool, owner: &str, load: &mut LoadContext) -> Mesh {
         let mut mesh = source.clone();
         let mut has_area = self.has_area.iter();
         mesh.triangles.retain(|_| has_area.next() == Some(&true));
         if has_normals {
             drop_unused_vertices(&mut mesh);
-            check_normals(&mut mesh, owner, report);
+            check_normals(&mut mesh, owner, load);
         } else {
             split_corners(&mut mesh, self.is_split_mirrored);
         }
@@ -115,14 +115,13 @@ impl Primitives {
         (place, primitive, has_colours): (PrimitiveInstance, &Primitive, bool),
         world_from_node: &DAffine3,
         owner: &str,
-        budget: &mut Budget,
-        report: &mut Report,
+        load: &mut LoadContext,
     ) -> Result<Option<(Arc<Mesh>, Option<LinearSrgb>)>> {
-        let bent_by = source.poses.is_own(place.node).then_some(place.node);
-        let known = match self.known.entry((place.mesh, place.primitive, bent_by)) {
+        let deformed_by = source.poses.is_own(place.node).then_some(place.node);
+        let known = match self.known.entry((place.mesh, place.primitive, deformed_by)) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(entry) => {
-                let local = read_local(source, (place, primitive, has_colours), owner, budget, report)?;
+                let local = read_local(source, (place, primitive, has_colours), owner, load)?;
                 entry.insert(KnownPrimitive {
                     source: local,
                     made: Vec::new(),
@@ -134,12 +133,12 @@ impl Primitives {
         };
         let (source, has_normals) = (&local.mesh, local.has_normals);
         if local.is_rounded {
-            warn_of_rounding(source, world_from_node, owner, report);
+            warn_of_rounding(source, world_from_node, owner, load);
         }
         let has_area = have_area(source, world_from_node, owner)?;
         self.degenerate += has_area.iter().filter(|has_area| !**has_area).count();
         if !has_area.contains(&true) {
-            report.warn(
+            load.warn(
                 owner,
                 "has no triangle with an area and was skipped",
                 "remove it from the scene",
@@ -155,9 +154,9 @@ impl Primitives {
             return Ok(Some((Arc::clone(made), local.colour)));
         }
         if !known.made.is_empty() {
-            take_copy(source, owner, budget)?;
+            take_copy(source, owner, load)?;
         }
-        let mut mesh = variant.of(source, has_normals, owner, report);
+        let mut mesh = variant.of(source, has_normals, owner, load);
         if variant.stands_at_origin {
             mesh = mesh.placed(world_from_node);
         }
@@ -190,21 +189,20 @@ impl Vertices<'_> {
         &self,
         semantic: Semantic,
         formats: Formats,
-        budget: &mut Budget,
+        load: &mut LoadContext,
     ) -> Result<Option<Vec<[f64; N]>>> {
         let Some(index) = self.index(semantic.clone()) else {
             return Ok(None);
         };
         let unpacked = self.unpacked.as_ref().filter(|unpacked| unpacked.has(&semantic));
         let Some(unpacked) = unpacked else {
-            return self.reader.vectors(index, formats, self.owner, budget).map(Some);
+            return self.reader.vectors(index, formats, self.owner, load).map(Some);
         };
         let accessor = self.reader.root.accessors.get(index.value());
         let is_normalised = accessor.is_some_and(|accessor| accessor.normalized);
         let read = unpacked.vectors(&semantic, is_normalised);
         let what = || format!("its Draco data has no {} of {N} numbers", semantic.to_string());
-        read.map(Some)
-            .ok_or_else(|| Error::failure(self.owner, what(), "export the file again"))
+        read.map(Some).ok_or_else(|| damaged(self.owner, what()))
     }
 
     /// An attribute of every vertex; `None` if it is missing or, with a warning, has another number of values.
@@ -213,50 +211,49 @@ impl Vertices<'_> {
         (semantic, what): (Semantic, &str),
         formats: Formats,
         count: usize,
-        budget: &mut Budget,
-        report: &mut Report,
+        load: &mut LoadContext,
     ) -> Result<Option<Vec<T>>> {
-        let read = self.read(semantic, formats, budget)?;
-        let fits = read.filter(|read| one_per_vertex(read.len(), count, what, self.owner, report));
+        let read = self.read(semantic, formats, load)?;
+        let fits = read.filter(|read| one_per_vertex(read.len(), count, what, self.owner, load));
         Ok(fits.map(convert))
     }
 
     /// The mesh with morph targets and skin applied, in the file's rest pose.
-    fn bent(
+    fn deformed(
         &self,
         source: PrimitiveSource,
         place: PrimitiveInstance,
         mesh: &Mesh,
-        budget: &mut Budget,
+        load: &mut LoadContext,
     ) -> Result<Mesh> {
         let PrimitiveSource {
             reader,
             poses,
             stands,
         } = source;
-        let mut bent = mesh.clone();
-        poses.morph(place, &mut bent, reader, self.owner, budget)?;
+        let mut deformed = mesh.clone();
+        poses.morph(place, &mut deformed, reader, self.owner, load)?;
         if poses.has_skin(place.node) {
             let mut influences = Vec::new();
             for set in 0.. {
-                let joints = self.read(Semantic::Joints(set), Formats::Index, budget)?;
-                let weights = self.read(Semantic::Weights(set), Formats::FloatOrShare, budget)?;
+                let joints = self.read(Semantic::Joints(set), Formats::Index, load)?;
+                let weights = self.read(Semantic::Weights(set), Formats::FloatOrShare, load)?;
                 let Some(both) = joints.zip(weights) else {
                     break;
                 };
                 influences.push(both);
             }
-            let joints = poses.joints(place.node, stands, reader, self.owner, budget)?;
-            pose::hang(&mut bent, &joints, &influences, self.owner)?;
+            let joints = poses.joints(place.node, stands, reader, self.owner, load)?;
+            pose::apply_skin(&mut deformed, &joints, &influences, self.owner)?;
         }
-        Ok(bent)
+        Ok(deformed)
     }
 
-    fn order(&self, vertex_count: usize, budget: &mut Budget) -> Result<Vec<u32>> {
+    fn order(&self, vertex_count: usize, load: &mut LoadContext) -> Result<Vec<u32>> {
         let owner = self.owner;
         let vertices = match (&self.unpacked, self.primitive.indices) {
             (Some(unpacked), _) => unpacked.indices(),
-            (None, Some(indices)) => self.reader.indices(indices, owner, budget)?,
+            (None, Some(indices)) => self.reader.indices(indices, owner, load)?,
             (None, None) => {
                 let count = u32::try_from(vertex_count).map_err(|_| {
                     Error::failure(owner, "has more vertices than glTF allows", "split the mesh")
@@ -265,31 +262,30 @@ impl Vertices<'_> {
             }
         };
         match vertices.iter().find(|vertex| **vertex as usize >= vertex_count) {
-            Some(vertex) => Err(Error::failure(
+            Some(vertex) => Err(damaged(
                 owner,
                 format!("refers to vertex {vertex}, but has only {vertex_count}"),
-                "repair the mesh or export the file again",
             )),
             None => Ok(vertices),
         }
     }
 
     /// Area-weighted mean of the colours and, if they vary, the colours themselves.
-    fn colours(&self, mesh: &Mesh, budget: &mut Budget, report: &mut Report) -> Result<Option<Colours>> {
+    fn colours(&self, mesh: &Mesh, load: &mut LoadContext) -> Result<Option<Colours>> {
         let Some(index) = self.index(Semantic::Colors(0)) else {
             return Ok(None);
         };
-        budget.take(mesh.positions.len() as u64 * COLOUR_BYTES, self.owner)?;
+        load.take(mesh.positions.len() as u64 * COLOUR_BYTES, self.owner)?;
         let has_alpha = self.reader.root.accessors.get(index.value()).is_some_and(
             |accessor| matches!(accessor.type_, Checked::Valid(shape) if shape.multiplicity() == 4),
         );
         let (which, formats) = ((Semantic::Colors(0), "colours"), Formats::FloatOrShare);
         let count = mesh.positions.len();
         let colours: Option<Vec<DVec3>> = if has_alpha {
-            let colours = self.one_each::<4, DVec4>(which, formats, count, budget, report)?;
+            let colours = self.one_each::<4, DVec4>(which, formats, count, load)?;
             colours.map(|colours| colours.into_iter().map(DVec4::truncate).collect())
         } else {
-            self.one_each(which, formats, count, budget, report)?
+            self.one_each(which, formats, count, load)?
         };
         let Some(colours) = colours else {
             return Ok(None);
@@ -337,53 +333,43 @@ fn read_local(
     source: PrimitiveSource,
     (place, primitive, has_colours): (PrimitiveInstance, &Primitive, bool),
     owner: &str,
-    budget: &mut Budget,
-    report: &mut Report,
+    load: &mut LoadContext,
 ) -> Result<Option<Local>> {
     let Checked::Valid(mode) = primitive.mode else {
-        report.warn(
-            owner,
-            "is of an unknown kind and was skipped",
-            "export the file again",
-        );
+        load.warn_damaged(owner, "is of an unknown kind and was skipped");
         return Ok(None);
     };
     let reader = source.reader;
     let vertices = Vertices {
         reader,
         primitive,
-        unpacked: draco::unpack(reader, primitive, owner, budget)?,
+        unpacked: draco::unpack(reader, primitive, owner, load)?,
         owner,
     };
-    let Some(positions) = vertices.read(Semantic::Positions, Formats::Float, budget)? else {
-        report.warn(owner, "has no positions and was skipped", "export the file again");
+    let Some(positions) = vertices.read(Semantic::Positions, Formats::Float, load)? else {
+        load.warn_damaged(owner, "has no positions and was skipped");
         return Ok(None);
     };
     let positions: Vec<DVec3> = convert(positions);
     let count = positions.len();
-    budget.take(count as u64 * VERTEX_BYTES, owner)?;
-    let order = vertices.order(count, budget)?;
-    budget.take(order.len() as u64 * TRIANGLE_BYTES, owner)?;
+    load.take(count as u64 * VERTEX_BYTES, owner)?;
+    let order = vertices.order(count, load)?;
+    load.take(order.len() as u64 * TRIANGLE_BYTES, owner)?;
     let mode = if vertices.unpacked.is_some() {
         Mode::Triangles
     } else {
         mode
     };
-    let Some(triangles) = assemble(&order, mode, owner, report) else {
+    let Some(triangles) = assemble(&order, mode, owner, load) else {
         return Ok(None);
     };
-    let normals: Option<Vec<DVec3>> = vertices.one_each(
-        (Semantic::Normals, "normals"),
-        Formats::Float,
-        count,
-        budget,
-        report,
-    )?;
+    let normals: Option<Vec<DVec3>> =
+        vertices.one_each((Semantic::Normals, "normals"), Formats::Float, count, load)?;
     let mut uv_sets = [None, None];
     for (set, uvs) in uv_sets.iter_mut().enumerate() {
         let which = (Semantic::TexCoords(set as u32), "texture coordinates");
-        let read = vertices.one_each(which, Formats::FloatOrShare, count, budget, report)?;
-        *uvs = read.map(|read| finite_uvs(read, owner, report));
+        let read = vertices.one_each(which, Formats::FloatOrShare, count, load)?;
+        *uvs = read.map(|read| finite_uvs(read, owner, load));
     }
     let [uv0, uv1] = uv_sets;
     let has_normals = normals.is_some();
@@ -395,8 +381,8 @@ fn read_local(
         colours: None,
         triangles,
     };
-    let colours = vertices.colours(&mesh, budget, report).unwrap_or_else(|error| {
-        report.warn(
+    let colours = vertices.colours(&mesh, load).unwrap_or_else(|error| {
+        load.warn(
             error.location,
             format!("{}; its colours were left out", error.what),
             error.remedy,
@@ -408,17 +394,17 @@ fn read_local(
         if has_colours {
             (colour, mesh.colours) = (None, Some(of_vertices));
         } else {
-            report.warn(
+            load.warn(
                 owner,
                 "its vertex colours were read as their mean, as it is not diffuse",
                 "use a base colour texture",
             );
         }
     }
-    if source.poses.bend(place) {
-        match vertices.bent(source, place, &mesh, budget) {
-            Ok(bent) => mesh = bent,
-            Err(error) => report.warn(
+    if source.poses.is_deformed(place) {
+        match vertices.deformed(source, place, &mesh, load) {
+            Ok(deformed) => mesh = deformed,
+            Err(error) => load.warn(
                 error.location,
                 format!("{}; it was left as it is", error.what),
                 error.remedy,
@@ -438,48 +424,59 @@ fn convert<const N: usize, T: From<[f64; N]>>(vectors: Vec<[f64; N]>) -> Vec<T> 
     vectors.into_iter().map(T::from).collect()
 }
 
-fn assemble(vertices: &[u32], mode: Mode, owner: &str, report: &mut Report) -> Option<Vec<[u32; 3]>> {
-    let triangles = triangles::assemble(vertices, mode);
-    if triangles.is_none() {
-        report.warn(
-            owner,
-            "consists of points or lines and was skipped",
-            "only triangles can be lit",
-        );
+/// Triangles of `vertices` under a mode, with the winding of the specification; `None`, with a warning, for points and
+/// lines. Left-over vertices are dropped.
+fn assemble(vertices: &[u32], mode: Mode, owner: &str, load: &mut LoadContext) -> Option<Vec<[u32; 3]>> {
+    let windows = vertices.windows(3).enumerate();
+    let short = if vertices.len() < 3 { vertices.len() } else { 0 };
+    let (triangles, left_over): (Vec<_>, _) = match mode {
+        Mode::Triangles => (vertices.as_chunks().0.to_vec(), vertices.len() % 3),
+        // Every second triangle of a strip has reversed winding.
+        Mode::TriangleStrip => (
+            windows
+                .map(|(index, w)| [w[0], w[1 + index % 2], w[2 - index % 2]])
+                .collect(),
+            short,
+        ),
+        Mode::TriangleFan => (
+            windows
+                .map(|(index, _)| [vertices[index + 1], vertices[index + 2], vertices[0]])
+                .collect(),
+            short,
+        ),
+        Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip => {
+            let what = "consists of points or lines and was skipped";
+            load.warn(owner, what, "only triangles can be lit");
+            return None;
+        }
+    };
+    if left_over > 0 {
+        let what = format!("{left_over} vertices at its end make no triangle and were ignored");
+        load.warn_damaged(owner, what);
     }
-    let left_over = triangles::left_over(vertices.len(), mode);
-    if triangles.is_some() && left_over > 0 {
-        report.warn(
-            owner,
-            format!("{left_over} vertices at its end make no triangle and were ignored"),
-            "export the file again",
-        );
-    }
-    triangles
+    Some(triangles)
 }
 
-fn one_per_vertex(count: usize, vertices: usize, what: &str, owner: &str, report: &mut Report) -> bool {
+fn one_per_vertex(count: usize, vertices: usize, what: &str, owner: &str, load: &mut LoadContext) -> bool {
     if count != vertices {
-        report.warn(
+        load.warn_damaged(
             owner,
             format!("has {count} {what} for {vertices} vertices; they were ignored"),
-            "export the file again",
         );
     }
     count == vertices
 }
 
-fn finite_uvs(mut uvs: Vec<DVec2>, owner: &str, report: &mut Report) -> Vec<DVec2> {
+fn finite_uvs(mut uvs: Vec<DVec2>, owner: &str, load: &mut LoadContext) -> Vec<DVec2> {
     let mut repaired = 0;
     for uv in uvs.iter_mut().filter(|uv| !uv.is_finite()) {
         *uv = DVec2::ZERO;
         repaired += 1;
     }
     if repaired > 0 {
-        report.warn(
+        load.warn_damaged(
             owner,
             format!("{repaired} texture coordinates are not finite and were set to 0"),
-            "export the file again",
         );
     }
     uvs
@@ -487,7 +484,7 @@ fn finite_uvs(mut uvs: Vec<DVec2>, owner: &str, report: &mut Report) -> Vec<DVec
 
 /// Warns if single precision rounds vertices, in proportion to their distance from the node's origin, by much relative
 /// to the size of the mesh; states the rounding error.
-fn warn_of_rounding(mesh: &Mesh, world_from_node: &DAffine3, owner: &str, report: &mut Report) {
+fn warn_of_rounding(mesh: &Mesh, world_from_node: &DAffine3, owner: &str, load: &mut LoadContext) {
     let Some((low, high)) = mesh.bounds() else {
         return;
     };
@@ -504,7 +501,7 @@ fn warn_of_rounding(mesh: &Mesh, world_from_node: &DAffine3, owner: &str, report
         .length()
         .max(linear.y_axis.length())
         .max(linear.z_axis.length());
-    report.warn(
+    load.warn(
         owner,
         format!(
             "its vertices lie {:.1e} m from their node's origin, where single precision rounds them by up to {:.1e} m",
@@ -523,10 +520,9 @@ fn have_area(mesh: &Mesh, world_from_node: &DAffine3, owner: &str) -> Result<Vec
     let mut placed = Vec::with_capacity(mesh.positions.len());
     for (vertex, position) in mesh.positions.iter().enumerate() {
         if !position.is_finite() {
-            return Err(Error::failure(
+            return Err(damaged(
                 owner,
                 format!("the position of vertex {vertex} is infinite or not a number"),
-                "repair the mesh or export the file again",
             ));
         }
         let position = world_from_node.transform_point3(*position);
@@ -546,31 +542,42 @@ fn have_area(mesh: &Mesh, world_from_node: &DAffine3, owner: &str) -> Result<Vec
     Ok(mesh.triangles.iter().map(has_area).collect())
 }
 
+/// A mesh of other triangles over the given vertices of a mesh.
+fn gathered(mesh: &Mesh, vertices: &[u32], triangles: Vec<[u32; 3]>) -> Mesh {
+    fn pick<T: Copy>(values: &[T], vertices: &[u32]) -> Vec<T> {
+        vertices.iter().map(|vertex| values[*vertex as usize]).collect()
+    }
+    let uvs = |uvs: &Option<Vec<DVec2>>| uvs.as_ref().map(|uvs| pick(uvs, vertices));
+    Mesh {
+        positions: pick(&mesh.positions, vertices),
+        normals: pick(&mesh.normals, vertices),
+        uv0: uvs(&mesh.uv0),
+        uv1: uvs(&mesh.uv1),
+        colours: mesh.colours.as_ref().map(|colours| pick(colours, vertices)),
+        triangles,
+    }
+}
+
 /// Drops vertices without triangles, since these would widen the bounds.
 fn drop_unused_vertices(mesh: &mut Mesh) {
     let mut used = vec![false; mesh.positions.len()];
     for vertex in mesh.triangles.iter().flatten() {
         used[*vertex as usize] = true;
     }
-    let kept: Vec<usize> = (0..used.len()).filter(|vertex| used[*vertex]).collect();
+    let kept: Vec<u32> = (0..)
+        .zip(&used)
+        .filter_map(|(vertex, used)| used.then_some(vertex))
+        .collect();
     if kept.len() == used.len() {
         return;
     }
-    let mut renamed = vec![0_u32; used.len()];
-    for (new, old) in kept.iter().enumerate() {
-        renamed[*old] = new as u32;
+    let mut renamed = vec![0; used.len()];
+    for (new, old) in (0..).zip(&kept) {
+        renamed[*old as usize] = new;
     }
-    mesh.positions = kept.iter().map(|vertex| mesh.positions[*vertex]).collect();
-    mesh.normals = kept.iter().map(|vertex| mesh.normals[*vertex]).collect();
-    for uvs in [&mut mesh.uv0, &mut mesh.uv1].into_iter().flatten() {
-        *uvs = kept.iter().map(|vertex| uvs[*vertex]).collect();
-    }
-    if let Some(colours) = &mut mesh.colours {
-        *colours = kept.iter().map(|vertex| colours[*vertex]).collect();
-    }
-    for vertex in mesh.triangles.iter_mut().flatten() {
-        *vertex = renamed[*vertex as usize];
-    }
+    let triangles = mesh.triangles.iter();
+    let triangles = triangles.map(|corners| corners.map(|vertex| renamed[vertex as usize]));
+    *mesh = gathered(mesh, &kept, triangles.collect());
 }
 
 /// Largest deviation of a normal's length from 1 that needs no warning [1]; 8-bit normals stay within it.
@@ -584,27 +591,14 @@ fn split_corners(mesh: &mut Mesh, is_mirrored: bool) {
         .iter()
         .flat_map(|corners| [corners[0], corners[second], corners[third]])
         .collect();
-    fn split<T: Copy>(values: Option<&Vec<T>>, order: &[u32]) -> Option<Vec<T>> {
-        let values = values?;
-        Some(order.iter().map(|vertex| values[*vertex as usize]).collect())
-    }
-    *mesh = Mesh {
-        positions: order
-            .iter()
-            .map(|vertex| mesh.positions[*vertex as usize])
-            .collect(),
-        normals: vec![DVec3::ZERO; order.len()],
-        uv0: split(mesh.uv0.as_ref(), &order),
-        uv1: split(mesh.uv1.as_ref(), &order),
-        colours: split(mesh.colours.as_ref(), &order),
-        triangles: (0..mesh.triangles.len() as u32)
-            .map(|t| [3 * t, 3 * t + second as u32, 3 * t + third as u32])
-            .collect(),
-    };
+    let (second, third) = (second as u32, third as u32);
+    let triangles = (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + second, 3 * t + third]);
+    *mesh = gathered(mesh, &order, triangles.collect());
+    mesh.normals.fill(DVec3::ZERO);
 }
 
 /// Warns of normals that are not unit length, and sets invalid ones to 0.
-fn check_normals(mesh: &mut Mesh, owner: &str, report: &mut Report) {
+fn check_normals(mesh: &mut Mesh, owner: &str, load: &mut LoadContext) {
     let (mut replaced, mut rescaled) = (0, 0);
     for normal in &mut mesh.normals {
         let length = normal.length();
@@ -616,14 +610,14 @@ fn check_normals(mesh: &mut Mesh, owner: &str, report: &mut Report) {
         }
     }
     if replaced > 0 {
-        report.warn(
+        load.warn(
             owner,
             format!("{replaced} normals are zero or not finite and were taken from the triangles"),
             "export the normals again",
         );
     }
     if rescaled > 0 {
-        report.warn(
+        load.warn(
             owner,
             format!("{rescaled} normals are not of length 1 and were brought to it"),
             "export the normals again",

@@ -6,9 +6,8 @@ use std::sync::Arc;
 
 use gltf::json::Value;
 
-use super::document::Document;
-use super::extras::{self, of_file, text};
-use super::report::Report;
+use super::context::LoadContext;
+use super::extras::{of_file, text};
 use super::uri;
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
@@ -22,34 +21,20 @@ pub const KEY: &str = "spectrum";
 /// Size limit, larger than any table of a spectrum [bytes].
 const MAX_CSV_BYTES: u64 = 16 << 20;
 
-/// Spectrum stated for a light: by its node, or else by its entry in a list of lights.
-pub fn stated<'a>(
-    document: &'a Document,
-    node: usize,
-    of_lights: &'a [Value],
-    light: usize,
-) -> Option<&'a Value> {
-    let of_node = extras::stated(&document.extras.nodes, node, KEY);
-    of_node.or_else(|| extras::stated(of_lights, light, KEY))
-}
-
-/// Replaces the colour of a light by its stated spectrum, if any.
+/// Replaces the colour of a light by its stated spectrum.
 ///
 /// # Errors
 /// A spectrum that does not exist or is not visible; a file that cannot be read or lies outside `folder`.
 pub fn apply(
     light: &mut Light,
-    stated: Option<&Value>,
+    stated: &Value,
     folder: &Path,
     owner: &str,
-    report: &mut Report,
+    load: &mut LoadContext,
 ) -> Result<()> {
-    let Some(stated) = stated else {
-        return Ok(());
-    };
     let spectrum = read(stated, folder, owner)?;
     if light.colour != LinearSrgb::WHITE {
-        report.warn(
+        load.warn(
             owner,
             format!("its colour was left out, since it has a `{KEY}`"),
             "leave the colour white",
@@ -64,15 +49,11 @@ pub fn apply(
 /// # Errors
 /// Those of [`apply`].
 pub fn read(stated: &Value, folder: &Path, owner: &str) -> Result<Arc<Spectrum>> {
-    by_name_or_file(text(stated, KEY, owner)?, folder, owner).map(Arc::new)
-}
-
-fn by_name_or_file(stated: &str, folder: &Path, owner: &str) -> Result<Spectrum> {
-    let is_file = Path::new(stated)
-        .extension()
-        .is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
-    if !is_file {
-        return illuminant(stated).map_err(|error| of_file(error.at(owner)));
+    let stated = text(stated, KEY, owner)?;
+    let extension = Path::new(stated).extension();
+    if !extension.is_some_and(|extension| extension.eq_ignore_ascii_case("csv")) {
+        let spectrum = illuminant(stated).map_err(|error| of_file(error.at(owner)))?;
+        return Ok(Arc::new(spectrum));
     }
     let bytes = uri::read(stated, folder, MAX_CSV_BYTES, owner)?;
     let no_text = |_| {
@@ -85,5 +66,6 @@ fn by_name_or_file(stated: &str, folder: &Path, owner: &str) -> Result<Spectrum>
     let table = String::from_utf8(bytes).map_err(no_text)?;
     read_lamp(&table)
         .and_then(|lamp| lamp.named(stated).to_luminous_equivalent(1.0))
+        .map(Arc::new)
         .map_err(|error| of_file(error.at(format!("{owner}, `{stated}`"))))
 }

@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 
 use gltf::json::Value;
 
+use super::context::LoadContext;
 use super::extras::{of_file, text};
-use super::report::Report;
 use crate::error::{Error, Result};
 use crate::optics::glass::Dispersion;
 use crate::optics::wavelength::VISIBLE;
@@ -90,12 +90,12 @@ pub fn dispersion(ior: f64, extension: &Value) -> std::result::Result<Option<Gla
     let glass = Glass::with_abbe_number(ior, 20.0 / dispersion);
     match glass.dispersion.checked() {
         Ok(_) => Ok(Some(glass)),
-        Err(error) => Err(format!("{error}, and its dispersion was read as 0")),
+        Err(error) => Err(format!("{}, and its dispersion was read as 0", error.what)),
     }
 }
 
 /// Warns of dispersive objects whose glass is used outside the range of its formula, in the scene's light.
-pub fn warn_of_ranges(scene: &Scene, report: &mut Report) {
+pub fn warn_of_ranges(scene: &Scene, load: &mut LoadContext) {
     let light = wavelengths(scene);
     for (index, material) in scene.materials.iter().enumerate() {
         let is_used = scene.objects.iter().any(|object| object.material == index);
@@ -107,7 +107,7 @@ pub fn warn_of_ranges(scene: &Scene, report: &mut Report) {
             continue;
         };
         for warning in glass.warnings(&light, &format!("material `{}`", material.name)) {
-            report.warn(warning.location, warning.what, warning.remedy);
+            load.warn(warning.location, warning.what, warning.remedy);
         }
     }
 }

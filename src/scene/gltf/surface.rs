@@ -6,12 +6,12 @@ use std::sync::Arc;
 use glam::DAffine3;
 use gltf::json::mesh;
 
+use super::context::{LoadContext, damaged};
 use super::nodes::PlacedNode;
 use super::pose::PrimitiveInstance;
 use super::primitive::{self, Primitives};
-use super::report::{Budget, Report};
-use super::{material, names};
-use crate::error::{Error, Result};
+use super::{extras, material};
+use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::watertight::{has_volume, is_closed};
 use crate::scene::{Material, Mesh, Object, Scene, instances};
@@ -27,8 +27,7 @@ pub fn add_objects(
     placed: &[PlacedNode],
     solid_glass: bool,
     materials: &mut Materials,
-    budget: &mut Budget,
-    report: &mut Report,
+    load: &mut LoadContext,
 ) -> Result<()> {
     let root = source.reader.root;
     let mut primitives = Primitives::default();
@@ -45,10 +44,9 @@ pub fn add_objects(
             continue;
         };
         let Some(mesh) = root.meshes.get(mesh_index.value()) else {
-            return Err(Error::failure(
+            return Err(damaged(
                 format!("node `{}`", placed.name),
                 format!("has mesh {}, which does not exist", mesh_index.value()),
-                "export the file again",
             ));
         };
         // A skinned mesh is placed by its joints, whatever the transform of its node.
@@ -63,9 +61,9 @@ pub fn add_objects(
                 mesh: mesh_index.value(),
                 primitive: index,
             };
-            let material = materials.of_primitive(part, &owner, report);
+            let material = materials.of_primitive(part, &owner, load);
             let part = (place, part, materials.is_opaque_body(material));
-            let read = primitives.read(source, part, &world_from_node, &owner, budget, report)?;
+            let read = primitives.read(source, part, &world_from_node, &owner, load)?;
             let Some((mesh, colour)) = read else {
                 continue;
             };
@@ -78,7 +76,7 @@ pub fn add_objects(
             };
             let material = materials.thin_or_solid(material, is_solid);
             let material = materials.tinted(material, colour);
-            materials.check_coordinates(material, object.mesh(), &placed.name, report);
+            materials.check_coordinates(material, object.mesh(), &placed.name, load);
             object.material = material;
             scene.objects.push(object);
         }
@@ -87,10 +85,10 @@ pub fn add_objects(
             primitives.forget(mesh_index.value());
         }
     }
-    take_copies(&scene.objects, budget)?;
+    take_copies(&scene.objects, load)?;
     let degenerate = primitives.degenerate;
     if degenerate > 0 {
-        report.warn(
+        load.warn(
             "meshes",
             format!("{degenerate} triangles without area were dropped"),
             "nothing needs to be done: they can neither be seen nor lit",
@@ -103,7 +101,7 @@ pub fn add_objects(
 ///
 /// # Errors
 /// Too little is left.
-fn take_copies(objects: &[Object], budget: &mut Budget) -> Result<()> {
+fn take_copies(objects: &[Object], load: &mut LoadContext) -> Result<()> {
     let mut known = HashSet::new();
     for (object, is_instance) in objects
         .iter()
@@ -111,7 +109,7 @@ fn take_copies(objects: &[Object], budget: &mut Budget) -> Result<()> {
     {
         if !known.insert(Arc::as_ptr(object.mesh())) && !is_instance {
             let owner = format!("node `{}`", object.name);
-            primitive::take_copy(object.mesh(), &owner, budget)?;
+            primitive::take_copy(object.mesh(), &owner, load)?;
         }
     }
     Ok(())
@@ -120,7 +118,7 @@ fn take_copies(objects: &[Object], budget: &mut Budget) -> Result<()> {
 fn owner(mesh: &mesh::Mesh, mesh_index: usize, primitive: usize) -> String {
     format!(
         "mesh `{}`, primitive {primitive}",
-        names::name(mesh.name.as_ref(), "mesh", mesh_index)
+        extras::name(mesh.name.as_deref(), "mesh", mesh_index)
     )
 }
 
@@ -152,13 +150,13 @@ impl Materials {
         self.all
     }
 
-    fn of_primitive(&mut self, part: &mesh::Primitive, owner: &str, report: &mut Report) -> usize {
+    fn of_primitive(&mut self, part: &mesh::Primitive, owner: &str, load: &mut LoadContext) -> usize {
         let named = part.material.map(|material| material.value());
         if let Some(material) = named {
             if material < self.in_file {
                 return material;
             }
-            report.warn(
+            load.warn(
                 owner,
                 format!("has material {material}, which does not exist; it was made diffuse white"),
                 "give it a material",
@@ -192,21 +190,15 @@ impl Materials {
             return material;
         }
         *twin.get_or_insert_with(|| {
-            let own = &self.all[material];
-            let made = if is_solid {
-                material::solid_twin(own)
-            } else {
-                material::thin_twin(own)
-            };
-            self.all.push(made);
+            self.all.push(material::twin(&self.all[material], is_solid));
             self.all.len() - 1
         })
     }
 
     /// Warns of the remaining thin walls.
-    pub fn warn_of_thin_walls(&self, solid_glass: bool, report: &mut Report) {
+    pub fn warn_of_thin_walls(&self, solid_glass: bool, load: &mut LoadContext) {
         for material in self.all.iter().filter(|material| material::is_thin(material)) {
-            report.warn(
+            load.warn(
                 format!("material `{}`", material.name),
                 "transmits light but has no thickness, so it is a thin pane and does not refract",
                 if solid_glass {
@@ -238,11 +230,11 @@ impl Materials {
         twin
     }
 
-    fn check_coordinates(&self, material: usize, mesh: &Mesh, name: &str, report: &mut Report) {
+    fn check_coordinates(&self, material: usize, mesh: &Mesh, name: &str, load: &mut LoadContext) {
         for (set, uvs) in [&mesh.uv0, &mesh.uv1].into_iter().enumerate() {
             let mut images = self.all[material].images().into_iter().flatten();
             if uvs.is_none() && images.any(|image| image.uv_set == set) {
-                report.warn(
+                load.warn(
                     format!("node `{name}`"),
                     format!("has a texture but no TEXCOORD_{set} to place it by"),
                     "give it texture coordinates",

@@ -6,6 +6,7 @@ use base64::Engine as _;
 use base64::alphabet::STANDARD;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 
+use super::context::damaged;
 use crate::error::{Error, Result};
 use crate::files;
 
@@ -36,7 +37,7 @@ pub fn read(uri: &str, folder: &Path, max_bytes: u64, owner: &str) -> Result<Vec
 }
 
 fn read_data(data: &str, owner: &str) -> Result<Vec<u8>> {
-    let refused = |what: &str| Error::failure(owner, what, "export the file again");
+    let refused = |what: &str| damaged(owner, what);
     let Some((kind, payload)) = data.split_once(',') else {
         return Err(refused("its data URI has no data"));
     };

@@ -10,8 +10,8 @@ use gltf::json::Value;
 use serde::Deserialize;
 use serde_json::json;
 
+use super::context::LoadContext;
 use super::extras;
-use super::report::Report;
 use crate::scene::waves::gravity_period_s;
 use crate::scene::{Scene, Wave, Waves};
 
@@ -37,14 +37,14 @@ struct WaveEntry {
 }
 
 /// Waves that a material states; `None`, with a warning, if any is invalid.
-pub fn read(stated: &Value, owner: &str, report: &mut Report) -> Option<Waves> {
+pub fn read(stated: &Value, owner: &str, load: &mut LoadContext) -> Option<Waves> {
     let waves = Vec::<WaveEntry>::deserialize(stated)
         .map_err(|error| format!("its `{KEY}` cannot be read ({error})"))
         .and_then(|list| list.iter().map(wave).collect())
         .and_then(|waves| Waves::new(waves).map_err(|why| format!("of its `{KEY}`, {why}")));
     waves
         .map_err(|why| {
-            report.warn(
+            load.warn(
                 owner,
                 format!("{why}: it has none"),
                 "give up to 8 waves of amplitude_m, wavelength_m, direction [x, z] or [x, y, z], phase_rad, \
@@ -55,7 +55,7 @@ pub fn read(stated: &Value, owner: &str, report: &mut Report) -> Option<Waves> {
 }
 
 /// Lifts the objects of nodes that ask for it; `nodes` are their extras.
-pub fn lift(scene: &mut Scene, nodes: &[Value], report: &mut Report) {
+pub fn displace(scene: &mut Scene, nodes: &[Value], load: &mut LoadContext) {
     for index in 0..scene.objects.len() {
         let object = &scene.objects[index];
         if extras::stated(nodes, object.node, SWELLS_KEY) != Some(&Value::Bool(true)) {
@@ -64,14 +64,14 @@ pub fn lift(scene: &mut Scene, nodes: &[Value], report: &mut Report) {
         if scene.material_of(index).waves.is_some() {
             scene.swells.insert(index, Arc::clone(object.mesh()));
         } else {
-            report.warn(
+            load.warn(
                 format!("object `{}`", object.name),
                 format!("has `{SWELLS_KEY}`, but its material has no `{KEY}`: it stays still"),
                 "give its material waves",
             );
         }
     }
-    scene.lift();
+    scene.displace_by_waves();
 }
 
 fn wave(stated: &WaveEntry) -> Result<Wave, String> {

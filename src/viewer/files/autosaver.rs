@@ -124,7 +124,7 @@ fn write(folder: &ConfigFolder, snapshot: Snapshot) {
     } = snapshot;
     // Without edits, saved edits that were not restored are kept.
     if !Arc::ptr_eq(&loaded, &edited) {
-        kept.changes = Change::between(&loaded, &edited);
+        kept.changes = Change::diff(&loaded, &edited);
     }
     if let Err(error) = folder.write_scene(&kept) {
         log::warn!("{error}");

@@ -128,7 +128,7 @@ impl Model {
     /// Shows the reloaded scene; camera, settings and edits stay.
     fn show_again(&mut self, mut scene: Scene) {
         let loaded = Arc::clone(self.edits.loaded());
-        let changes = Change::between(&loaded, self.edits.scene());
+        let changes = Change::diff(&loaded, self.edits.scene());
         let is_same_shape = load::share(&loaded, &mut scene);
         self.edits = EditedScene::new(Arc::new(scene));
         self.files.warning = None;

@@ -1,6 +1,6 @@
 //! Refractive index by wavelength: formulas, glass numbers, the catalogue.
 
-use nephroid::optics::glass::{Dispersion, Glass, GlassError, catalogue};
+use nephroid::optics::glass::{Dispersion, Glass, catalogue};
 use nephroid::optics::wavelength::{C_LINE, D_LINE, F_LINE, VISIBLE};
 
 use super::visible;
@@ -132,7 +132,10 @@ fn glass_numbers_are_index_and_abbe_number() {
     }
     for wrong in ["52358", "5235881", "523000", "0"] {
         let refused = Glass::parse(wrong).expect_err(wrong);
-        assert!(matches!(refused, GlassError::NotANumber { .. }), "{wrong}");
+        assert!(
+            refused.what.ends_with("is not a glass number of six digits"),
+            "{refused}"
+        );
     }
 }
 
@@ -200,7 +203,7 @@ fn no_index_is_below_one_or_infinite() {
         c_um2: [0.25, 0.0, 0.0, 0.0],
     };
     let refused = resonant.checked().expect_err("it has one");
-    assert!(matches!(refused, GlassError::Resonance { wavelength_nm: 500.0 }));
+    assert_eq!(refused.what, "the index is infinite at 500.0 nm");
     for dispersion in [steep, resonant] {
         for nm in (1..3000).map(f64::from) {
             let index = dispersion.index(Nanometres(nm));

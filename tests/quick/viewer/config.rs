@@ -56,7 +56,7 @@ fn what_was_set_is_found_again() {
     let kept = SavedState::new();
     let mut first = kept.model();
     use_it(&mut first);
-    let changes = Change::between(first.edits().loaded(), first.edits().scene());
+    let changes = Change::diff(first.edits().loaded(), first.edits().scene());
     assert_eq!(changes.len(), 1);
     let (settings, scene) = (first.choices.settings.clone(), Arc::clone(first.scene()));
     let views = first.navigator.views();

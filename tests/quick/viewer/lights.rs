@@ -64,7 +64,7 @@ fn each_change_of_lights_is_one_step() {
 fn kept_changes_lead_to_the_same_lights() {
     let loaded = fixtures::scene();
     let now = edited(&loaded, &edits());
-    let changes = Change::between(&loaded, &now);
+    let changes = Change::diff(&loaded, &now);
     let text = serde_json::to_string(&changes).expect("it can be written");
     let read: Vec<Change> = serde_json::from_str(&text).expect("it can be read");
     let again = read

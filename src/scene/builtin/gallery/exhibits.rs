@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::picture::Block;
 use super::{patterns, room};
 use crate::optics::LinearSrgb;
-use crate::scene::builtin::basin::Basin;
+use crate::scene::builtin::pool::Basin;
 use crate::scene::builtin::prism::Prism;
 use crate::scene::builtin::{parts, shapes};
 use crate::scene::{Light, Scene};
@@ -46,10 +46,7 @@ fn add_stand(scene: &mut Scene, name: &str, top: DVec3, half_m: f64, material: u
         ("right", right, -front, up),
         ("left", -right, front, up),
     ];
-    for (side, offset, u, v) in sides {
-        let face = room::in_metres(shapes::rectangle(middle + offset, u, v));
-        parts::add_with(scene, &format!("{name} {side}"), face, material);
-    }
+    room::add_faces(scene, (name, material), middle, &sides);
 }
 
 fn add_basin(scene: &mut Scene, stone: usize) {

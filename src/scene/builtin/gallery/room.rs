@@ -91,6 +91,19 @@ pub fn in_metres(mut mesh: Mesh) -> Mesh {
     mesh
 }
 
+/// Adds rectangles with textures in metres: name, offset from `middle` and half axes [m] of each.
+pub fn add_faces(
+    scene: &mut Scene,
+    (name, material): (&str, usize),
+    middle: DVec3,
+    faces: &[(&str, DVec3, DVec3, DVec3)],
+) {
+    for (face, offset, u, v) in faces {
+        let mesh = in_metres(shapes::rectangle(middle + offset, *u, *v));
+        parts::add_with(scene, &format!("{name} {face}"), mesh, material);
+    }
+}
+
 /// Adds four pieces of wall around the opening, and the four sides of the opening.
 fn add_window_wall(scene: &mut Scene, plaster: usize) {
     let x = X[1];
@@ -118,17 +131,10 @@ fn add_window_wall(scene: &mut Scene, plaster: usize) {
     let up = DVec3::Y * (0.5 * (WINDOW_Y[1] - WINDOW_Y[0]));
     let along = DVec3::Z * (0.5 * (WINDOW_Z[1] - WINDOW_Z[0]));
     let sides = [
-        ("window sill", -up, along, depth),
-        ("window lintel", up, depth, along),
-        ("window jamb behind", -along, depth, up),
-        ("window jamb before", along, up, depth),
+        ("sill", -up, along, depth),
+        ("lintel", up, depth, along),
+        ("jamb behind", -along, depth, up),
+        ("jamb before", along, up, depth),
     ];
-    for (name, offset, u, v) in sides {
-        parts::add_with(
-            scene,
-            name,
-            in_metres(shapes::rectangle(centre + offset, u, v)),
-            plaster,
-        );
-    }
+    add_faces(scene, ("window", plaster), centre, &sides);
 }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::{glassware, patterns, room};
 use crate::optics::LinearSrgb;
 use crate::scene::builtin::cut_glass::CutGlass;
-use crate::scene::builtin::ring::cylinder;
+use crate::scene::builtin::reference::cylinder;
 use crate::scene::builtin::{parts, shapes};
 use crate::scene::{Material, Scene, Volume};
 
@@ -56,13 +56,9 @@ fn add_table(scene: &mut Scene) {
         ("back", -half_z, -half_x, half_y),
         ("right", half_x, -half_z, half_y),
         ("left", -half_x, half_z, half_y),
+        ("underside", -half_y, half_x, half_z),
     ];
-    for (side, offset, u, v) in edges {
-        let edge = room::in_metres(shapes::rectangle(middle + offset, u, v));
-        parts::add_with(scene, &format!("table {side}"), edge, walnut);
-    }
-    let below = shapes::rectangle(middle - half_y, half_x, half_z);
-    parts::add_with(scene, "table underside", room::in_metres(below), walnut);
+    room::add_faces(scene, ("table", walnut), middle, &edges);
     let inset = DVec3::new(0.09, 0.0, 0.09);
     let leg = DVec3::new(0.07, 0.0, 0.07);
     for (index, (x, z)) in [(X[0], Z[0]), (X[1], Z[0]), (X[0], Z[1]), (X[1], Z[1])]

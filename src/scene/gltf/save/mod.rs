@@ -8,11 +8,11 @@ use glam::DVec3;
 
 use self::lights::Edited;
 use self::placing::NodePlacement;
+use super::context::LoadContext;
 use super::document::Document;
 use super::glb::{self, Glb};
 use super::light::{self, Origin};
 use super::nodes::PlacedNode;
-use super::report::Report;
 use super::{File, substance, write};
 use crate::error::{Error, Result, Warning};
 use crate::files;
@@ -37,8 +37,8 @@ pub fn save(
     options: &LoadOptions,
 ) -> Result<()> {
     let mut file = File::read(original, options.memory_limit_bytes)?;
-    let mut report = Report::default();
-    let lights = light::all(&file.document, &file.placed, &file.folder, &mut report)?;
+    let mut load = LoadContext::default();
+    let lights = light::all(&file.document, &file.placed, &file.folder, &mut load)?;
     let origins: Vec<Origin> = lights.into_iter().map(|(_, origin)| origin).collect();
 
     let before = file.glb.json.clone();
