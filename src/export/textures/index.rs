@@ -40,8 +40,10 @@ const HOW_TO_LOAD: [(&str, &str); 4] = [
     ),
     (
         "Bevy",
-        "ktx2 with --units lux/pi: commands.entity(surface).insert(Lightmap { image: assets.load(file), ..default() }); \
-         material.lightmap_exposure = 2_f32.powf(-exposure_stops)",
+        "ktx2 with --units lux/pi: on the Mesh3d below the node of surface, \
+         commands.entity(child).insert(Lightmap { image: assets.load(file), ..default() }); \
+         material.lightmap_exposure = 2_f32.powf(-exposure_stops); for TEXCOORD_0, \
+         mesh.insert_attribute(Mesh::ATTRIBUTE_UV_1, mesh.attribute(Mesh::ATTRIBUTE_UV_0).unwrap().clone())",
     ),
 ];
 
