@@ -117,7 +117,8 @@ def special_rows(addon):
     if hasattr(bpy.types, "ShaderNodeBsdfMetallic"):
         made, shader = material("BsdfMetallic")
         shader.fresnel_type = "PHYSICAL_CONDUCTOR"
-        shader.inputs["IOR"].default_value, shader.inputs["Extinction"].default_value = (1.0, 1.0, 1.0), (2.0, 2.0, 2.0)
+        shader.inputs["IOR"].default_value = (1.0, 1.0, 1.0)
+        shader.inputs["Extinction"].default_value = (2.0, 2.0, 2.0)
         equal("metal by index and extinction", read()[0]["pbrMetallicRoughness"]["baseColorFactor"], [0.5, 0.5, 0.5, 1.0])
 
     made, shader = material("BsdfPrincipled")
