@@ -17,15 +17,16 @@ class NephroidPreferences(bpy.types.AddonPreferences):
 
 
 class NephroidSettings(bpy.types.PropertyGroup):
-    preset: EnumProperty(name="Quality", default="PREVIEW", items=[
+    preset: EnumProperty(name="Quality", items=[
         ("DRAFT", "Draft", "10 % of visible error"), ("PREVIEW", "Preview", "3 % of visible error"),
         ("FINAL", "Final", "1 % of visible error")])
     layers: EnumProperty(name="Light", default="CAUSTIC", items=[
         ("CAUSTIC", "Caustics", "Light that met glass, mirrors or water; Blender's lamps light the rest"),
         ("ALL", "All Light", "Caustics, direct and indirect light; the surfaces show nothing else")])
-    map_size: EnumProperty(name="Map Size", default="1024", items=[
+    map_size: EnumProperty(name="Map Size", items=[
         ("AUTO", "As Fine as the Light", "Up to 4096 texels a side")] + [
-        (str(size), str(size), f"{size} × {size} texels") for size in (128, 256, 512, 1024, 2048, 4096)])
+        (str(size), str(size), f"{size} × {size} texels on every surface, however small")
+        for size in (128, 256, 512, 1024, 2048, 4096)])
     lamps: PointerProperty(name="Lamps", type=bpy.types.Collection,
                            description="Only lamps of this collection; empty takes all")
     objects: PointerProperty(name="Objects", type=bpy.types.Collection,

@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import tempfile
 import threading
-import time
 from pathlib import Path
 
 import bpy
@@ -14,11 +13,24 @@ import bpy
 from . import lamps, lightmaps
 from .scene import Export
 
+# How the program names what a message is about.
 NAMES = re.compile(r"(node|light|mesh|material) `([^`]*)`")
+# What to do in Blender where the program names an option. Other options are not in the user's hands.
+REMEDIES = {
+    "--environment": "add a lamp that shows in renders, or let the World shine",
+    "larger --map-resolution": "choose a larger Map Size",
+    "--map-resolution": "choose a smaller Map Size",
+    "--density": "choose a better Quality if it should be there",
+}
+NO_MAPS = ("no light falls on a surface by way of glass, mirrors or water; give an object such a material, or see which "
+           "collections Lamps and Objects name")
+
+# The Job and the LiveView that are under way.
+running = live = None
 
 
 def program():
-    """Path of the program: the one that the preferences name, else the one that came along, else the one on the path.
+    """Path of the program: the one that the preferences name, else the one that came along.
 
     Raises FileNotFoundError where there is none.
     """
@@ -27,119 +39,105 @@ def program():
         return bpy.path.abspath(chosen)
     try:
         import nephroid
-        path = nephroid.program()
-        path.chmod(path.stat().st_mode | 0o111)
-        return str(path)
     except ImportError:
-        found = shutil.which("nephroid")
-        if found is None:
-            raise FileNotFoundError("the program nephroid is not there; name it in the preferences of this add-on") from None
-        return found
+        raise FileNotFoundError("the program nephroid is not there; name it in the preferences of this add-on") from None
+    path = nephroid.program()
+    if not path.stat().st_mode & 0o100:
+        # Blender unpacks wheels without this bit.
+        path.chmod(0o755)
+    return str(path)
 
 
 class Files:
-    """A folder of its own with the scene and, where it shines, the world."""
+    """A folder of its own with the scene and, where it shines, the world; and the program that reads them."""
 
     def __init__(self, context):
+        self.program = program()
         self.folder = Path(tempfile.mkdtemp(prefix="nephroid-", dir=bpy.app.tempdir))
-        self.scene, self.world = self.folder / "scene.glb", self.folder / "world.exr"
-        self.settings = context.scene.nephroid
-        self.has_world = lamps.world_shines(context.scene.world, self.settings.world)
-        if self.has_world:
-            lamps.write_world(context.scene.world, self.world)
-        self.export = Export(context, self.scene, self.settings)
+        self.scene, settings = self.folder / "scene.glb", context.scene.nephroid
+        self.options = ["--preset", settings.preset.lower(), "--map-resolution", settings.map_size.lower(),
+                        "--layers", "caustic" if settings.layers == "CAUSTIC" else "caustic,direct,indirect",
+                        # The file says itself what is solid.
+                        "--solid-glass=off"]
+        if lamps.world_shines(context.scene.world, settings.world):
+            world = self.folder / "world.exr"
+            lamps.write_world(context.scene.world, world)
+            self.options += ["--environment", str(world)]
+        self.export = Export(context, self.scene)
 
-    def options(self):
-        """Of the program, for this scene and the settings of the panel."""
-        layers = "caustic" if self.settings.layers == "CAUSTIC" else "caustic,direct,indirect"
-        options = ["--preset", self.settings.preset.lower(), "--layers", layers,
-                   # The file says itself what is solid.
-                   "--map-resolution", self.settings.map_size.lower(), "--solid-glass=off"]
-        return options + (["--environment", str(self.world)] if self.has_world else [])
+    def start(self, *command, stderr):
+        """Starts the program, without a console window of its own."""
+        return subprocess.Popen([self.program, *map(str, command)], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
+                                stderr=stderr, creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0))
 
     def remove(self):
         shutil.rmtree(self.folder, ignore_errors=True)
-
-
-def start(*command, **streams):
-    """Starts the program without a console window of its own."""
-    flags = getattr(subprocess, "CREATE_NO_WINDOW", 0)
-    return subprocess.Popen([program(), *map(str, command)], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL,
-                            creationflags=flags, **streams)
 
 
 class Job:
     """A bake that runs beside Blender. Nothing in the file changes before `finish`."""
 
     def __init__(self, context):
+        self.keeps_lamps = context.scene.nephroid.layers == "CAUSTIC"
         self.files = Files(context)
         self.messages = list(self.files.export.messages)
         self.stage, self.share = "start", 0.0
-        self.failed, self.is_cancelled = None, False
-        files = self.files
-        self.steps = [
-            ["bake", files.scene, "-o", files.folder / "maps", "--progress", "json", *files.options()],
-            ["export", files.folder / "maps", "--format", "exr", "--bits", "32", "--units", "E/pi",
-             "-o", files.folder / "textures"],
-        ]
-        self.process = None
+        self.process, self.failed, self.is_cancelled = None, None, False
+        self.thread = threading.Thread(target=self.work, daemon=True)
+        self.thread.start()
+
+    def work(self):
+        """Bakes the maps and writes them as Blender reads them. Touches nothing of Blender's."""
+        folder = self.files.folder
         try:
-            self.next_step()
-        except OSError:
-            self.files.remove()
-            raise
+            self.run("bake", self.files.scene, "-o", folder / "maps", "--progress", "json", *self.files.options)
+            if not json.loads((folder / "maps" / "manifest.json").read_text())["maps"]:
+                raise RuntimeError(NO_MAPS)
+            self.run("export", folder / "maps", "--format", "exr", "--bits", "32", "--units", "E/pi", "-o", folder / "textures")
+        except (OSError, ValueError, RuntimeError) as error:
+            self.failed = str(error)
 
-    def next_step(self):
-        self.process = start(*self.steps.pop(0), stderr=subprocess.PIPE)
-        self.reader = threading.Thread(target=self.listen, args=(self.process.stderr,), daemon=True)
-        self.reader.start()
-
-    def listen(self, stream):
-        """Progress, warnings and the error, line by line."""
-        for line in stream:
-            line = line.decode(errors="replace").strip()
-            if line.startswith("{"):
+    def run(self, *command):
+        """Runs the program, and reads its progress, warnings and error, line by line."""
+        self.process = self.files.start(*command, stderr=subprocess.PIPE)
+        error = None
+        for line in self.process.stderr:
+            kind, _, text = line.decode(errors="replace").strip().partition(": ")
+            if kind.startswith("{"):
                 told = json.loads(line)
                 self.stage, self.share = told["stage"], told["done"] / max(told["total"], 1)
-            elif line.startswith("warning: ") and "so it is a thin pane" not in line:
-                self.messages.append((None, line.removeprefix("warning: ")))
-            elif line.startswith("error: "):
-                # The user knows of no file.
-                self.failed = line.removeprefix("error: ").replace(f"{self.files.scene}: ", "")
+            elif kind == "warning" and "so it is a thin pane" not in text:
+                self.messages.append((None, self.in_blender(text)))
+            elif kind == "error":
+                error = self.in_blender(text)
+        if self.process.wait() != 0 or self.is_cancelled:
+            raise RuntimeError(error or f"the program ended with {self.process.returncode}")
 
-    def poll(self):
-        """Whether it has ended, one way or the other."""
-        if self.process.poll() is None:
-            return False
-        self.reader.join()
-        if self.process.returncode != 0:
-            self.failed = self.failed or f"the program ended with {self.process.returncode}"
-            return True
-        manifest = json.loads((self.files.folder / "maps" / "manifest.json").read_text())
-        if not manifest["maps"]:
-            reasons = [effect["reason"] for effect in manifest["effects"] if not effect["on"]]
-            self.failed = f"there is no light to show: {reasons[0] if reasons else 'no surface received any'}"
-            return True
-        if not self.steps:
-            return True
-        self.next_step()
-        return False
+    def in_blender(self, text):
+        """A message in terms of the panel, without the file, of which the user does not know."""
+        text = text.replace(f"{self.files.scene}: ", "").removeprefix("--memory: ")
+        what, _, remedy = text.rpartition("; ")
+        if not what or "--" not in remedy:
+            return text
+        instead = [there for option, there in REMEDIES.items() if option in remedy]
+        return "; ".join([what, *instead[:1]])
 
     def cancel(self):
         """Ends it; nothing has been changed."""
-        self.process.kill()
-        self.process.wait()
-        self.reader.join()
+        self.is_cancelled = True
+        if self.process is not None:
+            self.process.kill()
+        self.thread.join()
         self.files.remove()
 
     def finish(self, context):
         """Puts the maps back; messages as (level, object name or '', text)."""
+        self.thread.join()
         found = [message for owner, text in self.messages for message in addressed("WARNING", owner, text)]
         try:
             if self.failed:
                 return found + addressed("ERROR", None, self.failed)
-            keeps_lamps = self.files.settings.layers == "CAUSTIC"
-            count = lightmaps.put_back(context, self.files.export, self.files.folder, keeps_lamps,
+            count = lightmaps.put_back(context, self.files.export, self.files.folder, self.keeps_lamps,
                                        lambda name, text: found.append(("WARNING", name, text)))
             return found + [("INFO", "", f"{count} light maps")]
         except (OSError, ValueError, RuntimeError) as error:
@@ -150,21 +148,15 @@ class Job:
 
 
 def addressed(level, owner, text):
-    """A message for each object that it is about: the one that it names, or those of a material or a mesh."""
-    if isinstance(owner, str):
-        return [(level, owner, text)]
-    named = [owner] if owner else NAMES.findall(text)
-    objects = bpy.context.scene.objects
-    names = []
-    for kind, name in named:
-        if kind in {"node", "light"} and name in objects:
-            names.append(name)
-        elif kind == "material":
-            names += [item.name for item in objects if any(slot.material and slot.material.name_full == name
-                                                           for slot in item.material_slots)]
-        elif kind == "mesh":
-            names += [item.name for item in objects if item.name == name or (item.data and item.data.name == name)]
-    return [(level, name, text) for name in dict.fromkeys(names)] or [(level, "", text)]
+    """A message for each object that it is about: the owner, (kind, name), or what the text names."""
+    names, start = [], text.partition(": ")[0]
+    for kind, name in [owner] if owner else [*NAMES.findall(text), ("node", start)]:
+        for item in bpy.context.scene.objects:
+            data = item.data.name if item.data else None
+            materials = [slot.material.name_full for slot in item.material_slots if slot.material]
+            if name in {"material": materials, "mesh": [item.name, data]}.get(kind, [item.name]):
+                names.append(item.name)
+    return [(level, name, text.removeprefix(f"{name}: ")) for name in dict.fromkeys(names)] or [(level, "", text)]
 
 
 def report(operator, context, messages):
@@ -178,18 +170,19 @@ def report(operator, context, messages):
             message.level, message.object, message.text = level, name, text
 
 
-running = None
-
-
-class NEPHROID_OT_bake(bpy.types.Operator):
-    """Bake the light that glass, mirrors and water throw onto the scene, and show it on the surfaces"""
-
-    bl_idname, bl_label = "nephroid.bake", "Bake Caustics"
-    bl_options = {"REGISTER", "UNDO"}
+class WhileIdle:
+    """Operators that change the scene wait for the bake."""
 
     @classmethod
     def poll(cls, context):
         return running is None and context.mode == "OBJECT"
+
+
+class NEPHROID_OT_bake(WhileIdle, bpy.types.Operator):
+    """Bake the light that glass, mirrors and water throw onto the scene, and show it on the surfaces"""
+
+    bl_idname, bl_label = "nephroid.bake", "Bake Caustics"
+    bl_options = {"REGISTER", "UNDO"}
 
     def begin(self, context):
         global running
@@ -202,16 +195,16 @@ class NEPHROID_OT_bake(bpy.types.Operator):
     def end(self, context):
         global running
         job, running = running, None
+        if job.is_cancelled:
+            job.cancel()
+            report(self, context, [("INFO", "", "Cancelled: nothing was changed")])
+            return {"CANCELLED"}
         messages = job.finish(context)
         report(self, context, messages)
         return {"CANCELLED"} if messages[-1][0] == "ERROR" else {"FINISHED"}
 
     def execute(self, context):
-        if not self.begin(context):
-            return {"CANCELLED"}
-        while not running.poll():
-            time.sleep(0.05)
-        return self.end(context)
+        return self.end(context) if self.begin(context) else {"CANCELLED"}
 
     def invoke(self, context, event):
         if not self.begin(context):
@@ -223,26 +216,23 @@ class NEPHROID_OT_bake(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
-        if event.type == "ESC":
-            running.is_cancelled = True
+        running.is_cancelled |= event.type == "ESC"
         if event.type not in {"TIMER", "ESC"}:
             return {"PASS_THROUGH"}
-        if not running.is_cancelled and not running.poll():
-            context.window_manager.progress_update(round(100 * running.share))
+        manager = context.window_manager
+        if running.thread.is_alive() and not running.is_cancelled:
+            manager.progress_update(round(100 * running.share))
             for area in context.screen.areas if context.screen else ():
                 if area.type == "PROPERTIES":
                     area.tag_redraw()
             return {"PASS_THROUGH"}
-        context.window_manager.event_timer_remove(self.timer)
-        context.window_manager.progress_end()
-        return self.stopped(context) if running.is_cancelled else self.end(context)
+        manager.event_timer_remove(self.timer)
+        manager.progress_end()
+        return self.end(context)
 
-    def stopped(self, context):
-        global running
-        running.cancel()
-        running = None
-        report(self, context, [("INFO", "", "Cancelled: nothing was changed")])
-        return {"CANCELLED"}
+    def cancel(self, context):
+        """Blender calls this when another file is opened."""
+        stop()
 
 
 class NEPHROID_OT_cancel(bpy.types.Operator):
@@ -250,24 +240,17 @@ class NEPHROID_OT_cancel(bpy.types.Operator):
 
     bl_idname, bl_label = "nephroid.cancel", "Cancel"
 
-    @classmethod
-    def poll(cls, context):
-        return running is not None
-
     def execute(self, context):
-        running.is_cancelled = True
+        if running is not None:
+            running.is_cancelled = True
         return {"FINISHED"}
 
 
-class NEPHROID_OT_remove(bpy.types.Operator):
+class NEPHROID_OT_remove(WhileIdle, bpy.types.Operator):
     """Take all light maps away again: images, coordinates, nodes and modifiers"""
 
     bl_idname, bl_label = "nephroid.remove", "Remove Light Maps"
     bl_options = {"REGISTER", "UNDO"}
-
-    @classmethod
-    def poll(cls, context):
-        return running is None and context.mode == "OBJECT"
 
     def execute(self, context):
         if not lightmaps.remove(context):
@@ -302,22 +285,24 @@ class LiveView:
     PERIOD_S = 0.3
 
     def __init__(self, context):
-        self.scene, self.is_changed = context.scene, False
-        self.files = Files(context)
-        self.process = start("view", self.files.scene, "--watch", "--fresh", *self.files.options(), stderr=subprocess.DEVNULL)
+        self.is_changed, self.files = False, Files(context)
+        self.process = self.files.start("view", self.files.scene, "--watch", "--fresh", *self.files.options,
+                                        stderr=subprocess.DEVNULL)
         bpy.app.handlers.depsgraph_update_post.append(self.note)
+        bpy.app.timers.register(self.look, first_interval=self.PERIOD_S)
 
     def note(self, scene, depsgraph):
-        kinds = ("geometry", "transform", "shading")
-        self.is_changed |= any(getattr(update, f"is_updated_{kind}") for update in depsgraph.updates for kind in kinds)
+        self.is_changed |= any(update.is_updated_geometry or update.is_updated_transform or update.is_updated_shading
+                               for update in depsgraph.updates)
 
     def look(self):
         """Writes what changed; seconds until the next look, or None where the window was closed."""
-        if self.process.poll() is not None:
+        if live is self and self.process.poll() is not None:
             self.close()
+        if live is not self:
             return None
         if self.is_changed and bpy.context.mode == "OBJECT" and running is None:
-            Export(bpy.context, self.files.scene, self.files.settings)
+            Export(bpy.context, self.files.scene)
             # Its own switching of modifiers is no change.
             bpy.context.view_layer.update()
             self.is_changed = False
@@ -326,14 +311,12 @@ class LiveView:
     def close(self):
         global live
         live = None
-        bpy.app.handlers.depsgraph_update_post.remove(self.note)
-        if self.process.poll() is None:
-            self.process.terminate()
-            self.process.wait()
+        # Opening another file has taken it away.
+        if self.note in bpy.app.handlers.depsgraph_update_post:
+            bpy.app.handlers.depsgraph_update_post.remove(self.note)
+        self.process.terminate()
+        self.process.wait()
         self.files.remove()
-
-
-live = None
 
 
 class NEPHROID_OT_live(bpy.types.Operator):
@@ -351,7 +334,6 @@ class NEPHROID_OT_live(bpy.types.Operator):
         except (OSError, RuntimeError) as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
-        bpy.app.timers.register(live.look, first_interval=LiveView.PERIOD_S)
         return {"FINISHED"}
 
 
@@ -362,8 +344,6 @@ def stop():
         running.cancel()
         running = None
     if live is not None:
-        if bpy.app.timers.is_registered(live.look):
-            bpy.app.timers.unregister(live.look)
         live.close()
 
 

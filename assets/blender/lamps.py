@@ -5,7 +5,7 @@ import math
 import bpy
 import numpy
 
-from .materials import LUMENS_PER_WATT, custom_properties, nodes_of, number, output, source
+from .materials import LUMENS_PER_WATT, custom_properties, number, output, source
 
 PUNCTUAL, FLAT = "KHR_lights_punctual", "EXT_lights_area"
 
@@ -16,25 +16,17 @@ WORLD_SAMPLES = 16
 
 def strength(lamp, fault):
     """Watts (of a sun W/m²) of each channel, with exposure, temperature and a plain Emission node."""
-    channels = numpy.array(lamp.color[:]) * lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0)
+    channels = numpy.array(lamp.color) * lamp.energy * 2.0 ** getattr(lamp, "exposure", 0.0)
     if getattr(lamp, "use_temperature", False):
-        channels = channels * numpy.array(lamp.temperature_color[:])
-    if nodes_of(lamp):
-        end = output(lamp)
-        node, _ = source(end.inputs["Surface"]) if end else (None, None)
-        if node is None or node.type != "EMISSION" or node.inputs["Color"].is_linked or node.inputs["Strength"].is_linked:
+        channels *= lamp.temperature_color
+    end = output(lamp)
+    if end is not None:
+        node, _ = source(end.inputs["Surface"])
+        if node is None or node.type != "EMISSION" or any(socket.is_linked for socket in node.inputs):
             fault("its nodes are not read; it was baked without them")
         else:
-            channels = channels * numpy.array(number(node.inputs["Color"].default_value)) * node.inputs["Strength"].default_value
+            channels *= numpy.array(number(node.inputs["Color"].default_value)) * node.inputs["Strength"].default_value
     return channels
-
-
-def size_m(lamp, scale):
-    """Width and height of an area lamp."""
-    width, height = lamp.size * scale[0], lamp.size * scale[1]
-    if lamp.shape in {"RECTANGLE", "ELLIPSE"}:
-        height = lamp.size_y * scale[1]
-    return width, height
 
 
 def gltf(lamp, scale, fault):
@@ -46,29 +38,27 @@ def gltf(lamp, scale, fault):
     brightest = float(channels.max())
     if brightest <= 0.0:
         return None, None, None
-    # Of a lamp that has no size, all of its light counts: `normalize` divides by its area.
     entry = {"name": lamp.name_full, "color": [max(float(channel), 0.0) / brightest for channel in channels]}
-    extras = custom_properties(lamp)
+    extras, is_normalized = custom_properties(lamp), getattr(lamp, "normalize", True)
     if lamp.type == "SUN":
         if lamp.angle > 0.0:
             extras.setdefault("angular_diameter_deg", min(math.degrees(lamp.angle), 180.0))
-        entry.update(type="directional", intensity=brightest * LUMENS_PER_WATT)
-        return PUNCTUAL, entry, extras
+        return PUNCTUAL, dict(entry, type="directional", intensity=brightest * LUMENS_PER_WATT), extras
     if lamp.type in {"POINT", "SPOT"}:
-        area_m2 = math.pi * lamp.shadow_soft_size ** 2
-        if not getattr(lamp, "normalize", True):
-            brightest *= area_m2
-        if lamp.shadow_soft_size > 0.0:
-            extras.setdefault("radius_m", lamp.shadow_soft_size)
-        entry.update(type=lamp.type.lower(), intensity=brightest / (4.0 * math.pi) * LUMENS_PER_WATT)
+        radius_m = lamp.shadow_soft_size
+        if radius_m > 0.0:
+            extras.setdefault("radius_m", radius_m)
+        power_w = brightest if is_normalized else brightest * math.pi * radius_m ** 2
+        entry.update(type=lamp.type.lower(), intensity=power_w / (4.0 * math.pi) * LUMENS_PER_WATT)
         if lamp.type == "SPOT":
-            outer = min(0.5 * lamp.spot_size, 0.5 * math.pi)
             if lamp.spot_size > math.pi:
                 fault("its cone is wider than 180 degrees and was narrowed to that")
+            outer = 0.5 * min(lamp.spot_size, math.pi)
             # glTF has no hard edge.
             entry["spot"] = {"outerConeAngle": outer, "innerConeAngle": outer * (1.0 - max(lamp.spot_blend, 1e-4))}
         return PUNCTUAL, entry, extras
-    width, height = size_m(lamp, scale)
+    has_sides = lamp.shape in {"RECTANGLE", "ELLIPSE"}
+    width, height = lamp.size * scale[0], (lamp.size_y if has_sides else lamp.size) * scale[1]
     is_disc = lamp.shape in {"DISK", "ELLIPSE"}
     area_m2 = width * height * (0.25 * math.pi if is_disc else 1.0)
     if area_m2 <= 0.0:
@@ -76,9 +66,9 @@ def gltf(lamp, scale, fault):
         return None, None, None
     if lamp.shape == "ELLIPSE":
         fault("is an ellipse and was baked as a disc of the same area")
-    if getattr(lamp, "spread", math.pi) < math.pi - 1e-3:
+    if lamp.spread < math.pi - 1e-3:
         fault("its spread was ignored; it was baked with one of 180 degrees")
-    radiance = brightest / math.pi / (area_m2 if getattr(lamp, "normalize", True) else 1.0)
+    radiance = brightest / math.pi / (area_m2 if is_normalized else 1.0)
     kind = "disk" if is_disc else "rect"
     entry.update(type=kind, shape=kind, intensity=radiance * LUMENS_PER_WATT,
                  size=math.sqrt(width * height) if is_disc else height, rect={"aspect": 1.0 if is_disc else width / height})
@@ -87,10 +77,8 @@ def gltf(lamp, scale, fault):
 
 def world_shines(world, wish):
     """Whether the world's light is baked: as wished, by default where it is more than one colour."""
-    if world is None or wish == "OFF":
-        return False
-    if wish == "ON":
-        return True
+    if world is None or wish != "AUTO":
+        return world is not None and wish == "ON"
     end = output(world)
     node = source(end.inputs["Surface"])[0] if end else None
     return node is not None and (node.type != "BACKGROUND" or node.inputs["Color"].is_linked)

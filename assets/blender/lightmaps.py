@@ -11,12 +11,12 @@ from pathlib import Path
 import bpy
 import numpy
 
-from .materials import LIGHT_MAP_GROUP, NODES, Surface, output
+from .materials import LIGHT_MAP_GROUP, Surface, output
 from .scene import BACK_UV_LAYER, BAKED_MESH, UV_LAYER
 
 IMAGE, MATTE = "Nephroid light", "Nephroid matte"
 FIRST_TILE, MOST_TILES = 1001, 999
-CAUSTIC_FLAGS = ("caustics_reflective", "caustics_refractive")
+CAUSTICS, CAUSTIC_FLAGS = "nephroid_caustics", ("caustics_reflective", "caustics_refractive")
 # Keeps coordinates off the borders of their tile.
 INSET = 1e-5
 
@@ -32,35 +32,37 @@ def put_back(context, export, folder, keeps_lamps, fault):
     `fault(object name, text)` is told of surfaces that cannot show theirs.
     """
     remove(context)
-    index = json.loads((folder / "textures" / "index.json").read_text())
-    entries = [(texture["file"], place) for texture in index["textures"] for place in texture["maps"]]
     shown, files, coordinates = {}, [], {}
-    for file, place in entries:
+    for texture in json.loads((folder / "textures" / "index.json").read_text())["textures"]:
+        place, = texture["maps"]
         part = export.parts[place["node"]]
-        item = bpy.data.objects.get(part.object)
-        why = unusable(item, part) or (len(files) >= MOST_TILES and "there are too many maps; its was left out")
-        if why:
-            fault(part.object, why)
+        why = unusable(bpy.data.objects.get(part.object), part)
+        if why or len(files) == MOST_TILES:
+            fault(part.object, why or "there are too many maps; its was left out")
             continue
-        files.append(folder / "textures" / file)
+        files.append(folder / "textures" / texture["file"])
         uvs = coordinates.setdefault(part.object, {}).setdefault(place["side"], numpy.zeros((len(part.geometry.loops), 3, 2)))
         write_tile(uvs, part, place, folder, len(files))
         shown[part.object] = part
     if not shown:
         return 0
-    image = load_tiles(files, folder)
-    group = light_map_group(image, keeps_lamps)
-    lit = set()
+    group = light_map_group(load_tiles(files, folder), keeps_lamps)
+    users = {}
     for name, part in shown.items():
         item = bpy.data.objects[name]
+        give_material(item)
         write_layers(item, part, coordinates[name])
-        lit.update(slot for slot in materials_of(item) if slot is not None)
-    for material in lit:
+        for material in {slot.material for slot in item.material_slots if slot.material}:
+            users.setdefault(material, []).append(name)
+    for material, names in users.items():
         why = add_node(material, group)
-        if why:
-            for name in users_of(material, shown):
-                fault(name, why)
-    remember(context.scene)
+        for name in names if why else ():
+            fault(name, why)
+    if hasattr(context.scene, "cycles"):
+        # Cycles' own caustics would be there twice.
+        context.scene[CAUSTICS] = [int(getattr(context.scene.cycles, name)) for name in CAUSTIC_FLAGS]
+        for name in CAUSTIC_FLAGS:
+            setattr(context.scene.cycles, name, False)
     return len(files)
 
 
@@ -78,7 +80,7 @@ def unusable(item, part):
 def write_tile(uvs, part, place, folder, tile):
     """Writes the coordinates of a map, moved to its tile, into those of its object."""
     geometry = part.geometry
-    rows = numpy.flatnonzero(geometry.slots == part.primitives[place["primitive"]])
+    rows = numpy.flatnonzero(geometry.slots == part.slots[place["primitive"]])
     if place["uv_file"]:
         data = (folder / "textures" / place["uv_file"]).read_bytes()
         own = numpy.frombuffer(data, dtype="<f8", offset=16).reshape(-1, 3, 2) * (1.0, -1.0) + (0.0, 1.0)
@@ -111,42 +113,39 @@ def load_tiles(files, folder):
 def light_map_group(image, keeps_lamps):
     """Adds albedo · E/π to a shader, or shows nothing else."""
     tree = bpy.data.node_groups.new(LIGHT_MAP_GROUP, "ShaderNodeTree")
-    for name, kind, way in [("Shader", "Shader", "INPUT"), ("Color", "Color", "INPUT"), ("Diffuse", "Float", "INPUT"),
-                            ("Strength", "Float", "INPUT"), ("Shader", "Shader", "OUTPUT")]:
+    for name, kind, way in [("Shader", "Shader", "INPUT"), ("Color", "Color", "INPUT"), ("Strength", "Float", "INPUT"),
+                            ("Shader", "Shader", "OUTPUT")]:
         tree.interface.new_socket(name, in_out=way, socket_type=f"NodeSocket{kind}")
 
-    def node(kind, x, y, **values):
-        made = tree.nodes.new(f"ShaderNode{kind}")
-        made.location = (x, y)
+    def node(kind, **values):
+        made = tree.nodes.new(kind)
+        made.location.x = 200.0 * len(tree.nodes)
         for name, value in values.items():
             setattr(made, name, value)
-        return made
+        return made.inputs, made.outputs
 
-    inputs, outputs = tree.nodes.new("NodeGroupInput"), tree.nodes.new("NodeGroupOutput")
-    inputs.location, outputs.location = (-200, 300), (800, 200)
-    front, back = node("UVMap", -400, 0, uv_map=UV_LAYER), node("UVMap", -400, -150, uv_map=BACK_UV_LAYER)
-    side = node("NewGeometry", -400, -300)
-    place = node("Mix", -200, 0, data_type="VECTOR")
-    texture = node("TexImage", 0, 0, image=image, extension="EXTEND")
-    tinted = node("VectorMath", 250, 100, operation="MULTIPLY")
-    amount = node("Math", 250, -150, operation="MULTIPLY")
-    emission, both = node("Emission", 450, 100), node("AddShader", 620, 200)
-    vectors = [socket for socket in place.inputs if socket.type == "VECTOR" and socket.name in "AB"]
-    link = tree.links.new
-    link(side.outputs["Backfacing"], next(socket for socket in place.inputs if socket.type == "VALUE"))
-    link(front.outputs["UV"], vectors[0])
-    link(back.outputs["UV"], vectors[1])
-    link(next(socket for socket in place.outputs if socket.type == "VECTOR"), texture.inputs["Vector"])
-    link(texture.outputs["Color"], tinted.inputs[0])
-    link(inputs.outputs["Color"], tinted.inputs[1])
-    link(inputs.outputs["Diffuse"], amount.inputs[0])
-    link(inputs.outputs["Strength"], amount.inputs[1])
-    link(tinted.outputs["Vector"], emission.inputs["Color"])
-    link(amount.outputs["Value"], emission.inputs["Strength"])
-    link(emission.outputs["Emission"], both.inputs[1])
+    def socket(sockets, name, kind):
+        # A Mix node has sockets of one name for each type.
+        return next(one for one in sockets if one.name == name and one.type == kind)
+
+    _, given = node("NodeGroupInput")
+    _, front = node("ShaderNodeUVMap", uv_map=UV_LAYER)
+    _, back = node("ShaderNodeUVMap", uv_map=BACK_UV_LAYER)
+    _, side = node("ShaderNodeNewGeometry")
+    choice, place = node("ShaderNodeMix", data_type="VECTOR")
+    at, light = node("ShaderNodeTexImage", image=image, extension="EXTEND")
+    factors, product = node("ShaderNodeVectorMath", operation="MULTIPLY")
+    shown, glow = node("ShaderNodeEmission")
+    parts, both = node("ShaderNodeAddShader")
+    result, _ = node("NodeGroupOutput")
+    for start, end in [
+            (side["Backfacing"], socket(choice, "Factor", "VALUE")), (front["UV"], socket(choice, "A", "VECTOR")),
+            (back["UV"], socket(choice, "B", "VECTOR")), (socket(place, "Result", "VECTOR"), at["Vector"]),
+            (light["Color"], factors[0]), (given["Color"], factors[1]), (product["Vector"], shown["Color"]),
+            (given["Strength"], shown["Strength"]), (glow["Emission"], parts[1]), (both["Shader"], result["Shader"])]:
+        tree.links.new(start, end)
     if keeps_lamps:
-        link(inputs.outputs["Shader"], both.inputs[0])
-    link(both.outputs["Shader"], outputs.inputs["Shader"])
+        tree.links.new(given["Shader"], parts[0])
     return tree
 
 
@@ -162,15 +161,12 @@ def add_node(material, group):
     node = tree.nodes.new("ShaderNodeGroup")
     node.node_tree = group
     node.label, node.location = LIGHT_MAP_GROUP, (end.location[0], end.location[1] + 220)
-    before = end.inputs["Surface"].links[0].from_socket
-    link(before, node.inputs["Shader"])
+    link(end.inputs["Surface"].links[0].from_socket, node.inputs["Shader"])
     link(node.outputs["Shader"], end.inputs["Surface"])
-    colour, name = surface.values["color"], NODES.get(surface.node.type, {}).get("color") if surface.node else None
-    node.inputs["Color"].default_value = (*colour, 1.0)
-    if isinstance(name, str) and surface.node.inputs[name].is_linked:
-        link(surface.node.inputs[name].links[0].from_socket, node.inputs["Color"])
-    node.inputs["Diffuse"].default_value = surface.diffuse_share()
-    node.inputs["Strength"].default_value = 1.0
+    node.inputs["Color"].default_value = (*surface.values["color"], 1.0)
+    if surface.colour_socket is not None and surface.colour_socket.is_linked:
+        link(surface.colour_socket.links[0].from_socket, node.inputs["Color"])
+    node.inputs["Strength"].default_value = surface.diffuse_share()
     if hasattr(material, "cycles"):
         # Paths find the light where they meet it; shadow rays to every lit surface would be noise.
         node["emission_sampling"] = material.cycles.emission_sampling
@@ -178,74 +174,59 @@ def add_node(material, group):
     return None
 
 
-def materials_of(item):
-    """An object's materials; one of ours where it has none."""
-    if not any(slot.material for slot in item.material_slots):
-        matte = bpy.data.materials.get(MATTE) or bpy.data.materials.new(MATTE)
-        matte.use_nodes = True
-        if item.material_slots:
-            item.material_slots[0].material = matte
-        else:
-            item.data.materials.append(matte)
-    return [slot.material for slot in item.material_slots]
-
-
-def users_of(material, names):
-    return [name for name in names if any(slot.material == material for slot in bpy.data.objects[name].material_slots)]
+def give_material(item):
+    """An object without materials gets one of ours."""
+    if any(slot.material for slot in item.material_slots):
+        return
+    matte = bpy.data.materials.get(MATTE) or bpy.data.materials.new(MATTE)
+    matte.use_nodes = True
+    if item.material_slots:
+        item.material_slots[0].material = matte
+    else:
+        item.data.materials.append(matte)
+        item.data[MATTE] = True
 
 
 def write_layers(item, part, sides):
     """Writes coordinates into the mesh that shows them."""
-    geometry = part.geometry
-    mesh = item.data
-    is_own = item.type == "MESH" and mesh.users == 1 and not item.modifiers and len(mesh.loops) == geometry.loop_count
+    geometry, mesh = part.geometry, item.data
+    is_own = item.type == "MESH" and mesh.users == 1 and not item.modifiers and len(mesh.loops) == len(geometry.vertices)
     layers = {side: by_loop(uvs, geometry) for side, uvs in sides.items()}
-    if is_own and all(layer is not None for layer in layers.values()):
-        for side, layer in layers.items():
-            add_layer(mesh, side, layer)
-        return
-    materials_of(item)
-    mesh = copy_of(geometry, f"{item.name} as baked", [slot.material for slot in item.material_slots])
-    for side, uvs in sides.items():
-        add_layer(mesh, side, uvs.reshape(-1, 2))
-    modifier = item.modifiers.new(BAKED_MESH, "NODES")
-    modifier.node_group = baked_mesh_group()
-    modifier.show_in_editmode = False
-    socket = next(entry for entry in modifier.node_group.interface.items_tree if entry.name == "Object")
-    modifier[socket.identifier] = bpy.data.objects.new(mesh.name, mesh)
+    if not is_own or any(layer is None for layer in layers.values()):
+        layers = {side: uvs.reshape(-1, 2) for side, uvs in sides.items()}
+        mesh = copy_of(geometry, f"{item.name} as baked", [slot.material for slot in item.material_slots])
+        modifier = item.modifiers.new(BAKED_MESH, "NODES")
+        modifier.node_group = baked_mesh_group()
+        modifier.show_in_editmode = False
+        socket = next(entry for entry in modifier.node_group.interface.items_tree if entry.name == "Object")
+        modifier[socket.identifier] = bpy.data.objects.new(mesh.name, mesh)
+    for side, layer in layers.items():
+        add_layer(mesh, UV_LAYER if side == "front" else BACK_UV_LAYER, layer)
 
 
 def by_loop(uvs, geometry):
     """Coordinates of each corner of a mesh's polygons; None where the triangles of one disagree."""
-    layer = numpy.zeros((geometry.loop_count, 2))
+    layer = numpy.zeros((len(geometry.vertices), 2))
     layer[geometry.loops] = uvs
     return layer if numpy.abs(layer[geometry.loops] - uvs).max() < 1e-6 else None
 
 
-def add_layer(mesh, side, values):
+def add_layer(mesh, name, values):
     """A UV layer that does not become the active one."""
-    layer = mesh.uv_layers.new(name=UV_LAYER if side == "front" else BACK_UV_LAYER, do_init=False)
+    layer = mesh.uv_layers.new(name=name, do_init=False)
     layer.uv.foreach_set("vector", numpy.ascontiguousarray(values, dtype=numpy.float32).ravel())
+    return layer
 
 
 def copy_of(geometry, name, materials):
     """The triangles of a baked mesh, with its normals and UV layers."""
-    mesh = bpy.data.meshes.new(name)
-    corners = geometry.loops.ravel()
-    mesh.vertices.add(len(geometry.positions))
-    mesh.vertices.foreach_set("co", geometry.positions.ravel())
-    mesh.loops.add(len(corners))
-    mesh.loops.foreach_set("vertex_index", geometry.vertices[corners])
-    mesh.polygons.add(len(geometry.loops))
-    mesh.polygons.foreach_set("loop_start", numpy.arange(0, len(corners), 3, dtype=numpy.int32))
+    mesh, corners = bpy.data.meshes.new(name), geometry.loops.ravel()
+    mesh.from_pydata(geometry.positions, [], geometry.vertices[geometry.loops], shade_flat=False)
     for material in materials:
         mesh.materials.append(material)
     mesh.polygons.foreach_set("material_index", geometry.slots.astype(numpy.int32))
     for layer_name, values in geometry.uvs.items():
-        layer = mesh.uv_layers.new(name=layer_name, do_init=False)
-        layer.uv.foreach_set("vector", values[corners].ravel())
-        layer.active_render = layer_name == geometry.active_uv
-    mesh.update(calc_edges=True)
+        add_layer(mesh, layer_name, values[corners]).active_render = layer_name == geometry.active_uv
     mesh.normals_split_custom_set(geometry.normals[corners])
     return mesh
 
@@ -264,14 +245,6 @@ def baked_mesh_group():
     tree.links.new(inputs.outputs["Object"], shown.inputs["Object"])
     tree.links.new(shown.outputs["Geometry"], outputs.inputs["Geometry"])
     return tree
-
-
-def remember(scene):
-    """Turns Cycles' own caustics off, which would be there twice, and notes how they were."""
-    if hasattr(scene, "cycles"):
-        scene["nephroid_caustics"] = [int(getattr(scene.cycles, name)) for name in CAUSTIC_FLAGS]
-        for name in CAUSTIC_FLAGS:
-            setattr(scene.cycles, name, False)
 
 
 def remove(context):
@@ -301,14 +274,14 @@ def remove(context):
                 mesh.uv_layers.remove(mesh.uv_layers[name])
     matte = bpy.data.materials.get(MATTE)
     if matte is not None:
-        for owner in (*bpy.data.meshes, *bpy.data.curves):
-            if list(owner.materials) == [matte]:
+        for owner in (*bpy.data.meshes, *bpy.data.curves, *bpy.data.metaballs):
+            if owner.pop(MATTE, False) and list(owner.materials) == [matte]:
                 owner.materials.clear()
         bpy.data.materials.remove(matte)
     for blocks, name in [(bpy.data.node_groups, LIGHT_MAP_GROUP), (bpy.data.node_groups, BAKED_MESH), (bpy.data.images, IMAGE)]:
         for block in [block for block in blocks if is_ours(block, name)]:
             blocks.remove(block)
-    kept = context.scene.pop("nephroid_caustics", None)
+    kept = context.scene.pop(CAUSTICS, None)
     if kept is not None:
         for name, value in zip(CAUSTIC_FLAGS, kept):
             setattr(context.scene.cycles, name, bool(value))

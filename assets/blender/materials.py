@@ -2,6 +2,8 @@
 
 import math
 
+import numpy
+
 LUMENS_PER_WATT = 683.0
 # Roughness above which the program takes a metal for matte.
 MATTE_METAL = 0.6
@@ -21,25 +23,12 @@ NODES = {
     "BSDF_DIFFUSE": {"color": "Color", "roughness": 1.0},
     "BSDF_TRANSPARENT": {"color": 0.0, "roughness": 1.0, "alpha": 0.0},
     "EMISSION": {"color": 0.0, "roughness": 1.0, "emission": "Color", "emission_strength": "Strength"},
-    # Matte, with a word about it.
-    "BSDF_TRANSLUCENT": {"color": "Color", "roughness": 1.0},
-    "BSDF_SHEEN": {"color": "Color", "roughness": 1.0},
-    "BSDF_TOON": {"color": "Color", "roughness": 1.0},
-    "SUBSURFACE_SCATTERING": {"color": "Color", "roughness": 1.0},
 }
+# Of any other.
+MATTE = {"color": "Color", "roughness": 1.0}
 
-READ_AS = {
-    "BSDF_REFRACTION": "glass, which reflects as well",
-    "BSDF_TRANSLUCENT": "matte: no light goes through",
-    "BSDF_SHEEN": "matte",
-    "BSDF_TOON": "matte",
-    "SUBSURFACE_SCATTERING": "matte: no light goes through",
-}
-
-# Sockets that have no place in glTF or in the program, and the value at which they do nothing.
-IGNORED = {
-    "Subsurface Weight": 0.0, "Sheen Weight": 0.0, "Anisotropic": 0.0, "Anisotropy": 0.0, "Thin Film Thickness": 0.0,
-}
+# Sockets that have no place in glTF or in the program, and do nothing at 0.
+IGNORED = ("Subsurface Weight", "Sheen Weight", "Anisotropic", "Anisotropy", "Thin Film Thickness")
 
 DEFAULTS = {
     "color": (0.8, 0.8, 0.8), "metallic": 0.0, "roughness": 0.5, "ior": 1.5, "alpha": 1.0, "transmission": 0.0,
@@ -85,53 +74,44 @@ class Surface:
 
     def __init__(self, material):
         self.material, self.faults = material, []
-        self.node = None
+        self.node = self.volume_node = self.colour_socket = None
+        self.has_unread_colour = False
         self.values = dict(DEFAULTS, color=tuple(material.diffuse_color)[:3], roughness=1.0)
         # Image texture nodes by property.
         self.images = {}
         end = output(material)
-        if end is None:
-            return
-        node, _ = source(end.inputs["Surface"])
-        if node is not None:
-            self.read(node)
-        self.volume_node, _ = source(end.inputs["Volume"])
-
-    volume_node = None
-    has_unread_colour = False
+        if end is not None:
+            self.volume_node, _ = source(end.inputs["Volume"])
+            self.read(source(end.inputs["Surface"])[0])
 
     def fault(self, text):
         if text not in self.faults:
             self.faults.append(text)
 
     def read(self, node):
-        """Reads a shader node into `values`."""
-        if node.type == "MIX_SHADER":
-            return self.mix(node)
-        if node.type == "ADD_SHADER":
-            return self.add(node)
-        row = NODES.get(node.type)
-        if row is None:
-            self.fault(f"its shader {node.bl_label} is not read; it was baked as matte")
+        """Reads a shader node, if there is one, into `values`."""
+        if node is None:
             return
-        self.node = node
-        self.values = dict(DEFAULTS)
-        for name, what in row.items():
-            if isinstance(what, str):
-                socket = node.inputs.get(what)
-                if socket is not None:
-                    self.values[name] = self.value(name, socket)
-            else:
+        if node.type in {"MIX_SHADER", "ADD_SHADER"}:
+            (self.mix if node.type == "MIX_SHADER" else self.add)(node)
+            return
+        self.node, self.values, self.colour_socket = node, dict(DEFAULTS), None
+        for name, what in NODES.get(node.type, MATTE).items():
+            if not isinstance(what, str):
                 self.values[name] = (what,) * 3 if name == "color" else what
-        if node.type in READ_AS:
-            self.fault(f"its {node.bl_label} was read as {READ_AS[node.type]}")
-        for name, neutral in IGNORED.items():
-            socket = node.inputs.get(name)
-            if socket is not None and (socket.is_linked or abs(socket.default_value - neutral) > 1e-6):
-                self.fault(f"its {name} was ignored")
+            elif what in node.inputs:
+                self.values[name] = self.value(name, node.inputs[what])
+                self.colour_socket = node.inputs[what] if name == "color" else self.colour_socket
+        if node.type not in NODES:
+            self.fault(f"its {node.bl_label} was read as matte: no light goes through")
+        if node.type == "BSDF_REFRACTION":
+            self.fault("its Refraction BSDF was read as glass, which reflects as well")
         if node.type == "BSDF_METALLIC" and node.fresnel_type == "PHYSICAL_CONDUCTOR":
-            self.values["color"] = conductor(number(node.inputs["IOR"].default_value),
-                                             number(node.inputs["Extinction"].default_value))
+            n, k = (numpy.array(node.inputs[name].default_value) for name in ("IOR", "Extinction"))
+            self.values["color"] = tuple(((n - 1.0) ** 2 + k * k) / ((n + 1.0) ** 2 + k * k))
+        for name in IGNORED:
+            if name in node.inputs and (node.inputs[name].is_linked or node.inputs[name].default_value != 0.0):
+                self.fault(f"its {name} was ignored")
 
     def value(self, name, socket):
         """A constant, or what stands for one beside an image."""
@@ -145,87 +125,86 @@ class Surface:
         if name == "normal" and node.type == "NORMAL_MAP":
             strength = node.inputs["Strength"].default_value
             node, origin = source(node.inputs["Color"])
-        if node is not None and node.type == "TEX_IMAGE" and node.image is not None:
+        outcome = "was ignored" if name == "normal" else "default was baked"
+        if node is None or node.type != "TEX_IMAGE" or node.image is None:
+            self.fault(f"the nodes at its {socket.name} are not read; its {outcome}")
+            self.has_unread_colour |= name == "color"
+        elif not node.image.size[0] or node.image.source == "TILED":
+            self.fault(f"the image {node.image.name} at its {socket.name} is missing or tiled; its {outcome}")
+        else:
             self.images[name] = node
             if name in {"color", "emission"}:
                 return (1.0, 1.0, 1.0)
             return strength if name == "normal" else self.mean(name, node, origin)
-        outcome = "it was ignored" if name == "normal" else "its default was baked"
-        self.fault(f"the nodes at its {socket.name} are not read; {outcome}")
-        self.has_unread_colour |= name == "color"
         return DEFAULTS[name]
 
     def mean(self, name, node, origin):
         """Of the image that a factor follows; alpha keeps its image."""
         if name == "alpha":
             return 1.0
-        import numpy
-        image = node.image
-        pixels = numpy.empty(len(image.pixels), dtype=numpy.float32)
-        image.pixels.foreach_get(pixels)
-        pixels = pixels.reshape(-1, image.channels)
-        if not len(pixels):
-            return DEFAULTS[name]
-        self.images.pop(name)
-        return float(pixels[:, 3].mean() if origin.name == "Alpha" and image.channels > 3 else pixels[:, :3].mean())
+        del self.images[name]
+        pixels = numpy.empty(len(node.image.pixels), dtype=numpy.float32)
+        node.image.pixels.foreach_get(pixels)
+        pixels = pixels.reshape(-1, node.image.channels)
+        return float(pixels[:, 3:].mean() if origin.name == "Alpha" and pixels.shape[1] > 3 else pixels[:, :3].mean())
 
     def mix(self, node):
         """One of two shaders, or a shader that covers in part."""
-        factor, first, second = node.inputs[0], node.inputs[1], node.inputs[2]
-        a, b = source(first)[0], source(second)[0]
+        factor, *shaders = node.inputs
+        shaders = [source(socket)[0] for socket in shaders]
         by, origin = source(factor)
-        is_clear = [shader is None or shader.type == "BSDF_TRANSPARENT" for shader in (a, b)]
+        is_clear = [shader is None or shader.type == "BSDF_TRANSPARENT" for shader in shaders]
         if by is not None and by.type == "LIGHT_PATH":
             # A common way to let shadows of glass be light: the glass itself is what we need.
-            chosen = b if is_clear[0] else a
-            return self.read(chosen) if chosen else None
-        share = number(origin.default_value if by is not None and by.type == "VALUE" else factor.default_value)
-        if is_clear[0] != is_clear[1]:
-            self.read(b if is_clear[0] else a)
-            if by is None or by.type == "VALUE":
-                self.values["alpha"] *= share if is_clear[0] else 1.0 - share
-            elif by.type == "TEX_IMAGE" and is_clear[0] and origin.name == "Alpha":
-                self.images["alpha"] = by
-            else:
-                self.fault("the nodes that mix it with a Transparent BSDF are not read; it was baked opaque")
-            return None
-        if by is not None or 0.0 < share < 1.0:
-            self.fault("its Mix Shader was read as the shader with the greater share")
-        chosen = b if share > 0.5 else a
-        return self.read(chosen) if chosen else None
+            self.read(shaders[is_clear[0]])
+            return
+        is_constant = by is None or by.type == "VALUE"
+        share = number((factor if by is None else origin).default_value) if is_constant else factor.default_value
+        if is_clear[0] == is_clear[1]:
+            if not is_constant or 0.0 < share < 1.0:
+                self.fault("its Mix Shader was read as the shader with the greater share")
+            self.read(shaders[share > 0.5])
+            return
+        self.read(shaders[is_clear[0]])
+        if is_constant:
+            self.values["alpha"] *= share if is_clear[0] else 1.0 - share
+        elif by.type == "TEX_IMAGE" and is_clear[0] and origin.name == "Alpha":
+            self.images["alpha"] = by
+        else:
+            self.fault("the nodes that mix it with a Transparent BSDF are not read; it was baked opaque")
 
     def add(self, node):
         """A shader and what it emits."""
         parts = [source(socket)[0] for socket in node.inputs]
-        parts = sorted((part for part in parts if part is not None), key=lambda part: part.type == "EMISSION")
+        parts = sorted(filter(None, parts), key=lambda part: part.type == "EMISSION") or [None]
+        glow, glow_images = {}, {}
         if len(parts) == 2 and parts[1].type == "EMISSION" and parts[0].type != "EMISSION":
             self.read(parts[1])
             glow = {name: self.values[name] for name in ("emission", "emission_strength")}
-            glow_image = self.images.pop("emission", None)
-            self.read(parts[0])
-            self.values.update(glow)
-            if glow_image is not None:
-                self.images["emission"] = glow_image
-        elif parts:
-            self.read(parts[0])
-            if len(parts) == 2:
-                self.fault("its Add Shader was read as its first shader")
+            glow_images = self.images
+            self.images = {}
+        elif len(parts) == 2:
+            self.fault("its Add Shader was read as its first shader")
+        self.read(parts[0])
+        self.values.update(glow)
+        self.images.update(glow_images)
 
     def absorption(self):
-        """Attenuation distance [m] and colour of its volume; None where that is clear."""
+        """What its volume adds to KHR_materials_volume."""
         node = self.volume_node
         if node is None:
-            return None
-        if node.type == "VOLUME_ABSORPTION":
-            color, density = node.inputs["Color"], node.inputs["Density"]
-            if source(color)[0] or source(density)[0]:
-                self.fault("the nodes at its volume are not read; their defaults were baked")
-            # Cycles' coefficient is density · (1 − colour).
-            density = max(density.default_value, 0.0)
-            left = [math.exp(-(1.0 - min(max(channel, 0.0), 1.0))) for channel in number(color.default_value)]
-            return (1.0 / density, left) if density > 0.0 else None
-        self.fault(f"its volume, a {node.bl_label}, is not read; it was baked as clear")
-        return None
+            return {}
+        if node.type != "VOLUME_ABSORPTION":
+            self.fault(f"its volume, a {node.bl_label}, is not read; it was baked as clear")
+            return {}
+        color, density = node.inputs["Color"], node.inputs["Density"]
+        if color.is_linked or density.is_linked:
+            self.fault("the nodes at its volume are not read; their defaults were baked")
+        if density.default_value <= 0.0:
+            return {}
+        # Cycles' coefficient is density · (1 − colour).
+        left = [math.exp(unit(channel) - 1.0) for channel in number(color.default_value)]
+        return {"attenuationDistance": 1.0 / density.default_value, "attenuationColor": left}
 
     def is_matte(self):
         """Whether only its light map shows its colour, since no caustic leaves it."""
@@ -240,12 +219,12 @@ class Surface:
     def gltf(self, texture):
         """The glTF material. `texture(node)` gives the texture info of an image node."""
         values, images, own = self.values, self.images, self.material.nephroid
-        transmission, color = values["transmission"], clamped(values["color"])
+        transmission, color = values["transmission"], [unit(channel) for channel in values["color"]]
         if self.node is not None and self.node.type == "BSDF_PRINCIPLED" and transmission >= 0.5:
             # Light crosses twice, and Cycles gives each crossing the root.
             color = [math.sqrt(channel) for channel in color]
-        pbr = {"baseColorFactor": [*color, clamped([values["alpha"]])[0]], "metallicFactor": clamped([values["metallic"]])[0],
-               "roughnessFactor": clamped([values["roughness"]])[0]}
+        pbr = {"baseColorFactor": [*color, unit(values["alpha"])], "metallicFactor": unit(values["metallic"]),
+               "roughnessFactor": unit(values["roughness"])}
         extensions = {}
         result = {"name": self.material.name_full, "pbrMetallicRoughness": pbr, "doubleSided": True, "extensions": extensions}
         if "color" in images:
@@ -258,24 +237,20 @@ class Surface:
         if "normal" in images and values["normal"]:
             result["normalTexture"] = dict(texture(images["normal"]), scale=values["normal"])
         if transmission > 0.0:
-            extensions["KHR_materials_transmission"] = {"transmissionFactor": clamped([transmission])[0]}
-            volume = {"thicknessFactor": 0.0 if own.is_thin else 1.0}
-            absorbed = self.absorption()
-            if absorbed:
-                volume.update(attenuationDistance=absorbed[0], attenuationColor=absorbed[1])
-            extensions["KHR_materials_volume"] = volume
+            extensions["KHR_materials_transmission"] = {"transmissionFactor": unit(transmission)}
+            extensions["KHR_materials_volume"] = {"thicknessFactor": 0.0 if own.is_thin else 1.0, **self.absorption()}
         if values["ior"] != 1.5:
             extensions["KHR_materials_ior"] = {"ior": max(values["ior"], 1.0)}
         if values["specular"] != 0.5 and transmission == 0.0:
-            extensions["KHR_materials_specular"] = {"specularFactor": clamped([2.0 * values["specular"]])[0]}
+            extensions["KHR_materials_specular"] = {"specularFactor": unit(2.0 * values["specular"])}
         if values["coat"] > 0.0:
             if abs(values["coat_ior"] - 1.5) > 0.01:
                 self.fault("its coat was read with an index of 1.5")
-            extensions["KHR_materials_clearcoat"] = {"clearcoatFactor": clamped([values["coat"]])[0],
-                                                     "clearcoatRoughnessFactor": clamped([values["coat_roughness"]])[0]}
+            extensions["KHR_materials_clearcoat"] = {"clearcoatFactor": unit(values["coat"]),
+                                                     "clearcoatRoughnessFactor": unit(values["coat_roughness"])}
         brightest = max(values["emission"]) * values["emission_strength"]
         if brightest > 0.0:
-            result["emissiveFactor"] = clamped([channel / max(values["emission"]) for channel in values["emission"]])
+            result["emissiveFactor"] = [unit(channel / max(values["emission"])) for channel in values["emission"]]
             extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": brightest * LUMENS_PER_WATT}
             if "emission" in images:
                 result["emissiveTexture"] = texture(images["emission"])
@@ -289,14 +264,9 @@ class Surface:
         return result
 
 
-def clamped(channels):
-    """Channels within 0 and 1."""
-    return [min(max(float(channel), 0.0), 1.0) for channel in channels]
-
-
-def conductor(ior, extinction):
-    """Reflectance of a metal seen head on."""
-    return tuple(((n - 1.0) ** 2 + k * k) / ((n + 1.0) ** 2 + k * k) for n, k in zip(ior, extinction))
+def unit(value):
+    """A value within 0 and 1."""
+    return min(max(float(value), 0.0), 1.0)
 
 
 def custom_properties(owner):

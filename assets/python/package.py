@@ -20,31 +20,29 @@ LICENCES = HERE / "LICENSES.txt"
 LICENCE_FILES = ("license", "licence", "copying", "notice", "unlicense", "copyright", "ofl", "ufl")
 
 # Platforms of wheels as Blender calls them.
-BLENDER_PLATFORMS = [("manylinux", "x86_64", "linux-x64"), ("linux", "x86_64", "linux-x64"), ("macosx", "arm64", "macos-arm64"),
-                     ("macosx", "x86_64", "macos-x64"), ("win", "amd64", "windows-x64"), ("win", "arm64", "windows-arm64")]
+BLENDER_PLATFORMS = {("linux", "x86_64"): "linux-x64", ("macosx", "arm64"): "macos-arm64", ("macosx", "x86_64"): "macos-x64",
+                     ("win", "amd64"): "windows-x64", ("win", "arm64"): "windows-arm64"}
 
 
-def output_of(*command):
-    return subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+def cargo(*command):
+    return subprocess.run(["cargo", *command], cwd=ROOT, check=True, capture_output=True, text=True).stdout
 
 
 def licences(target):
     """Our own licences, then those of all crates that are linked, each text once, after the crates that it covers."""
-    on = ["--target", target] if target else []
-    told = output_of("cargo", "tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}", *on)
+    told = cargo("tree", "--locked", "--edges", "normal", "--prefix", "none", "--format", "{p}", *target)
     linked = {tuple(line.split()[:2]) for line in told.splitlines() if line}
-    packages = json.loads(output_of("cargo", "metadata", "--locked", "--format-version", "1"))["packages"]
     texts, bare = {}, []
-    for package in packages:
-        name = f"{package['name']} {package['version']}"
+    for package in json.loads(cargo("metadata", "--locked", "--format-version", "1"))["packages"]:
         if (package["name"], f"v{package['version']}") not in linked or package["name"] == "nephroid":
             continue
+        name = f"{package['name']} {package['version']} ({package['license'] or 'see its licence file'})"
         folder = Path(package["manifest_path"]).parent
         files = [file for file in sorted(folder.rglob("*")) if file.name.lower().startswith(LICENCE_FILES) and file.is_file()]
         for file in files:
-            texts.setdefault(file.read_text(errors="replace").strip(), []).append(f"{name} ({package['license']}): {file.name}")
+            texts.setdefault(file.read_text(errors="replace").strip(), []).append(f"{name}: {file.name}")
         if not files:
-            bare.append(f"{name} ({package['license'] or 'see its licence file'}), {package['repository'] or 'no repository'}")
+            bare.append(f"{name}, {package['repository'] or 'no repository'}")
     parts = ["Nephroid: MIT or Apache-2.0, at your choice. The crates that it contains follow."]
     parts += [(ROOT / name).read_text() for name in ("LICENSE-MIT", "LICENSE-APACHE")]
     parts += ["\n".join(names) + "\n\n" + text for text, names in texts.items()]
@@ -54,17 +52,16 @@ def licences(target):
 
 def extension(wheel, output):
     """The Blender extension, with the program inside as a wheel."""
-    system = next(blender for start, machine, blender in BLENDER_PLATFORMS
-                  if f"-{start}" in wheel.name and wheel.stem.endswith(machine))
-    path = output / f"nephroid-blender-{wheel.name.split('-')[1]}-{system}.zip"
+    _, version, *_, platform = wheel.stem.split("-")
+    system = next(name for (kind, machine), name in BLENDER_PLATFORMS.items()
+                  if kind in platform and platform.endswith(machine))
+    path = output / f"nephroid-blender-{version}-{system}.zip"
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in sorted((ROOT / "assets" / "blender").iterdir()):
-            if file.name == "blender_manifest.toml":
-                head, permissions, rest = file.read_text().partition("[permissions]")
-                head += f'platforms = ["{system}"]\nwheels = ["./wheels/{wheel.name}"]\n\n'
-                archive.writestr(file.name, head + permissions + rest)
-            elif file.suffix == ".py":
-                archive.write(file, file.name)
+        for file in sorted((ROOT / "assets" / "blender").glob("*.py")):
+            archive.write(file, file.name)
+        manifest = (ROOT / "assets" / "blender" / "blender_manifest.toml").read_text()
+        extra = f'platforms = ["{system}"]\nwheels = ["./wheels/{wheel.name}"]\n\n[permissions]'
+        archive.writestr("blender_manifest.toml", manifest.replace("[permissions]", extra))
         archive.write(LICENCES, LICENCES.name)
         archive.write(wheel, f"wheels/{wheel.name}", zipfile.ZIP_STORED)
     return path
@@ -87,13 +84,13 @@ def main():
     output = Path(sys.argv[1]).resolve()
     output.mkdir(parents=True, exist_ok=True)
     arguments = sys.argv[2:]
-    target = arguments[arguments.index("--target") + 1] if "--target" in arguments else None
-    LICENCES.write_text(licences(target))
+    place = arguments.index("--target") if "--target" in arguments else len(arguments)
+    LICENCES.write_text(licences(arguments[place:place + 2]))
     for wheel in output.glob("nephroid-*.whl"):
         wheel.unlink()
     try:
-        subprocess.run([sys.executable, "-m", "maturin", "sdist", "--out", output], cwd=HERE, check=True)
-        subprocess.run([sys.executable, "-m", "maturin", "build", "--release", "--out", output, *arguments], cwd=HERE, check=True)
+        for command in ["sdist"], ["build", "--release", *arguments]:
+            subprocess.run([sys.executable, "-m", "maturin", *command, "--out", output], cwd=HERE, check=True)
         wheel = next(output.glob("nephroid-*.whl"))
         made = [wheel, *output.glob("nephroid-*.tar.gz"), tarball(wheel, output), extension(wheel, output)]
     finally:
