@@ -8,7 +8,7 @@ use super::View;
 use super::renderer::{GpuMs, Renderer};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, readback};
+use crate::gpu::{Gpu, readback, texture_of};
 use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::Matrix3;
 use crate::progress::{Control, Progress, Stage};
@@ -151,7 +151,11 @@ pub fn measure(
     control: &Control,
 ) -> Result<Vec<MannerTimes>> {
     gpu.check_texture_size("picture", walk.view.width, walk.view.height)?;
-    let target = target(gpu, &walk.view);
+    let size = [walk.view.width, walk.view.height, 1];
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+    let target = gpu
+        .device
+        .create_texture(&texture_of("frame", size, FORMAT, usage));
     let manners = switches
         .iter()
         .map(|switch| TimedRenderer::new(gpu, walk, *switch));
@@ -190,23 +194,6 @@ pub fn auto_exposure_stops(gpu: &Gpu, walk: &Walk<'_>) -> Result<f64> {
         ..walk.view.clone()
     };
     Ok(renderer.radiance(gpu, &view)?.auto_exposure_stops())
-}
-
-fn target(gpu: &Gpu, view: &View) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("frame"),
-        size: wgpu::Extent3d {
-            width: view.width,
-            height: view.height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: FORMAT,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    })
 }
 
 #[derive(Clone, Copy, Debug)]

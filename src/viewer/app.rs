@@ -195,18 +195,19 @@ impl App {
         match Graphics::new(event_loop, self.proxy.clone(), self.model.scene(), self.size) {
             Ok(mut graphics) => {
                 if self.model.log.is_kept() {
-                    graphics.interface().watch_controls();
+                    graphics.interface.watch_controls();
                 }
-                let adapter = graphics.gpu().adapter_name();
+                let adapter = graphics.gpu.adapter_name();
                 let started = json!({"scene": self.model.scene().name, "adapter": adapter});
                 self.model.log.write("started", started);
                 let report = &mut self.model.picture;
                 report.adapter = adapter;
                 report.frame_times = graphics
+                    .gpu
                     .tells_times()
                     .then(|| report.frame_times.take().unwrap_or_default());
                 graphics.window().request_redraw();
-                self.pace = if graphics.gpu().is_software() {
+                self.pace = if graphics.gpu.is_software() {
                     Pace::of_software()
                 } else {
                     Pace::default()
@@ -249,7 +250,7 @@ impl App {
         let reason = self
             .graphics
             .as_ref()
-            .and_then(|graphics| graphics.gpu().take_error())
+            .and_then(|graphics| graphics.gpu.take_error())
             .unwrap_or_else(|| {
                 Error::failure(
                     "window",
@@ -335,7 +336,7 @@ impl App {
         let shown = graphics.show(&mut painting);
         // The error of a lost device is reported by `recover`.
         if shown != FrameOutcome::Broken
-            && let Some(error) = graphics.gpu().take_error()
+            && let Some(error) = graphics.gpu.take_error()
         {
             self.tell_fault(&error);
         }
@@ -363,10 +364,10 @@ impl App {
         self.model.picture.lost_device = lost.is_some_and(|loss| loss.elapsed() < LOSSES_WITHIN);
         let mut commands: Vec<Command> = self.model.placed().map(Command::Edit).into_iter().collect();
         let graphics = self.graphics.as_mut()?;
-        let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
-        let beside = graphics.beside_id();
+        let (window, picture) = (Arc::clone(graphics.window()), graphics.main.id);
+        let beside = graphics.beside.as_ref().map(|beside| beside.id);
         let model = &self.model;
-        let painting = graphics.interface().run(&window, |ui| {
+        let painting = graphics.interface.run(&window, |ui| {
             commands.extend(self.panel.show(ui, model));
             let rect = overlay::show(ui, picture, model, self.notice.as_deref());
             self.picture_rect = rect;
@@ -399,7 +400,7 @@ impl App {
 
     fn is_software(&self) -> bool {
         let graphics = self.graphics.as_ref();
-        graphics.is_some_and(|graphics| graphics.gpu().is_software())
+        graphics.is_some_and(|graphics| graphics.gpu.is_software())
     }
 
     /// Schedules the next frame.
@@ -490,7 +491,7 @@ impl ApplicationHandler<UserEvent> for App {
 
     fn user_event(&mut self, _: &ActiveEventLoop, news: UserEvent) {
         if let (UserEvent::Accessibility(event), Some(graphics)) = (news, &mut self.graphics) {
-            graphics.interface().on_accessibility(event);
+            graphics.interface.on_accessibility(event);
         }
         self.request_redraw();
     }
@@ -508,7 +509,7 @@ impl ApplicationHandler<UserEvent> for App {
             self.pace.touch(Instant::now());
         }
         // egui asks for another frame after each frame; `schedule` decides that here.
-        if graphics.interface().on_event(&window, &event) && event != WindowEvent::RedrawRequested {
+        if graphics.interface.on_event(&window, &event) && event != WindowEvent::RedrawRequested {
             window.request_redraw();
             if is_by_hand {
                 let is_baking = self.model.state.is_baking();

@@ -39,33 +39,18 @@ pub enum Handle {
 }
 
 impl Handle {
-    /// Name for assistive technology.
-    fn name(self) -> &'static str {
+    /// Name for assistive technology, colour, and unit axis; the rotation has no axis.
+    fn look(self) -> (&'static str, Color32, Option<DVec3>) {
         match self {
-            Self::X => "Move x",
-            Self::Y => "Move y",
-            Self::Z => "Move z",
-            Self::Turn => "Turn",
+            Self::X => ("Move x", Color32::from_rgb(235, 90, 80), Some(DVec3::X)),
+            Self::Y => ("Move y", Color32::from_rgb(120, 210, 90), Some(DVec3::Y)),
+            Self::Z => ("Move z", Color32::from_rgb(90, 150, 250), Some(DVec3::Z)),
+            Self::Turn => ("Turn", Color32::from_rgb(230, 200, 90), None),
         }
     }
 
-    fn colour(self) -> Color32 {
-        match self {
-            Self::X => Color32::from_rgb(235, 90, 80),
-            Self::Y => Color32::from_rgb(120, 210, 90),
-            Self::Z => Color32::from_rgb(90, 150, 250),
-            Self::Turn => Color32::from_rgb(230, 200, 90),
-        }
-    }
-
-    /// Unit axis; `None` for the rotation.
     fn axis(self) -> Option<DVec3> {
-        match self {
-            Self::X => Some(DVec3::X),
-            Self::Y => Some(DVec3::Y),
-            Self::Z => Some(DVec3::Z),
-            Self::Turn => None,
-        }
+        self.look().2
     }
 
     /// The coordinate that a view ray points at: distance from `origin` along the axis [m], or angle about the
@@ -211,8 +196,9 @@ impl Gizmo {
         if !lens.picture.contains_rect(rect) && self.grip.is_none() {
             return None;
         }
-        let response = ui.interact(rect, ui.scope_id().with(handle.name()), Sense::drag());
-        response.widget_info(|| WidgetInfo::slider(true, 0.0, handle.name()));
+        let (name, ..) = handle.look();
+        let response = ui.interact(rect, ui.scope_id().with(name), Sense::drag());
+        response.widget_info(|| WidgetInfo::slider(true, 0.0, name));
         self.is_hot |= response.hovered() || response.dragged();
         let pointer = response.interact_pointer_pos()?;
         if response.drag_started() {
@@ -255,7 +241,8 @@ fn on_ring(angle_rad: f64, length_m: f64) -> DVec3 {
 
 fn draw(ui: &Ui, lens: &Viewport<'_>, handle: Handle, (origin, tip): (DVec3, DVec3), length_m: f64) {
     let painter = ui.painter().with_clip_rect(lens.picture);
-    let stroke = Stroke::new(2.5, handle.colour());
+    let (_, colour, _) = handle.look();
+    let stroke = Stroke::new(2.5, colour);
     let line = |from: DVec3, to: DVec3| {
         if let Some(ends) = lens.line(from, to) {
             painter.line_segment(ends, stroke);
@@ -272,7 +259,7 @@ fn draw(ui: &Ui, lens: &Viewport<'_>, handle: Handle, (origin, tip): (DVec3, DVe
     } else {
         line(origin, tip);
     }
-    painter.circle_filled(lens.place(tip), TIP, handle.colour());
+    painter.circle_filled(lens.place(tip), TIP, colour);
 }
 
 /// Marks every light that has a position, so that it can be clicked.

@@ -16,7 +16,7 @@ use super::ViewerOptions;
 use super::background::Wake;
 use super::command::{Choices, Command};
 use super::comparison_view::SavedMaps;
-use super::edits::{EditedItem, EditedScene};
+use super::edits::{EditedItem, EditedScene, changed};
 use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
 use super::files::autosaver::Autosaver;
@@ -94,8 +94,6 @@ pub struct Model {
     sketcher: PreviewTask,
     /// The maps that the present ones are compared with.
     pub reference: Option<SavedMaps>,
-    /// Ray to pick along as soon as the collision surfaces are built.
-    picking: Option<Ray>,
     /// The light that the mouse drags.
     placing: picking::DraggedLight,
     /// Tasks that wait for the collision surfaces.
@@ -151,7 +149,6 @@ impl Model {
             prober: Prober::new(wake),
             sketcher: PreviewTask::new(wake),
             reference: None,
-            picking: None,
             placing: picking::DraggedLight::default(),
             pending_tasks: pending_tasks::PendingTasks::default(),
             player: None,
@@ -355,7 +352,6 @@ impl Model {
         self.state = state;
         self.poll_probe(has_maps);
         self.poll_sketch();
-        self.poll_pick();
         self.poll_pending();
         if has_maps {
             self.maps_revision += 1;
@@ -476,14 +472,11 @@ impl Model {
         let before = std::mem::replace(&mut self.choices, choices);
         let (edits, now) = (&mut self.edits, &self.choices);
         edits.note_settings(&before.settings, &now.settings);
-        edits.note_display(before.display, now.display);
-        if before.film != now.film {
-            edits.note_film(&before.film, &now.film);
-        }
-        if before.automatic != now.automatic {
-            edits.note_automatic(now.automatic);
-            self.revision += 1;
-        }
+        edits.note([&before.display, &now.display], changed, EditedItem::Display);
+        edits.note_film(&before.film, &now.film);
+        let automatic = [&before.automatic, &now.automatic];
+        edits.note(automatic, |_, _| "automatic".into(), EditedItem::Automatic);
+        self.revision += u64::from(before.automatic != now.automatic);
         self.note_settings_since(before.settings);
     }
 

@@ -1,12 +1,14 @@
 //! New lights: placed where there is room in front of the camera, and as bright as suits the picture.
 
 use glam::DVec3;
+use strum::{EnumMessage, IntoStaticStr};
 
 use crate::geometry::Ray;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
 use crate::transport::Tracer;
 use crate::units::{Irradiance, Radiance, RadiantIntensity};
+use crate::viewer::walking::Collider;
 
 /// Irradiance at the view target for exposure 0 [W/m²]; a grey surface is then well exposed.
 const SUITABLE_W_M2: f64 = 4.0;
@@ -25,14 +27,17 @@ const SIDE: f64 = 0.25;
 /// Tangent of the angle by which new lights lean from the vertical towards the camera [1].
 const LEANING: f64 = 0.4;
 
-/// Kinds of lights that can be added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Kinds of lights that can be added. The panel shows the comment of each variant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumMessage, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum NewLight {
-    /// A point light.
+    /// A point that shines the same in every direction.
     Lamp,
+    /// A cone of light, at what is looked at.
     Spot,
+    /// Parallel light from infinitely far.
     Sun,
-    /// A square area light.
+    /// A flat square lamp, turned to what is looked at.
     Panel,
 }
 
@@ -51,20 +56,14 @@ impl ViewTarget {
     /// The first surface along a view ray; `otherwise` if there is none.
     pub fn of(surfaces: &Tracer, gaze: &Ray, otherwise: DVec3) -> Self {
         let to_eye = -gaze.direction;
-        match surfaces.intersect(gaze) {
-            Some(place) => {
-                let normal = surfaces.surface_at(&place).geometric_normal;
-                Self {
-                    point: gaze.at(place.distance_m),
-                    normal: normal * normal.dot(to_eye).signum(),
-                    to_eye,
-                }
-            }
-            None => Self {
-                point: otherwise,
-                normal: to_eye,
-                to_eye,
-            },
+        let met = surfaces.meets(gaze.origin, gaze.direction, f64::INFINITY);
+        let (point, normal) = met.map_or((otherwise, to_eye), |(distance_m, normal)| {
+            (gaze.at(distance_m), normal)
+        });
+        Self {
+            point,
+            normal,
+            to_eye,
         }
     }
 }
@@ -74,12 +73,7 @@ impl NewLight {
     pub const ALL: [Self; 4] = [Self::Lamp, Self::Spot, Self::Sun, Self::Panel];
 
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Lamp => "lamp",
-            Self::Spot => "spot",
-            Self::Sun => "sun",
-            Self::Panel => "panel",
-        }
+        self.into()
     }
 
     /// A white light with a unique name that lights the target, in a scene of radius `radius_m` that is shown with

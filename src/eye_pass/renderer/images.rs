@@ -88,6 +88,13 @@ impl Images {
                 uploaded += bytes;
             }
         }
+        if self.texture_pool.is_sparse() {
+            self.texture_pool = self.texture_pool.emptied(gpu);
+            for image in &mut self.textures {
+                let moved = image.move_to(gpu, &mut self.texture_pool);
+                uploaded += Uploaded::other(moved.tile_bytes as usize);
+            }
+        }
         let looks = |material: &Material| material.images().map(Option::<&TextureRef>::cloned);
         self.looks = scene.materials.iter().map(looks).collect();
         let bumps = |object: usize| {
@@ -111,23 +118,22 @@ impl Images {
                     if let Some(old) = map {
                         old.image.release(&mut self.map_pool);
                     }
-                    // A map beyond the budget starts with its coarsest level.
-                    let finest = shown.map(|shown| {
+                    *map = shown.map(|shown| {
+                        // A map beyond the budget starts with its coarsest level.
                         let tiles = tiles_of(shown.chart.width, shown.chart.height);
-                        if tiles * MAP_TILE_BYTES > self.budget_bytes {
-                            usize::MAX
-                        } else {
-                            0
-                        }
-                    });
-                    let made = shown
-                        .zip(finest)
-                        .map(|(shown, finest)| DeviceMap::new(gpu, &mut self.map_pool, shown, finest));
-                    *map = made.map(|(made, bytes)| {
+                        let is_too_large = tiles * MAP_TILE_BYTES > self.budget_bytes;
+                        let finest = if is_too_large { usize::MAX } else { 0 };
+                        let (made, bytes) = DeviceMap::new(gpu, &mut self.map_pool, shown, finest);
                         uploaded += bytes;
                         made
                     });
                 }
+            }
+        }
+        if self.map_pool.is_sparse() {
+            self.map_pool = self.map_pool.emptied(gpu);
+            for map in self.maps.iter_mut().flatten() {
+                uploaded += map.image.move_to(gpu, &mut self.map_pool);
             }
         }
         uploaded += self.write_table(gpu);

@@ -155,14 +155,6 @@ impl Objects {
         looks.any(|look| look.surface.is_specular() && !look.surface.is_receiver() && look.has_texture)
     }
 
-    pub(super) fn has_masks(&self) -> bool {
-        self.list.iter().any(Appearance::has_mask)
-    }
-
-    pub(super) fn has_bumps(&self) -> bool {
-        self.list.iter().any(|look| look.has_bumps)
-    }
-
     fn write_records(&mut self, gpu: &Gpu) -> Uploaded {
         let records: Vec<ObjectRecord> = (0..)
             .zip(&self.list)
@@ -362,15 +354,6 @@ pub enum Inspected {
 }
 
 impl Inspected {
-    pub const ALL: [Self; 6] = [
-        Self::Irradiance,
-        Self::Texels,
-        Self::TexelDensity,
-        Self::Normals,
-        Self::Uv,
-        Self::MapUv,
-    ];
-
     /// `INSPECTED_*` of the shader.
     pub(super) fn code(self) -> u32 {
         match self {

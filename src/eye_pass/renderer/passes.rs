@@ -12,7 +12,7 @@ use super::geometry::Segment;
 use super::pipelines::{PipelineKey, RenderTarget};
 use super::sky::Sky;
 use super::targets::{Targets, TracedTargets};
-use super::timing::Timing;
+use super::timing::{AFTER_CHAINS, BEFORE_CHAINS, SURFACES};
 use super::uniforms::{Frame, SeenWavelengths, rgb};
 use super::{MapStyle, Renderer};
 use crate::effect::EffectSwitch;
@@ -67,7 +67,7 @@ impl Renderer {
         let background = view
             .background
             .map(|channel| (channel * radiance_scale).min(LARGEST_SCALED));
-        let marks = self.timing.as_ref().map(Timing::around_surfaces);
+        let marks = self.timing.as_ref().map(|timing| timing.marks(SURFACES));
         let mut pass = targets.begin_pass(encoder, background.to_array(), marks);
         pass.set_bind_group(0, &frame, &[]);
         if let Some(sky) = self.seen_sky() {
@@ -105,7 +105,7 @@ impl Renderer {
             ..ChainLimits::default()
         };
         let start = scene.start(view, &limits, self.traces_lights);
-        let wavelengths = if self.draw_state().parts_wavelengths {
+        let wavelengths = if self.draw_state().flags.is_dispersive {
             SeenWavelengths::of(&wavelengths::of_picture(sample.picture), &self.objects.glasses)
         } else {
             SeenWavelengths::default()
@@ -124,12 +124,12 @@ impl Renderer {
         let Some(targets) = self.traced.as_ref().filter(|_| !list.traced.is_empty()) else {
             return;
         };
-        let timing = self.timing.as_ref();
-        let mut pass = targets.begin_depth(encoder, timing.map(Timing::before_chains));
+        let marks = |of| self.timing.as_ref().map(|timing| timing.marks(of));
+        let mut pass = targets.begin_depth(encoder, marks(BEFORE_CHAINS));
         pass.set_bind_group(0, frame, &[]);
         self.draw_each(&mut pass, &list.depths);
         drop(pass);
-        let mut pass = targets.begin_chains(encoder, timing.map(Timing::after_chains));
+        let mut pass = targets.begin_chains(encoder, marks(AFTER_CHAINS));
         pass.set_bind_group(0, frame, &[]);
         pass.set_bind_group(1, chains, &[]);
         if let Some(sky) = self.seen_sky() {
@@ -161,10 +161,14 @@ impl Renderer {
             .keep_budget(gpu, view.camera.position, pixel_rad, &visible);
         let draw_state = self.draw_state();
         let is_specular = |object: &usize| draw_state.is_specular(&self.objects.list[*object]);
-        if draw_state.traces_lights || visible.iter().any(is_specular) {
+        if draw_state.flags.traces_lights || visible.iter().any(is_specular) {
             self.make_chain_scene(gpu);
         }
-        if let Some(scene) = self.chain_scene.as_mut().filter(|_| draw_state.traces_lights) {
+        if let Some(scene) = self
+            .chain_scene
+            .as_mut()
+            .filter(|_| draw_state.flags.traces_lights)
+        {
             scene.set_lights(gpu, &self.scene);
         }
         // Chains may have been refused just above, which changes the draw state.

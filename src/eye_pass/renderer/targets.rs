@@ -2,7 +2,7 @@
 
 use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
 use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, cleared, texture_of};
 
 /// Render targets of a frame.
 #[derive(Debug)]
@@ -59,16 +59,13 @@ impl Targets {
             Some(samples) => (samples, Some(&self.resolved_view), wgpu::StoreOp::Discard),
             None => (&self.resolved_view, None, wgpu::StoreOp::Store),
         };
+        let target = cleared(view, wgpu::Color { r, g, b, a: 1.0 });
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surfaces"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view,
-                depth_slice: None,
                 resolve_target,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
-                    store,
-                },
+                ops: wgpu::Operations { store, ..target.ops },
+                ..target
             })],
             depth_stencil_attachment: Some(depth(&self.depth, Some(0.0), wgpu::StoreOp::Discard)),
             timestamp_writes,
@@ -116,15 +113,7 @@ impl TracedTargets {
     ) -> wgpu::RenderPass<'a> {
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("chains"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
+            color_attachments: &[Some(cleared(&self.view, wgpu::Color::TRANSPARENT))],
             depth_stencil_attachment: Some(depth(&self.depth, None, wgpu::StoreOp::Discard)),
             timestamp_writes,
             ..Default::default()
@@ -160,17 +149,7 @@ fn texture(
     usage: wgpu::TextureUsages,
 ) -> wgpu::Texture {
     gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
         sample_count,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
+        ..texture_of(label, [width, height, 1], format, usage)
     })
 }

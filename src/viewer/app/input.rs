@@ -34,7 +34,7 @@ impl App {
         let is_typing = self
             .graphics
             .as_mut()
-            .is_some_and(|graphics| graphics.interface().context.text_edit_focused());
+            .is_some_and(|graphics| graphics.interface.context.text_edit_focused());
         if is_typing && event.state.is_pressed() {
             return;
         }
@@ -232,7 +232,7 @@ impl App {
             return false;
         };
         let is_background = |layer: egui::LayerId| layer.order == egui::Order::Background;
-        let layer = graphics.interface().context.layer_id_at(place);
+        let layer = graphics.interface.context.layer_id_at(place);
         self.picture_rect.contains(place) && layer.is_none_or(is_background)
     }
 

@@ -1,4 +1,4 @@
-//! Tasks that wait for the scene's surfaces: lights to add, and the search for the brightest spot.
+//! Tasks that wait for the scene's surfaces: objects to pick, lights to add, and the search for the brightest spot.
 
 use std::sync::Arc;
 
@@ -25,8 +25,10 @@ const OFF: f64 = 1e-6;
 const HALVINGS: i32 = 6;
 
 /// Tasks for when the collision surfaces are built.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PendingTasks {
+    /// Picks the object along this ray.
+    pub pick: Option<Ray>,
     pub light: Option<NewLight>,
     pub brightest: bool,
 }
@@ -40,15 +42,25 @@ impl Model {
 
     /// Runs the pending tasks if the collision surfaces are built.
     pub(super) fn poll_pending(&mut self) {
-        if self.pending_tasks.light.is_none() && !self.pending_tasks.brightest {
+        if self.pending_tasks == PendingTasks::default() {
             return;
         }
         let Some(surfaces) = self.surfaces() else { return };
-        let pending_tasks = std::mem::take(&mut self.pending_tasks);
-        if let Some(light) = pending_tasks.light {
+        let PendingTasks {
+            pick,
+            light,
+            brightest,
+        } = std::mem::take(&mut self.pending_tasks);
+        if let Some(view_ray) = pick {
+            match surfaces.intersect(&view_ray) {
+                Some(hit) => self.hold(GizmoTarget::Object(hit.object as usize)),
+                None => self.choices.selection.hold(None),
+            }
+        }
+        if let Some(light) = light {
             self.add_light(light, &surfaces);
         }
-        if pending_tasks.brightest {
+        if brightest {
             self.show_brightest(&surfaces);
         }
     }

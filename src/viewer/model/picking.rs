@@ -10,6 +10,7 @@ use crate::scene::{Edit, LightEdit};
 use crate::transport::Tracer;
 use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::panel::PlaceTool;
+use crate::viewer::walking::Collider;
 use serde_json::json;
 
 /// Distance from surfaces at which a light without a useful distance of its own is placed, in scene radii.
@@ -72,22 +73,19 @@ impl DragTool {
 
 /// First surface point along a ray, and the unit normal that faces the ray's origin.
 fn met(surfaces: &Tracer, gaze: &Ray) -> Option<(DVec3, DVec3)> {
-    let place = surfaces.intersect(gaze)?;
-    let normal = surfaces.surface_at(&place).geometric_normal;
-    let point = gaze.origin + gaze.direction * place.distance_m;
-    Some((point, normal * -normal.dot(gaze.direction).signum()))
+    let (distance_m, normal) = surfaces.meets(gaze.origin, gaze.direction, f64::INFINITY)?;
+    Some((gaze.at(distance_m), normal))
 }
 
 impl Model {
     /// Picks the object along a ray, as soon as the collision surfaces are built.
     pub fn pick(&mut self, gaze: Ray) {
-        self.picking = Some(gaze);
-        self.poll_pick();
+        self.seek(|pending| pending.pick = Some(gaze));
     }
 
     /// Selects a light or an object and gives it handles.
     pub fn hold(&mut self, held: GizmoTarget) {
-        self.picking = None;
+        self.pending_tasks.pick = None;
         self.choices.selection.hold(Some(held));
         let scene = self.edits.scene();
         let name = match held {
@@ -119,18 +117,6 @@ impl Model {
                 self.navigator.frame_ball(centre, radius_m, aspect);
             }
             _ => self.navigator.frame(aspect),
-        }
-    }
-
-    pub(super) fn poll_pick(&mut self) {
-        let Some(gaze) = self.picking else { return };
-        let Some(surfaces) = self.surfaces() else {
-            return;
-        };
-        self.picking = None;
-        match surfaces.intersect(&gaze) {
-            Some(place) => self.hold(GizmoTarget::Object(place.object as usize)),
-            None => self.choices.selection.hold(None),
         }
     }
 

@@ -111,6 +111,13 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         uploaded
     }
 
+    /// Uploads the resident levels into a pool that has taken the place of the one before.
+    pub(in super::super) fn move_to(&mut self, gpu: &Gpu, pool: &mut TilePool) -> Uploaded {
+        let finest = std::mem::replace(&mut self.finest, self.levels.len());
+        self.pages.iter_mut().for_each(|pages| pages.fill(EMPTY));
+        self.set_finest(gpu, pool, finest)
+    }
+
     /// Frees all slots.
     pub(in super::super) fn release(&mut self, pool: &mut TilePool) {
         for page in self.pages.iter_mut().flatten() {
