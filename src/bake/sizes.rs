@@ -252,7 +252,7 @@ impl ChartCache {
         largest_side: usize,
     ) -> Option<u32> {
         let share = statistics.mean(receiver)?.map_share;
-        let (width, height) = first_size(self.parametrisation(receiver.object())?.suggested_aspect);
+        let (width, height) = self.doubled_size(receiver.object(), 0)?;
         let coarse = |times: u32| ((width * height) << (2 * times)) as f64 * share < 1.0;
         let small = |times: u32| width.max(height) << times < largest_side;
         (0..).find(|&times| !(coarse(times) && small(times)))
@@ -320,7 +320,7 @@ impl ChartCache {
 
     /// Number of halvings of direct light's texels at the shadow borders of a receiver; 0 if it has none.
     pub fn border_doublings(&self, receiver: Receiver, settings: &BakeSettings) -> u32 {
-        if settings.map_resolution != MapResolution::Auto || !self.has_borders(receiver) {
+        if settings.map_resolution != MapResolution::Auto || self.borders(receiver).is_none() {
             return 0;
         }
         let Some(size) = self.direct_size(receiver.object(), settings) else {
@@ -333,12 +333,6 @@ impl ChartCache {
         } else {
             0
         }
-    }
-
-    fn has_borders(&self, receiver: Receiver) -> bool {
-        let known = self.borders.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut borders = known.iter().filter(|((_, of), _)| *of == receiver);
-        borders.any(|(_, borders)| borders.marked.contains(&true))
     }
 
     /// Shadow borders of all lights on a receiver; `None` if there are none.
@@ -446,7 +440,7 @@ fn border_doublings(settings: &BakeSettings) -> u32 {
 const MIN_GRID_SIDE: usize = 8;
 
 /// A size of about FIRST_SIDE² texels whose aspect ratio is a power of two, at most 8:1.
-pub fn first_size(aspect: f64) -> (usize, usize) {
+fn first_size(aspect: f64) -> (usize, usize) {
     let steps = aspect.log2().round().clamp(-3.0, 3.0) as i32;
     let stretch = |steps: i32| FIRST_SIDE << steps.max(0);
     (stretch(steps), stretch(-steps))

@@ -234,8 +234,8 @@ impl CausticLayer<'_> {
         };
         let listener = unwatched(context.control);
         let chart_for = |receiver: Receiver| {
-            let aspect = self.sizes.parametrisation(receiver.object())?.suggested_aspect;
-            self.sizes.chart(receiver, super::sizes::first_size(aspect))
+            self.sizes
+                .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
         };
         let mut maps = self.no_maps();
         let mut all = HalfBuffers {

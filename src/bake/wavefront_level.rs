@@ -146,8 +146,10 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> FootprintStatistics {
         let light = progress.visible;
-        let chart_for: &ChartFor =
-            &|receiver: Receiver| self.sizes.chart(receiver, self.first_size(receiver.object())?);
+        let chart_for: &ChartFor = &|receiver: Receiver| {
+            self.sizes
+                .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
+        };
         let receivers = Receivers::new(self.tracer, chart_for);
         let none = SubcellFeatures::default();
         let size = self.statistics_size(light);

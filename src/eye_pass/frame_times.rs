@@ -204,10 +204,6 @@ struct TimedFrame {
     specular: u64,
 }
 
-fn sum(ms: GpuMs) -> f64 {
-    ms.opaque + ms.specular + ms.tone_mapping
-}
-
 /// Each switch has a renderer of its own, since switching chains off frees their resources.
 struct TimedRenderer {
     chains: EffectSwitch,
@@ -247,7 +243,7 @@ impl TimedRenderer {
             self.warm_up.push(WarmUp {
                 frame: frame + 1,
                 wall_ms: drawing.wall_ms,
-                device_ms: drawing.device_ms.map(sum),
+                device_ms: drawing.device_ms.map(|ms| ms.sum()),
                 pipelines: made,
             });
         }
@@ -265,11 +261,11 @@ impl TimedRenderer {
         gpu.wait()?;
         let wall_ms = 1e3 * start.elapsed().as_secs_f64();
         // The GPU is done, so these times are of this frame.
-        let is_told = self.renderer.collect_times(gpu);
+        let is_measured = self.renderer.collect_times(gpu);
         let counts = self.renderer.counts();
         Ok(TimedFrame {
             wall_ms,
-            device_ms: counts.gpu_ms.filter(|_| is_told),
+            device_ms: counts.gpu_ms.filter(|_| is_measured),
             objects: counts.drawn_objects,
             specular: counts.drawn_specular,
         })
@@ -295,16 +291,16 @@ impl TimedRenderer {
 
 /// `None` if any frame has no GPU times.
 fn device_ms(drawings: &[TimedFrame]) -> Option<DeviceMs> {
-    let told: Vec<GpuMs> = drawings
+    let times: Vec<GpuMs> = drawings
         .iter()
         .map(|drawing| drawing.device_ms)
         .collect::<Option<_>>()?;
-    let spread = |value: fn(GpuMs) -> f64| Spread::of(told.iter().copied().map(value).collect());
+    let spread = |value: fn(GpuMs) -> f64| Spread::of(times.iter().copied().map(value).collect());
     Some(DeviceMs {
         opaque: spread(|ms| ms.opaque),
         specular: spread(|ms| ms.specular),
         tone_mapping: spread(|ms| ms.tone_mapping),
-        sum: spread(sum),
+        sum: spread(|ms| ms.sum()),
     })
 }
 

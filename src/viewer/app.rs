@@ -28,10 +28,10 @@ use super::model::{MapsShown, Model};
 use super::overlay;
 use super::pace::Pace;
 use super::panel::Panel;
-use super::timing::{FrameTimes, sum_ms};
+use super::timing::FrameTimes;
 use super::{ViewerOptions, comparison_view, probe, sketching};
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::MapStyle;
+use crate::eye_pass::renderer::{GpuMs, MapStyle};
 use crate::illumination::IlluminationMap;
 use crate::progress::Control;
 use serde_json::{Value, json};
@@ -231,12 +231,6 @@ impl App {
     }
 
     fn closing(&mut self) {
-        let Model { log, picture, .. } = &mut self.model;
-        let (while_baking, otherwise) = (picture.latencies.while_baking(), picture.latencies.otherwise());
-        log.write(
-            "latency",
-            json!({"while_baking": while_baking, "otherwise": otherwise}),
-        );
         self.model.log.write("closing", Value::Null);
     }
 
@@ -433,7 +427,6 @@ impl App {
         };
         if shown == FrameOutcome::Yes {
             self.frames += 1;
-            self.model.picture.latencies.show(now);
         }
         if wait.is_zero() {
             self.wake_at = None;
@@ -465,7 +458,7 @@ impl App {
                     "frames": frames,
                     "position_m": position,
                     "exposure_stops": self.model.choices.display.exposure_stops,
-                    "device_ms": newest.copied().map(sum_ms),
+                    "device_ms": newest.map(GpuMs::sum),
                 }),
             );
         }
@@ -480,7 +473,6 @@ impl ApplicationHandler<UserEvent> for App {
     }
 
     fn new_events(&mut self, event_loop: &ActiveEventLoop, _: StartCause) {
-        self.model.picture.latencies.begin_turn(Instant::now());
         if self.stop.as_ref().is_some_and(|stop| stop.is_cancelled()) {
             self.close(event_loop);
         } else if self.wake_at.is_some_and(|due| Instant::now() >= due) {
@@ -504,17 +496,12 @@ impl ApplicationHandler<UserEvent> for App {
         if window.id() != id {
             return;
         }
-        let is_by_hand = is_by_hand(&event);
-        if is_by_hand {
+        if is_by_hand(&event) {
             self.pace.touch(Instant::now());
         }
         // egui asks for another frame after each frame; `schedule` decides that here.
         if graphics.interface.on_event(&window, &event) && event != WindowEvent::RedrawRequested {
             window.request_redraw();
-            if is_by_hand {
-                let is_baking = self.model.state.is_baking();
-                self.model.picture.latencies.meet(Instant::now(), is_baking);
-            }
         }
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
@@ -549,10 +536,6 @@ impl ApplicationHandler<UserEvent> for App {
             && self.looking_from.is_some()
         {
             self.model.navigator.look(DVec2::new(x, y));
-            self.model
-                .picture
-                .latencies
-                .meet(Instant::now(), self.model.state.is_baking());
             self.request_redraw();
         }
     }
@@ -561,7 +544,6 @@ impl ApplicationHandler<UserEvent> for App {
         let look = self.stop.as_ref().map(|_| Instant::now() + STOP_POLL_INTERVAL);
         let until = [self.wake_at, look].into_iter().flatten().min();
         event_loop.set_control_flow(until.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
-        self.model.picture.latencies.end_turn(Instant::now());
     }
 }
 

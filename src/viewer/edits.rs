@@ -179,7 +179,7 @@ impl EditedScene {
 
     /// Undoes the newest step, or redoes the last undone one. Returns its name and the state before and after; a
     /// change of the scene is already applied.
-    pub fn turn(&mut self, is_back: bool) -> Option<(String, [EditedItem; 2])> {
+    pub fn step(&mut self, is_back: bool) -> Option<(String, [EditedItem; 2])> {
         let History {
             done,
             undone,

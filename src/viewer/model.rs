@@ -26,7 +26,7 @@ use super::navigation::{NavigationMode, Navigator};
 use super::playback::Playback;
 use super::probe::{Probed, Prober};
 use super::sketching::PreviewTask;
-use super::timing::{FrameTimes, Latencies};
+use super::timing::FrameTimes;
 use super::views::MapSurvey;
 use super::walking::{Collider, CollisionScene};
 use super::worker::{BakeRequest, BakeState, BakedLevel, EffectDifference, Worker};
@@ -124,8 +124,6 @@ pub struct PictureReport {
     pub chains: Option<EffectLine>,
     /// GPU times of the last pictures; `None` if the device cannot measure them.
     pub frame_times: Option<FrameTimes>,
-    /// Latencies from input events to frames.
-    pub latencies: Latencies,
     /// Whether the graphics device was lost and recreated a short while ago.
     pub lost_device: bool,
 }
@@ -240,8 +238,8 @@ impl Model {
     }
 
     /// Probes the surface along a ray; `None` clears the probe.
-    pub fn probe(&mut self, gaze: Option<Ray>) {
-        self.prober.ask(gaze);
+    pub fn probe(&mut self, view_ray: Option<Ray>) {
+        self.prober.ask(view_ray);
     }
 
     /// Result of the probe so far.
@@ -502,7 +500,7 @@ impl Model {
     /// Undoes the last change, or redoes the last undone one.
     fn step_history(&mut self, is_back: bool) {
         self.refusal = None;
-        let Some((text, [from, to])) = self.edits.turn(is_back) else {
+        let Some((text, [from, to])) = self.edits.step(is_back) else {
             return;
         };
         let event = if is_back { "undone" } else { "redone" };
@@ -518,7 +516,7 @@ impl Model {
                 self.choices.automatic = automatic;
                 self.revision += 1;
             }
-            // The scene: `turn` has already restored it.
+            // The scene: `step` has already restored it.
             _ => {
                 self.revision += 1;
                 self.stand_at_moment();

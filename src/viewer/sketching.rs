@@ -79,7 +79,7 @@ pub fn draw(painter: &Painter, lens: &Viewport<'_>, sketch: &PathPreview, what: 
     if what.hits {
         for landing in &sketch.landings {
             if lens.is_before(landing.point) {
-                painter.circle_filled(lens.place(landing.point), DOT, HIT);
+                painter.circle_filled(lens.project(landing.point), DOT, HIT);
             }
         }
     }

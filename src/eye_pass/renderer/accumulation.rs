@@ -17,8 +17,7 @@ pub(super) const BINDINGS: [Binding; 3] = [
 /// A running mean of frames. The two pictures alternate between the current mean and the previous one.
 #[derive(Debug)]
 pub(super) struct Mean {
-    width: u32,
-    height: u32,
+    size: [u32; 2],
     pictures: [wgpu::Texture; 2],
     views: [wgpu::TextureView; 2],
     /// Frames in the mean.
@@ -29,14 +28,14 @@ pub(super) struct Mean {
 
 impl Mean {
     /// The mean that there is if it has the size, else an empty one. The size must be within the device's limit.
-    pub(super) fn of_size(before: Option<Self>, gpu: &Gpu, width: u32, height: u32) -> Self {
-        let has_size = |mean: &Self| (mean.width, mean.height) == (width, height);
+    pub(super) fn of_size(before: Option<Self>, gpu: &Gpu, size: [u32; 2]) -> Self {
         before
-            .filter(has_size)
-            .unwrap_or_else(|| Self::new(gpu, width, height))
+            .filter(|mean| mean.size == size)
+            .unwrap_or_else(|| Self::new(gpu, size))
     }
 
-    fn new(gpu: &Gpu, width: u32, height: u32) -> Self {
+    fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+        let [width, height] = size;
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
             | wgpu::TextureUsages::TEXTURE_BINDING
             | wgpu::TextureUsages::COPY_SRC;
@@ -44,8 +43,7 @@ impl Mean {
         let pictures = [(); 2].map(|()| gpu.device.create_texture(&picture));
         let layout = bind_group_layout(gpu, "mean", &BINDINGS);
         Self {
-            width,
-            height,
+            size,
             views: [0, 1].map(|index: usize| pictures[index].create_view(&Default::default())),
             pictures,
             count: 0,

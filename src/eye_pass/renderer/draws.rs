@@ -262,3 +262,10 @@ pub struct GpuMs {
     /// Tone mapping; 0 for frames that are read back as radiance.
     pub tone_mapping: f64,
 }
+
+impl GpuMs {
+    /// All passes [ms].
+    pub fn sum(&self) -> f64 {
+        self.opaque + self.specular + self.tone_mapping
+    }
+}

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::bindings::Storage;
 use super::maps::{self, DeviceMap, ShownMap};
-use super::paging::{Level, PagedImage, TILE, Texels, TilePool, Uploaded, is_halved};
+use super::paging::{Level, PagedImage, TILE, TilePool, Uploaded, is_halved};
 use crate::gpu::Gpu;
 use crate::illumination::{IlluminationMap, Receiver};
 use crate::optics::LinearSrgb;
@@ -367,12 +367,9 @@ fn mip_chain(texture: &Texture) -> Vec<Level<Texel>> {
     while let Some(last) = images.last().filter(|(size, _)| is_halved(*size)) {
         images.push(halved(last));
     }
-    let level = |(size, texels): Image| Level {
-        size,
-        extent: size.map(|side| side as f32),
-        texels: Texels::Rows(texels),
-    };
-    images.into_iter().map(level).collect()
+    let level =
+        |(size, texels): &Image| Level::of_rows(*size, size.map(|side| side as f32), texture.wrap, texels);
+    images.iter().map(level).collect()
 }
 
 /// Means of 2×2 texels in linear light; an odd last row or column is dropped.

@@ -9,7 +9,7 @@ use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 use rayon::slice::{ParallelSlice, ParallelSliceMut};
 
 use super::minify::Minification;
-use super::paging::{Level, PagedImage, Texels, TilePool, Uploaded};
+use super::paging::{Level, PagedImage, TilePool, Uploaded};
 use super::tiled;
 use crate::gpu::Gpu;
 use crate::illumination::{Chart, IlluminationMap};
@@ -18,6 +18,8 @@ use crate::scene::texture::Wrap;
 /// Linear red, green and blue; if one of them is not finite, all are 0 and alpha is 1.
 pub(super) type Texel = [f16; 4];
 
+/// Maps do not repeat.
+const WRAP: [Wrap; 2] = [Wrap::ClampToEdge; 2];
 /// Texels per parallel task.
 const BLOCK: usize = 4096;
 /// Largest stored value, well below the largest half float, 65504.
@@ -63,7 +65,7 @@ impl DeviceMap {
         let peak_w_m2 = peak(&map.irradiance);
         let irradiance_scale = scale_for_half_floats(peak_w_m2);
         let levels = levels(map, &minification, irradiance_scale);
-        let (image, uploaded) = PagedImage::new(gpu, pool, levels, [Wrap::ClampToEdge; 2], finest);
+        let (image, uploaded) = PagedImage::new(gpu, pool, levels, WRAP, finest);
         let map = Self {
             image,
             chart: Arc::clone(&map.chart),
@@ -149,10 +151,9 @@ fn levels(map: &ShownMap, minification: &Minification, scale: f32) -> Vec<Level<
     (0..)
         .zip(sizes)
         .zip(all)
-        .map(|((level, size), irradiance)| Level {
-            size: *size,
-            extent: [width, height].map(|side| side * (-level as f32).exp2()),
-            texels: Texels::Rows(half_floats(irradiance, scale)),
+        .map(|((level, size), irradiance)| {
+            let extent = [width, height].map(|side| side * (-level as f32).exp2());
+            Level::of_rows(*size, extent, WRAP, &half_floats(irradiance, scale))
         })
         .collect()
 }

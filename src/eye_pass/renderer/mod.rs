@@ -51,7 +51,7 @@ use self::maps::ShownMap;
 use self::objects::{Appearance, Objects};
 use self::pipelines::{PipelineFlags, SurfacePipelines};
 use self::sky::Sky;
-use self::targets::{Targets, TracedTargets};
+use self::targets::Targets;
 use self::timing::Timing;
 use self::tone_mapping::ToneMappingPipelines;
 use super::View;
@@ -83,7 +83,7 @@ pub struct Renderer {
     refusal: Option<Error>,
     sky: Option<Sky>,
     targets: Option<Targets>,
-    traced: Option<TracedTargets>,
+    traced: Option<Targets>,
     mean: Option<Mean>,
     /// Whether mirrors are grey instead of black while chains are switched off.
     has_stand_in: bool,
@@ -281,7 +281,7 @@ impl Renderer {
             .traced
             .as_ref()
             .filter(|_| self.drawn[1] > 0)
-            .map(|traced| u64::from(traced.width) * u64::from(traced.height));
+            .map(|traced| traced.size.map(u64::from).iter().product());
         let timed = self.timing.as_ref().and_then(Timing::latest);
         EyeCounts {
             pipelines: (self.surfaces.count() + self.tone_mapping.count()) as u64,
@@ -361,7 +361,7 @@ impl Renderer {
         if self.drawn_view.as_ref() != Some(view) {
             return self.draw(gpu, encoder, target, view);
         }
-        let mut mean = Mean::of_size(self.mean.take(), gpu, view.width, view.height);
+        let mut mean = Mean::of_size(self.mean.take(), gpu, [view.width, view.height]);
         if mean.count() == 0
             && let Some(targets) = &self.targets
         {

@@ -143,7 +143,7 @@ impl Renderer {
 
     fn add_to_mean(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, is_first: bool) {
         let Some(targets) = &self.targets else { return };
-        let mut mean = Mean::of_size(self.mean.take(), gpu, targets.width, targets.height);
+        let mut mean = Mean::of_size(self.mean.take(), gpu, targets.size);
         if is_first {
             mean.clear();
         }

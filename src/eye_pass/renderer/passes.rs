@@ -11,7 +11,7 @@ use super::draws::{EyeQuality, Sample};
 use super::geometry::Segment;
 use super::pipelines::{PipelineKey, RenderTarget};
 use super::sky::Sky;
-use super::targets::{Targets, TracedTargets};
+use super::targets::Targets;
 use super::timing::{AFTER_CHAINS, BEFORE_CHAINS, SURFACES};
 use super::uniforms::{Frame, SeenWavelengths, rgb};
 use super::{MapStyle, Renderer};
@@ -42,14 +42,15 @@ impl Renderer {
         let quality = self.quality;
         self.collect_times(gpu);
         self.drawn_view = None;
-        let size_fits = |targets: &Targets| (targets.width, targets.height) == (view.width, view.height);
-        let targets = match self.targets.take().filter(size_fits) {
-            Some(targets) => targets,
-            None => Targets::new(gpu, view.width, view.height, self.sample_count)?,
-        };
+        let size = [view.width, view.height];
+        let targets = Targets::of_size(self.targets.take(), gpu, "picture", size, self.sample_count)?;
         let list = self.prepare(gpu, view);
         if list.specular_objects > 0 {
-            self.make_traced_targets(gpu, view, quality)?;
+            let limit = gpu.limits().max_texture_dimension_2d;
+            let scaled = |pixels: u32| (f64::from(pixels) * quality.traced_scale).ceil() as u32;
+            let size = size.map(|pixels| scaled(pixels).clamp(1, limit));
+            let traced = Targets::of_size(self.traced.take(), gpu, "traced picture", size, 1)?;
+            self.traced = Some(traced);
         }
         let frame = self.frame(view, radiance_scale, sample, quality);
         let needs_scene = list.all().any(|draw| draw.key.writes.goes_through_scene());
@@ -136,17 +137,6 @@ impl Renderer {
             pass.set_bind_group(2, sky.bound(), &[]);
         }
         self.draw_each(&mut pass, &list.traced);
-    }
-
-    fn make_traced_targets(&mut self, gpu: &Gpu, view: &View, quality: EyeQuality) -> Result<()> {
-        let limit = gpu.limits().max_texture_dimension_2d;
-        let side = |pixels: u32| ((f64::from(pixels) * quality.traced_scale).ceil() as u32).clamp(1, limit);
-        let (width, height) = (side(view.width), side(view.height));
-        let size_fits = |targets: &TracedTargets| (targets.width, targets.height) == (width, height);
-        if !self.traced.as_ref().is_some_and(size_fits) {
-            self.traced = Some(TracedTargets::new(gpu, width, height)?);
-        }
-        Ok(())
     }
 
     /// Creates what a view needs and does not exist yet; returns its draw list.
@@ -258,7 +248,7 @@ impl Renderer {
         let traced = self
             .traced
             .as_ref()
-            .map_or([view.width, view.height], |traced| [traced.width, traced.height]);
+            .map_or([view.width, view.height], |traced| traced.size);
         let half_height = (0.5 * camera.vertical_fov_rad).tan();
         let traced_height = f64::from(traced[1]);
         let traced_per_pixel = [0, 1].map(|axis: usize| f64::from(traced[axis]) / size[axis]);
@@ -292,8 +282,7 @@ impl Renderer {
             },
             colour_scale: self.map_style.colour_scale().map(|number| number as f32),
             fault: (radiance_scale / view.exposure_stops.exp2()) as f32,
-            padding0: 0.0,
-            padding1: 0.0,
+            ..Frame::default()
         }
     }
 
@@ -312,7 +301,7 @@ impl Renderer {
 
     fn bind_composed(&self, gpu: &Gpu, list: &DrawList) -> Option<wgpu::BindGroup> {
         let traced = self.traced.as_ref().filter(|_| list.specular_objects > 0)?;
-        let resources = [wgpu::BindingResource::TextureView(&traced.view)];
+        let resources = [wgpu::BindingResource::TextureView(&traced.resolved_view)];
         Some(bind_group(
             gpu,
             "traced picture",

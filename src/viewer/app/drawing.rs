@@ -220,7 +220,7 @@ impl App {
         let Some(graphics) = &self.graphics else { return };
         let (counts, quality) = (graphics.main.renderer.counts(), graphics.main.renderer.quality());
         if let Some(times) = &mut self.model.picture.frame_times {
-            times.set_made(FrameStats {
+            times.made = Some(FrameStats {
                 traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
                 samples: counts.samples,
             });

@@ -68,15 +68,15 @@ impl Model {
     /// Adds a light near what the camera looks at, and gives it handles.
     fn add_light(&mut self, light: NewLight, surfaces: &Arc<Tracer>) {
         let (camera, radius_m) = (self.navigator.camera(), self.navigator.radius_m());
-        let gaze = Ray {
+        let view_ray = Ray {
             origin: camera.position,
             direction: camera.forward,
         };
         let scene = Arc::clone(self.edits.scene());
         let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
-        let aim = ViewTarget::of(surfaces, &gaze, 0.5 * (low + high));
+        let target = ViewTarget::of(surfaces, &view_ray, 0.5 * (low + high));
         let stops = self.choices.display.exposure_stops;
-        let added = light.make((surfaces, radius_m), &aim, stops, &scene);
+        let added = light.make((surfaces, radius_m), &target, stops, &scene);
         let is_added = self.edit(&Edit::AddLight(Arc::new(added)));
         self.edits.release();
         if is_added {
@@ -106,12 +106,12 @@ impl Model {
         let level = DVec3::new(back.x, 0.0, back.z).normalize_or(DVec3::X);
         let ways = [back, spot.normal + level, spot.normal - level, spot.normal].map(DVec3::normalize);
         let is_seen = |eye: DVec3| {
-            let gaze = Ray {
+            let view_ray = Ray {
                 origin: eye,
                 direction: (spot.point - eye).normalize(),
             };
-            let seen = surfaces.closest_hit(&gaze);
-            let through = probe::seen(surfaces, &gaze).map(|seen| seen.hit);
+            let seen = surfaces.closest_hit(&view_ray);
+            let through = probe::seen(surfaces, &view_ray).map(|seen| seen.hit);
             [seen, through]
                 .into_iter()
                 .flatten()

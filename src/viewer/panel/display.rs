@@ -2,7 +2,7 @@
 
 use egui::{DragValue, Response, Slider, SliderClamping, Ui};
 
-use super::control::{about, choice, counted, listed, listed_but, row, rows, setting, short};
+use super::control::{about, ask, choice, counted, listed, listed_but, row, rows, setting, short};
 use super::{Command, Display, LayerShown, Model, Quantity, bake};
 use crate::eye_pass::WhiteBalance;
 use crate::optics::spectrum::temperature::CAMERA_KELVIN;
@@ -10,8 +10,6 @@ use crate::settings::LayerKind;
 use crate::viewer::false_colours;
 use crate::viewer::views::{IrradianceUnit, ScaleChoice};
 
-const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure once, so that brightness stays \
-                             comparable afterwards. Takes one small picture.";
 const NO_DIFFERENCE: &str = "Ask under Effects what an effect is worth.";
 const NO_ERRORS: &str = "These maps come without an estimate of their error.";
 
@@ -32,10 +30,7 @@ pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Ve
                 // Leaves room for the button.
                 ui.spacing_mut().slider_width = 74.0;
                 let slider = exposure(ui, &mut display.exposure_stops);
-                let auto = ui.button("Auto").on_hover_text(AUTO_EXPOSURE);
-                if auto.clicked() {
-                    commands.push(Command::MeasureExposure);
-                }
+                ask(ui, "Auto", None, commands, Command::MeasureExposure);
                 slider
             })
             .inner
@@ -59,10 +54,10 @@ pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Ve
         }
     });
     if model.survey.faults > 0 {
-        let told = counted(model.survey.faults, "texel");
+        let faults = counted(model.survey.faults, "texel");
         ui.colored_label(
             bake::ATTENTION,
-            format!("{told} without a finite value, shown in magenta."),
+            format!("{faults} without a finite value, shown in magenta."),
         );
     }
 }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use strum::EnumMessage;
 
 use super::control::{
-    CONTROL_WIDTH, about, counted, edited, pick_name, row, rows, setting, significant, slider,
+    CONTROL_WIDTH, about, about_button, counted, edited, pick_name, row, rows, setting, significant, slider,
 };
 use super::{Command, Model, bake, glass, light_colour, light_size, waves};
 use crate::optics::LinearSrgb;
@@ -177,7 +177,7 @@ fn remove_light(ui: &mut Ui, selection: &mut Selection, scene: &Scene, commands:
     let remove = ui.add_enabled(why_not.is_none(), egui::Button::new("Remove"));
     let remove = remove
         .accessible_name("Remove light")
-        .on_hover_text("Takes the light out of the scene; undo brings it back.")
+        .on_hover_text(about_button("Remove light"))
         .on_disabled_hover_text(format!("`{}` {}.", light.name, why_not.unwrap_or_default()));
     if remove.clicked() {
         commands.push(Command::Edit(Edit::RemoveLight(selection.light)));

@@ -8,7 +8,7 @@ use crate::gpu::{Gpu, texture_of};
 mod image;
 
 pub(super) use image::PagedImage;
-pub(super) use image::{Level, Texels, stored};
+pub(super) use image::{Level, stored};
 
 /// Side of a tile [texels]; `TILE` in the shader.
 pub(super) const TILE: usize = 64;
