@@ -23,19 +23,9 @@ fn tone_map_neutral(exposed: vec3f) -> vec3f {
     return mix(colour * (new_peak / peak), vec3f(new_peak), whiteness);
 }
 
-// The matrices below are written row by row, so a colour is multiplied from the left.
-
-// From linear sRGB to AgX's working space, with the primaries of BT.709 moved a fifth of the way towards D65; and back.
-const AGX_INSET = mat3x3f(
-    0.842398929049531, 0.078430165104864, 0.079170905845605,
-    0.042398929049531, 0.878430165104864, 0.079170905845605,
-    0.042398929049531, 0.078430165104864, 0.879170905845605,
-);
-const AGX_OUTSET = mat3x3f(
-    1.197001338688086, -0.098037706381080, -0.098963632307006,
-    -0.052998661311914, 1.151962293618920, -0.098963632307006,
-    -0.052998661311914, -0.098037706381080, 1.151036367692994,
-);
+// AgX's working space has the primaries of BT.709, moved a fifth of the way towards D65: every channel is four fifths of
+// itself plus these shares of all three.
+const AGX_SHARES = vec3f(0.042398929049531, 0.078430165104864, 0.079170905845605);
 
 // AgX's sigmoid in closed form: middle grey maps to 1/2 with slope 2; the exponents below and above it differ.
 fn agx_contrast(position: vec3f) -> vec3f {
@@ -51,11 +41,13 @@ fn tone_map_agx(exposed: vec3f) -> vec3f {
     let least = -12.473931188332413;
     let most = 4.026068811667587;
     // Keeps black away from the logarithm's pole.
-    let stops = clamp(log2(max(exposed * AGX_INSET, vec3f(1e-5))), vec3f(least), vec3f(most));
-    let codes = agx_contrast((stops - least) / (most - least)) * AGX_OUTSET;
-    return pow(max(codes, vec3f(0.0)), vec3f(2.2));
+    let inset = 0.8 * exposed + dot(AGX_SHARES, exposed);
+    let stops = clamp(log2(max(inset, vec3f(1e-5))), vec3f(least), vec3f(most));
+    let codes = agx_contrast((stops - least) / (most - least));
+    return pow(max(1.25 * (codes - dot(AGX_SHARES, codes)), vec3f(0.0)), vec3f(2.2));
 }
 
+// Matrices are written row by row, so a colour is multiplied from the left.
 const ACES_INPUT = mat3x3f(
     0.59719, 0.35458, 0.04823,
     0.07600, 0.90834, 0.01566,

@@ -5,8 +5,7 @@
 //! operations, so that the choice does not depend on the machine.
 
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{LightLevel, LightState};
-use super::map_size::Sizes;
+use super::light_level::{KeptError, LightLevel};
 use super::photon_level::GROWTH;
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::setup::VisibleLight;
@@ -50,7 +49,7 @@ pub(super) enum Carrier {
     Splats,
 }
 
-impl LightProgress {
+impl LightProgress<'_> {
     /// Continues from the first photons; the last level of patches becomes the rival.
     pub(super) fn turn_to_photons(&mut self) {
         self.carrier = Carrier::Photons;
@@ -70,7 +69,7 @@ impl CausticLayer<'_> {
     /// The first rough or spatially varying object that the light reaches; `None` if roughness is off.
     pub(super) fn rough_object(&self, light: &VisibleLight) -> Option<usize> {
         let scene = self.tracer.scene();
-        let reached = self.aim.sights[light.light].reached.iter();
+        let reached = self.visibility.sights[light.light].reached.iter();
         let mut objects = reached.map(|&(object, _)| object);
         let rough = objects.find(|&object| scene.material_of(object).is_rough());
         rough.filter(|_| self.plan.is_on(Effect::Roughness))
@@ -83,13 +82,13 @@ impl CausticLayer<'_> {
 
     /// # Errors
     /// A light with an extent or on rough surfaces, with an estimator that supports neither.
-    pub(super) fn refuse_soft_light(&self, lights: &[&VisibleLight]) -> Result<()> {
+    pub(super) fn refuse_soft_light(&self) -> Result<()> {
         let estimator = self.settings.estimator;
         if matches!(estimator, Estimator::Auto | Estimator::Photon) {
             return Ok(());
         }
         let scene = self.tracer.scene();
-        for light in lights {
+        for light in self.lit() {
             let source = &scene.lights[light.light];
             let (cause, effect) = if self.has_places(light) {
                 (String::from("has a size"), Effect::AreaLights)
@@ -134,97 +133,75 @@ impl CausticLayer<'_> {
     /// were traced.
     pub(super) fn decide_carrier(
         &self,
-        light: &VisibleLight,
-        sizes: &Sizes,
-        state: &mut LightState,
-        light_progress: &mut LightProgress,
-        course: &mut BakeContext,
+        light: &mut LightProgress,
+        context: &mut BakeContext,
     ) -> Result<bool> {
         let Some(target) = self.settings.max_error else {
             return Ok(false);
         };
-        let is_first = light_progress.rival.is_none();
-        if is_first
-            || self.are_photons_sooner(light, light_progress)
-            || self.lacks_auditors(light, light_progress)
-        {
-            let before = (light_progress.rival.as_mut(), light_progress.aim);
-            let made = self.more_photons(light, sizes, state, before, course)?;
+        let is_first = light.rival.is_none();
+        if is_first || self.are_photons_sooner(light) || self.lacks_auditors(light) {
+            let mut rival = light.rival.take();
+            let made = self.more_photons(light, rival.as_mut(), context)?;
             let is_made = made.is_some();
-            light_progress.rival = made.or(light_progress.rival.take());
+            light.rival = made.or(rival);
             if is_made || !is_first {
                 return Ok(is_made);
             }
         }
-        let Some((segments, per_photon)) = light_progress.rival.as_ref().and_then(photon_segments) else {
+        let Some((segments, per_photon)) = light.rival.as_ref().and_then(photon_segments) else {
             // Nothing arrived: patches find paths that are too rare for a few photons.
-            light_progress.carrier = Carrier::Patches;
+            light.carrier = Carrier::Patches;
             return Ok(false);
         };
-        let most_share = light_progress.most_share.unwrap_or(target);
-        let by_photons = match light_progress.shares.first() {
+        let most_share = light.most_share.unwrap_or(target);
+        let by_photons = match light.shares.first() {
             Some((0, share)) => segments * (share / most_share).powi(2).max(1.0),
             _ => f64::INFINITY,
         };
-        let cost = |level: &LightLevel| cost(level, per_photon);
-        let so_far = cost_of(&light_progress.levels, per_photon);
-        let next = light_progress.levels.last().map_or(0.0, cost) * LEVEL_GROWTH;
-        let promised = promised(light_progress, cost, most_share).unwrap_or(0.0);
-        let goes_many_ways = light_progress.levels.is_empty() && per_photon > MAX_PATHS;
-        let is_late = are_photons_in_time(light_progress, state, course);
-        let is_biased = is_biased(light_progress)
-            && light_progress
-                .shares
-                .last()
-                .is_some_and(|(_, share)| *share > most_share);
+        let so_far = cost_of(&light.levels, per_photon);
+        let next = light.levels.last().map_or(0.0, |level| cost(level, per_photon)) * LEVEL_GROWTH;
+        let promised = promised(light, per_photon, most_share).unwrap_or(0.0);
+        let goes_many_ways = light.levels.is_empty() && per_photon > MAX_PATHS;
+        let is_above_share = light.shares.last().is_some_and(|(_, share)| *share > most_share);
         if goes_many_ways
-            || is_late
-            || is_biased
+            || are_photons_in_time(light, context)
+            || (is_biased(light) && is_above_share)
             || so_far + next > by_photons
             || promised > PATCH_COST_FRACTION * by_photons
         {
-            light_progress.turn_to_photons();
+            light.turn_to_photons();
         }
         // The number of queries is not known before cells are subdivided, so it is capped.
-        course.most_queries = ((by_photons - so_far) / RECEIVER_QUERY) as u64;
+        context.most_queries = ((by_photons - so_far) / RECEIVER_QUERY) as u64;
         Ok(false)
     }
 
     /// Whether patches may have a bias that the first photons are too few to detect, and more photons cost less than
     /// the patches did.
-    fn lacks_auditors(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
-        let Some(rival) = light_progress
-            .rival
-            .as_ref()
-            .filter(|_| self.spectra.is_interpolated(light.light))
-        else {
+    fn lacks_auditors(&self, light: &LightProgress) -> bool {
+        let rival = light.rival.as_ref();
+        let Some(rival) = rival.filter(|_| self.spectra.is_interpolated(light.visible.light)) else {
             return false;
         };
-        let is_coarse = rival
-            .error
-            .as_ref()
-            .is_some_and(|error| error.estimate.relative_rmse > AUDIT_RMSE);
-        let known = photon_segments(rival).filter(|_| is_coarse);
-        known.is_some_and(|(segments, per_photon)| {
-            GROWTH.1 * segments < cost_of(&light_progress.levels, per_photon)
-        })
+        let is_coarse = |error: &KeptError| error.estimate.relative_rmse > AUDIT_RMSE;
+        let known = photon_segments(rival).filter(|_| rival.error.as_ref().is_some_and(is_coarse));
+        known.is_some_and(|(segments, per_photon)| GROWTH.1 * segments < cost_of(&light.levels, per_photon))
     }
 
     /// Whether another level of photons costs less than the first level of patches.
-    fn are_photons_sooner(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
-        let known = light_progress.rival.as_ref().and_then(photon_segments);
-        let (Some((segments, per_photon)), true) = (known, light_progress.levels.is_empty()) else {
+    fn are_photons_sooner(&self, light: &LightProgress) -> bool {
+        let known = light.rival.as_ref().and_then(photon_segments);
+        let (Some((segments, per_photon)), true) = (known, light.levels.is_empty()) else {
             return false;
         };
-        let cells: f64 = self
-            .spectra
-            .parts(light.light)
+        let light = light.visible;
+        let size = self.spectra.part_size(light.light, self.lattices(light)[0]);
+        let cells = light.item_buffer.lattice_cells(light.launch.face_count(), size);
+        let parts = self.spectra.parts(light.light);
+        let cells: f64 = parts
             .iter()
-            .map(|(_, part)| {
-                let size = self.spectra.part_size(light.light, self.lattices(light)[0]);
-                let cells = light.item_buffer.lattice_cells(light.launch.face_count(), size);
-                cells as f64 * part.node_count() as f64
-            })
+            .map(|(_, part)| cells as f64 * part.node_count() as f64)
             .sum();
         GROWTH.1 * segments < CELL_COST * per_photon.powi(3) * cells
     }
@@ -243,52 +220,39 @@ fn cost_of(levels: &[LightLevel], per_photon: f64) -> f64 {
 
 /// Whether audits exceed the error that the last two levels of patches estimate for themselves: finer patches would not
 /// reduce that.
-fn is_biased(light_progress: &LightProgress) -> bool {
-    let mut last = light_progress.levels.iter().rev().take(2);
-    light_progress.levels.len() > 1
-        && last.all(|level| level.error.as_ref().is_some_and(|error| error.estimate.is_raised))
+fn is_biased(light: &LightProgress) -> bool {
+    let mut last = light.levels.iter().rev().take(2);
+    let is_raised = |level: &LightLevel| level.error.as_ref().is_some_and(|error| error.estimate.is_raised);
+    light.levels.len() > 1 && last.all(is_raised)
 }
 
 /// Whether the time left is too short for another level of patches, but enough for photons that beat the last one.
-fn are_photons_in_time(light_progress: &LightProgress, state: &LightState, course: &BakeContext) -> bool {
-    let (Some(left_s), Some(photon_s)) = (course.limited.time_left_s(), state.photon_s) else {
+fn are_photons_in_time(light: &LightProgress, context: &BakeContext) -> bool {
+    let (Some(left_s), Some(photon_s)) = (context.limited.time_left_s(), light.state.photon_s) else {
         return false;
     };
-    let photons = light_progress
+    let photons = light
         .rival
         .as_ref()
         .and_then(|rival| rival.key.photons)
         .unwrap_or(0);
-    let (Some(&(0, of_photons)), Some(&(_, of_patches))) =
-        (light_progress.shares.first(), light_progress.shares.last())
-    else {
+    let (Some(&(0, of_photons)), Some(&(_, of_patches))) = (light.shares.first(), light.shares.last()) else {
         return false;
     };
-    let own_s = left_s / course.open_lights as f64;
+    let own_s = left_s / context.open_lights as f64;
     let times = 1.0 + own_s / (photon_s * f64::from(photons));
-    light_progress.level_s * LEVEL_GROWTH > own_s && of_photons / times.sqrt() < of_patches
+    light.level_s * LEVEL_GROWTH > own_s && of_photons / times.sqrt() < of_patches
 }
 
 /// Predicted total cost of patches that contribute `most_share` to the error of the bake, extrapolated from the last
 /// two levels with a known share; `None` with fewer.
-fn promised(
-    light_progress: &LightProgress,
-    cost: impl Fn(&LightLevel) -> f64,
-    most_share: f64,
-) -> Option<f64> {
-    let cost_of = |levels: usize| -> f64 { light_progress.levels.iter().take(levels).map(&cost).sum() };
-    let has_error = |levels: usize| {
-        let last = levels
-            .checked_sub(1)
-            .and_then(|last| light_progress.levels.get(last));
-        last.is_some_and(|level| level.error.is_some())
+fn promised(light: &LightProgress, per_photon: f64, most_share: f64) -> Option<f64> {
+    let point = |&(count, share): &(usize, f64)| {
+        let levels = light.levels.get(..count)?;
+        let is_known = levels.last()?.error.is_some();
+        is_known.then(|| (cost_of(levels, per_photon), share))
     };
-    let known: Vec<(f64, f64)> = light_progress
-        .shares
-        .iter()
-        .filter(|(levels, _)| has_error(*levels))
-        .map(|&(levels, share)| (cost_of(levels), share))
-        .collect();
+    let known: Vec<(f64, f64)> = light.shares.iter().filter_map(point).collect();
     let [.., (before, coarse), (after, fine)] = known[..] else {
         return None;
     };

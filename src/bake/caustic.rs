@@ -11,21 +11,21 @@ use super::forecast::{CostPoint, Forecast, forecast};
 use super::goals::{Errors, Goal};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates};
 use super::map_size::Sizes;
-use super::metric::{Backdrop, ErrorTerms};
+use super::metric::ErrorTerms;
 use super::shards::{PassSums, ShardRole};
+use super::showing::Showing;
 use super::sizes::ChartCache;
 use super::spectra::Spectra;
 use crate::error::{Error, Result, Warning};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::accuracy::{self, Images, LightError, PreviousRound};
-use crate::light_pass::caustic::pass::{PassReport, Stopwatch};
+use crate::light_pass::caustic::pass::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::caustic::setup::{LightVisibility, VisibleLight};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::shard_index::ShardIndex;
 use crate::light_pass::wavefront::refine::Round;
-use crate::optics::LinearSrgb;
 use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
 use crate::settings::{BakeSettings, Estimator};
@@ -52,7 +52,7 @@ const PART_BEFORE_INDIRECT: f64 = 0.85;
 /// Inputs of the caustic layer.
 pub(super) struct CausticLayer<'a> {
     pub(super) tracer: &'a Tracer,
-    pub(super) aim: &'a LightVisibility,
+    pub(super) visibility: &'a LightVisibility,
     pub(super) settings: &'a BakeSettings,
     pub(super) sizes: &'a ChartCache,
     /// Spectra of the lights that are traced by wavelength.
@@ -92,9 +92,12 @@ pub(super) enum Stopped {
     Cancelled,
 }
 
-/// Levels of one light in the running bake.
-#[derive(Debug, Default)]
-pub(super) struct LightProgress {
+/// One light in the running bake.
+#[derive(Debug)]
+pub(super) struct LightProgress<'a> {
+    pub(super) visible: &'a VisibleLight,
+    /// What is kept of it between bakes.
+    pub(super) state: LightState,
     pub(super) carrier: Carrier,
     /// Last level of the other carrier, shown while its error is lower: photons traced to predict their cost, or
     /// abandoned patches.
@@ -107,7 +110,7 @@ pub(super) struct LightProgress {
     /// Relative RMSE that the last round aims at.
     pub(super) goal: Option<f64>,
     /// Relative RMSE of this light's maps that the target of the whole bake asks for.
-    pub(super) aim: Option<f64>,
+    pub(super) target_rmse: Option<f64>,
     /// Number of levels, and the light's share of the error of the whole bake with that many, in the target metric.
     pub(super) shares: Vec<(usize, f64)>,
     /// Upper limit of that share.
@@ -117,7 +120,33 @@ pub(super) struct LightProgress {
     pub(super) is_underrated: bool,
 }
 
-impl LightProgress {
+impl<'a> LightProgress<'a> {
+    fn new(visible: &'a VisibleLight, state: LightState, carrier: Carrier) -> Self {
+        Self {
+            visible,
+            state,
+            carrier,
+            rival: None,
+            levels: Vec::new(),
+            level_s: 0.0,
+            rounds: Vec::new(),
+            goal: None,
+            target_rmse: None,
+            shares: Vec::new(),
+            most_share: None,
+            done: false,
+            is_underrated: false,
+        }
+    }
+
+    /// Begins anew, as a light that is not negligible.
+    fn start_over(&mut self) {
+        *self = Self {
+            is_underrated: true,
+            ..Self::new(self.visible, std::mem::take(&mut self.state), self.carrier)
+        };
+    }
+
     /// The level to show: the last one, or the rival while it is better.
     pub(super) fn shown(&self) -> Option<&LightLevel> {
         if self.is_rival_better() {
@@ -144,50 +173,11 @@ impl LightProgress {
     }
 }
 
-/// Receives the intermediate results of a bake.
-pub(super) trait BakeObserver {
-    /// Takes a result that is not the final one.
-    ///
-    /// # Errors
-    /// An error ends the bake.
-    fn show(
-        &mut self,
-        _levels: &[CompletedLevel],
-        _so_far: &CausticOutcome,
-        _clock: &mut Clock,
-    ) -> Result<()> {
-        Ok(())
-    }
-
-    /// Takes the first result, when the light of other layers is not known yet.
-    ///
-    /// # Errors
-    /// An error ends the bake.
-    fn show_first(
-        &mut self,
-        _levels: &[CompletedLevel],
-        _so_far: &CausticOutcome,
-        _clock: &mut Clock,
-    ) -> Result<()> {
-        Ok(())
-    }
-
-    /// Light of other layers on the maps of these levels and on all other maps.
-    fn backdrop(&mut self, _levels: &[CompletedLevel]) -> Backdrop {
-        Backdrop::new()
-    }
-}
-
-impl BakeObserver for () {}
-
 /// The level to show of each light that has one.
-pub(super) fn shown<'a>(
-    lights: &[&VisibleLight],
-    all_progress: &'a [LightProgress],
-) -> Vec<CompletedLevel<'a>> {
-    let pictures = lights.iter().zip(all_progress);
-    pictures
-        .filter_map(|(light, light_progress)| Some((light.light, light_progress.shown()?)))
+pub(super) fn shown<'a>(lights: &'a [LightProgress]) -> Vec<CompletedLevel<'a>> {
+    lights
+        .iter()
+        .filter_map(|light| Some((light.visible.light, light.shown()?)))
         .collect()
 }
 
@@ -198,6 +188,8 @@ pub(super) struct BakeContext<'a> {
     pub(super) outcome: &'a mut CausticOutcome,
     /// Whether passes run here, in part, or come from shards.
     pub(super) role: &'a mut ShardRole,
+    /// Sizes of all maps.
+    pub(super) sizes: Sizes,
     /// Mean footprints, if needed.
     pub(super) statistics: Option<FootprintStatistics>,
     /// Receiver queries after which the next level of patches is abandoned.
@@ -206,6 +198,16 @@ pub(super) struct BakeContext<'a> {
     pub(super) limited: &'a Control,
     /// Lights that are still being refined.
     pub(super) open_lights: usize,
+}
+
+/// The scope of passes that nobody watches.
+pub(super) fn unwatched(control: &Control) -> ProgressScope<'_> {
+    ProgressScope {
+        progress: &(),
+        control,
+        done: 0,
+        total: 0,
+    }
 }
 
 impl BakeContext<'_> {
@@ -231,7 +233,7 @@ impl BakeContext<'_> {
 }
 
 impl CausticLayer<'_> {
-    /// Bakes all lights, reusing levels that are still valid. The observer sees every result but the last.
+    /// Bakes all lights, reusing levels that are still valid. `showing` gets every result but the last.
     ///
     /// # Errors
     /// Light that the estimator cannot follow; a power that is not finite; shards whose maps may exceed the memory
@@ -240,7 +242,7 @@ impl CausticLayer<'_> {
         &self,
         states: &mut LightStates,
         (clock, role): (&mut Clock, &mut ShardRole),
-        observer: &mut dyn BakeObserver,
+        mut showing: Option<&mut Showing>,
     ) -> Result<CausticOutcome> {
         if role.is_cut() && !self.fits_anyway() {
             return Err(Error::failure(
@@ -253,8 +255,7 @@ impl CausticLayer<'_> {
             ));
         }
         let mut outcome = CausticOutcome::default();
-        let lights: Vec<&VisibleLight> = self.lit().collect();
-        self.refuse_soft_light(&lights)?;
+        self.refuse_soft_light()?;
         let whole = self.control.without_deadline();
         let part = if self.plan.is_on(Effect::Indirect) {
             PART_BEFORE_INDIRECT
@@ -263,163 +264,140 @@ impl CausticLayer<'_> {
         };
         let limit_s = self.settings.max_time_s.map(|limit_s| part * limit_s);
         let limited = super::limited(self.control, limit_s, self.began);
-        let mut course = BakeContext {
+        let mut lights = self.begin(states);
+        let mut context = BakeContext {
             control: &limited,
             clock,
             outcome: &mut outcome,
             role,
+            sizes: Sizes::default(),
             statistics: None,
             most_queries: u64::MAX,
             limited: &limited,
             open_lights: lights.len(),
         };
+        self.find_sizes(&mut states.statistics, &mut lights, &mut context)?;
+        context.control = &whole;
+        let mut is_first = true;
+        let errors = loop {
+            context.open_lights = lights.iter().filter(|light| !light.done).count();
+            for light in lights.iter_mut().filter(|light| !light.done) {
+                self.advance(light, &mut context)?;
+            }
+            if let Some(showing) = &mut showing
+                && std::mem::take(&mut is_first)
+                && !self.control.is_cancelled()
+            {
+                showing.show_first(&shown(&lights), context.outcome, context.clock);
+            }
+            let mut terms = self.error_terms(&lights, showing.as_deref_mut());
+            let mut errors = self.errors(&lights, &terms);
+            let dim = self.promote_dim_lights(&errors, &lights);
+            for &index in &dim {
+                lights[index].start_over();
+                self.advance(&mut lights[index], &mut context)?;
+            }
+            if !dim.is_empty() {
+                terms = self.error_terms(&lights, showing.as_deref_mut());
+                errors = self.errors(&lights, &terms);
+            }
+            self.decide(&mut lights, &errors, &terms);
+            self.note_cost(states, &lights, &errors, &mut context);
+            // The first picture ignores the time limit, the others respect it.
+            context.control = &limited;
+            if limited.is_cancelled() || lights.iter().all(|light| light.done) {
+                break errors;
+            }
+            if let Some(showing) = &mut showing {
+                showing.show(&shown(&lights), context.outcome, context.clock);
+            }
+        };
+        outcome.stopped = self.stopped(&lights, &errors, &limited);
+        for mut light in lights {
+            // The last level is shown; a rival that is worse is kept for the next bake.
+            let is_better = light.is_rival_better();
+            if let Some(rival) = light.rival.take() {
+                let index = if is_better { light.levels.len() } else { 0 };
+                light.levels.insert(index, rival);
+            }
+            if let Some(level) = light.levels.last() {
+                outcome.finished.push(light.visible.light);
+                let strays = level
+                    .strays
+                    .iter()
+                    .map(|&receiver| self.stray(light.visible, receiver));
+                outcome.warnings.extend(strays);
+            }
+            light.state.keep(light.levels, self.settings.memory_bytes);
+            states.put(light.visible.light, light.state);
+        }
+        Ok(outcome)
+    }
+
+    /// All lights, with what is still valid of their states.
+    fn begin<'b>(&'b self, states: &mut LightStates) -> Vec<LightProgress<'b>> {
+        let lights: Vec<&VisibleLight> = self.lit().collect();
         let scene = self.tracer.scene();
         let moving = (lights.len() > 1 && scene.is_animated()).then_some(&**scene);
-        for light in &lights {
-            let state = states.of_mut(light.light);
+        let begin = |light: &'b VisibleLight| {
+            let mut state = states.take(light.light);
             let has_bumps = self.plan.is_on(Effect::Bumps);
             let spectrum = self.spectra.key(light.light);
             let bytes = self.settings.kept_light_bytes();
             state.begin(light, (has_bumps, spectrum), bytes, moving);
-        }
-        let sizes = self.sizes_of_maps(states, &lights, &mut course)?;
-        course.statistics = states.statistics.as_ref().map(|(_, known)| known.clone());
-        let mut all_progress = Vec::with_capacity(lights.len());
-        for light in &lights {
-            all_progress.push(LightProgress {
-                carrier: self.carrier(light),
-                ..LightProgress::default()
-            });
-        }
-        course.control = &whole;
-        let mut is_first = true;
-        let errors = loop {
-            course.open_lights = all_progress
-                .iter()
-                .filter(|light_progress| !light_progress.done)
-                .count();
-            for (light, light_progress) in lights
-                .iter()
-                .zip(&mut all_progress)
-                .filter(|(_, light_progress)| !light_progress.done)
-            {
-                self.advance(
-                    light,
-                    &sizes,
-                    states.of_mut(light.light),
-                    light_progress,
-                    &mut course,
-                )?;
-            }
-            if std::mem::take(&mut is_first) && !self.control.is_cancelled() {
-                observer.show_first(&shown(&lights, &all_progress), course.outcome, course.clock)?;
-            }
-            let mut counting = self.counting(&lights, &all_progress, observer);
-            let mut errors = self.errors(&lights, &all_progress, &counting);
-            let promote_dim_lights = self.promote_dim_lights(&errors, &all_progress);
-            for &index in &promote_dim_lights {
-                all_progress[index] = LightProgress {
-                    is_underrated: true,
-                    carrier: all_progress[index].carrier,
-                    ..LightProgress::default()
-                };
-                let state = states.of_mut(lights[index].light);
-                self.advance(
-                    lights[index],
-                    &sizes,
-                    state,
-                    &mut all_progress[index],
-                    &mut course,
-                )?;
-            }
-            if !promote_dim_lights.is_empty() {
-                counting = self.counting(&lights, &all_progress, observer);
-                errors = self.errors(&lights, &all_progress, &counting);
-            }
-            self.decide(&lights, &mut all_progress, &errors, &counting);
-            self.note_cost(states, &lights, &all_progress, &errors, &mut course);
-            // The first picture ignores the time limit, the others respect it.
-            course.control = &limited;
-            if limited.is_cancelled() || all_progress.iter().all(|light_progress| light_progress.done) {
-                break errors;
-            }
-            observer.show(&shown(&lights, &all_progress), course.outcome, course.clock)?;
+            LightProgress::new(light, state, self.carrier(light))
         };
-        outcome.stopped = self.stopped(&all_progress, &errors, &limited);
-        for (light, mut light_progress) in lights.iter().zip(all_progress) {
-            // The last level is shown; a rival that is worse is kept for the next bake.
-            let is_better = light_progress.is_rival_better();
-            if let Some(rival) = light_progress.rival.take() {
-                let place = if is_better { light_progress.levels.len() } else { 0 };
-                light_progress.levels.insert(place, rival);
-            }
-            if let Some(level) = light_progress.levels.last() {
-                outcome.finished.push(light.light);
-                let strays = level.strays.iter().map(|&receiver| self.stray(light, receiver));
-                outcome.warnings.extend(strays);
-            }
-            let state = states.of_mut(light.light);
-            state.keep(light_progress.levels, self.settings.memory_bytes);
-        }
-        Ok(outcome)
+        lights.into_iter().map(begin).collect()
     }
 
     /// Records the cost of this level if its error is known.
     fn note_cost(
         &self,
         states: &LightStates,
-        lights: &[&VisibleLight],
-        all_progress: &[LightProgress],
+        lights: &[LightProgress],
         errors: &Errors,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) {
         let error = errors.error();
         // The cost of the first photons says nothing about patches.
-        let is_open = all_progress.iter().any(|light_progress| {
-            light_progress.carrier == Carrier::Undecided
-                && light_progress
-                    .levels
-                    .last()
-                    .is_none_or(|level| level.error.is_none())
+        let is_open = lights.iter().any(|light| {
+            let last = light.levels.last();
+            light.carrier == Carrier::Undecided && last.is_none_or(|level| level.error.is_none())
         });
         // An unchanged error means that the level was cut off.
-        let is_known = course
-            .outcome
-            .course
-            .last()
-            .is_some_and(|last| last.error == error);
+        let last = context.outcome.course.last();
+        let is_known = last.is_some_and(|last| last.error == error);
         if !errors.are_of_all(lights) || !error.is_finite() || is_open || is_known {
             return;
         }
-        let held = all_progress
+        let kept = lights.iter().map(|light| light.state.bytes());
+        let held = lights
             .iter()
-            .flat_map(|light_progress| &light_progress.levels)
+            .flat_map(|light| &light.levels)
             .map(LightLevel::bytes);
-        let clock = &course.clock;
+        let clock = &context.clock;
         let point = CostPoint {
-            rays: course.outcome.counts.rays,
+            rays: context.outcome.counts.rays,
             cpu_s: clock.plan.cpu + clock.trace.cpu + clock.deposit.cpu,
             wall_s: clock.plan.wall + clock.trace.wall + clock.deposit.wall,
-            bytes: states.bytes() + held.sum::<u64>(),
+            bytes: states.bytes() + kept.sum::<u64>() + held.sum::<u64>(),
             error,
-            is_coarse: lights.iter().zip(all_progress).any(|(light, light_progress)| {
-                let begins = match light_progress.carrier {
+            is_coarse: lights.iter().any(|light| {
+                let begins = match light.carrier {
                     Carrier::Photons => 1,
-                    _ => self.lattices(light).len(),
+                    _ => self.lattices(light.visible).len(),
                 };
-                !light_progress.done && light_progress.levels.len() < begins
+                !light.done && light.levels.len() < begins
             }),
-            is_by_photons: all_progress
-                .iter()
-                .any(|light_progress| light_progress.carrier == Carrier::Photons),
+            is_by_photons: lights.iter().any(|light| light.carrier == Carrier::Photons),
         };
-        course.outcome.course.push(point);
+        context.outcome.course.push(point);
         let Some(target) = self.settings.max_error else {
             return;
         };
-        if let Some(expected) = forecast(&course.outcome.course, target, self.settings.estimator) {
+        if let Some(expected) = forecast(&context.outcome.course, target, self.settings.estimator) {
             self.progress.expect(&expected.in_words());
-            course.outcome.forecast.get_or_insert((point, expected));
+            context.outcome.forecast.get_or_insert((point, expected));
         }
     }
 
@@ -442,11 +420,11 @@ impl CausticLayer<'_> {
     }
 
     /// Why no finer level follows.
-    fn stopped(&self, all_progress: &[LightProgress], errors: &Errors, limited: &Control) -> Option<Stopped> {
+    fn stopped(&self, lights: &[LightProgress], errors: &Errors, limited: &Control) -> Option<Stopped> {
         if self.control.is_cancelled() {
             return Some(Stopped::Cancelled);
         }
-        if limited.is_cancelled() && !all_progress.iter().all(|light_progress| light_progress.done) {
+        if limited.is_cancelled() && !lights.iter().all(|light| light.done) {
             return Some(Stopped::Time);
         }
         let target = self.settings.max_error?;
@@ -456,195 +434,158 @@ impl CausticLayer<'_> {
     /// Lights of nonzero strength that reach something specular.
     pub(super) fn lit(&self) -> impl Iterator<Item = &VisibleLight> {
         let scene = self.tracer.scene();
-        let lights = self.aim.lights.iter();
+        let lights = self.visibility.lights.iter();
         lights.filter(|light| scene.lights[light.light].strength().max_channel() > 0.0)
     }
 
     /// Does something with the rays of a light, whose ways are noted where its state asks for that.
-    pub(super) fn noting<R>(
+    pub(super) fn noting<'b, R>(
         &self,
-        state: &mut LightState,
-        run: impl FnOnce(&CausticLayer, &mut LightState) -> R,
+        light: &mut LightProgress<'b>,
+        run: impl FnOnce(&CausticLayer, &mut LightProgress<'b>) -> R,
     ) -> R {
-        let noting = state
-            .traversed
-            .as_ref()
-            .map(|traversed| self.tracer.noting(traversed));
+        let traversed = light.state.traversed.as_ref();
+        let noting = traversed.map(|traversed| self.tracer.noting(traversed));
         let tracer = noting.as_ref().unwrap_or(self.tracer);
-        run(&CausticLayer { tracer, ..*self }, state)
+        run(&CausticLayer { tracer, ..*self }, light)
     }
 
     /// Adds one level to a light.
-    fn advance(
-        &self,
-        light: &VisibleLight,
-        sizes: &Sizes,
-        state: &mut LightState,
-        light_progress: &mut LightProgress,
-        course: &mut BakeContext,
-    ) -> Result<()> {
-        self.noting(state, |layer, state| {
-            layer.next_level(light, sizes, state, light_progress, course)
-        })
+    fn advance(&self, light: &mut LightProgress, context: &mut BakeContext) -> Result<()> {
+        self.noting(light, |layer, light| layer.next_level(light, context))
     }
 
-    fn next_level(
-        &self,
-        light: &VisibleLight,
-        sizes: &Sizes,
-        state: &mut LightState,
-        light_progress: &mut LightProgress,
-        course: &mut BakeContext,
-    ) -> Result<()> {
-        if light_progress.carrier == Carrier::Undecided {
-            // Photons are shown before patches, which take longer.
-            let made_photons = self.decide_carrier(light, sizes, state, light_progress, course)?;
-            if made_photons {
-                return Ok(());
-            }
+    fn next_level(&self, light: &mut LightProgress, context: &mut BakeContext) -> Result<()> {
+        // Photons are shown before patches, which take longer.
+        if light.carrier == Carrier::Undecided && self.decide_carrier(light, context)? {
+            return Ok(());
         }
-        if light_progress.carrier == Carrier::Photons {
-            return self.advance_photons(light, sizes, state, light_progress, course);
+        if light.carrier == Carrier::Photons {
+            return self.advance_photons(light, context);
         }
-        let unit = self.unit(light)?;
-        let step = light_progress.levels.len();
-        let key = self.key(light, step, light_progress, sizes);
+        let unit = self.unit(light.visible)?;
+        let key = self.key(light, None, context);
         let began = Instant::now();
-        let made = match state.take(&key) {
+        let made = match light.state.take(&key) {
             Some(level) => Some(level),
-            None => self.make(light, key, unit, state, course)?,
+            None => self.make(light, key, unit, context)?,
         };
-        light_progress.level_s = began.elapsed().as_secs_f64();
-        course.most_queries = u64::MAX;
+        light.level_s = began.elapsed().as_secs_f64();
+        context.most_queries = u64::MAX;
         let Some(mut level) = made else {
-            if light_progress.carrier == Carrier::Undecided && !course.control.is_cancelled() {
-                light_progress.turn_to_photons();
+            if light.carrier == Carrier::Undecided && !context.control.is_cancelled() {
+                light.turn_to_photons();
             }
             return Ok(());
         };
-        if light_progress.carrier == Carrier::Undecided && level.lumped_share > MAX_LUMPED_SHARE {
-            light_progress.turn_to_photons();
-            light_progress.rival = None;
+        if light.carrier == Carrier::Undecided && level.lumped_share > MAX_LUMPED_SHARE {
+            light.turn_to_photons();
+            light.rival = None;
             return Ok(());
         }
         if level.key.trace.is_negligible {
             // No better estimate is worth its cost: all of its light counts as error.
             let whole = accuracy::images(&level.maps, level.unit);
-            let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
-            let estimate = accuracy::by_difference(&whole, &Images::new(), 1.0, &ledger);
+            let estimate = accuracy::by_difference(&whole, &Images::new(), 1.0, &level.energy());
             level.error = estimate.map(|estimate| KeptError {
                 predecessors: 0,
                 auditors: None,
                 estimate,
             });
-            light_progress.levels.push(level);
-            light_progress.done = true;
+            light.levels.push(level);
+            light.done = true;
             return Ok(());
         }
-        let predecessors = step.min(ESTIMATED_LEVELS - 1);
-        let auditors = light_progress.rival.as_ref().and_then(|rival| rival.key.photons);
+        let predecessors = light.levels.len().min(ESTIMATED_LEVELS - 1);
+        let auditors = light.rival.as_ref().and_then(|rival| rival.key.photons);
         let is_known = |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
-        if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
-            let estimate = self.error_of(light, &level, state, light_progress, course)?;
+        if !level.error.as_ref().is_some_and(is_known) && !context.control.is_cancelled() {
+            let estimate = self.error_of(light, &level, context)?;
             level.error = estimate.map(|estimate| KeptError {
                 predecessors,
                 auditors,
                 estimate,
             });
         }
-        light_progress.levels.push(level);
+        light.levels.push(level);
         Ok(())
     }
 
     /// Decides which lights continue, and towards which goal.
-    fn decide(
-        &self,
-        lights: &[&VisibleLight],
-        all_progress: &mut [LightProgress],
-        errors: &Errors,
-        counting: &ErrorTerms,
-    ) {
-        let goals = self.goals(lights, all_progress, errors);
-        for ((light, light_progress), goal) in lights.iter().zip(all_progress).zip(goals) {
-            if light_progress.done {
-                continue;
-            }
-            light_progress.done = match goal {
+    fn decide(&self, lights: &mut [LightProgress], errors: &Errors, terms: &ErrorTerms) {
+        let goals = self.goals(lights, errors);
+        for (light, goal) in lights.iter_mut().zip(goals).filter(|(light, _)| !light.done) {
+            light.done = match goal {
                 Goal::Converged => true,
-                Goal::NextLevel => !self.has_next_level(light, light_progress),
-                Goal::Refine(target) if light_progress.carrier == Carrier::Photons => {
-                    let is_good = light_progress
-                        .error()
-                        .is_some_and(|error| error.relative_rmse <= target);
-                    is_good || !self.has_next_level(light, light_progress)
+                Goal::NextLevel => !self.has_next_level(light),
+                Goal::Refine(target) if light.carrier == Carrier::Photons => {
+                    let is_good = light.error().is_some_and(|error| error.relative_rmse <= target);
+                    is_good || !self.has_next_level(light)
                 }
-                Goal::Refine(target) => !self.refine(light_progress, target, counting),
+                Goal::Refine(target) => !self.refine(light, target, terms),
             };
         }
     }
 
-    fn has_next_level(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
-        if light_progress.carrier == Carrier::Photons {
-            self.next_photons(light, light_progress.levels.last(), light_progress.aim)
-                .is_some()
-        } else {
-            light_progress.levels.len() < self.lattices(light).len()
+    pub(super) fn has_next_level(&self, light: &LightProgress) -> bool {
+        match light.carrier {
+            Carrier::Photons => {
+                let next = self.next_photons(light.visible, light.levels.last(), light.target_rmse);
+                next.is_some()
+            }
+            _ => light.levels.len() < self.lattices(light.visible).len(),
         }
     }
 
     fn make(
         &self,
-        light: &VisibleLight,
+        light: &mut LightProgress,
         key: LevelKey,
         unit: FluxUnit,
-        state: &mut LightState,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         match self.settings.estimator {
-            estimator if estimator.refines() => self.make_wavefront(light, key, unit, state, course),
-            _ => self.make_splats(light, key, unit, state, course),
+            estimator if estimator.refines() => self.make_wavefront(light, key, unit, context),
+            _ => self.make_splats(light, key, unit, context),
         }
     }
 
     /// Error of a level, estimated from the levels before it; `None` while unknown, and for a shard's part.
     fn error_of(
         &self,
-        light: &VisibleLight,
+        light: &LightProgress,
         level: &LightLevel,
-        state: &mut LightState,
-        light_progress: &LightProgress,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) -> Result<Option<LightError>> {
-        let is_shard = course.role.is_shard();
-        let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
+        let is_shard = context.role.is_shard();
+        let energy = level.energy();
         Ok(match self.settings.estimator {
             estimator if estimator.refines() && is_shard => None,
             estimator if estimator.refines() => {
                 let watch = Stopwatch::start();
-                let levels = light_progress.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
+                let levels = light.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
                 let coarser: Vec<Images> = levels
                     .map(|level| accuracy::images(&level.maps, level.unit))
                     .collect();
-                let before = light_progress.rounds.last().and_then(|round| {
-                    let error = &light_progress.levels.last()?.error.as_ref()?.estimate;
+                let before = light.rounds.last().zip(light.error()).map(|(round, error)| {
                     let refined = &round.tiles;
-                    Some(PreviousRound { error, refined })
+                    PreviousRound { error, refined }
                 });
                 let fine = accuracy::images(&level.maps, level.unit);
                 let mut estimate =
-                    accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &ledger);
-                if let (Some(estimate), Some(photons)) = (&mut estimate, &light_progress.rival) {
-                    self.audit(light, &fine, photons, estimate);
+                    accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &energy);
+                if let (Some(estimate), Some(photons)) = (&mut estimate, &light.rival) {
+                    self.audit(light.visible, &fine, photons, estimate);
                 }
-                course.clock.deposit.add(watch.elapsed());
+                context.clock.deposit.add(watch.elapsed());
                 estimate
             }
             _ => {
-                let thinner = self.thinned_images(light, level, state, course)?;
+                let thinner = self.thinned_images(light, level, context)?;
                 match (thinner, &level.noise) {
                     (Some(thinner), Some(noise)) if !is_shard => {
                         let fine = accuracy::images(&level.maps, level.unit);
-                        accuracy::estimate_splats(&fine, &thinner, noise, &ledger)
+                        accuracy::estimate_splats(&fine, &thinner, noise, &energy)
                     }
                     _ => None,
                 }
@@ -653,31 +594,25 @@ impl CausticLayer<'_> {
     }
 
     /// Plans another round of refinement towards a relative RMSE; false if nothing is left to refine.
-    fn refine(&self, light_progress: &mut LightProgress, target: f64, counting: &ErrorTerms) -> bool {
-        let Some(error) = light_progress.error() else {
+    fn refine(&self, light: &mut LightProgress, target: f64, terms: &ErrorTerms) -> bool {
+        let (Some(error), Some(level)) = (light.error(), light.levels.last()) else {
             return false;
         };
-        if error.relative_rmse <= target {
+        let is_spent = self.settings.estimator == Estimator::Splat || light.rounds.len() >= MAX_ROUNDS;
+        if error.relative_rmse <= target || is_spent {
             return false;
         }
         // One round hardly gains more, and smaller steps leave a result to show if time runs out.
         let goal = (GOAL * target).max(ROUND_GAIN * error.relative_rmse);
-        if self.settings.estimator == Estimator::Splat || light_progress.rounds.len() >= MAX_ROUNDS {
-            return false;
-        }
-        let Some(level) = light_progress.levels.last() else {
-            return false;
-        };
-        let counted = match counting {
+        let counted = match terms {
             ErrorTerms::Rmse => None,
             ErrorTerms::Visible(counts) => Some(counts.of_tiles(level, error)),
         };
         let tiles = accuracy::rough_tiles(error, goal, counted.as_ref());
         let is_any = !tiles.is_empty();
-        let overshoots = &level.overshoots[..];
-        let round = Round::new(tiles, overshoots);
-        light_progress.rounds.push(round);
-        light_progress.goal = Some(goal);
+        let round = Round::new(tiles, &level.overshoots[..]);
+        light.rounds.push(round);
+        light.goal = Some(goal);
         is_any
     }
 }

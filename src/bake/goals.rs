@@ -52,7 +52,7 @@ impl Errors {
     }
 
     /// Whether the error of every light is known.
-    pub(super) fn are_of_all(&self, lights: &[&VisibleLight]) -> bool {
+    pub(super) fn are_of_all(&self, lights: &[LightProgress]) -> bool {
         !lights.is_empty() && self.lights.len() == lights.len()
     }
 
@@ -98,12 +98,12 @@ impl CausticLayer<'_> {
     }
 
     /// Lights that were treated as negligible but are bright enough on some spot to need refinement.
-    pub(super) fn promote_dim_lights(&self, errors: &Errors, all_progress: &[LightProgress]) -> Vec<usize> {
+    pub(super) fn promote_dim_lights(&self, errors: &Errors, lights: &[LightProgress]) -> Vec<usize> {
         let Some(target) = self.settings.max_error else {
             return Vec::new();
         };
         let is_negligible = |light: &&ErrorOfLight| {
-            let last = all_progress[light.index].levels.last();
+            let last = lights[light.index].levels.last();
             last.is_some_and(|level| level.key.trace.is_negligible)
         };
         let mut dim: Vec<&ErrorOfLight> = errors.lights.iter().filter(is_negligible).collect();
@@ -117,47 +117,33 @@ impl CausticLayer<'_> {
         dim[kept..].iter().map(|light| light.index).collect()
     }
 
-    /// Deposited flux of a light [W], if known.
-    fn flux_w(&self, light: &VisibleLight, light_progress: &LightProgress) -> Option<f64> {
-        let level = light_progress.shown()?;
-        let strength = level.strength(&self.tracer.scene().lights[light.light]);
-        Some(level.ledger.watts(Account::Deposited, level.unit, strength))
-    }
-
     /// Errors of the lights that have one.
-    pub(super) fn errors(
-        &self,
-        lights: &[&VisibleLight],
-        all_progress: &[LightProgress],
-        counting: &ErrorTerms,
-    ) -> Errors {
-        match counting {
-            ErrorTerms::Visible(counts) => {
-                let of = |(index, (light, light_progress)): (usize, (&&VisibleLight, &LightProgress))| {
-                    let level = light_progress.shown()?;
-                    let error = &level.error.as_ref()?.estimate;
-                    let strength = level.strength(&self.tracer.scene().lights[light.light]);
-                    Some(ErrorOfLight {
-                        index,
-                        relative_rmse: error.relative_rmse,
-                        share: counts.of_light(level, error) * strength.luminance(),
-                    })
-                };
-                let lights = lights.iter().zip(all_progress).enumerate().filter_map(of);
-                Errors {
-                    lights: lights.collect(),
-                }
-            }
-            ErrorTerms::Rmse => self.errors_by_rmse(lights, all_progress),
+    pub(super) fn errors(&self, lights: &[LightProgress], terms: &ErrorTerms) -> Errors {
+        let ErrorTerms::Visible(counts) = terms else {
+            return self.errors_by_rmse(lights);
+        };
+        let of = |(index, light): (usize, &LightProgress)| {
+            let level = light.shown()?;
+            let error = &level.error.as_ref()?.estimate;
+            let strength = level.strength(&self.tracer.scene().lights[light.visible.light]);
+            Some(ErrorOfLight {
+                index,
+                relative_rmse: error.relative_rmse,
+                share: counts.of_light(level, error) * strength.luminance(),
+            })
+        };
+        Errors {
+            lights: lights.iter().enumerate().filter_map(of).collect(),
         }
     }
 
     /// Errors as shares of the relative RMSE over all maps, by area and flux.
-    fn errors_by_rmse(&self, lights: &[&VisibleLight], all_progress: &[LightProgress]) -> Errors {
+    fn errors_by_rmse(&self, lights: &[LightProgress]) -> Errors {
         let (mut areas_m2, mut all_w) = (BTreeMap::new(), 0.0);
-        let of = |(index, (light, light_progress)): (usize, (&&VisibleLight, &LightProgress))| {
-            let level = light_progress.shown()?;
-            let flux_w = self.flux_w(light, light_progress)?;
+        let of = |(index, light): (usize, &LightProgress)| {
+            let level = light.shown()?;
+            let strength = level.strength(&self.tracer.scene().lights[light.visible.light]);
+            let flux_w = level.ledger.watts(Account::Deposited, level.unit, strength);
             // Lights without a known error count in the total, too.
             all_w += flux_w;
             let of_light = level.maps.iter();
@@ -169,12 +155,7 @@ impl CausticLayer<'_> {
             let error = &level.error.as_ref()?.estimate;
             Some((index, error.relative_rmse, flux_w, area_m2))
         };
-        let known: Vec<(usize, f64, f64, f64)> = lights
-            .iter()
-            .zip(all_progress)
-            .enumerate()
-            .filter_map(of)
-            .collect();
+        let known: Vec<(usize, f64, f64, f64)> = lights.iter().enumerate().filter_map(of).collect();
         let all_m2: f64 = areas_m2.values().sum();
         let of = |&(index, relative_rmse, flux_w, area_m2): &(usize, f64, f64, f64)| ErrorOfLight {
             index,
@@ -191,57 +172,50 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// The next goal of each light. Also updates its aim and its shares of the error.
-    pub(super) fn goals(
-        &self,
-        lights: &[&VisibleLight],
-        all_progress: &mut [LightProgress],
-        errors: &Errors,
-    ) -> Vec<Goal> {
-        let has_ladder = |light: &VisibleLight, light_progress: &LightProgress| {
-            light_progress.carrier != Carrier::Photons
-                && light_progress.levels.len() < self.lattices(light).len()
+    /// The next goal of each light. Also updates its target and its shares of the error.
+    pub(super) fn goals(&self, lights: &mut [LightProgress], errors: &Errors) -> Vec<Goal> {
+        let has_ladder = |light: &LightProgress| {
+            light.carrier != Carrier::Photons && light.levels.len() < self.lattices(light.visible).len()
         };
         let Some(target) = self.settings.max_error else {
             return vec![Goal::NextLevel; lights.len()];
         };
         let all_known = errors.are_of_all(lights);
+        let has_others = lights.len() > 1;
         let level = errors.level(target);
         // Without an error there is nothing to aim at after the last lattice.
-        let without_error = |(light, light_progress): (&&VisibleLight, &LightProgress)| {
-            if has_ladder(light, light_progress) || light_progress.carrier == Carrier::Photons {
+        let without_error = |light: &LightProgress| {
+            if has_ladder(light) || light.carrier == Carrier::Photons {
                 Goal::NextLevel
             } else {
                 Goal::Converged
             }
         };
-        let mut goals: Vec<Goal> = lights.iter().zip(&*all_progress).map(without_error).collect();
+        let mut goals: Vec<Goal> = lights.iter().map(without_error).collect();
         for &ErrorOfLight {
             index,
             relative_rmse,
             share,
         } in &errors.lights
         {
-            let light_progress = &mut all_progress[index];
-            light_progress
-                .shares
-                .retain(|(levels, _)| *levels < light_progress.levels.len());
-            light_progress.shares.push((light_progress.levels.len(), share));
-            light_progress.most_share = level.is_finite().then_some(level);
-            light_progress.aim = (share > 0.0 && level.is_finite()).then(|| relative_rmse * level / share);
-            goals[index] = if level.is_infinite() && all_known && light_progress.carrier == Carrier::Undecided
-            {
+            let light = &mut lights[index];
+            let count = light.levels.len();
+            light.shares.retain(|(levels, _)| *levels < count);
+            light.shares.push((count, share));
+            light.most_share = level.is_finite().then_some(level);
+            light.target_rmse = (share > 0.0 && level.is_finite()).then(|| relative_rmse * level / share);
+            goals[index] = if level.is_infinite() && all_known && light.carrier == Carrier::Undecided {
                 // Its first photons suffice.
                 Goal::Converged
-            } else if has_ladder(lights[index], light_progress) {
-                let is_negligible = all_known && lights.len() > 1 && share < NEGLIGIBLE * level;
+            } else if has_ladder(light) {
+                let is_negligible = all_known && has_others && share < NEGLIGIBLE * level;
                 if is_negligible && level.is_finite() {
                     Goal::Converged
                 } else {
                     Goal::NextLevel
                 }
             } else {
-                light_progress.aim.map_or(Goal::Converged, Goal::Refine)
+                light.target_rmse.map_or(Goal::Converged, Goal::Refine)
             };
         }
         goals

@@ -1,5 +1,6 @@
 //! Schedules indirect light after the layers that it is gathered from.
 
+use super::PreparedBake;
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
 use super::indirect_cache::{IndirectCache, link_bytes, most_texels};
@@ -12,9 +13,8 @@ use crate::light_pass::indirect::{
     Grid, MAX_BOUNCES, MIN_PASSES, Network, Resampling, Solution, TraceCounts,
 };
 use crate::optics::LinearSrgb;
-use crate::progress::{Control, Progress};
-use crate::settings::{BakeSettings, LayerKind};
-use crate::transport::Tracer;
+use crate::progress::Control;
+use crate::settings::LayerKind;
 
 /// Target of the relative error of the rays if the settings have none [1].
 const USUAL_TARGET: f64 = 0.03;
@@ -42,41 +42,32 @@ pub(super) struct IndirectWork {
     is_done: bool,
 }
 
-/// Inputs of the gathering.
-pub(super) struct GatherInput<'a> {
-    pub(super) tracer: &'a Tracer,
-    pub(super) sizes: &'a ChartCache,
-    pub(super) settings: &'a BakeSettings,
-    pub(super) progress: &'a dyn Progress,
-    /// Cancellation by the user.
-    pub(super) control: &'a Control,
-    /// The same with the time limit: after the first passes, none starts beyond it.
-    pub(super) limited: &'a Control,
-}
-
 impl IndirectWork {
     /// Traces rays between the elements until their error meets the target, and solves for the indirect light of
     /// `maps`; false if cancelled before the first solution. Calls `better` for each solution but the last.
     pub(super) fn gather(
         &mut self,
-        gathering: &GatherInput,
+        bake: &PreparedBake,
+        sizes: &ChartCache,
         cache: &mut IndirectCache,
         maps: &[IlluminationMap],
         better: &mut dyn FnMut(&Self, &IndirectCache),
     ) -> bool {
         let watch = Stopwatch::start();
-        let settings = gathering.settings;
-        cache.prepare(gathering.tracer, gathering.sizes, settings, most_texels(settings));
+        let settings = bake.settings;
+        cache.prepare(&bake.tracer, sizes, settings, most_texels(settings));
         self.seconds.add(watch.elapsed());
-        let target = gathering.settings.max_error.unwrap_or(USUAL_TARGET);
+        // After the first passes, none starts beyond the time limit.
+        let limited = super::limited(bake.control, settings.max_time_s, bake.began);
+        let target = settings.max_error.unwrap_or(USUAL_TARGET);
         (self.target, self.solution) = (target, None);
         let elements = cache.network().map_or(0, Network::element_count);
         let mut passes = vec![MIN_PASSES; elements];
         loop {
             let watch = Stopwatch::start();
-            let is_there = self.step(gathering, cache, maps, &passes);
+            let is_there = self.step(bake, &limited, cache, maps, &passes);
             let wanting = match &self.solution {
-                Some(solution) if is_there && !gathering.control.is_cancelled() => {
+                Some(solution) if is_there && !bake.control.is_cancelled() => {
                     solution.wanting(target, &passes)
                 }
                 _ => Vec::new(),
@@ -95,7 +86,8 @@ impl IndirectWork {
     /// Solves with the requested passes; false if they could not be traced.
     fn step(
         &mut self,
-        gathering: &GatherInput,
+        bake: &PreparedBake,
+        limited: &Control,
         cache: &mut IndirectCache,
         maps: &[IlluminationMap],
         passes: &[u8],
@@ -105,14 +97,9 @@ impl IndirectWork {
             return false;
         };
         let before = network.counts();
-        self.is_cramped = has_solution && network.bytes_after(passes) > link_bytes(gathering.settings);
-        let control = if has_solution {
-            gathering.limited
-        } else {
-            gathering.control
-        };
-        let is_traced =
-            !self.is_cramped && cache.trace(gathering.tracer, passes, (gathering.progress, control));
+        self.is_cramped = has_solution && network.bytes_after(passes) > link_bytes(bake.settings);
+        let control = if has_solution { limited } else { bake.control };
+        let is_traced = !self.is_cramped && cache.trace(&bake.tracer, passes, (bake.progress, control));
         let Some(network) = cache.network() else {
             return false;
         };
@@ -153,12 +140,9 @@ impl IndirectWork {
             let Some(grid) = grid_of(network, map) else {
                 continue;
             };
-            let resampling = Resampling::new(grid, &map.chart);
-            let is_hidden = |element: usize| network.is_hidden(grid.first + element);
-            let own = grid.first..grid.first + grid.elements.all().len();
-            let values: Vec<[f64; 3]> = solution.irradiance[own].iter().map(|e| e.to_array()).collect();
             let errors: Vec<[f64; 3]> = network.errors(grid, solution).iter().map(|e| [*e; 3]).collect();
-            let error = resampling.to_map(&errors, is_hidden);
+            let is_hidden = |element: usize| network.is_hidden(grid.first + element);
+            let error = Resampling::new(grid, &map.chart).to_map(&errors, is_hidden);
             let has_caustic = map.layer(LayerKind::Caustic).is_some();
             map.error = match map.error.take() {
                 Some(other) => Some(other.iter().zip(&error).map(|(a, b)| a.hypot(b[0])).collect()),
@@ -168,7 +152,7 @@ impl IndirectWork {
             };
             map.layers.push(Layer {
                 kind: LayerKind::Indirect,
-                irradiance: resampling.to_map(&values, is_hidden),
+                irradiance: on_map(network, grid, map, solution),
             });
         }
     }
@@ -199,14 +183,11 @@ impl IndirectWork {
                 let Some(grid) = grid_of(network, map) else {
                     continue;
                 };
-                let own = grid.first..grid.first + grid.elements.all().len();
-                let values: Vec<[f64; 3]> = solution.irradiance[own].iter().map(|e| e.to_array()).collect();
-                let is_hidden = |element: usize| network.is_hidden(grid.first + element);
                 parts.push(LightLayer {
                     receiver: map.chart.receiver,
                     light,
                     kind: LayerKind::Indirect,
-                    irradiance: Resampling::new(grid, &map.chart).to_map(&values, is_hidden),
+                    irradiance: on_map(network, grid, map, &solution),
                 });
             }
         }
@@ -273,6 +254,14 @@ impl IndirectWork {
         both.trace.add(self.seconds);
         both
     }
+}
+
+/// Indirect light on a map [W/m²].
+fn on_map(network: &Network, grid: &Grid, map: &IlluminationMap, solution: &Solution) -> Vec<[f32; 3]> {
+    let own = grid.first..grid.first + grid.elements.all().len();
+    let values: Vec<[f64; 3]> = solution.irradiance[own].iter().map(|e| e.to_array()).collect();
+    let is_hidden = |element: usize| network.is_hidden(grid.first + element);
+    Resampling::new(grid, &map.chart).to_map(&values, is_hidden)
 }
 
 /// Sums of all source layers on all elements [W/m²].

@@ -1,12 +1,9 @@
 //! The sequence of lattices and map sizes that a bake runs through.
 
-use std::collections::BTreeMap;
-
 use glam::DVec2;
 
 use super::caustic::{BakeContext, CausticLayer, ESTIMATED_LEVELS, LightProgress};
-use super::light_level::{LevelKey, LightStates, TraceKey};
-use super::map_size::Sizes;
+use super::light_level::{LevelKey, StatisticsKey, TraceKey};
 use super::splat_level::LEVEL_STRIDES;
 use crate::error::{Error, Result};
 use crate::illumination::accumulator::FluxUnit;
@@ -87,25 +84,29 @@ impl CausticLayer<'_> {
     }
 
     /// Everything that a level depends on.
-    pub(super) fn key(
-        &self,
-        light: &VisibleLight,
-        step: usize,
-        light_progress: &LightProgress,
-        sizes: &Sizes,
-    ) -> LevelKey {
-        let lattices = self.lattices(light);
+    pub(super) fn key(&self, light: &LightProgress, photons: Option<u32>, context: &BakeContext) -> LevelKey {
+        let lattices = self.lattices(light.visible);
+        // Photons are not refined.
+        let (step, rounds, goal, is_underrated) = match photons {
+            Some(_) => (0, &[][..], None, false),
+            None => (
+                light.levels.len(),
+                &light.rounds[..],
+                light.goal,
+                light.is_underrated,
+            ),
+        };
         let size = lattices[step.min(lattices.len() - 1)];
         // Coarse lattices are deposited just as coarsely, so that their difference shows both kinds of error.
         let before_last = (lattices.len() - 1).saturating_sub(step);
         LevelKey {
             trace: TraceKey {
-                is_negligible: !light_progress.is_underrated && self.is_negligible(light),
-                ..self.trace_key(light, size, before_last as i32, &light_progress.rounds)
+                is_negligible: !is_underrated && self.is_negligible(light.visible),
+                ..self.trace_key(light.visible, size, before_last as i32, rounds)
             },
-            photons: None,
-            sizes: sizes.clone(),
-            coarseness: coarseness(self.settings.max_error, light_progress.goal)
+            photons,
+            sizes: context.sizes.clone(),
+            coarseness: coarseness(self.settings.max_error, goal)
                 * (before_last as f64).exp2().min(MAX_COARSE),
             kernels: self.kernels(),
             stride: match self.settings.estimator {
@@ -230,45 +231,38 @@ impl CausticLayer<'_> {
             || (settings.estimator == Estimator::Splat && of_splats)
     }
 
-    /// Sizes of all maps. Measures mean footprints at the settings' density on a thinner lattice, if needed.
-    pub(super) fn sizes_of_maps(
+    /// Finds the sizes of all maps. Measures mean footprints at the settings' density on a thinner lattice, if needed.
+    pub(super) fn find_sizes(
         &self,
-        states: &mut LightStates,
-        lights: &[&VisibleLight],
-        course: &mut BakeContext,
-    ) -> Result<Sizes> {
+        known: &mut Option<(StatisticsKey, FootprintStatistics)>,
+        lights: &mut [LightProgress],
+        context: &mut BakeContext,
+    ) -> Result<()> {
         if self.wants_statistics() {
-            let paths: BTreeMap<usize, TraceKey> = lights
-                .iter()
-                .map(|light| {
-                    (
-                        light.light,
-                        self.trace_key(light, self.lattice_size(light), 0, &[]),
-                    )
-                })
-                .collect();
-            let key = (paths, self.map_density_per_sr());
-            if states.statistics.as_ref().is_none_or(|(known, _)| *known != key) {
+            let paths = lights.iter().map(|light| {
+                let size = self.lattice_size(light.visible);
+                (light.visible.light, self.trace_key(light.visible, size, 0, &[]))
+            });
+            let key = (paths.collect(), self.map_density_per_sr());
+            if known.as_ref().is_none_or(|(known, _)| *known != key) {
                 let mut statistics = FootprintStatistics::default();
                 for light in lights {
-                    let unit = self.unit(light)?;
-                    let state = states.of_mut(light.light);
-                    statistics.merge(&self.noting(state, |layer, state| {
+                    let unit = self.unit(light.visible)?;
+                    statistics.merge(&self.noting(light, |layer, light| {
                         match self.settings.estimator.refines() {
-                            true => layer.wavefront_statistics(light, unit, state, course),
-                            false => layer.splat_statistics(light, unit, state, course),
+                            true => layer.wavefront_statistics(light, unit, context),
+                            false => layer.splat_statistics(light, unit, context),
                         }
                     }));
                 }
                 // A cancelled run has seen only a part.
-                let complete = !course.control.is_cancelled();
-                states.statistics = complete.then_some((key, statistics));
+                let complete = !context.control.is_cancelled();
+                *known = complete.then_some((key, statistics));
             }
         }
-        let statistics = states.statistics.as_ref().map(|(_, statistics)| statistics);
-        let (sizes, warnings) = self.map_sizes(statistics);
-        course.outcome.warnings = warnings;
-        Ok(sizes)
+        context.statistics = known.as_ref().map(|(_, statistics)| statistics.clone());
+        (context.sizes, context.outcome.warnings) = self.map_sizes(context.statistics.as_ref());
+        Ok(())
     }
 
     /// The lattice that mean footprints are taken from: one of the light's lattices.

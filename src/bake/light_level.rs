@@ -14,7 +14,7 @@ use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::caustic::arrival_cache::ArrivalCache;
 use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::caustic::statistics::FootprintStatistics;
-use crate::light_pass::ledger::CarriedFlux;
+use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::wavefront::cell::SubdivisionLimits;
@@ -148,9 +148,13 @@ impl LightStates {
         self.by_light.is_empty()
     }
 
-    /// The state of a light, by its index in the scene.
-    pub(super) fn of_mut(&mut self, light: usize) -> &mut LightState {
-        self.by_light.entry(light).or_default()
+    /// Removes and returns the state of a light, by its index in the scene.
+    pub(super) fn take(&mut self, light: usize) -> LightState {
+        self.by_light.remove(&light).unwrap_or_default()
+    }
+
+    pub(super) fn put(&mut self, light: usize, state: LightState) {
+        self.by_light.insert(light, state);
     }
 
     pub(super) fn finest(&self, light: usize) -> Option<&LightLevel> {
@@ -177,7 +181,7 @@ impl LightStates {
 #[derive(Debug, Default)]
 pub(super) struct LightState {
     /// Where its rays start, and what they are aimed at.
-    aim: Option<VisibleLight>,
+    visible: Option<VisibleLight>,
     /// Where they went, of all that is kept.
     pub(super) traversed: Option<Arc<TraversedCells>>,
     /// Whether bumps bent its rays.
@@ -202,6 +206,11 @@ impl LightLevel {
         } else {
             light.strength()
         }
+    }
+
+    /// Energy of all paths at unit strength [W].
+    pub(super) fn energy(&self) -> EnergyLedger {
+        self.ledger.report("", self.unit, LinearSrgb::WHITE).energy_w
     }
 
     /// Radiant flux on all maps [W]; `None` unless bands are kept.
@@ -270,15 +279,15 @@ impl LightState {
         kept_bytes: u64,
         moving: Option<&Scene>,
     ) {
-        match &self.aim {
-            Some(aim) if aim.launch == light.launch => {
-                if !aim.aims_as(light) {
+        match &self.visible {
+            Some(visible) if visible.launch == light.launch => {
+                if !visible.aims_as(light) {
                     self.forget_maps();
                 }
             }
             _ => *self = Self::default(),
         }
-        self.aim = Some(light.clone());
+        self.visible = Some(light.clone());
         // Tracers of single wavelengths note nothing.
         let noted = moving.filter(|_| spectrum.is_none()).and_then(Scene::bounds);
         self.traversed.take_if(|_| noted.is_none());
@@ -296,14 +305,12 @@ impl LightState {
 
     /// Whether no path can have come near what changed: objects and the boxes in which they are or were [m].
     pub(super) fn is_beyond(&self, changed: &[(usize, Bounds)], scene: &Scene) -> bool {
-        self.aim
-            .as_ref()
-            .zip(self.traversed.as_ref())
-            .is_some_and(|(aim, traversed)| {
-                changed.iter().all(|&(object, bounds)| {
-                    !traversed.meets(bounds) && !aim.is_aimed_at(object, bounds, scene)
-                })
-            })
+        let (Some(visible), Some(traversed)) = (&self.visible, &self.traversed) else {
+            return false;
+        };
+        changed
+            .iter()
+            .all(|&(object, bounds)| !traversed.meets(bounds) && !visible.is_aimed_at(object, bounds, scene))
     }
 
     /// Drops maps whose paths changed. Rays stay, as their cache knows which of them are valid.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::caustic::CausticLayer;
 use super::map_size::{self, MapSize, SizeRequest, Sizes};
-use super::sizes::{self, LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE, MapMemory};
+use super::sizes::{LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE, MapMemory};
 use crate::error::Warning;
 use crate::illumination::tiles::COARSEST;
 use crate::illumination::{Chart, Receiver};
@@ -185,7 +185,7 @@ impl CausticLayer<'_> {
 
     /// Size for a surface that only the full lattice reached.
     fn default_size(&self, object: usize) -> Option<(usize, usize)> {
-        let (width, height) = self.first_size(object)?;
+        let (width, height) = self.sizes.doubled_size(object, 0)?;
         Some(match self.settings.map_resolution {
             MapResolution::Auto => (width, height),
             MapResolution::Fixed {
@@ -193,13 +193,6 @@ impl CausticLayer<'_> {
                 height: highest,
             } => (width.min(most), height.min(highest)),
         })
-    }
-
-    /// The size of a map before the first doubling.
-    pub(super) fn first_size(&self, object: usize) -> Option<(usize, usize)> {
-        Some(sizes::first_size(
-            self.sizes.parametrisation(object)?.suggested_aspect,
-        ))
     }
 }
 

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::caustic::{BakeObserver, CausticLayer, LightProgress, shown};
+use super::caustic::{CausticLayer, LightProgress, shown};
+use super::finish::CompletedLevel;
 use super::light_level::LightLevel;
+use super::showing::Showing;
 use crate::illumination::visible::{self, BlockLight, Blocks};
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::accuracy::{self, Image, LightError};
-use crate::light_pass::caustic::setup::VisibleLight;
-use crate::optics::LinearSrgb;
 use crate::settings::ErrorMetric;
 
 /// Light of other layers, by receiver.
@@ -34,32 +34,20 @@ pub(super) struct Counts(BTreeMap<Receiver, Vec<f64>>);
 
 impl CausticLayer<'_> {
     /// How errors are weighted, given the shown levels of all lights and the light of other layers.
-    pub(super) fn counting(
-        &self,
-        lights: &[&VisibleLight],
-        all_progress: &[LightProgress],
-        observer: &mut dyn BakeObserver,
-    ) -> ErrorTerms {
+    pub(super) fn error_terms(&self, lights: &[LightProgress], showing: Option<&mut Showing>) -> ErrorTerms {
         if self.settings.error_metric == ErrorMetric::Rmse || self.settings.max_error.is_none() {
             return ErrorTerms::Rmse;
         }
-        let backdrop = observer.backdrop(&shown(lights, all_progress));
-        ErrorTerms::Visible(self.visible_counts(lights, all_progress, &backdrop))
+        let levels = shown(lights);
+        let backdrop = showing.map_or_else(Backdrop::new, |showing| showing.backdrop(&levels));
+        ErrorTerms::Visible(self.visible_counts(&levels, &backdrop))
     }
 
-    fn visible_counts(
-        &self,
-        lights: &[&VisibleLight],
-        all_progress: &[LightProgress],
-        backdrop: &Backdrop,
-    ) -> Counts {
+    fn visible_counts(&self, levels: &[CompletedLevel], backdrop: &Backdrop) -> Counts {
         let mut charts: BTreeMap<Receiver, Arc<Chart>> = BTreeMap::new();
         let mut traced: BTreeMap<Receiver, Vec<f64>> = BTreeMap::new();
-        for (light, light_progress) in lights.iter().zip(all_progress) {
-            let Some(level) = light_progress.shown() else {
-                continue;
-            };
-            let strength = level.strength(&self.tracer.scene().lights[light.light]);
+        for (light, level) in levels {
+            let strength = level.strength(&self.tracer.scene().lights[*light]);
             for (receiver, image) in accuracy::images(&level.maps, level.unit) {
                 let sums = traced.entry(receiver);
                 let sums = sums.or_insert_with(|| vec![0.0; image.luminance.len()]);
@@ -67,11 +55,8 @@ impl CausticLayer<'_> {
                     *sum += e * strength.luminance();
                 }
             }
-            let known = level
-                .maps
-                .iter()
-                .map(|(receiver, map)| (receiver, Arc::clone(&map.chart)));
-            charts.extend(known);
+            let known = level.maps.iter();
+            charts.extend(known.map(|(receiver, map)| (receiver, Arc::clone(&map.chart))));
         }
         for (&receiver, beside) in backdrop {
             charts
@@ -122,8 +107,7 @@ impl CausticLayer<'_> {
 impl Counts {
     /// Error of a light's maps at unit strength [1 per unit of strength].
     pub(super) fn of_light(&self, level: &LightLevel, error: &LightError) -> f64 {
-        let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE).energy_w;
-        let truncated = accuracy::truncated_share(&ledger);
+        let truncated = accuracy::truncated_share(&level.energy());
         let images = accuracy::images(&level.maps, level.unit);
         let squares = images.iter().map(|(receiver, image)| {
             let squares = self.squares(*receiver, image, error, truncated);

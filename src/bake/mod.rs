@@ -51,14 +51,14 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
 use crate::settings::{BakeSettings, ItemBufferKind};
 use crate::transport::Tracer;
-use caustic::{BakeObserver, CausticLayer, CausticOutcome, Stopped};
+use caustic::{CausticLayer, CausticOutcome, Stopped};
 use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
 use finish::{CompletedLevel, MapAssembler};
 use first_look::FirstLook;
 use indirect_cache::IndirectCache;
-use indirect_work::{GatherInput, IndirectWork};
+use indirect_work::IndirectWork;
 use light_level::LightStates;
 use scene_change::SceneChange;
 use shards::ShardRole;
@@ -72,7 +72,7 @@ use spectra::Spectra;
 pub struct Baker {
     scene: Arc<Scene>,
     tracer: Option<Arc<Tracer>>,
-    aim: Option<(VisibilityKey, Arc<LightVisibility>)>,
+    visibility: Option<(VisibilityKey, Arc<LightVisibility>)>,
     sizes: ChartCache,
     lights: LightStates,
     direct: DirectCache,
@@ -84,7 +84,7 @@ pub struct Baker {
 /// have an extent.
 type VisibilityKey = (ItemBufferKind, CullMode, bool);
 
-fn aim_key(settings: &BakeSettings) -> VisibilityKey {
+fn visibility_key(settings: &BakeSettings) -> VisibilityKey {
     let aiming = match settings.effects.get(Effect::LightPass) {
         EffectSwitch::On => CullMode::Everything,
         EffectSwitch::Auto | EffectSwitch::Off => CullMode::Reachable,
@@ -122,7 +122,7 @@ impl Baker {
         Ok(Self {
             scene,
             tracer: None,
-            aim: None,
+            visibility: None,
             sizes,
             lights: LightStates::default(),
             direct: DirectCache::default(),
@@ -172,7 +172,7 @@ impl Baker {
             self.lights.statistics = None;
         }
         if change.moves_paths() || !change.lights.is_empty() {
-            self.aim = None;
+            self.visibility = None;
         }
         let changed = change.boxes(&self.scene, &scene);
         for state in self.lights.iter_mut() {
@@ -221,15 +221,15 @@ impl Baker {
     /// Settings outside their ranges.
     pub fn estimate(&mut self, settings: &BakeSettings) -> Result<BakeEstimate> {
         settings.validate()?;
-        let aim = self.aim(settings);
-        let plan = plan::decide(&self.scene, settings, &aim.sights);
+        let visibility = self.visibility(settings);
+        let plan = plan::decide(&self.scene, settings, &visibility.sights);
         let mut estimate = BakeEstimate {
             plan,
             rays: 0,
             item_buffer_cells: 0,
         };
         if estimate.plan.is_on(Effect::LightPass) {
-            for light in &aim.lights {
+            for light in &visibility.lights {
                 let size = light.launch.lattice_size(settings.density_per_sr, light.reach_m);
                 estimate.rays += light.item_buffer.lattice_cells(light.launch.face_count(), size);
                 estimate.item_buffer_cells += light.item_buffer.marked_cells();
@@ -279,23 +279,19 @@ impl Baker {
             .install(|| self.bake_here(settings, progress, control, level, &mut ShardRole::Alone))
     }
 
-    fn aim(&mut self, settings: &BakeSettings) -> Arc<LightVisibility> {
+    fn visibility(&mut self, settings: &BakeSettings) -> Arc<LightVisibility> {
         if !plan::wants_caustics(settings) {
             // No caustic layer requested: skip the item buffers.
             return Arc::default();
         }
-        let wanted = aim_key(settings);
-        match &self.aim {
-            Some((known, aim)) if *known == wanted => aim.clone(),
+        let wanted = visibility_key(settings);
+        match &self.visibility {
+            Some((known, visibility)) if *known == wanted => visibility.clone(),
             _ => {
-                let aim = Arc::new(LightVisibility::take(
-                    &self.tracer(),
-                    wanted.0,
-                    wanted.1,
-                    wanted.2,
-                ));
-                self.aim = Some((wanted, aim.clone()));
-                aim
+                let (kind, culling, sizes) = wanted;
+                let visibility = Arc::new(LightVisibility::take(&self.tracer(), kind, culling, sizes));
+                self.visibility = Some((wanted, visibility.clone()));
+                visibility
             }
         }
     }
@@ -311,14 +307,14 @@ impl Baker {
         progress.advance(Stage::Build, 0, 1);
         let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
         progress.advance(Stage::Plan, 0, 1);
-        let known = self.aim.as_ref().map(|(_, aim)| Arc::clone(aim));
-        let aim = clock.time(|clock| &mut clock.plan, || self.aim(settings));
-        let is_new = known.is_none_or(|known| !Arc::ptr_eq(&known, &aim));
+        let known = self.visibility.as_ref().map(|(_, known)| Arc::clone(known));
+        let visibility = clock.time(|clock| &mut clock.plan, || self.visibility(settings));
+        let is_new = known.is_none_or(|known| !Arc::ptr_eq(&known, &visibility));
         PreparedBake {
-            plan: plan::decide(&self.scene, settings, &aim.sights),
-            item_buffer_tests: if is_new { aim.tests() } else { 0 },
+            plan: plan::decide(&self.scene, settings, &visibility.sights),
+            item_buffer_tests: if is_new { visibility.tests() } else { 0 },
             tracer,
-            aim,
+            visibility,
             settings,
             progress,
             control,
@@ -370,7 +366,7 @@ impl Baker {
         let ground = self.prepare(settings, progress, control, (&mut clock, began));
         let PreparedBake {
             tracer,
-            aim,
+            visibility,
             plan,
             item_buffer_tests,
             ..
@@ -391,12 +387,8 @@ impl Baker {
         let lights = &mut self.lights;
         let mut showing = Showing {
             finish: &finish,
-            tracer,
-            aim,
-            progress,
-            control,
+            bake: &ground,
             watch: &whole,
-            item_buffer_tests,
             level,
             direct: &mut self.direct,
             indirect: &mut self.indirect,
@@ -405,7 +397,7 @@ impl Baker {
             first_look,
             glance: None,
         };
-        let mut outcome = ground.bake(&self.sizes, lights, &mut clock, role, &mut showing)?;
+        let mut outcome = ground.bake(&self.sizes, lights, &mut clock, role, Some(&mut showing))?;
         let Showing {
             mut lamps,
             direct,
@@ -435,16 +427,7 @@ impl Baker {
         clock.deposit.add(watch.elapsed());
         if plan.is_on(Effect::Indirect) {
             let mut gathered = IndirectWork::default();
-            let limited = limited(control, settings.max_time_s, began);
-            let gathering = GatherInput {
-                tracer,
-                sizes: &self.sizes,
-                settings,
-                progress,
-                control,
-                limited: &limited,
-            };
-            let complete = gathered.gather(&gathering, indirect, &maps, &mut |so_far, known| {
+            let complete = gathered.gather(&ground, &self.sizes, indirect, &maps, &mut |so_far, known| {
                 let Some(level) = level.as_mut().filter(|_| control.is_watched()) else {
                     return;
                 };
@@ -454,7 +437,7 @@ impl Baker {
                 let mut result = finish.result((maps, parts), &finished, &outcome);
                 let mut clock = so_far.clock(&clock);
                 clock.total = whole.elapsed();
-                account(&mut result, &finish, aim, &clock);
+                account(&mut result, &finish, visibility, &clock);
                 level(result);
             });
             if !complete {
@@ -466,7 +449,7 @@ impl Baker {
         }
         let mut result = finish.result((maps, parts), &finished, &outcome);
         clock.total = whole.elapsed();
-        account(&mut result, &finish, aim, &clock);
+        account(&mut result, &finish, visibility, &clock);
         Ok(result)
     }
 }
@@ -504,7 +487,7 @@ impl Threads {
 /// What every bake starts from: the prepared scene and the plan.
 struct PreparedBake<'a> {
     tracer: Arc<Tracer>,
-    aim: Arc<LightVisibility>,
+    visibility: Arc<LightVisibility>,
     plan: EffectPlan,
     /// Tests of the item buffers, if this bake built them.
     item_buffer_tests: u64,
@@ -523,7 +506,7 @@ impl PreparedBake<'_> {
         lights: &mut LightStates,
         clock: &mut Clock,
         role: &mut ShardRole,
-        observer: &mut dyn BakeObserver,
+        showing: Option<&mut Showing>,
     ) -> Result<CausticOutcome> {
         if !self.plan.is_on(Effect::LightPass) {
             return Ok(CausticOutcome::default());
@@ -532,8 +515,8 @@ impl PreparedBake<'_> {
         let seen = smooth.as_ref().unwrap_or(&self.tracer);
         let layer = CausticLayer {
             tracer: seen,
-            spectra: &Spectra::new(seen, &self.aim, &self.plan, self.settings)?,
-            aim: &self.aim,
+            spectra: &Spectra::new(seen, &self.visibility, &self.plan, self.settings)?,
+            visibility: &self.visibility,
             settings: self.settings,
             sizes,
             plan: &self.plan,
@@ -541,26 +524,20 @@ impl PreparedBake<'_> {
             control: self.control,
             began: self.began,
         };
-        layer.bake(lights, (clock, role), observer)
+        layer.bake(lights, (clock, role), showing)
     }
 }
 
-/// Records times and item buffers.
-fn account(result: &mut Bake, finish: &MapAssembler, aim: &LightVisibility, clock: &Clock) {
+/// Records times, and the cost of the item buffers, light by light.
+fn account(result: &mut Bake, finish: &MapAssembler, visibility: &LightVisibility, clock: &Clock) {
     (result.timings_s, result.cpu_s) = clock.timings();
-    result.item_buffers = item_buffers(finish.scene, aim);
-}
-
-/// Cost of the item buffers, light by light.
-fn item_buffers(scene: &Scene, aim: &LightVisibility) -> Vec<ItemBufferReport> {
-    let lights = scene.lights.iter().zip(&aim.looks);
-    lights
-        .map(|(light, look)| ItemBufferReport {
-            light: light.name.clone(),
-            cells: look.cells,
-            hidden_cells: look.hidden_cells,
-            tests: look.tests,
-            cpu_ms: 1e3 * look.seconds.cpu,
-        })
-        .collect()
+    let lights = finish.scene.lights.iter().zip(&visibility.looks);
+    let item_buffers = lights.map(|(light, look)| ItemBufferReport {
+        light: light.name.clone(),
+        cells: look.cells,
+        hidden_cells: look.hidden_cells,
+        tests: look.tests,
+        cpu_ms: 1e3 * look.seconds.cpu,
+    });
+    result.item_buffers = item_buffers.collect();
 }

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums, drop_coarse};
-use super::map_size::Sizes;
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
@@ -57,11 +56,11 @@ const MIN_GROWTH: f64 = 1.2;
 
 /// Limits the photons of a level to what `part` of the remaining time allows, because an interrupted level is lost. The
 /// first level is not limited.
-fn in_time(photons: u32, before: u32, part: f64, state: &LightState, course: &BakeContext) -> u32 {
-    let (1.., Some(left_s), Some(photon_s)) = (before, course.control.time_left_s(), state.photon_s) else {
+fn in_time(photons: u32, before: u32, part: f64, state: &LightState, context: &BakeContext) -> u32 {
+    let (1.., Some(left_s), Some(photon_s)) = (before, context.control.time_left_s(), state.photon_s) else {
         return photons;
     };
-    let own_s = part * left_s / course.open_lights as f64;
+    let own_s = part * left_s / context.open_lights as f64;
     let affordable = f64::from(before) + own_s / photon_s;
     let least = MIN_GROWTH * f64::from(before);
     (affordable.max(least) as u32).min(photons)
@@ -73,7 +72,7 @@ impl CausticLayer<'_> {
         &self,
         light: &VisibleLight,
         last: Option<&LightLevel>,
-        aim: Option<f64>,
+        target_rmse: Option<f64>,
     ) -> Option<u32> {
         let before = last.and_then(|level| level.key.photons);
         let Some(target) = self.settings.max_error else {
@@ -88,11 +87,10 @@ impl CausticLayer<'_> {
         };
         let known = last.and_then(|level| {
             let error = level.error.as_ref()?.estimate.relative_rmse;
-            let ledger = level.ledger.report("", level.unit, LinearSrgb::WHITE);
-            let truncated = accuracy::truncated_share(&ledger.energy_w);
+            let truncated = accuracy::truncated_share(&level.energy());
             (error.is_finite() && error > 0.0).then_some((error, truncated))
         });
-        let goal = aim.unwrap_or(target);
+        let goal = target_rmse.unwrap_or(target);
         let times = match known {
             Some((error, truncated)) => {
                 // More photons do not recover truncated light.
@@ -154,64 +152,49 @@ impl CausticLayer<'_> {
     ///
     /// # Errors
     /// A power that is not finite.
-    pub(super) fn advance_photons(
-        &self,
-        light: &VisibleLight,
-        sizes: &Sizes,
-        state: &mut LightState,
-        light_progress: &mut LightProgress,
-        course: &mut BakeContext,
-    ) -> Result<()> {
-        let last = light_progress.levels.last_mut();
-        if self
-            .next_photons(light, last.as_deref(), light_progress.aim)
-            .is_none()
-        {
-            light_progress.done = true;
+    pub(super) fn advance_photons(&self, light: &mut LightProgress, context: &mut BakeContext) -> Result<()> {
+        if !self.has_next_level(light) {
+            light.done = true;
             return Ok(());
         }
-        let made = self.more_photons(light, sizes, state, (last, light_progress.aim), course)?;
+        let mut last = light.levels.pop();
+        let made = self.more_photons(light, last.as_mut(), context)?;
         // The light is negligible: a better estimate is not worth its cost.
-        light_progress.done |= !light_progress.is_underrated && made.is_some() && self.is_negligible(light);
-        light_progress.levels.extend(made);
+        light.done |= !light.is_underrated && made.is_some() && self.is_negligible(light.visible);
+        light.levels.extend(last.into_iter().chain(made));
         // Only the last level is needed, but the next bake reaches it sooner with all of them.
-        drop_coarse(&mut light_progress.levels, 1, self.settings.memory_bytes / 8);
+        drop_coarse(&mut light.levels, 1, self.settings.memory_bytes / 8);
         Ok(())
     }
 
-    /// The next level of a light that aims at a relative RMSE; `None` if nothing is left to do, or it was stopped.
+    /// The next level of a light after its last one; `None` if nothing is left to do, or it was stopped.
     ///
     /// # Errors
     /// A power that is not finite.
     pub(super) fn more_photons(
         &self,
-        light: &VisibleLight,
-        sizes: &Sizes,
-        state: &mut LightState,
-        (last, aim): (Option<&mut LightLevel>, Option<f64>),
-        course: &mut BakeContext,
+        light: &mut LightProgress,
+        last: Option<&mut LightLevel>,
+        context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
-        let Some(photons) = self.next_photons(light, last.as_deref(), aim) else {
+        let Some(photons) = self.next_photons(light.visible, last.as_deref(), light.target_rmse) else {
             return Ok(None);
         };
         let before = last.as_ref().and_then(|last| last.key.photons).unwrap_or(0);
-        let part = if self.has_bundles(light) {
+        let part = if self.has_bundles(light.visible) {
             PART_OF_TIME_WITH_BUNDLES
         } else {
             PART_OF_TIME
         };
-        let photons = in_time(photons, before, part, state, course);
-        let key = LevelKey {
-            photons: Some(photons),
-            ..self.key(light, 0, &LightProgress::default(), sizes)
-        };
-        match state.take(&key) {
+        let photons = in_time(photons, before, part, &light.state, context);
+        let key = self.key(light, Some(photons), context);
+        match light.state.take(&key) {
             Some(level) => Ok(Some(level)),
             None => {
                 let began = Instant::now();
-                let made = self.make_photons(light, key, last, course)?;
+                let made = self.make_photons(light.visible, key, last, context)?;
                 let took_s = began.elapsed().as_secs_f64();
-                state.photon_s = made.as_ref().map(|_| took_s / f64::from(photons - before));
+                light.state.photon_s = made.as_ref().map(|_| took_s / f64::from(photons - before));
                 Ok(made)
             }
         }
@@ -223,7 +206,7 @@ impl CausticLayer<'_> {
         light: &VisibleLight,
         key: LevelKey,
         before: Option<&mut LightLevel>,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         let unit = self.photon_unit(light)?;
         let photons = key.photons.unwrap_or(FIRST_PHOTONS);
@@ -233,7 +216,7 @@ impl CausticLayer<'_> {
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
         let spectrum = self.spectra.photons(light.light);
-        let sums = course.pass(&chart_for, nothing, |course, share, mut sums| {
+        let sums = context.pass(&chart_for, nothing, |context, share, mut sums| {
             let rules = PhotonRules {
                 tracer: self.tracer,
                 spectrum,
@@ -244,9 +227,9 @@ impl CausticLayer<'_> {
             };
             let listener = ProgressScope {
                 progress: self.progress,
-                control: course.control,
-                done: course.outcome.counts.rays,
-                total: course.outcome.counts.rays + HALVES as u64 * u64::from(photons - first),
+                control: context.control,
+                done: context.outcome.counts.rays,
+                total: context.outcome.counts.rays + HALVES as u64 * u64::from(photons - first),
             };
             let mut halves = sums.maps.iter_mut().map(|maps| maps.sets_mut());
             let mut halves = [halves.next(), halves.next()].map(|half| half.unwrap_or(&mut []));
@@ -261,7 +244,7 @@ impl CausticLayer<'_> {
             });
             sums
         })?;
-        course.outcome.count(&sums.report, course.clock);
+        context.outcome.count(&sums.report, context.clock);
         if sums.report.cancelled {
             return Ok(None);
         }
@@ -276,8 +259,8 @@ impl CausticLayer<'_> {
             segments += so_far;
         }
         let unit = unit.per(u64::from(photons) * HALVES as u64);
-        let is_shard = course.role.is_shard();
-        let level = course.clock.time(
+        let is_shard = context.role.is_shard();
+        let level = context.clock.time(
             |clock| &mut clock.deposit,
             || self.photon_level(light, (key, unit), raw, is_shard),
         );

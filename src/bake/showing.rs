@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::caustic::{BakeObserver, CausticOutcome};
+use super::caustic::CausticOutcome;
 use super::clock::Clock;
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
@@ -11,16 +11,12 @@ use super::first_look::FirstLook;
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
 use super::metric::{Backdrop, ComparisonView};
-use super::{Bake, LightLayer, account};
-use crate::error::Result;
+use super::{Bake, LightLayer, PreparedBake, account};
 use crate::illumination::IlluminationMap;
 use crate::light_pass::caustic::pass::Stopwatch;
-use crate::light_pass::caustic::setup::LightVisibility;
 use crate::optics::luminance;
 use crate::plan::Effect;
-use crate::progress::{Control, Progress};
 use crate::settings::LayerKind;
-use crate::transport::Tracer;
 
 /// Receives intermediate results.
 pub(super) type LevelCallback<'a> = dyn FnMut(Bake) + Send + 'a;
@@ -28,14 +24,9 @@ pub(super) type LevelCallback<'a> = dyn FnMut(Bake) + Send + 'a;
 /// Passes the levels of a bake to a callback.
 pub(super) struct Showing<'a, 'level> {
     pub(super) finish: &'a MapAssembler<'a>,
-    pub(super) tracer: &'a Tracer,
-    pub(super) aim: &'a LightVisibility,
-    pub(super) progress: &'a dyn Progress,
-    pub(super) control: &'a Control,
+    pub(super) bake: &'a PreparedBake<'a>,
     /// Runs since the start of the bake.
     pub(super) watch: &'a Stopwatch,
-    /// Tests that built the item buffers.
-    pub(super) item_buffer_tests: u64,
     pub(super) level: Option<&'a mut LevelCallback<'level>>,
     pub(super) direct: &'a mut DirectCache,
     pub(super) indirect: &'a mut IndirectCache,
@@ -58,44 +49,48 @@ impl Showing<'_, '_> {
     ) {
         let mut result = self.finish.result(maps, levels, so_far);
         clock.total = self.watch.elapsed();
-        account(&mut result, self.finish, self.aim, &self.lamps.clock(clock));
+        account(
+            &mut result,
+            self.finish,
+            &self.bake.visibility,
+            &self.lamps.clock(clock),
+        );
         if let Some(level) = &mut self.level {
             level(result);
         }
     }
-}
 
-impl BakeObserver for Showing<'_, '_> {
-    fn show_first(
+    /// Takes the first result, when the light of other layers is not known yet.
+    pub(super) fn show_first(
         &mut self,
         levels: &[CompletedLevel],
         so_far: &CausticOutcome,
         clock: &mut Clock,
-    ) -> Result<()> {
+    ) {
         if self.level.is_none() || levels.is_empty() || !self.finish.plan.is_on(Effect::Direct) {
-            return Ok(());
+            return;
         }
         let (charts, _) = self.finish.charts(levels);
         let direct_charts = self.finish.direct_charts(&charts);
-        if self.direct.knows(self.finish.scene.lights.len(), &direct_charts) {
-            return Ok(());
+        if !self.direct.knows(self.finish.scene.lights.len(), &direct_charts) {
+            self.show(levels, so_far, clock);
         }
-        self.show(levels, so_far, clock)
     }
 
-    fn show(&mut self, levels: &[CompletedLevel], so_far: &CausticOutcome, clock: &mut Clock) -> Result<()> {
+    /// Takes a result that is not the final one.
+    pub(super) fn show(&mut self, levels: &[CompletedLevel], so_far: &CausticOutcome, clock: &mut Clock) {
         let is_first = std::mem::take(&mut self.is_first);
         if self.level.is_none() {
-            return Ok(());
+            return;
         }
         if is_first && let Some(look) = &mut self.first_look {
-            let on_whom = (self.progress, self.control);
-            let maps = look.maps(self.finish, self.tracer, levels, on_whom);
+            let on_whom = (self.bake.progress, self.bake.control);
+            let maps = look.maps(self.finish, &self.bake.tracer, levels, on_whom);
             self.hand_out(maps, levels, so_far, clock);
-            return Ok(());
+            return;
         }
-        if !is_first && !self.control.is_watched() {
-            return Ok(());
+        if !is_first && !self.bake.control.is_watched() {
+            return;
         }
         let (finish, plan) = (self.finish, self.finish.plan);
         let (charts, memory_warning) = finish.charts(levels);
@@ -103,12 +98,12 @@ impl BakeObserver for Showing<'_, '_> {
         // The first picture after a change has to come soon; direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
         if !waits && plan.is_on(Effect::Direct) {
-            let on_whom = (self.progress, self.control);
+            let on_whom = (self.bake.progress, self.bake.control);
             self.lamps
-                .shine(self.tracer, &direct_charts, self.direct, on_whom);
+                .shine(&self.bake.tracer, &direct_charts, self.direct, on_whom);
         }
         let mut so_far = self.lamps.added_to(so_far);
-        so_far.counts.item_buffer_tests = self.item_buffer_tests;
+        so_far.counts.item_buffer_tests = self.bake.item_buffer_tests;
         so_far.warnings.extend(memory_warning);
         let (mut maps, mut parts) = finish.maps(levels, &charts, self.direct);
         if plan.is_on(Effect::Indirect) && !waits {
@@ -117,19 +112,23 @@ impl BakeObserver for Showing<'_, '_> {
             IndirectWork::of_known(known, &maps).add_to(known, &mut maps, &mut parts);
         }
         self.hand_out((maps, parts), levels, &so_far, clock);
-        Ok(())
     }
 
-    fn backdrop(&mut self, levels: &[CompletedLevel]) -> Backdrop {
+    /// Light of other layers on the maps of these levels and on all other maps.
+    pub(super) fn backdrop(&mut self, levels: &[CompletedLevel]) -> Backdrop {
         let finish = self.finish;
         if !finish.plan.is_on(Effect::Direct) && !finish.plan.is_on(Effect::Indirect) {
             return Backdrop::new();
         }
         let (charts, _) = finish.charts(levels);
-        let on_whom = (self.progress, self.control);
+        let on_whom = (self.bake.progress, self.bake.control);
         if finish.plan.is_on(Effect::Direct) {
-            self.lamps
-                .shine(self.tracer, &finish.direct_charts(&charts), self.direct, on_whom);
+            self.lamps.shine(
+                &self.bake.tracer,
+                &finish.direct_charts(&charts),
+                self.direct,
+                on_whom,
+            );
         }
         let (mut maps, _) = finish.maps(levels, &charts, self.direct);
         if finish.plan.is_on(Effect::Indirect) {
@@ -139,7 +138,7 @@ impl BakeObserver for Showing<'_, '_> {
                 None => self
                     .glance
                     .get_or_insert_default()
-                    .traced(finish, self.tracer, on_whom),
+                    .traced(finish, &self.bake.tracer, on_whom),
             };
             IndirectWork::of_known(known, &maps).add_to(known, &mut maps, &mut Vec::new());
         }

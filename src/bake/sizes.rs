@@ -1,14 +1,13 @@
 //! The chart of each surface and the size of its map.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
 
 use super::map_size::{self, Borders, MapSize, SizeRequest, TileDemand};
 use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, Parametrisation, parametrise};
-use crate::illumination::tiles::tile_counts;
+use crate::illumination::tiles::{TileLayout, tile_counts};
 use crate::illumination::{Chart, Receiver, Side, UvSet};
 use crate::light_pass::caustic::statistics::FootprintStatistics;
 use crate::light_pass::direct::find_borders;
@@ -83,30 +82,14 @@ pub struct ChartCache {
     laid_out: Mutex<BTreeMap<(usize, usize), Arc<Parametrisation>>>,
     /// Whether each object's mesh is closed.
     closed: Vec<OnceLock<bool>>,
-    /// Dense charts, by receiver and size.
-    charts: Mutex<BTreeMap<ChartKey, KeptChart>>,
-    /// Tiled charts, the latest last.
-    tiled: Mutex<Vec<Arc<Chart>>>,
-    /// Number of requests for charts.
-    asked: AtomicU64,
+    /// Charts by receiver, those used last at the end.
+    charts: Mutex<BTreeMap<Receiver, Vec<Arc<Chart>>>>,
     /// Shadow borders of each light on each receiver.
     borders: Mutex<BTreeMap<(usize, Receiver), Borders>>,
 }
 
-/// Receiver, and width and height of the chart.
-type ChartKey = (Receiver, (usize, usize));
-
-/// A chart, and the number of requests before its last use.
-type KeptChart = (Arc<Chart>, u64);
-
-/// Approximate number of charts kept per receiver.
-const CHARTS_PER_RECEIVER: usize = 4;
-
-/// Minimum number of charts kept.
-const MIN_CHARTS: usize = 256;
-
-/// Maximum number of tiled charts kept.
-const MAX_TILED_CHARTS: usize = 64;
+/// Maximum number of charts kept per receiver.
+const MAX_CHARTS: usize = 8;
 
 impl ChartCache {
     pub fn new(scene: Arc<Scene>) -> Self {
@@ -118,8 +101,6 @@ impl ChartCache {
             closed,
             laid_out: Mutex::default(),
             charts: Mutex::default(),
-            tiled: Mutex::default(),
-            asked: AtomicU64::new(0),
             borders: Mutex::default(),
         }
     }
@@ -134,9 +115,7 @@ impl ChartCache {
         let laid_out = sizes.laid_out.get_mut().unwrap_or_else(PoisonError::into_inner);
         laid_out.retain(|(object, _), _| !changed.contains(object));
         let charts = sizes.charts.get_mut().unwrap_or_else(PoisonError::into_inner);
-        charts.retain(|(receiver, _), _| !changed.contains(&receiver.object()));
-        let tiled = sizes.tiled.get_mut().unwrap_or_else(PoisonError::into_inner);
-        tiled.retain(|chart| !changed.contains(&chart.object()));
+        charts.retain(|receiver, _| !changed.contains(&receiver.object()));
         sizes
     }
 
@@ -213,27 +192,12 @@ impl ChartCache {
 
     /// A dense chart.
     pub fn chart(&self, receiver: Receiver, (width, height): (usize, usize)) -> Option<Arc<Chart>> {
-        let key = (receiver, (width, height));
-        // Even after a panic under the lock, the charts in the map are complete.
-        let charts = || self.charts.lock().unwrap_or_else(PoisonError::into_inner);
-        let now = self.asked.fetch_add(1, Ordering::Relaxed);
-        if let Some((chart, last)) = charts().get_mut(&key) {
-            *last = now;
-            return Some(Arc::clone(chart));
-        }
-        let chart = self
-            .laid_out(receiver.object(), width.min(height))?
-            .chart(width, height);
-        let chart = Arc::new(chart.of_side(receiver.side()));
-        let mut charts = charts();
-        if charts.len() >= MIN_CHARTS.max(CHARTS_PER_RECEIVER * 2 * self.scene.objects.len()) {
-            let oldest = charts.iter().min_by_key(|(_, (_, last))| *last);
-            if let Some(oldest) = oldest.map(|(key, _)| *key) {
-                charts.remove(&oldest);
-            }
-        }
-        charts.insert(key, (Arc::clone(&chart), now));
-        Some(chart)
+        let is_it =
+            |chart: &Arc<Chart>| chart.layout.is_none() && (chart.width, chart.height) == (width, height);
+        self.cached(receiver, is_it, || {
+            let laid_out = self.laid_out(receiver.object(), width.min(height))?;
+            Some(laid_out.chart(width, height))
+        })
     }
 
     /// A chart of a size, dense or tiled.
@@ -241,22 +205,41 @@ impl ChartCache {
         let Some(layout) = &size.layout else {
             return self.chart(receiver, size.size);
         };
-        let mut tiled = self.tiled.lock().unwrap_or_else(PoisonError::into_inner);
-        let is_it = |chart: &&Arc<Chart>| {
-            let known = chart.layout.as_ref();
-            chart.receiver == receiver
-                && known.is_some_and(|known| Arc::ptr_eq(known, layout) || known == layout)
+        let is_same = |known: &Arc<TileLayout>| Arc::ptr_eq(known, layout) || known == layout;
+        let is_it = |chart: &Arc<Chart>| chart.layout.as_ref().is_some_and(is_same);
+        self.cached(receiver, is_it, || {
+            self.parametrisation(receiver.object())?.tiled_chart(layout)
+        })
+    }
+
+    fn cached(
+        &self,
+        receiver: Receiver,
+        is_it: impl Fn(&Arc<Chart>) -> bool,
+        make: impl FnOnce() -> Option<Chart>,
+    ) -> Option<Arc<Chart>> {
+        // Even after a panic under the lock, the charts in the map are complete.
+        let all = || self.charts.lock().unwrap_or_else(PoisonError::into_inner);
+        let find = |charts: &mut Vec<Arc<Chart>>| {
+            let chart = charts.remove(charts.iter().position(&is_it)?);
+            charts.push(Arc::clone(&chart));
+            Some(chart)
         };
-        if let Some(chart) = tiled.iter().find(is_it) {
-            return Some(Arc::clone(chart));
+        if let Some(chart) = find(all().entry(receiver).or_default()) {
+            return Some(chart);
         }
-        let chart = self.parametrisation(receiver.object())?.tiled_chart(layout)?;
-        let chart = Arc::new(chart.of_side(receiver.side()));
-        if tiled.len() >= MAX_TILED_CHARTS {
-            tiled.remove(0);
+        let made = Arc::new(make()?.of_side(receiver.side()));
+        let mut all = all();
+        let charts = all.entry(receiver).or_default();
+        // Another thread may have made it meanwhile.
+        if let Some(chart) = find(charts) {
+            return Some(chart);
         }
-        tiled.push(Arc::clone(&chart));
-        Some(chart)
+        if charts.len() == MAX_CHARTS {
+            charts.remove(0);
+        }
+        charts.push(Arc::clone(&made));
+        Some(made)
     }
 
     /// Number of doublings from the first size of a receiver's map until its texels are no larger than the mean
@@ -269,7 +252,7 @@ impl ChartCache {
         largest_side: usize,
     ) -> Option<u32> {
         let share = statistics.mean(receiver)?.map_share;
-        let (width, height) = first_size(self.parametrisation(receiver.object())?.suggested_aspect);
+        let (width, height) = self.doubled_size(receiver.object(), 0)?;
         let coarse = |times: u32| ((width * height) << (2 * times)) as f64 * share < 1.0;
         let small = |times: u32| width.max(height) << times < largest_side;
         (0..).find(|&times| !(coarse(times) && small(times)))
@@ -337,7 +320,7 @@ impl ChartCache {
 
     /// Number of halvings of direct light's texels at the shadow borders of a receiver; 0 if it has none.
     pub fn border_doublings(&self, receiver: Receiver, settings: &BakeSettings) -> u32 {
-        if settings.map_resolution != MapResolution::Auto || !self.has_borders(receiver) {
+        if settings.map_resolution != MapResolution::Auto || self.borders(receiver).is_none() {
             return 0;
         }
         let Some(size) = self.direct_size(receiver.object(), settings) else {
@@ -350,12 +333,6 @@ impl ChartCache {
         } else {
             0
         }
-    }
-
-    fn has_borders(&self, receiver: Receiver) -> bool {
-        let known = self.borders.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut borders = known.iter().filter(|((_, of), _)| *of == receiver);
-        borders.any(|(_, borders)| borders.marked.contains(&true))
     }
 
     /// Shadow borders of all lights on a receiver; `None` if there are none.
@@ -463,7 +440,7 @@ fn border_doublings(settings: &BakeSettings) -> u32 {
 const MIN_GRID_SIDE: usize = 8;
 
 /// A size of about FIRST_SIDE² texels whose aspect ratio is a power of two, at most 8:1.
-pub fn first_size(aspect: f64) -> (usize, usize) {
+fn first_size(aspect: f64) -> (usize, usize) {
     let steps = aspect.log2().round().clamp(-3.0, 3.0) as i32;
     let stretch = |steps: i32| FIRST_SIDE << steps.max(0);
     (stretch(steps), stretch(-steps))

@@ -89,7 +89,7 @@ impl Spectra {
     /// A light whose colour has no spectrum.
     pub(super) fn new(
         tracer: &Tracer,
-        aim: &LightVisibility,
+        visibility: &LightVisibility,
         plan: &EffectPlan,
         settings: &BakeSettings,
     ) -> Result<Self> {
@@ -106,9 +106,9 @@ impl Spectra {
         if !plan.is_on(Effect::Dispersion) && !settings.keep_spectrum {
             return Ok(spectra);
         }
-        for visible_light in &aim.lights {
+        for visible_light in &visibility.lights {
             let light = &scene.lights[visible_light.light];
-            let reached = &aim.sights[visible_light.light].reached;
+            let reached = &visibility.sights[visible_light.light].reached;
             let parts = |&(object, _): &(usize, Option<usize>)| scene.material_of(object).is_dispersive();
             let is_parted = plan.is_on(Effect::Dispersion) && reached.iter().any(parts);
             if light.strength().max_channel() > 0.0 && (is_parted || settings.keep_spectrum) {

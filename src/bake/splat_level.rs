@@ -1,7 +1,7 @@
 //! One light by splats: the full lattice at once, and sparser ones to estimate the error.
 
 use super::band_maps::BandMaps;
-use super::caustic::{BakeContext, CausticLayer};
+use super::caustic::{BakeContext, CausticLayer, LightProgress, unwatched};
 use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
 use super::shards::PassSums;
 use crate::error::Result;
@@ -41,12 +41,12 @@ impl CausticLayer<'_> {
     /// stopped.
     pub(super) fn make_splats(
         &self,
-        light: &VisibleLight,
+        progress: &mut LightProgress,
         key: LevelKey,
         unit: FluxUnit,
-        state: &mut LightState,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
+        let (light, state) = (progress.visible, &mut progress.state);
         let lattice = Lattice {
             strides: (key.stride, key.stride),
             ..self.lattice(light, unit)
@@ -60,9 +60,9 @@ impl CausticLayer<'_> {
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
         let mut arrived = None;
-        let mut sums = course.pass(&chart_for, nothing, |course, share, sums| {
+        let mut sums = context.pass(&chart_for, nothing, |context, share, sums| {
             let worker = Worker { share, source };
-            let (sums, kept) = self.deposit_parts(light, lattice, worker, &key, sums, course);
+            let (sums, kept) = self.deposit_parts(light, lattice, worker, &key, sums, context);
             arrived = kept;
             sums
         })?;
@@ -76,10 +76,10 @@ impl CausticLayer<'_> {
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         self.spectra.to_linear_srgb(light.light, &mut second, &mut none);
-        course.outcome.count(&report, course.clock);
-        let is_known = !report.cancelled && !course.role.is_shard();
+        context.outcome.count(&report, context.clock);
+        let is_known = !report.cancelled && !context.role.is_shard();
         let noise = is_known.then(|| {
-            course.clock.time(
+            context.clock.time(
                 |clock| &mut clock.deposit,
                 || {
                     let [a, b] = [&maps, &second].map(|maps| accuracy::images(maps, unit));
@@ -105,7 +105,7 @@ impl CausticLayer<'_> {
         worker: Worker,
         key: &LevelKey,
         mut sums: PassSums,
-        course: &BakeContext,
+        context: &BakeContext,
     ) -> (PassSums, Option<ArrivalCache>) {
         let mut kept = None;
         let (first, second) = sums.maps.split_at_mut(1);
@@ -128,7 +128,7 @@ impl CausticLayer<'_> {
                     worker.source
                 },
             };
-            let (of_part, arrived) = self.deposit_splats(lattice, worker, key, &mut halves, course);
+            let (of_part, arrived) = self.deposit_splats(lattice, worker, key, &mut halves, context);
             sums.report.merge(of_part);
             kept = arrived;
             if sums.report.cancelled {
@@ -145,18 +145,18 @@ impl CausticLayer<'_> {
         worker: Worker,
         key: &LevelKey,
         halves: &mut HalfBuffers,
-        course: &BakeContext,
+        context: &BakeContext,
     ) -> (PassReport, Option<ArrivalCache>) {
         let depositor = Depositor {
             lattice,
             settings: self.settings,
-            statistics: course.statistics.as_ref(),
+            statistics: context.statistics.as_ref(),
             gathers: false,
         };
         let listener = ProgressScope {
             progress: self.progress,
-            control: course.control,
-            done: course.outcome.counts.rays,
+            control: context.control,
+            done: context.outcome.counts.rays,
             total: match worker.share {
                 Some(share) => share.of(lattice.ray_count()),
                 None => lattice.ray_count(),
@@ -175,11 +175,11 @@ impl CausticLayer<'_> {
     /// Maps from every second ray across and down, which stands for four; `None` for a level that is thinned itself.
     pub(super) fn thinned_images(
         &self,
-        light: &VisibleLight,
+        progress: &LightProgress,
         level: &LightLevel,
-        state: &LightState,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) -> Result<Option<Images>> {
+        let (light, state) = (progress.visible, &progress.state);
         if level.key.stride > 1 {
             return Ok(None);
         }
@@ -190,16 +190,16 @@ impl CausticLayer<'_> {
         let source = source_of(state, &level.key.trace);
         let chart_for = |receiver: Receiver| self.chart(receiver, &level.key.sizes);
         let nothing = PassSums::new(vec![self.part_maps()]);
-        let mut sums = course.pass(&chart_for, nothing, |course, share, sums| {
+        let mut sums = context.pass(&chart_for, nothing, |context, share, sums| {
             let worker = Worker { share, source };
-            self.deposit_parts(light, lattice, worker, &level.key, sums, course)
+            self.deposit_parts(light, lattice, worker, &level.key, sums, context)
                 .0
         })?;
         let mut report = sums.report;
         let (mut maps, _) = sums.maps.swap_remove(0).into_sum();
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
-        course.outcome.count(&report, course.clock);
+        context.outcome.count(&report, context.clock);
         Ok(Some(accuracy::images(&maps, level.unit)))
     }
 
@@ -215,11 +215,11 @@ impl CausticLayer<'_> {
     /// Mean footprints at the full density, from a lattice about 64 times thinner.
     pub(super) fn splat_statistics(
         &self,
-        light: &VisibleLight,
+        progress: &LightProgress,
         unit: FluxUnit,
-        state: &LightState,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) -> FootprintStatistics {
+        let (light, state) = (progress.visible, &progress.state);
         let settings = BakeSettings {
             footprint: Footprint::Ellipse,
             sigma: Sigma::Constant(1.0),
@@ -232,15 +232,10 @@ impl CausticLayer<'_> {
             statistics: None,
             gathers: true,
         };
-        let listener = ProgressScope {
-            progress: &(),
-            control: course.control,
-            done: 0,
-            total: 0,
-        };
+        let listener = unwatched(context.control);
         let chart_for = |receiver: Receiver| {
-            let aspect = self.sizes.parametrisation(receiver.object())?.suggested_aspect;
-            self.sizes.chart(receiver, super::sizes::first_size(aspect))
+            self.sizes
+                .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
         };
         let mut maps = self.no_maps();
         let mut all = HalfBuffers {
@@ -251,7 +246,7 @@ impl CausticLayer<'_> {
         let (mut report, _) = pass::run(&depositor, source, &mut all, &chart_for, &listener);
         // Kernels of the coarse run are on no map.
         report.splats = 0;
-        course.outcome.count(&report, course.clock);
+        context.outcome.count(&report, context.clock);
         let cells = (lattice.strides.0 * lattice.strides.1) as f64;
         report.statistics.refined(cells)
     }

@@ -3,8 +3,8 @@
 use glam::DVec2;
 
 use super::carrier::Carrier;
-use super::caustic::{BakeContext, CausticLayer};
-use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
+use super::caustic::{BakeContext, CausticLayer, LightProgress, unwatched};
+use super::light_level::{LevelKey, LightLevel, TraceKey};
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
@@ -38,12 +38,12 @@ impl CausticLayer<'_> {
     /// Traces and deposits a level, or deposits cached paths on other maps; `None` if it was stopped.
     pub(super) fn make_wavefront(
         &self,
-        light: &VisibleLight,
+        progress: &mut LightProgress,
         key: LevelKey,
         unit: FluxUnit,
-        state: &mut LightState,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
+        let (light, state) = (progress.visible, &mut progress.state);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let receivers = Receivers::new(self.tracer, &chart_for);
         let refinement = Refinement {
@@ -52,19 +52,11 @@ impl CausticLayer<'_> {
         };
         let mut traced = None;
         // Bands are too many to keep, and a shard has another share of each pass.
-        let (mut taken, room) = if self.spectra.has_bands(light) || course.role.is_cut() {
-            (
-                None,
-                Room {
-                    bands_bytes: 0,
-                    ..self.room()
-                },
-            )
-        } else {
-            (state.take_traced(&key), self.room())
-        };
+        let keeps_bands = !self.spectra.has_bands(light) && !context.role.is_cut();
+        let room = self.room(keeps_bands);
+        let mut taken = keeps_bands.then(|| state.take_traced(&key)).flatten();
         let nothing = PassSums::new(vec![self.part_maps()]);
-        let mut sums = course.pass(&chart_for, nothing, |course, share, mut sums| {
+        let mut sums = context.pass(&chart_for, nothing, |context, share, mut sums| {
             let maps = &mut sums.maps[0];
             let size = self.spectra.part_size(light.light, key.trace.size);
             let bodies = self.small_bodies(light, size, Self::closeness(&key.trace));
@@ -75,17 +67,17 @@ impl CausticLayer<'_> {
                     chart_for: &chart_for,
                     lattice: WavefrontLattice {
                         refinement: Some(&refinement),
-                        ..self.bumpy_lattice(light, part, &key.trace, &bodies, unit, course.control)
+                        ..self.bumpy_lattice(light, part, &key.trace, &bodies, unit, context.control)
                     },
                     reference_w: reference_w(light),
                     coarseness: key.coarseness,
-                    most_queries: course.most_queries.saturating_sub(sums.report.receiver_queries),
+                    most_queries: context.most_queries.saturating_sub(sums.report.receiver_queries),
                 };
                 let cells = depositor.lattice.cell_count();
                 let listener = ProgressScope {
                     progress: self.progress,
-                    control: course.control,
-                    done: course.outcome.counts.rays + sums.report.rays,
+                    control: context.control,
+                    done: context.outcome.counts.rays + sums.report.rays,
                     total: share.map_or(cells, |share| share.of(cells)),
                 };
                 let maps = maps.of(band);
@@ -107,7 +99,7 @@ impl CausticLayer<'_> {
         self.spectra
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         let strays = drop_negligible_maps(&mut maps, &mut report.ledger);
-        course.outcome.count(&report, course.clock);
+        context.outcome.count(&report, context.clock);
         Ok((!report.cancelled).then(|| LightLevel {
             strays,
             overshoots: report.overshoots,
@@ -149,25 +141,31 @@ impl CausticLayer<'_> {
     /// Footprints at the density that maps are made for, from a thinner lattice.
     pub(super) fn wavefront_statistics(
         &self,
-        light: &VisibleLight,
+        progress: &mut LightProgress,
         unit: FluxUnit,
-        state: &mut LightState,
-        course: &mut BakeContext,
+        context: &mut BakeContext,
     ) -> FootprintStatistics {
-        let chart_for: &ChartFor =
-            &|receiver: Receiver| self.sizes.chart(receiver, self.first_size(receiver.object())?);
+        let light = progress.visible;
+        let chart_for: &ChartFor = &|receiver: Receiver| {
+            self.sizes
+                .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
+        };
         let receivers = Receivers::new(self.tracer, chart_for);
         let none = SubcellFeatures::default();
         let size = self.statistics_size(light);
         let mut lattice = WavefrontLattice {
             // Light that takes very many paths is spread as wide as its cells: splitting them shows nothing of it.
             splits: SubdivisionLimits::NONE,
-            ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, course.control)
+            ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, context.control)
         };
         // Patches reuse these rays. If photons may take over, the strong branches are enough.
         let is_for_patches = self.carrier(light) == Carrier::Patches;
         let mut own = RayCache::default();
-        let rays = if is_for_patches { &mut state.rays } else { &mut own };
+        let rays = if is_for_patches {
+            &mut progress.state.rays
+        } else {
+            &mut own
+        };
         if !is_for_patches {
             let threshold = &mut lattice.tracer.limits.branch_threshold;
             *threshold = threshold.max(MIN_SIZED_SHARE);
@@ -180,20 +178,12 @@ impl CausticLayer<'_> {
             coarseness: 1.0,
             most_queries: u64::MAX,
         };
-        let listener = ProgressScope {
-            progress: &(),
-            control: course.control,
-            done: 0,
-            total: 0,
-        };
-        let room = Room {
-            bands_bytes: 0,
-            ..self.room()
-        };
+        let listener = unwatched(context.control);
+        let room = self.room(false);
         let (mut report, _) = depositor.run(None, rays, None, &listener, room);
         // Patches of this run are on no map.
         (report.cells, report.splats) = (0, 0);
-        course.outcome.count(&report, course.clock);
+        context.outcome.count(&report, context.clock);
         let cells = |size: (usize, usize)| size.0 as f64 * size.1 as f64;
         let meant = light
             .launch
@@ -222,11 +212,11 @@ impl CausticLayer<'_> {
         }
     }
 
-    fn room(&self) -> Room {
-        let bytes = self.settings.kept_light_bytes() / 2;
+    fn room(&self, keeps_bands: bool) -> Room {
+        let rays_bytes = self.settings.kept_light_bytes() / 2;
         Room {
-            bands_bytes: bytes,
-            rays_bytes: bytes,
+            bands_bytes: if keeps_bands { rays_bytes } else { 0 },
+            rays_bytes,
         }
     }
 

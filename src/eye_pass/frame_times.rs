@@ -8,7 +8,7 @@ use super::View;
 use super::renderer::{GpuMs, Renderer};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, readback};
+use crate::gpu::{Gpu, readback, texture_of};
 use crate::illumination::IlluminationMap;
 use crate::optics::spectrum::xyz::Matrix3;
 use crate::progress::{Control, Progress, Stage};
@@ -151,7 +151,11 @@ pub fn measure(
     control: &Control,
 ) -> Result<Vec<MannerTimes>> {
     gpu.check_texture_size("picture", walk.view.width, walk.view.height)?;
-    let target = target(gpu, &walk.view);
+    let size = [walk.view.width, walk.view.height, 1];
+    let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
+    let target = gpu
+        .device
+        .create_texture(&texture_of("frame", size, FORMAT, usage));
     let manners = switches
         .iter()
         .map(|switch| TimedRenderer::new(gpu, walk, *switch));
@@ -192,33 +196,12 @@ pub fn auto_exposure_stops(gpu: &Gpu, walk: &Walk<'_>) -> Result<f64> {
     Ok(renderer.radiance(gpu, &view)?.auto_exposure_stops())
 }
 
-fn target(gpu: &Gpu, view: &View) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("frame"),
-        size: wgpu::Extent3d {
-            width: view.width,
-            height: view.height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: FORMAT,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    })
-}
-
 #[derive(Clone, Copy, Debug)]
 struct TimedFrame {
     wall_ms: f64,
     device_ms: Option<GpuMs>,
     objects: u64,
     specular: u64,
-}
-
-fn sum(ms: GpuMs) -> f64 {
-    ms.opaque + ms.specular + ms.tone_mapping
 }
 
 /// Each switch has a renderer of its own, since switching chains off frees their resources.
@@ -260,7 +243,7 @@ impl TimedRenderer {
             self.warm_up.push(WarmUp {
                 frame: frame + 1,
                 wall_ms: drawing.wall_ms,
-                device_ms: drawing.device_ms.map(sum),
+                device_ms: drawing.device_ms.map(|ms| ms.sum()),
                 pipelines: made,
             });
         }
@@ -278,11 +261,11 @@ impl TimedRenderer {
         gpu.wait()?;
         let wall_ms = 1e3 * start.elapsed().as_secs_f64();
         // The GPU is done, so these times are of this frame.
-        let is_told = self.renderer.collect_times(gpu);
+        let is_measured = self.renderer.collect_times(gpu);
         let counts = self.renderer.counts();
         Ok(TimedFrame {
             wall_ms,
-            device_ms: counts.gpu_ms.filter(|_| is_told),
+            device_ms: counts.gpu_ms.filter(|_| is_measured),
             objects: counts.drawn_objects,
             specular: counts.drawn_specular,
         })
@@ -308,16 +291,16 @@ impl TimedRenderer {
 
 /// `None` if any frame has no GPU times.
 fn device_ms(drawings: &[TimedFrame]) -> Option<DeviceMs> {
-    let told: Vec<GpuMs> = drawings
+    let times: Vec<GpuMs> = drawings
         .iter()
         .map(|drawing| drawing.device_ms)
         .collect::<Option<_>>()?;
-    let spread = |value: fn(GpuMs) -> f64| Spread::of(told.iter().copied().map(value).collect());
+    let spread = |value: fn(GpuMs) -> f64| Spread::of(times.iter().copied().map(value).collect());
     Some(DeviceMs {
         opaque: spread(|ms| ms.opaque),
         specular: spread(|ms| ms.specular),
         tone_mapping: spread(|ms| ms.tone_mapping),
-        sum: spread(sum),
+        sum: spread(|ms| ms.sum()),
     })
 }
 

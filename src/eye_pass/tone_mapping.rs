@@ -34,45 +34,20 @@ fn transform(rows: &Rows, colour: LinearSrgb) -> LinearSrgb {
     LinearSrgb::new(r, g, b)
 }
 
-/// Linear sRGB to AgX's working space, whose primaries are those of BT.709 moved a fifth of the way towards D65.
-///
-/// Computed from that rule, so that greys stay grey; the rounded matrix of the sources differs by 1e-4.
-const AGX_INSET: Rows = [
-    [
-        0.842_398_929_049_531,
-        0.078_430_165_104_864,
-        0.079_170_905_845_605,
-    ],
-    [
-        0.042_398_929_049_531,
-        0.878_430_165_104_864,
-        0.079_170_905_845_605,
-    ],
-    [
-        0.042_398_929_049_531,
-        0.078_430_165_104_864,
-        0.879_170_905_845_605,
-    ],
+/// AgX's working space has the primaries of BT.709, moved a fifth of the way towards D65: every channel is four fifths of
+/// itself plus these shares of all three. Computed from that rule, so that greys stay grey; the rounded matrix of the
+/// sources differs by 1e-4.
+const AGX_SHARES: [f64; 3] = [
+    0.042_398_929_049_531,
+    0.078_430_165_104_864,
+    0.079_170_905_845_605,
 ];
 
-/// The inverse of [`AGX_INSET`].
-const AGX_OUTSET: Rows = [
-    [
-        1.197_001_338_688_086,
-        -0.098_037_706_381_080,
-        -0.098_963_632_307_006,
-    ],
-    [
-        -0.052_998_661_311_914,
-        1.151_962_293_618_92,
-        -0.098_963_632_307_006,
-    ],
-    [
-        -0.052_998_661_311_914,
-        -0.098_037_706_381_080,
-        1.151_036_367_692_994,
-    ],
-];
+/// The part of a colour that every channel of the working space shares.
+fn agx_fifth(colour: LinearSrgb) -> LinearSrgb {
+    let [r, g, b] = AGX_SHARES;
+    LinearSrgb::grey(r * colour.r + g * colour.g + b * colour.b)
+}
 
 /// log2(0.18) − 10 and log2(0.18) + 6.5: ten stops below and 6.5 above middle grey.
 const AGX_STOPS: [f64; 2] = [-12.473_931_188_332_413, 4.026_068_811_667_587];
@@ -99,9 +74,9 @@ fn agx_contrast(position: f64) -> f64 {
 /// <https://iolite-engine.com/blog_posts/minimal_agx_implementation>.
 fn agx(exposed: LinearSrgb) -> LinearSrgb {
     let [least, most] = AGX_STOPS;
-    let codes = transform(&AGX_INSET, exposed)
+    let codes = (exposed * 0.8 + agx_fifth(exposed))
         .map(|channel| agx_contrast((channel.log2().clamp(least, most) - least) / (most - least)));
-    transform(&AGX_OUTSET, codes).map(|code| code.max(0.0).powf(2.2))
+    ((codes - agx_fifth(codes)) * 1.25).map(|code| code.max(0.0).powf(2.2))
 }
 
 /// Stephen Hill's fit of the ACES reference rendering and output transforms, with its matrices from and to linear sRGB.

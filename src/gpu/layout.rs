@@ -33,6 +33,7 @@ macro_rules! shader_struct {
 
         impl $name {
             /// Offsets of its fields.
+            #[allow(dead_code, reason = "tests compare every struct with the shaders'")]
             pub(crate) fn layout() -> $crate::gpu::layout::StructLayout {
                 $crate::gpu::layout::StructLayout {
                     name: stringify!($name),

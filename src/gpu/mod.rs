@@ -121,6 +121,11 @@ impl Gpu {
         self.adapter.get_info().device_type == wgpu::DeviceType::Cpu
     }
 
+    /// Whether GPU times can be measured.
+    pub fn tells_times(&self) -> bool {
+        self.device.features().contains(CLOCK)
+    }
+
     pub fn limits(&self) -> wgpu::Limits {
         self.device.limits()
     }
@@ -166,6 +171,42 @@ impl Gpu {
             ),
             format!("choose 1 to {limit} in each direction"),
         ))
+    }
+}
+
+/// A texture of `[width, height, layers]`, with one mip level and one sample per texel.
+pub fn texture_of(
+    label: &str,
+    [width, height, depth_or_array_layers]: [u32; 3],
+    format: wgpu::TextureFormat,
+    usage: wgpu::TextureUsages,
+) -> wgpu::TextureDescriptor<'_> {
+    wgpu::TextureDescriptor {
+        label: Some(label),
+        size: wgpu::Extent3d {
+            width,
+            height,
+            depth_or_array_layers,
+        },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: wgpu::TextureDimension::D2,
+        format,
+        usage,
+        view_formats: &[],
+    }
+}
+
+/// A target that a pass clears and keeps.
+pub fn cleared(view: &wgpu::TextureView, clear: wgpu::Color) -> wgpu::RenderPassColorAttachment<'_> {
+    wgpu::RenderPassColorAttachment {
+        view,
+        depth_slice: None,
+        resolve_target: None,
+        ops: wgpu::Operations {
+            load: wgpu::LoadOp::Clear(clear),
+            store: wgpu::StoreOp::Store,
+        },
     }
 }
 

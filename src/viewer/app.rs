@@ -28,10 +28,10 @@ use super::model::{MapsShown, Model};
 use super::overlay;
 use super::pace::Pace;
 use super::panel::Panel;
-use super::timing::{FrameTimes, sum_ms};
+use super::timing::FrameTimes;
 use super::{ViewerOptions, comparison_view, probe, sketching};
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::MapStyle;
+use crate::eye_pass::renderer::{GpuMs, MapStyle};
 use crate::illumination::IlluminationMap;
 use crate::progress::Control;
 use serde_json::{Value, json};
@@ -195,18 +195,19 @@ impl App {
         match Graphics::new(event_loop, self.proxy.clone(), self.model.scene(), self.size) {
             Ok(mut graphics) => {
                 if self.model.log.is_kept() {
-                    graphics.interface().watch_controls();
+                    graphics.interface.watch_controls();
                 }
-                let adapter = graphics.gpu().adapter_name();
+                let adapter = graphics.gpu.adapter_name();
                 let started = json!({"scene": self.model.scene().name, "adapter": adapter});
                 self.model.log.write("started", started);
                 let report = &mut self.model.picture;
                 report.adapter = adapter;
                 report.frame_times = graphics
+                    .gpu
                     .tells_times()
                     .then(|| report.frame_times.take().unwrap_or_default());
                 graphics.window().request_redraw();
-                self.pace = if graphics.gpu().is_software() {
+                self.pace = if graphics.gpu.is_software() {
                     Pace::of_software()
                 } else {
                     Pace::default()
@@ -230,12 +231,6 @@ impl App {
     }
 
     fn closing(&mut self) {
-        let Model { log, picture, .. } = &mut self.model;
-        let (while_baking, otherwise) = (picture.latencies.while_baking(), picture.latencies.otherwise());
-        log.write(
-            "latency",
-            json!({"while_baking": while_baking, "otherwise": otherwise}),
-        );
         self.model.log.write("closing", Value::Null);
     }
 
@@ -249,7 +244,7 @@ impl App {
         let reason = self
             .graphics
             .as_ref()
-            .and_then(|graphics| graphics.gpu().take_error())
+            .and_then(|graphics| graphics.gpu.take_error())
             .unwrap_or_else(|| {
                 Error::failure(
                     "window",
@@ -335,7 +330,7 @@ impl App {
         let shown = graphics.show(&mut painting);
         // The error of a lost device is reported by `recover`.
         if shown != FrameOutcome::Broken
-            && let Some(error) = graphics.gpu().take_error()
+            && let Some(error) = graphics.gpu.take_error()
         {
             self.tell_fault(&error);
         }
@@ -363,10 +358,10 @@ impl App {
         self.model.picture.lost_device = lost.is_some_and(|loss| loss.elapsed() < LOSSES_WITHIN);
         let mut commands: Vec<Command> = self.model.placed().map(Command::Edit).into_iter().collect();
         let graphics = self.graphics.as_mut()?;
-        let (window, picture) = (Arc::clone(graphics.window()), graphics.picture_id());
-        let beside = graphics.beside_id();
+        let (window, picture) = (Arc::clone(graphics.window()), graphics.main.id);
+        let beside = graphics.beside.as_ref().map(|beside| beside.id);
         let model = &self.model;
-        let painting = graphics.interface().run(&window, |ui| {
+        let painting = graphics.interface.run(&window, |ui| {
             commands.extend(self.panel.show(ui, model));
             let rect = overlay::show(ui, picture, model, self.notice.as_deref());
             self.picture_rect = rect;
@@ -399,7 +394,7 @@ impl App {
 
     fn is_software(&self) -> bool {
         let graphics = self.graphics.as_ref();
-        graphics.is_some_and(|graphics| graphics.gpu().is_software())
+        graphics.is_some_and(|graphics| graphics.gpu.is_software())
     }
 
     /// Schedules the next frame.
@@ -432,7 +427,6 @@ impl App {
         };
         if shown == FrameOutcome::Yes {
             self.frames += 1;
-            self.model.picture.latencies.show(now);
         }
         if wait.is_zero() {
             self.wake_at = None;
@@ -464,7 +458,7 @@ impl App {
                     "frames": frames,
                     "position_m": position,
                     "exposure_stops": self.model.choices.display.exposure_stops,
-                    "device_ms": newest.copied().map(sum_ms),
+                    "device_ms": newest.map(GpuMs::sum),
                 }),
             );
         }
@@ -479,7 +473,6 @@ impl ApplicationHandler<UserEvent> for App {
     }
 
     fn new_events(&mut self, event_loop: &ActiveEventLoop, _: StartCause) {
-        self.model.picture.latencies.begin_turn(Instant::now());
         if self.stop.as_ref().is_some_and(|stop| stop.is_cancelled()) {
             self.close(event_loop);
         } else if self.wake_at.is_some_and(|due| Instant::now() >= due) {
@@ -490,7 +483,7 @@ impl ApplicationHandler<UserEvent> for App {
 
     fn user_event(&mut self, _: &ActiveEventLoop, news: UserEvent) {
         if let (UserEvent::Accessibility(event), Some(graphics)) = (news, &mut self.graphics) {
-            graphics.interface().on_accessibility(event);
+            graphics.interface.on_accessibility(event);
         }
         self.request_redraw();
     }
@@ -503,17 +496,12 @@ impl ApplicationHandler<UserEvent> for App {
         if window.id() != id {
             return;
         }
-        let is_by_hand = is_by_hand(&event);
-        if is_by_hand {
+        if is_by_hand(&event) {
             self.pace.touch(Instant::now());
         }
         // egui asks for another frame after each frame; `schedule` decides that here.
-        if graphics.interface().on_event(&window, &event) && event != WindowEvent::RedrawRequested {
+        if graphics.interface.on_event(&window, &event) && event != WindowEvent::RedrawRequested {
             window.request_redraw();
-            if is_by_hand {
-                let is_baking = self.model.state.is_baking();
-                self.model.picture.latencies.meet(Instant::now(), is_baking);
-            }
         }
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
@@ -548,10 +536,6 @@ impl ApplicationHandler<UserEvent> for App {
             && self.looking_from.is_some()
         {
             self.model.navigator.look(DVec2::new(x, y));
-            self.model
-                .picture
-                .latencies
-                .meet(Instant::now(), self.model.state.is_baking());
             self.request_redraw();
         }
     }
@@ -560,7 +544,6 @@ impl ApplicationHandler<UserEvent> for App {
         let look = self.stop.as_ref().map(|_| Instant::now() + STOP_POLL_INTERVAL);
         let until = [self.wake_at, look].into_iter().flatten().min();
         event_loop.set_control_flow(until.map_or(ControlFlow::Wait, ControlFlow::WaitUntil));
-        self.model.picture.latencies.end_turn(Instant::now());
     }
 }
 

@@ -152,6 +152,57 @@ impl<K, T> Drop for Background<K, T> {
     }
 }
 
+/// The newest result of work that depends on a key, kept until that of another key is there.
+#[derive(Debug)]
+pub struct Latest<K, T> {
+    made: Option<(K, Arc<T>)>,
+    coming: Background<K, T>,
+}
+
+impl<K: Clone, T: Send + Sync + 'static> Latest<K, T> {
+    /// Nothing is made yet. `wake` is called when something is.
+    pub(super) fn new(name: &'static str, wake: &Wake) -> Self {
+        Self {
+            made: None,
+            coming: Background::new(name, wake),
+        }
+    }
+
+    /// The newest result and its key.
+    pub(super) fn made(&self) -> Option<&(K, Arc<T>)> {
+        self.made.as_ref()
+    }
+
+    /// Drops the result and stops the work.
+    pub(super) fn forget(&mut self) {
+        self.made = None;
+        self.coming.stop();
+    }
+
+    /// Starts to make the result of a key, from the one before, unless it is there or another one is being made.
+    /// Returns whether a result has come.
+    pub(super) fn follow(
+        &mut self,
+        key: &K,
+        is_same: impl Fn(&K, &K) -> bool,
+        make: impl FnOnce(Option<Arc<T>>, &Task) -> T + Send + 'static,
+    ) -> bool {
+        let mut is_new = false;
+        if let Some((of, Some(made))) = self.coming.take() {
+            self.made = Some((of, Arc::new(made)));
+            is_new = true;
+        }
+        let is_there = self.made.as_ref().is_some_and(|(of, _)| is_same(of, key));
+        if !is_there && self.coming.of().is_none() {
+            let before = self.made.as_ref().map(|(_, made)| Arc::clone(made));
+            if let Err(error) = self.coming.start(key.clone(), move |task| make(before, task)) {
+                log::warn!("{error}");
+            }
+        }
+        is_new
+    }
+}
+
 /// Error for a thread that the system cannot create.
 pub(super) fn no_thread(location: &str, error: &std::io::Error) -> Error {
     Error::failure(

@@ -29,7 +29,7 @@ pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<BrightSpot> {
         Some((map, texel, value))
     });
     let (map, texel, irradiance_w_m2) = brightest.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    let (point, normal) = place(scene, &map.chart, texel)?;
+    let (point, normal) = surface_point(scene, &map.chart, texel)?;
     (irradiance_w_m2 > 0.0).then_some(BrightSpot {
         point,
         normal,
@@ -38,7 +38,7 @@ pub fn find(scene: &Scene, maps: &[IlluminationMap]) -> Option<BrightSpot> {
 }
 
 /// The surface point at a texel's centre, or the nearest one if the centre is not covered.
-fn place(scene: &Scene, chart: &Chart, texel: usize) -> Option<(DVec3, DVec3)> {
+fn surface_point(scene: &Scene, chart: &Chart, texel: usize) -> Option<(DVec3, DVec3)> {
     let uv = middle(chart, texel)?;
     let mesh = scene.objects.get(chart.object())?.mesh_in_scene();
     let within = |(triangle, corners): (usize, &[DVec2; 3])| {

@@ -62,7 +62,7 @@ impl SavedMaps {
     }
 
     /// The difference between the present maps and the reference, in words.
-    pub fn told(&self) -> String {
+    pub fn in_words(&self) -> String {
         match &self.relative_rmse {
             Ok(rmse) => format!(
                 "differs from {} by {} % (relative RMSE)",
@@ -128,5 +128,9 @@ pub fn show(
     let top = picture.top() + 70.0;
     say(pos2(x - 12.0, top), Align2::RIGHT_TOP, "now");
     say(pos2(x + 12.0, top), Align2::LEFT_TOP, &reference.name);
-    say(pos2(x + 12.0, top + 24.0), Align2::LEFT_TOP, &reference.told());
+    say(
+        pos2(x + 12.0, top + 24.0),
+        Align2::LEFT_TOP,
+        &reference.in_words(),
+    );
 }

@@ -142,48 +142,34 @@ impl EditedScene {
         Ok(())
     }
 
-    fn note(&mut self, text: String, before: EditedItem, after: EditedItem) {
-        self.history.record(Step {
-            text,
-            target: None,
-            before,
-            after,
-        });
+    /// Records a change of a part of the choices, if there is one; `text` names it.
+    pub fn note<T: Clone + PartialEq>(
+        &mut self,
+        [before, after]: [&T; 2],
+        text: impl FnOnce(&T, &T) -> String,
+        item: impl Fn(T) -> EditedItem,
+    ) {
+        if before != after {
+            self.history.record(Step {
+                text: text(before, after),
+                target: None,
+                before: item(before.clone()),
+                after: item(after.clone()),
+            });
+        }
     }
 
     /// Records a change of the settings, if there is one.
     pub fn note_settings(&mut self, before: &BakeSettings, after: &BakeSettings) {
-        if before != after {
-            let parts = [before, after].map(|settings| EditedItem::Settings(Box::new(settings.clone())));
-            let [from, to] = parts;
-            self.note(changed(before, after), from, to);
-        }
+        self.note([before, after], changed, |settings| {
+            EditedItem::Settings(Box::new(settings))
+        });
     }
 
-    /// Records a change of the display, if there is one.
-    pub fn note_display(&mut self, before: Display, after: Display) {
-        if before != after {
-            self.note(
-                changed(&before, &after),
-                EditedItem::Display(before),
-                EditedItem::Display(after),
-            );
-        }
-    }
-
-    /// Records a change of the camera path.
+    /// Records a change of the camera path, if there is one.
     pub fn note_film(&mut self, before: &Film, after: &Film) {
-        let [from, to] = [before, after].map(|film| EditedItem::Film(Box::new(film.clone())));
-        self.note(before.change_to(after).into(), from, to);
-    }
-
-    /// Records that automatic baking was switched.
-    pub fn note_automatic(&mut self, after: bool) {
-        self.note(
-            "automatic".into(),
-            EditedItem::Automatic(!after),
-            EditedItem::Automatic(after),
-        );
+        let text = |before: &Film, after: &Film| before.change_to(after).to_owned();
+        self.note([before, after], text, |film| EditedItem::Film(Box::new(film)));
     }
 
     /// Closes the newest step: the next change is a step of its own.
@@ -193,7 +179,7 @@ impl EditedScene {
 
     /// Undoes the newest step, or redoes the last undone one. Returns its name and the state before and after; a
     /// change of the scene is already applied.
-    pub fn turn(&mut self, is_back: bool) -> Option<(String, [EditedItem; 2])> {
+    pub fn step(&mut self, is_back: bool) -> Option<(String, [EditedItem; 2])> {
         let History {
             done,
             undone,
@@ -220,7 +206,7 @@ impl EditedScene {
 }
 
 /// Names of the fields that differ, without their units.
-fn changed<T: Serialize>(before: &T, after: &T) -> String {
+pub fn changed<T: Serialize>(before: &T, after: &T) -> String {
     let [before, after] = [before, after].map(|part| serde_json::to_value(part).unwrap_or_default());
     let fields = after.as_object().into_iter().flatten();
     let changed = fields.filter(|(name, value)| before.get(name) != Some(value));

@@ -181,7 +181,7 @@ pub fn save_picture(
 }
 
 /// Message about written files.
-pub fn told(files: &[PathBuf]) -> String {
+pub fn saved_in_words(files: &[PathBuf]) -> String {
     let names: Vec<_> = files.iter().map(|file| file.display().to_string()).collect();
     format!("Saved {}.", names.join(" and "))
 }

@@ -39,49 +39,34 @@ pub enum Handle {
 }
 
 impl Handle {
-    /// Name for assistive technology.
-    fn name(self) -> &'static str {
+    /// Name for assistive technology, colour, and unit axis; the rotation has no axis.
+    fn look(self) -> (&'static str, Color32, Option<DVec3>) {
         match self {
-            Self::X => "Move x",
-            Self::Y => "Move y",
-            Self::Z => "Move z",
-            Self::Turn => "Turn",
+            Self::X => ("Move x", Color32::from_rgb(235, 90, 80), Some(DVec3::X)),
+            Self::Y => ("Move y", Color32::from_rgb(120, 210, 90), Some(DVec3::Y)),
+            Self::Z => ("Move z", Color32::from_rgb(90, 150, 250), Some(DVec3::Z)),
+            Self::Turn => ("Turn", Color32::from_rgb(230, 200, 90), None),
         }
     }
 
-    fn colour(self) -> Color32 {
-        match self {
-            Self::X => Color32::from_rgb(235, 90, 80),
-            Self::Y => Color32::from_rgb(120, 210, 90),
-            Self::Z => Color32::from_rgb(90, 150, 250),
-            Self::Turn => Color32::from_rgb(230, 200, 90),
-        }
-    }
-
-    /// Unit axis; `None` for the rotation.
     fn axis(self) -> Option<DVec3> {
-        match self {
-            Self::X => Some(DVec3::X),
-            Self::Y => Some(DVec3::Y),
-            Self::Z => Some(DVec3::Z),
-            Self::Turn => None,
-        }
+        self.look().2
     }
 
     /// The coordinate that a view ray points at: distance from `origin` along the axis [m], or angle about the
     /// vertical from z towards x [rad]. `None` if the ray is almost parallel to the axis, or to the ring's plane.
-    pub fn reach(self, origin: DVec3, gaze: &Ray) -> Option<f64> {
+    pub fn reach(self, origin: DVec3, view_ray: &Ray) -> Option<f64> {
         let Some(axis) = self.axis() else {
-            let down = gaze.direction.y;
-            let along_m = (origin.y - gaze.origin.y) / down;
-            let met = gaze.origin + gaze.direction * along_m - origin;
+            let down = view_ray.direction.y;
+            let along_m = (origin.y - view_ray.origin.y) / down;
+            let met = view_ray.origin + view_ray.direction * along_m - origin;
             return (down.abs() > FLATTEST && along_m > 0.0).then(|| met.x.atan2(met.z));
         };
         // The point on the axis nearest to the ray.
-        let from = gaze.origin - origin;
-        let slant = axis.dot(gaze.direction);
+        let from = view_ray.origin - origin;
+        let slant = axis.dot(view_ray.direction);
         let sine_squared = 1.0 - slant * slant;
-        let nearest = (axis.dot(from) - slant * gaze.direction.dot(from)) / sine_squared;
+        let nearest = (axis.dot(from) - slant * view_ray.direction.dot(from)) / sine_squared;
         (sine_squared > FLATTEST * FLATTEST).then_some(nearest)
     }
 }
@@ -193,7 +178,7 @@ impl Gizmo {
             if !lens.is_before(tip) {
                 continue;
             }
-            edit = self.pull(ui, lens, (*handle, &pose), lens.place(tip)).or(edit);
+            edit = self.pull(ui, lens, (*handle, &pose), lens.project(tip)).or(edit);
             draw(ui, lens, *handle, (origin, tip), length_m);
         }
         edit
@@ -211,14 +196,15 @@ impl Gizmo {
         if !lens.picture.contains_rect(rect) && self.grip.is_none() {
             return None;
         }
-        let response = ui.interact(rect, ui.scope_id().with(handle.name()), Sense::drag());
-        response.widget_info(|| WidgetInfo::slider(true, 0.0, handle.name()));
+        let (name, ..) = handle.look();
+        let response = ui.interact(rect, ui.scope_id().with(name), Sense::drag());
+        response.widget_info(|| WidgetInfo::slider(true, 0.0, name));
         self.is_hot |= response.hovered() || response.dragged();
         let pointer = response.interact_pointer_pos()?;
         if response.drag_started() {
             let pressed = ui.input(|input| input.pointer.press_origin());
-            let gaze = lens.gaze(pressed.unwrap_or(pointer));
-            let begun = handle.reach(pose.middle_m(), &gaze)?;
+            let view_ray = lens.view_ray(pressed.unwrap_or(pointer));
+            let begun = handle.reach(pose.middle_m(), &view_ray)?;
             self.grip = Some(Grip {
                 handle,
                 from: *pose,
@@ -232,7 +218,7 @@ impl Gizmo {
         if response.drag_delta() == egui::Vec2::ZERO {
             return None;
         }
-        let reached = handle.reach(grip.from.middle_m(), &lens.gaze(pointer))?;
+        let reached = handle.reach(grip.from.middle_m(), &lens.view_ray(pointer))?;
         Some(grip.from.pulled(handle, reached - grip.begun))
     }
 }
@@ -255,7 +241,8 @@ fn on_ring(angle_rad: f64, length_m: f64) -> DVec3 {
 
 fn draw(ui: &Ui, lens: &Viewport<'_>, handle: Handle, (origin, tip): (DVec3, DVec3), length_m: f64) {
     let painter = ui.painter().with_clip_rect(lens.picture);
-    let stroke = Stroke::new(2.5, handle.colour());
+    let (_, colour, _) = handle.look();
+    let stroke = Stroke::new(2.5, colour);
     let line = |from: DVec3, to: DVec3| {
         if let Some(ends) = lens.line(from, to) {
             painter.line_segment(ends, stroke);
@@ -272,7 +259,7 @@ fn draw(ui: &Ui, lens: &Viewport<'_>, handle: Handle, (origin, tip): (DVec3, DVe
     } else {
         line(origin, tip);
     }
-    painter.circle_filled(lens.place(tip), TIP, handle.colour());
+    painter.circle_filled(lens.project(tip), TIP, colour);
 }
 
 /// Marks every light that has a position, so that it can be clicked.
@@ -280,7 +267,7 @@ fn lamps(ui: &Ui, lens: &Viewport<'_>, scene: &Scene) {
     let painter = ui.painter().with_clip_rect(lens.picture);
     for light in &scene.lights {
         if let Some(position) = light.kind.position().filter(|position| lens.is_before(*position)) {
-            let at = lens.place(position);
+            let at = lens.project(position);
             painter.circle_stroke(at, 7.0, Stroke::new(1.5, LAMP));
             painter.circle_filled(at, 2.0, LAMP);
         }
@@ -293,7 +280,7 @@ pub fn light_at(lens: &Viewport<'_>, scene: &Scene, place: Pos2) -> Option<usize
         let position = light.kind.position()?;
         let distance = lens
             .is_before(position)
-            .then(|| lens.place(position).distance(place))?;
+            .then(|| lens.project(position).distance(place))?;
         (distance < REACH).then_some((index, distance))
     });
     seen.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index)

@@ -7,6 +7,8 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
+use crate::gpu::{Gpu, cleared};
+
 /// egui's state for one window, and its renderer.
 pub struct Interface {
     pub context: egui::Context,
@@ -103,56 +105,39 @@ impl Interface {
         Some(found)
     }
 
-    /// Uploads new textures. Must be called for every painting, even if it is not shown: egui sends textures only
-    /// once.
-    pub fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, painting: &mut Painting) {
+    /// Paints over the whole of a target, given with its size [pixels]. Must be called for every painting, even if there
+    /// is no target: egui sends textures only once.
+    pub fn paint(
+        &mut self,
+        gpu: &Gpu,
+        painting: &mut Painting,
+        target: Option<(wgpu::TextureView, [u32; 2])>,
+    ) {
         for (id, deltas) in painting.textures.set.drain() {
             for delta in &deltas {
-                self.renderer.update_texture(device, queue, id, delta);
+                self.renderer.update_texture(&gpu.device, &gpu.queue, id, delta);
             }
         }
-    }
-
-    /// Frees old textures. Must be called after the painting was shown or could not be.
-    pub fn release(&mut self, painting: &mut Painting) {
+        if let Some((target, size_in_pixels)) = target {
+            let descriptor = egui_wgpu::ScreenDescriptor {
+                size_in_pixels,
+                pixels_per_point: painting.pixels_per_point,
+            };
+            let (renderer, primitives) = (&mut self.renderer, &painting.primitives);
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let before =
+                renderer.update_buffers(&gpu.device, &gpu.queue, &mut encoder, primitives, &descriptor);
+            let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("interface"),
+                color_attachments: &[Some(cleared(&target, wgpu::Color::BLACK))],
+                ..Default::default()
+            });
+            renderer.render(&mut pass.forget_lifetime(), primitives, &descriptor);
+            gpu.queue.submit(before.into_iter().chain([encoder.finish()]));
+        }
         for id in painting.textures.free.drain() {
             self.renderer.free_texture(&id);
         }
-    }
-
-    /// Paints over the whole of `target`, `size` in pixels.
-    pub fn paint(
-        &mut self,
-        device: &wgpu::Device,
-        queue: &wgpu::Queue,
-        encoder: &mut wgpu::CommandEncoder,
-        target: &wgpu::TextureView,
-        size: [u32; 2],
-        painting: &Painting,
-    ) {
-        let descriptor = egui_wgpu::ScreenDescriptor {
-            size_in_pixels: size,
-            pixels_per_point: painting.pixels_per_point,
-        };
-        let before = self
-            .renderer
-            .update_buffers(device, queue, encoder, &painting.primitives, &descriptor);
-        queue.submit(before);
-        let pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("interface"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            ..wgpu::RenderPassDescriptor::default()
-        });
-        self.renderer
-            .render(&mut pass.forget_lifetime(), &painting.primitives, &descriptor);
     }
 }
 

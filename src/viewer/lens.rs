@@ -27,7 +27,7 @@ impl Viewport<'_> {
     }
 
     /// Projection of a point in front of the near plane; may lie outside the picture.
-    pub fn place(&self, point: DVec3) -> Pos2 {
+    pub fn project(&self, point: DVec3) -> Pos2 {
         let offset = point - self.camera.position;
         let scale = 1.0 / self.m_per_point(point);
         let (x, y) = (offset.dot(self.camera.right()), offset.dot(self.camera.up));
@@ -51,15 +51,15 @@ impl Viewport<'_> {
             [false, true] => Some([cut(), to]),
             [false, false] => None,
         }
-        .map(|ends| ends.map(|end| self.place(end)))
+        .map(|ends| ends.map(|end| self.project(end)))
     }
 
     /// The view ray through a point of the picture.
-    pub fn gaze(&self, place: Pos2) -> Ray {
+    pub fn view_ray(&self, at: Pos2) -> Ray {
         let picture = self.picture;
         let share = |at: f32, from: f32, length: f32| 2.0 * f64::from((at - from) / length) - 1.0;
-        let across = share(place.x, picture.left(), picture.width());
-        let down = share(place.y, picture.top(), picture.height());
+        let across = share(at.x, picture.left(), picture.width());
+        let down = share(at.y, picture.top(), picture.height());
         let aspect = f64::from(picture.aspect_ratio());
         Ray {
             origin: self.camera.position,

@@ -16,7 +16,7 @@ use super::ViewerOptions;
 use super::background::Wake;
 use super::command::{Choices, Command};
 use super::comparison_view::SavedMaps;
-use super::edits::{EditedItem, EditedScene};
+use super::edits::{EditedItem, EditedScene, changed};
 use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
 use super::files::autosaver::Autosaver;
@@ -26,7 +26,7 @@ use super::navigation::{NavigationMode, Navigator};
 use super::playback::Playback;
 use super::probe::{Probed, Prober};
 use super::sketching::PreviewTask;
-use super::timing::{FrameTimes, Latencies};
+use super::timing::FrameTimes;
 use super::views::MapSurvey;
 use super::walking::{Collider, CollisionScene};
 use super::worker::{BakeRequest, BakeState, BakedLevel, EffectDifference, Worker};
@@ -94,8 +94,6 @@ pub struct Model {
     sketcher: PreviewTask,
     /// The maps that the present ones are compared with.
     pub reference: Option<SavedMaps>,
-    /// Ray to pick along as soon as the collision surfaces are built.
-    picking: Option<Ray>,
     /// The light that the mouse drags.
     placing: picking::DraggedLight,
     /// Tasks that wait for the collision surfaces.
@@ -126,8 +124,6 @@ pub struct PictureReport {
     pub chains: Option<EffectLine>,
     /// GPU times of the last pictures; `None` if the device cannot measure them.
     pub frame_times: Option<FrameTimes>,
-    /// Latencies from input events to frames.
-    pub latencies: Latencies,
     /// Whether the graphics device was lost and recreated a short while ago.
     pub lost_device: bool,
 }
@@ -151,7 +147,6 @@ impl Model {
             prober: Prober::new(wake),
             sketcher: PreviewTask::new(wake),
             reference: None,
-            picking: None,
             placing: picking::DraggedLight::default(),
             pending_tasks: pending_tasks::PendingTasks::default(),
             player: None,
@@ -243,8 +238,8 @@ impl Model {
     }
 
     /// Probes the surface along a ray; `None` clears the probe.
-    pub fn probe(&mut self, gaze: Option<Ray>) {
-        self.prober.ask(gaze);
+    pub fn probe(&mut self, view_ray: Option<Ray>) {
+        self.prober.ask(view_ray);
     }
 
     /// Result of the probe so far.
@@ -355,7 +350,6 @@ impl Model {
         self.state = state;
         self.poll_probe(has_maps);
         self.poll_sketch();
-        self.poll_pick();
         self.poll_pending();
         if has_maps {
             self.maps_revision += 1;
@@ -476,14 +470,11 @@ impl Model {
         let before = std::mem::replace(&mut self.choices, choices);
         let (edits, now) = (&mut self.edits, &self.choices);
         edits.note_settings(&before.settings, &now.settings);
-        edits.note_display(before.display, now.display);
-        if before.film != now.film {
-            edits.note_film(&before.film, &now.film);
-        }
-        if before.automatic != now.automatic {
-            edits.note_automatic(now.automatic);
-            self.revision += 1;
-        }
+        edits.note([&before.display, &now.display], changed, EditedItem::Display);
+        edits.note_film(&before.film, &now.film);
+        let automatic = [&before.automatic, &now.automatic];
+        edits.note(automatic, |_, _| "automatic".into(), EditedItem::Automatic);
+        self.revision += u64::from(before.automatic != now.automatic);
         self.note_settings_since(before.settings);
     }
 
@@ -509,7 +500,7 @@ impl Model {
     /// Undoes the last change, or redoes the last undone one.
     fn step_history(&mut self, is_back: bool) {
         self.refusal = None;
-        let Some((text, [from, to])) = self.edits.turn(is_back) else {
+        let Some((text, [from, to])) = self.edits.step(is_back) else {
             return;
         };
         let event = if is_back { "undone" } else { "redone" };
@@ -525,7 +516,7 @@ impl Model {
                 self.choices.automatic = automatic;
                 self.revision += 1;
             }
-            // The scene: `turn` has already restored it.
+            // The scene: `step` has already restored it.
             _ => {
                 self.revision += 1;
                 self.stand_at_moment();

@@ -1,12 +1,14 @@
 //! New lights: placed where there is room in front of the camera, and as bright as suits the picture.
 
 use glam::DVec3;
+use strum::{EnumMessage, IntoStaticStr};
 
 use crate::geometry::Ray;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
 use crate::transport::Tracer;
 use crate::units::{Irradiance, Radiance, RadiantIntensity};
+use crate::viewer::walking::Collider;
 
 /// Irradiance at the view target for exposure 0 [W/m²]; a grey surface is then well exposed.
 const SUITABLE_W_M2: f64 = 4.0;
@@ -25,14 +27,17 @@ const SIDE: f64 = 0.25;
 /// Tangent of the angle by which new lights lean from the vertical towards the camera [1].
 const LEANING: f64 = 0.4;
 
-/// Kinds of lights that can be added.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Kinds of lights that can be added. The panel shows the comment of each variant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumMessage, IntoStaticStr)]
+#[strum(serialize_all = "lowercase")]
 pub enum NewLight {
-    /// A point light.
+    /// A point that shines the same in every direction.
     Lamp,
+    /// A cone of light, at what is looked at.
     Spot,
+    /// Parallel light from infinitely far.
     Sun,
-    /// A square area light.
+    /// A flat square lamp, turned to what is looked at.
     Panel,
 }
 
@@ -49,22 +54,16 @@ pub struct ViewTarget {
 
 impl ViewTarget {
     /// The first surface along a view ray; `otherwise` if there is none.
-    pub fn of(surfaces: &Tracer, gaze: &Ray, otherwise: DVec3) -> Self {
-        let to_eye = -gaze.direction;
-        match surfaces.intersect(gaze) {
-            Some(place) => {
-                let normal = surfaces.surface_at(&place).geometric_normal;
-                Self {
-                    point: gaze.at(place.distance_m),
-                    normal: normal * normal.dot(to_eye).signum(),
-                    to_eye,
-                }
-            }
-            None => Self {
-                point: otherwise,
-                normal: to_eye,
-                to_eye,
-            },
+    pub fn of(surfaces: &Tracer, view_ray: &Ray, otherwise: DVec3) -> Self {
+        let to_eye = -view_ray.direction;
+        let met = surfaces.meets(view_ray.origin, view_ray.direction, f64::INFINITY);
+        let (point, normal) = met.map_or((otherwise, to_eye), |(distance_m, normal)| {
+            (view_ray.at(distance_m), normal)
+        });
+        Self {
+            point,
+            normal,
+            to_eye,
         }
     }
 }
@@ -74,12 +73,7 @@ impl NewLight {
     pub const ALL: [Self; 4] = [Self::Lamp, Self::Spot, Self::Sun, Self::Panel];
 
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Lamp => "lamp",
-            Self::Spot => "spot",
-            Self::Sun => "sun",
-            Self::Panel => "panel",
-        }
+        self.into()
     }
 
     /// A white light with a unique name that lights the target, in a scene of radius `radius_m` that is shown with
@@ -87,13 +81,13 @@ impl NewLight {
     pub fn make(
         self,
         (surfaces, radius_m): (&Tracer, f64),
-        aim: &ViewTarget,
+        target: &ViewTarget,
         exposure_stops: f64,
         scene: &Scene,
     ) -> Light {
         let irradiance_w_m2 = SUITABLE_W_M2 * (-exposure_stops).exp2();
-        let position = place(surfaces, aim, radius_m);
-        let way = aim.point - position;
+        let position = free_position(surfaces, target, radius_m);
+        let way = target.point - position;
         let distance_m = way.length();
         let direction = way / distance_m;
         let intensity = RadiantIntensity(irradiance_w_m2 * distance_m * distance_m);
@@ -107,7 +101,7 @@ impl NewLight {
                 outer_cone_rad: CONE_RAD.1,
             },
             Self::Sun => LightKind::Sun {
-                direction: -above(aim, LEANING),
+                direction: -above(target, LEANING),
                 normal_irradiance: Irradiance(irradiance_w_m2),
             },
             Self::Panel => {
@@ -133,14 +127,14 @@ impl NewLight {
 }
 
 /// Unit vector upwards, leaning towards the camera; `leaning` is the tangent of the angle.
-fn above(aim: &ViewTarget, leaning: f64) -> DVec3 {
-    let level = DVec3::new(aim.to_eye.x, 0.0, aim.to_eye.z).normalize_or(DVec3::X);
+fn above(target: &ViewTarget, leaning: f64) -> DVec3 {
+    let level = DVec3::new(target.to_eye.x, 0.0, target.to_eye.z).normalize_or(DVec3::X);
     (DVec3::Y + level * leaning).normalize()
 }
 
 /// A free position for the light [m]: preferably above the target, else along its normal, else towards the camera.
-fn place(surfaces: &Tracer, aim: &ViewTarget, radius_m: f64) -> DVec3 {
-    let from = aim.point + aim.normal * (OFF * radius_m);
+fn free_position(surfaces: &Tracer, target: &ViewTarget, radius_m: f64) -> DVec3 {
+    let from = target.point + target.normal * (OFF * radius_m);
     let room = |direction: DVec3| {
         let ray = Ray {
             origin: from,
@@ -151,13 +145,16 @@ fn place(surfaces: &Tracer, aim: &ViewTarget, radius_m: f64) -> DVec3 {
             .map_or(f64::INFINITY, |place| place.distance_m);
         (OF_ROOM * free_m).min(FARTHEST * radius_m)
     };
-    let ways = [above(aim, LEANING), DVec3::Y, aim.normal, aim.to_eye];
+    let ways = [above(target, LEANING), DVec3::Y, target.normal, target.to_eye];
     // Directions below the surface are not free.
-    let open = ways.into_iter().filter(|way| way.dot(aim.normal) > 0.0);
+    let open = ways.into_iter().filter(|way| way.dot(target.normal) > 0.0);
     let open: Vec<(DVec3, f64)> = open.map(|way| (way, room(way))).collect();
     let roomy = open.iter().find(|(_, room_m)| *room_m > NEAR * radius_m);
     let widest = open.iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let (way, room_m) = roomy.or(widest).copied().unwrap_or((aim.normal, NEAR * radius_m));
+    let (way, room_m) = roomy
+        .or(widest)
+        .copied()
+        .unwrap_or((target.normal, NEAR * radius_m));
     from + way * room_m
 }
 

@@ -75,7 +75,9 @@ impl Probed {
         let paths = self
             .explanation
             .as_ref()
-            .map_or(LinearSrgb::BLACK, |told| told.caustic() + told.direct());
+            .map_or(LinearSrgb::BLACK, |explanation| {
+                explanation.caustic() + explanation.direct()
+            });
         let all = paths.luminance() + indirect;
         if all > 0.0 {
             path.irradiance.luminance() / all
@@ -115,14 +117,14 @@ impl Probed {
         let paths = self
             .explanation
             .as_ref()
-            .map(|told| told.paths.iter().map(path).collect::<Vec<_>>());
+            .map(|explanation| explanation.paths.iter().map(path).collect::<Vec<_>>());
         json!({
             "surface": self.surface,
             "position_m": self.point.to_array(),
             "texel": texel,
             "paths": paths,
-            "rays": self.explanation.as_ref().map(|told| told.rays),
-            "complete": self.explanation.as_ref().map(|told| told.is_complete),
+            "rays": self.explanation.as_ref().map(|explanation| explanation.rays),
+            "complete": self.explanation.as_ref().map(|explanation| explanation.is_complete),
         })
     }
 }
@@ -138,9 +140,9 @@ pub struct ProbeTarget {
 
 /// The matte surface that a ray ends on. At glass and mirrors it follows the stronger branch. `None` if it ends on
 /// none.
-pub fn seen(tracer: &Tracer, gaze: &Ray) -> Option<ProbeTarget> {
-    let mut ray = *gaze;
-    let mut media: MediumStack = media_at(tracer, gaze.origin);
+pub fn seen(tracer: &Tracer, view_ray: &Ray) -> Option<ProbeTarget> {
+    let mut ray = *view_ray;
+    let mut media: MediumStack = media_at(tracer, view_ray.origin);
     for _ in 0..MAX_SEEN_THROUGH {
         let hit = tracer.closest_hit(&ray)?;
         let interaction = tracer.interact(&hit, ray.direction, &media);
@@ -202,7 +204,7 @@ fn scale_w_m2(maps: &[IlluminationMap], target: &Target, texel: &ProbedTexel) ->
 /// The probed point and what is known of it.
 #[derive(Debug)]
 pub struct Prober {
-    gaze: Option<Ray>,
+    view_ray: Option<Ray>,
     /// Whether the ray still has to be traced.
     is_due: bool,
     shown: Option<Probed>,
@@ -213,7 +215,7 @@ impl Prober {
     /// No point is probed yet. `wake` is called when light paths are found.
     pub fn new(wake: &Wake) -> Self {
         Self {
-            gaze: None,
+            view_ray: None,
             is_due: false,
             shown: None,
             coming: Background::new("probe", wake),
@@ -221,16 +223,16 @@ impl Prober {
     }
 
     /// Probes what is visible along a ray; `None` clears the probe.
-    pub fn ask(&mut self, gaze: Option<Ray>) {
-        self.gaze = gaze;
-        self.is_due = gaze.is_some();
+    pub fn ask(&mut self, view_ray: Option<Ray>) {
+        self.view_ray = view_ray;
+        self.is_due = view_ray.is_some();
         self.coming.stop();
         self.shown = None;
     }
 
     /// Repeats the probe because the scene or its maps have changed.
     pub fn ask_again(&mut self) {
-        self.is_due = self.gaze.is_some();
+        self.is_due = self.view_ray.is_some();
     }
 
     /// Whether [`look`](Self::look) has to be called with the scene's surfaces.
@@ -244,13 +246,15 @@ impl Prober {
 
     /// Traces the pending ray and starts to search light paths.
     pub fn look(&mut self, tracer: &Arc<Tracer>, maps: &[IlluminationMap], limits: Limits) {
-        let Some(gaze) = self.gaze.filter(|_| self.is_due) else {
+        let Some(view_ray) = self.view_ray.filter(|_| self.is_due) else {
             return;
         };
         self.is_due = false;
         self.coming.stop();
         self.shown = None;
-        let Some(seen) = seen(tracer, &gaze) else { return };
+        let Some(seen) = seen(tracer, &view_ray) else {
+            return;
+        };
         let (probed, target) = read(tracer, maps, &seen);
         if let (Some(target), Some(texel)) = (target, &probed.texel) {
             let scale = scale_w_m2(maps, &target, texel);
@@ -285,7 +289,10 @@ const POINT: Color32 = Color32::from_rgb(255, 80, 80);
 /// Draws the paths over the picture; stronger paths are wider.
 pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
     let painter = painter.with_clip_rect(lens.picture);
-    let paths = probed.explanation.iter().flat_map(|told| &told.paths);
+    let paths = probed
+        .explanation
+        .iter()
+        .flat_map(|explanation| &explanation.paths);
     for path in paths.take(MAX_PATHS) {
         let share = probed.share(path) as f32;
         let colour = if path.vertices.is_empty() { DIRECT } else { CAUSTIC };
@@ -300,15 +307,15 @@ pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
         }
         for vertex in &path.vertices {
             if lens.is_before(vertex.point) {
-                painter.circle_filled(lens.place(vertex.point), 3.0, colour);
+                painter.circle_filled(lens.project(vertex.point), 3.0, colour);
             }
         }
         if lens.is_before(path.start) {
-            painter.circle_stroke(lens.place(path.start), 5.0, Stroke::new(1.5, colour));
+            painter.circle_stroke(lens.project(path.start), 5.0, Stroke::new(1.5, colour));
         }
     }
     if lens.is_before(probed.point) {
-        let at = lens.place(probed.point);
+        let at = lens.project(probed.point);
         for (x, y) in [(6.0, 0.0), (0.0, 6.0)] {
             let ends = [pos2(at.x - x, at.y - y), pos2(at.x + x, at.y + y)];
             painter.line_segment(ends, Stroke::new(2.0, POINT));

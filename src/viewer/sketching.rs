@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{Color32, Painter, Stroke};
 
-use super::background::{Background, Task, Wake};
+use super::background::{Latest, Task, Wake};
 use super::lens::Viewport;
 use crate::light_pass::sketch::{PathPreview, SketchLimits, sketch};
 use crate::transport::Tracer;
@@ -31,54 +31,34 @@ impl PreviewFlags {
 
 /// Traces the path preview and keeps the last one.
 #[derive(Debug)]
-pub struct PreviewTask {
-    /// The preview and what it was traced with.
-    shown: Option<(Arc<Tracer>, SketchLimits, Arc<PathPreview>)>,
-    coming: Background<(Arc<Tracer>, SketchLimits), PathPreview>,
-}
+pub struct PreviewTask(Latest<(Arc<Tracer>, SketchLimits), PathPreview>);
 
 impl PreviewTask {
     /// No preview yet. `wake` is called when one is ready.
     pub fn new(wake: &Wake) -> Self {
-        Self {
-            shown: None,
-            coming: Background::new("sketch", wake),
-        }
+        Self(Latest::new("sketch", wake))
     }
 
     /// The last preview.
     pub fn shown(&self) -> Option<&Arc<PathPreview>> {
-        self.shown.as_ref().map(|(.., sketch)| sketch)
+        self.0.made().map(|(_, sketch)| sketch)
     }
 
     /// Drops the preview and stops tracing.
     pub fn forget(&mut self) {
-        self.shown = None;
-        self.coming.stop();
+        self.0.forget();
     }
 
     /// Traces a preview of these surfaces unless the last one is of them; returns whether a new one is ready. One
     /// preview is traced at a time: newer surfaces wait until it ends.
     pub fn follow(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) -> bool {
-        let found = self.coming.take();
-        let is_new = matches!(found, Some((_, Some(_))));
-        if let Some(((of, with), Some(sketch))) = found {
-            self.shown = Some((of, with, Arc::new(sketch)));
-        }
-        let is_of_these =
-            |(of, with, _): &(Arc<Tracer>, SketchLimits, _)| Arc::ptr_eq(of, tracer) && *with == limits;
-        if self.coming.of().is_none() && !self.shown.as_ref().is_some_and(is_of_these) {
-            self.start(tracer, limits);
-        }
-        is_new
-    }
-
-    fn start(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) {
         let of = Arc::clone(tracer);
-        let search = move |task: &Task| sketch(&of, limits, &task.control);
-        if let Err(error) = self.coming.start((Arc::clone(tracer), limits), search) {
-            log::warn!("{error}");
-        }
+        let is_same = |(a, with_a): &(Arc<Tracer>, SketchLimits),
+                       (b, with_b): &(Arc<Tracer>, SketchLimits)| {
+            Arc::ptr_eq(a, b) && with_a == with_b
+        };
+        let search = move |_, task: &Task| sketch(&of, limits, &task.control);
+        self.0.follow(&(Arc::clone(tracer), limits), is_same, search)
     }
 }
 
@@ -99,7 +79,7 @@ pub fn draw(painter: &Painter, lens: &Viewport<'_>, sketch: &PathPreview, what: 
     if what.hits {
         for landing in &sketch.landings {
             if lens.is_before(landing.point) {
-                painter.circle_filled(lens.place(landing.point), DOT, HIT);
+                painter.circle_filled(lens.project(landing.point), DOT, HIT);
             }
         }
     }

@@ -60,26 +60,19 @@ impl Quantity {
         self.into()
     }
 
-    /// The property that the device computes in place of light; `None` if the quantity is light or a map of colours.
-    fn inspected(self) -> Option<Inspected> {
-        match self {
-            Self::Light | Self::Error | Self::Difference | Self::Wavelength => None,
-            Self::Irradiance => Some(Inspected::Irradiance),
-            Self::Texels => Some(Inspected::Texels),
-            Self::TexelDensity => Some(Inspected::TexelDensity),
-            Self::Normals => Some(Inspected::Normals),
-            Self::Uv => Some(Inspected::Uv),
-            Self::MapUv => Some(Inspected::MapUv),
-        }
-    }
-
     /// How maps are displayed to show this quantity.
     pub fn map_style(self, scale: ColourScale) -> MapStyle {
-        match (self, self.inspected()) {
-            (Self::Light, _) => MapStyle::Lit,
-            (_, Some(what)) => MapStyle::Inspected { what, scale },
-            (_, None) => MapStyle::AsItIs,
-        }
+        let what = match self {
+            Self::Light => return MapStyle::Lit,
+            Self::Error | Self::Difference | Self::Wavelength => return MapStyle::AsItIs,
+            Self::Irradiance => Inspected::Irradiance,
+            Self::Texels => Inspected::Texels,
+            Self::TexelDensity => Inspected::TexelDensity,
+            Self::Normals => Inspected::Normals,
+            Self::Uv => Inspected::Uv,
+            Self::MapUv => Inspected::MapUv,
+        };
+        MapStyle::Inspected { what, scale }
     }
 }
 

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::background::{Background, Task, Wake};
+use super::background::{Latest, Wake};
 use crate::geometry::Ray;
 use crate::scene::Scene;
 use crate::transport::Tracer;
@@ -184,47 +184,25 @@ impl Collider for Tracer {
     }
 }
 
+/// The surfaces of the scene, built on a thread.
 #[derive(Debug)]
-pub struct CollisionScene {
-    found: Option<(Arc<Scene>, Arc<Tracer>)>,
-    coming: Background<Arc<Scene>, Tracer>,
-}
+pub struct CollisionScene(Latest<Arc<Scene>, Tracer>);
 
 impl CollisionScene {
     /// Nothing is built yet. `wake` is called when a build ends.
     pub fn new(wake: &Wake) -> Self {
-        Self {
-            found: None,
-            coming: Background::new("surroundings", wake),
-        }
+        Self(Latest::new("surroundings", wake))
     }
 
     /// The surfaces of a scene; `None` until they are built, and if the system cannot create a thread.
     pub fn of(&mut self, scene: &Arc<Scene>) -> Option<Arc<Tracer>> {
-        if let Some((of, Some(tracer))) = self.coming.take() {
-            self.found = Some((of, Arc::new(tracer)));
-        }
-        if let Some((of, tracer)) = &self.found
-            && Arc::ptr_eq(of, scene)
-        {
-            return Some(Arc::clone(tracer));
-        }
-        if self.coming.of().is_none() {
-            self.start(scene);
-        }
-        None
-    }
-
-    fn start(&mut self, scene: &Arc<Scene>) {
-        let before = self.found.as_ref().map(|(_, tracer)| Arc::clone(tracer));
         let of = Arc::clone(scene);
-        let search = move |_: &Task| match before {
+        self.0.follow(scene, Arc::ptr_eq, move |before, _| match before {
             Some(before) => before.edited(of),
             None => Tracer::new(of),
-        };
-        if let Err(error) = self.coming.start(Arc::clone(scene), search) {
-            log::warn!("{error}");
-        }
+        });
+        let made = self.0.made().filter(|(of, _)| Arc::ptr_eq(of, scene));
+        made.map(|(_, tracer)| Arc::clone(tracer))
     }
 }
 

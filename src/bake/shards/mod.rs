@@ -109,7 +109,7 @@ impl Baker {
             let ground = self.prepare(settings, progress, control, (&mut clock, Instant::now()));
             let mut role = ShardRole::shard(share);
             let mut states = LightStates::default();
-            ground.bake(&self.sizes, &mut states, &mut clock, &mut role, &mut ())?;
+            ground.bake(&self.sizes, &mut states, &mut clock, &mut role, None)?;
             if control.is_cancelled() {
                 return Err(Error::cancelled(&self.scene.source));
             }

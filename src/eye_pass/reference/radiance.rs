@@ -144,21 +144,21 @@ impl<'a> LitScene<'a> {
             depth: 0,
             at: None,
         }];
-        while let Some(mut gaze) = waiting.pop() {
-            let Some((hit, distance_m)) = nearest::<CHAINS>(self.tracer, gaze.ray) else {
-                seen += gaze.brings(self.beyond(gaze.ray.direction));
+        while let Some(mut path) = waiting.pop() {
+            let Some((hit, distance_m)) = nearest::<CHAINS>(self.tracer, path.ray) else {
+                seen += path.brings(self.beyond(path.ray.direction));
                 continue;
             };
             if CHAINS {
-                gaze.weight = gaze.weight * gaze.media.transmittance(self.tracer.scene(), distance_m);
+                path.weight = path.weight * path.media.transmittance(self.tracer.scene(), distance_m);
             }
-            if CHAINS && gaze.at.is_none() && spectrum.parts(self.tracer, &hit, &gaze.media) {
+            if CHAINS && path.at.is_none() && spectrum.splits_at(self.tracer, &hit, &path.media) {
                 for at in &spectrum.wavelengths {
                     let at = Some(at);
-                    seen += self.meet::<CHAINS>(EyePath { at, ..gaze }, &hit, &mut waiting, rays);
+                    seen += self.meet::<CHAINS>(EyePath { at, ..path }, &hit, &mut waiting, rays);
                 }
             } else {
-                seen += self.meet::<CHAINS>(gaze, &hit, &mut waiting, rays);
+                seen += self.meet::<CHAINS>(path, &hit, &mut waiting, rays);
             }
         }
         seen
@@ -167,26 +167,26 @@ impl<'a> LitScene<'a> {
     /// Radiance that a surface itself adds to a path. The branches to follow are pushed onto `waiting`.
     fn meet<'b, const CHAINS: bool>(
         &self,
-        gaze: EyePath<'b>,
+        path: EyePath<'b>,
         hit: &SurfaceHit,
         waiting: &mut Vec<EyePath<'b>>,
         rays: &mut EyeRays,
     ) -> LinearSrgb {
-        let incident = gaze.ray.direction;
-        let tracer = gaze.at.map_or(self.tracer, |at| &at.tracer);
-        let interaction = tracer.interact(hit, incident, &gaze.media);
+        let incident = path.ray.direction;
+        let tracer = path.at.map_or(self.tracer, |at| &at.tracer);
+        let interaction = tracer.interact(hit, incident, &path.media);
         let side = Side::met(incident, hit.geometric_normal);
-        let seen = gaze.brings(self.own_radiance(hit, side, interaction.leaving));
+        let seen = path.brings(self.own_radiance(hit, side, interaction.leaving));
         if !CHAINS {
             return seen;
         }
         let [back, through] = [interaction.reflection, interaction.transmission]
-            .map(|branch| branch.and_then(|branch| self.followed(&gaze, &branch)));
+            .map(|branch| branch.and_then(|branch| self.followed(&path, &branch)));
         let is_through_stronger = match (&back, &through) {
             (Some(back), Some(through)) => through.weight.max_channel() >= back.weight.max_channel(),
             _ => through.is_some(),
         };
-        let follows_both = gaze.depth < self.limits.branching_depth;
+        let follows_both = path.depth < self.limits.branching_depth;
         let back = back.filter(|_| follows_both || !is_through_stronger);
         let through = through.filter(|_| follows_both || is_through_stronger);
         for next in [back, through].into_iter().flatten() {
@@ -223,17 +223,17 @@ impl<'a> LitScene<'a> {
 
     /// The path along a branch; `None` beyond the limits. Refraction scales radiance by the square of n on the eye's
     /// side over n on the far side.
-    fn followed<'b>(&self, gaze: &EyePath<'b>, branch: &Branch) -> Option<EyePath<'b>> {
-        let weight = gaze.weight * branch.share * (branch.ior_ratio * branch.ior_ratio);
-        let within = gaze.depth < self.limits.max_depth
+    fn followed<'b>(&self, path: &EyePath<'b>, branch: &Branch) -> Option<EyePath<'b>> {
+        let weight = path.weight * branch.share * (branch.ior_ratio * branch.ior_ratio);
+        let within = path.depth < self.limits.max_depth
             && weight.max_channel() > 0.0
             && weight.max_channel() >= self.limits.branch_threshold;
         within.then(|| EyePath {
             ray: branch.ray,
             media: branch.media,
             weight,
-            depth: gaze.depth + 1,
-            at: gaze.at,
+            depth: path.depth + 1,
+            at: path.at,
         })
     }
 }
@@ -283,9 +283,9 @@ impl SpectralScene {
     /// For each sample of a pixel `count` wavelengths, whose shift varies between samples; none in scenes without
     /// dispersion.
     pub fn of_samples(tracer: &Tracer, count: u32, samples: u32) -> Vec<Self> {
-        let is_parting = tracer.scene().parts_wavelengths() && count > 0;
+        let is_dispersive_scene = tracer.scene().parts_wavelengths() && count > 0;
         let sample = |index: u32| {
-            if !is_parting {
+            if !is_dispersive_scene {
                 return Self::default();
             }
             let bands = wavelengths::bands(count, wavelengths::shift_of_sample(index));
@@ -301,7 +301,7 @@ impl SpectralScene {
     }
 
     /// Whether the directions or shares of light that leaves a surface depend on the wavelength.
-    pub fn parts(&self, tracer: &Tracer, hit: &SurfaceHit, media: &MediumStack) -> bool {
+    pub fn splits_at(&self, tracer: &Tracer, hit: &SurfaceHit, media: &MediumStack) -> bool {
         let scene = tracer.scene();
         let is_dispersive = |object: usize| scene.material_of(object).is_dispersive();
         let goes_by_index = match scene.material_of(hit.object).surface {

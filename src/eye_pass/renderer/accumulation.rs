@@ -1,9 +1,9 @@
 //! Averages pictures of the same view, which antialiases what is seen in mirrors and through glass.
 
-use super::bindings::{Binding, bind_group, bind_group_layout, cover_pipeline, texture, uniform};
+use super::bindings::{Binding, bind_group, bind_group_layout, cover, cover_pipeline, texture, uniform};
 use super::shaders::ACCUMULATED;
 use super::uniforms::Accumulation;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, texture_of};
 
 /// Half floats are too coarse for the mean of many frames.
 pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
@@ -17,8 +17,7 @@ pub(super) const BINDINGS: [Binding; 3] = [
 /// A running mean of frames. The two pictures alternate between the current mean and the previous one.
 #[derive(Debug)]
 pub(super) struct Mean {
-    width: u32,
-    height: u32,
+    size: [u32; 2],
     pictures: [wgpu::Texture; 2],
     views: [wgpu::TextureView; 2],
     /// Frames in the mean.
@@ -28,31 +27,23 @@ pub(super) struct Mean {
 }
 
 impl Mean {
-    /// The size must be within the device's limit.
-    pub(super) fn new(gpu: &Gpu, width: u32, height: u32) -> Self {
-        let picture = || {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
-                label: Some("mean"),
-                size: wgpu::Extent3d {
-                    width,
-                    height,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: FORMAT,
-                usage: wgpu::TextureUsages::RENDER_ATTACHMENT
-                    | wgpu::TextureUsages::TEXTURE_BINDING
-                    | wgpu::TextureUsages::COPY_SRC,
-                view_formats: &[],
-            })
-        };
-        let pictures = [picture(), picture()];
+    /// The mean that there is if it has the size, else an empty one. The size must be within the device's limit.
+    pub(super) fn of_size(before: Option<Self>, gpu: &Gpu, size: [u32; 2]) -> Self {
+        before
+            .filter(|mean| mean.size == size)
+            .unwrap_or_else(|| Self::new(gpu, size))
+    }
+
+    fn new(gpu: &Gpu, size: [u32; 2]) -> Self {
+        let [width, height] = size;
+        let usage = wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC;
+        let picture = texture_of("mean", [width, height, 1], FORMAT, usage);
+        let pictures = [(); 2].map(|()| gpu.device.create_texture(&picture));
         let layout = bind_group_layout(gpu, "mean", &BINDINGS);
         Self {
-            width,
-            height,
+            size,
             views: [0, 1].map(|index: usize| pictures[index].create_view(&Default::default())),
             pictures,
             count: 0,
@@ -66,10 +57,6 @@ impl Mean {
             ),
             layout,
         }
-    }
-
-    pub(super) fn has_size(&self, width: u32, height: u32) -> bool {
-        (self.width, self.height) == (width, height)
     }
 
     pub(super) fn clear(&mut self) {
@@ -98,19 +85,7 @@ impl Mean {
             wgpu::BindingResource::TextureView(&self.views[before]),
         ];
         let bind_group = bind_group(gpu, "mean", &self.layout, resources);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("mean"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.views[after],
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations::default(),
-            })],
-            ..Default::default()
-        });
-        pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &bind_group, &[]);
-        pass.draw(0..3, 0..1);
+        cover(encoder, &self.views[after], (&self.pipeline, &bind_group), None);
         self.count += 1;
     }
 

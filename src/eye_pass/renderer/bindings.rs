@@ -2,7 +2,7 @@
 
 use bytemuck::Pod;
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, cleared};
 
 /// Type of a binding, with the stages that it is visible to.
 pub(super) type Binding = (wgpu::ShaderStages, wgpu::BindingType);
@@ -115,6 +115,23 @@ pub(super) fn cover_pipeline(
             multiview_mask: None,
             cache: None,
         })
+}
+
+/// Draws over the whole of a target with a pipeline of [`cover_pipeline`].
+pub(super) fn cover(
+    encoder: &mut wgpu::CommandEncoder,
+    target: &wgpu::TextureView,
+    (pipeline, bind_group): (&wgpu::RenderPipeline, &wgpu::BindGroup),
+    timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
+) {
+    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        color_attachments: &[Some(cleared(target, wgpu::Color::BLACK))],
+        timestamp_writes,
+        ..Default::default()
+    });
+    pass.set_pipeline(pipeline);
+    pass.set_bind_group(0, bind_group, &[]);
+    pass.draw(0..3, 0..1);
 }
 
 /// A buffer that shaders read, with a copy of its contents on the CPU.

@@ -79,7 +79,7 @@ impl ChainScene {
             Some(before) => Self { tracer, ..before },
             None => Self::with_meshes(gpu, tracer, firsts)?,
         };
-        made.place(gpu)?;
+        made.write_instances(gpu)?;
         Ok(made)
     }
 
@@ -96,8 +96,9 @@ impl ChainScene {
             nodes.extend(mesh.bvh.nodes.iter().map(|node| placed(node, start)));
             triangles.extend(records(mesh, &firsts));
         }
-        for bytes in [size_of_val(nodes.as_slice()), size_of_val(triangles.as_slice())] {
-            check_bytes(gpu, tracer.scene(), bytes)?;
+        let largest = size_of_val(nodes.as_slice()).max(size_of_val(triangles.as_slice()));
+        if largest as u64 > readable(gpu) {
+            return Err(too_many_triangles(gpu, tracer.scene()));
         }
         let mut made = Self {
             firsts,
@@ -119,9 +120,15 @@ impl ChainScene {
     ///
     /// # Errors
     /// A hierarchy that is too deep.
-    fn place(&mut self, gpu: &Gpu) -> Result<()> {
+    fn write_instances(&mut self, gpu: &Gpu) -> Result<()> {
         let (above, instances) = self.tracer.packed_instances();
-        check_depth(self.tracer.scene(), 2 + above.depth + self.depth)?;
+        let depth = 2 + above.depth + self.depth;
+        if depth >= STACK {
+            let what = format!(
+                "the hierarchy of its triangles is {depth} levels deep, and at most {STACK} can be traversed"
+            );
+            return Err(refused(self.tracer.scene(), what));
+        }
         let first = 3 + above.nodes.len();
         let over_instances = |node: &PackedNode| match node.count {
             0 => placed(node, (3, 0)),
@@ -390,51 +397,20 @@ fn numbers(media: &MediumStack) -> [u32; 4] {
 /// # Errors
 /// A scene that exceeds the device's limits.
 fn check(gpu: &Gpu, scene: &Scene, geometry: &Geometry) -> Result<()> {
-    let limits = gpu.limits();
-    if limits.max_storage_buffers_per_shader_stage < BUFFERS {
-        return Err(refused(
-            scene,
-            format!(
-                "the device allows a shader {} buffers, and {BUFFERS} are needed",
-                limits.max_storage_buffers_per_shader_stage
-            ),
-        ));
+    let (buffers, objects) = (
+        gpu.limits().max_storage_buffers_per_shader_stage,
+        scene.objects.len(),
+    );
+    if buffers < BUFFERS {
+        let what = format!("the device allows a shader {buffers} buffers, and {BUFFERS} are needed");
+        return Err(refused(scene, what));
     }
-    if geometry.pages.len() > 1 {
+    if geometry.pages.len() > 1 || u32::try_from(scene.triangle_count()).is_err() {
         return Err(too_many_triangles(gpu, scene));
     }
-    if u32::try_from(scene.triangle_count()).is_err() {
-        return Err(too_many_triangles(gpu, scene));
-    }
-    if scene.objects.len() > MAX_OBJECTS {
-        return Err(refused(
-            scene,
-            format!(
-                "{} objects are more than the {MAX_OBJECTS} that it can tell apart",
-                scene.objects.len()
-            ),
-        ));
-    }
-    Ok(())
-}
-
-/// # Errors
-/// A hierarchy deeper than the traversal stack.
-fn check_depth(scene: &Scene, depth: usize) -> Result<()> {
-    if depth >= STACK {
-        return Err(refused(
-            scene,
-            format!(
-                "the hierarchy of its triangles is {depth} levels deep, and at most {STACK} can be traversed"
-            ),
-        ));
-    }
-    Ok(())
-}
-
-fn check_bytes(gpu: &Gpu, scene: &Scene, bytes: usize) -> Result<()> {
-    if bytes as u64 > readable(gpu) {
-        return Err(too_many_triangles(gpu, scene));
+    if objects > MAX_OBJECTS {
+        let what = format!("{objects} objects are more than the {MAX_OBJECTS} that it can tell apart");
+        return Err(refused(scene, what));
     }
     Ok(())
 }
@@ -446,14 +422,9 @@ fn readable(gpu: &Gpu) -> u64 {
 }
 
 fn too_many_triangles(gpu: &Gpu, scene: &Scene) -> Error {
-    refused(
-        scene,
-        format!(
-            "a buffer of the device holds at most {} KiB, and {} triangles take more",
-            readable(gpu) >> 10,
-            scene.triangle_count()
-        ),
-    )
+    let (kib, count) = (readable(gpu) >> 10, scene.triangle_count());
+    let what = format!("a buffer of the device holds at most {kib} KiB, and {count} triangles take more");
+    refused(scene, what)
 }
 
 fn refused(scene: &Scene, what: String) -> Error {

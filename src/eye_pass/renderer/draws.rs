@@ -18,20 +18,8 @@ pub(super) struct DrawState {
     pub(super) style: MapStyle,
     /// Whether chains are traced.
     pub(super) has_chains: bool,
-    /// Whether any mirror or clear surface has a texture.
-    pub(super) has_tinted_glass: bool,
-    /// Whether any surface has bumps.
-    pub(super) has_bumps: bool,
-    /// Whether the resolution of the traced image differs from that of the frame.
-    pub(super) is_scaled: bool,
-    /// Whether direct light is traced.
-    pub(super) traces_lights: bool,
-    /// Whether an environment is visible.
-    pub(super) has_sky: bool,
-    /// Whether chains split into wavelengths.
-    pub(super) parts_wavelengths: bool,
-    /// Whether any surface has an alpha mask.
-    pub(super) has_masks: bool,
+    /// What pipelines of chains support.
+    pub(super) flags: PipelineFlags,
 }
 
 impl DrawState {
@@ -71,26 +59,16 @@ impl DrawState {
         } else {
             Faces::Front
         };
-        let how = PipelineFlags {
-            has_texture: match writes {
-                RenderTarget::Traced => self.has_tinted_glass,
-                _ => look.has_texture,
+        let flags = match writes {
+            RenderTarget::Traced => self.flags,
+            _ => PipelineFlags {
+                has_texture: look.has_texture,
+                has_bumps: look.has_bumps,
+                has_mask: look.has_mask(),
+                ..self.flags
             },
-            is_scaled: self.is_scaled,
-            traces_lights: self.traces_lights,
-            has_bumps: match writes {
-                RenderTarget::Traced => self.has_bumps,
-                _ => look.has_bumps,
-            },
-            has_sky: self.has_sky,
-            parts_wavelengths: self.parts_wavelengths,
-            has_mask: match writes {
-                RenderTarget::Traced => self.has_masks,
-                _ => look.has_mask(),
-            },
-            is_logarithmic: self.style.is_logarithmic(),
         };
-        PipelineKey::new(writes, look.surface, faces, how)
+        PipelineKey::new(writes, look.surface, faces, flags)
     }
 }
 
@@ -283,4 +261,11 @@ pub struct GpuMs {
     pub specular: f64,
     /// Tone mapping; 0 for frames that are read back as radiance.
     pub tone_mapping: f64,
+}
+
+impl GpuMs {
+    /// All passes [ms].
+    pub fn sum(&self) -> f64 {
+        self.opaque + self.specular + self.tone_mapping
+    }
 }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::bindings::Storage;
 use super::maps::{self, DeviceMap, ShownMap};
-use super::paging::{Level, PagedImage, TILE, Texels, TilePool, Uploaded, is_halved};
+use super::paging::{Level, PagedImage, TILE, TilePool, Uploaded, is_halved};
 use crate::gpu::Gpu;
 use crate::illumination::Receiver;
 use crate::optics::LinearSrgb;
@@ -87,6 +87,13 @@ impl Images {
                 uploaded += bytes;
             }
         }
+        if self.texture_pool.is_sparse() {
+            self.texture_pool = self.texture_pool.emptied(gpu);
+            for image in &mut self.textures {
+                let moved = image.move_to(gpu, &mut self.texture_pool);
+                uploaded += Uploaded::other(moved.tile_bytes as usize);
+            }
+        }
         let looks = |material: &Material| material.images().map(Option::<&TextureRef>::cloned);
         self.looks = scene.materials.iter().map(looks).collect();
         let bumps = |object: usize| {
@@ -110,23 +117,22 @@ impl Images {
                     if let Some(old) = map {
                         old.image.release(&mut self.map_pool);
                     }
-                    // A map beyond the budget starts with its coarsest level.
-                    let finest = shown.map(|shown| {
+                    *map = shown.map(|shown| {
+                        // A map beyond the budget starts with its coarsest level.
                         let tiles = tiles_of(shown.chart.width, shown.chart.height);
-                        if tiles * MAP_TILE_BYTES > self.budget_bytes {
-                            usize::MAX
-                        } else {
-                            0
-                        }
-                    });
-                    let made = shown
-                        .zip(finest)
-                        .map(|(shown, finest)| DeviceMap::new(gpu, &mut self.map_pool, shown, finest));
-                    *map = made.map(|(made, bytes)| {
+                        let is_too_large = tiles * MAP_TILE_BYTES > self.budget_bytes;
+                        let finest = if is_too_large { usize::MAX } else { 0 };
+                        let (made, bytes) = DeviceMap::new(gpu, &mut self.map_pool, shown, finest);
                         uploaded += bytes;
                         made
                     });
                 }
+            }
+        }
+        if self.map_pool.is_sparse() {
+            self.map_pool = self.map_pool.emptied(gpu);
+            for map in self.maps.iter_mut().flatten() {
+                uploaded += map.image.move_to(gpu, &mut self.map_pool);
             }
         }
         uploaded += self.write_table(gpu);
@@ -347,12 +353,9 @@ fn mip_chain(texture: &Texture) -> Vec<Level<Texel>> {
     while let Some(last) = images.last().filter(|(size, _)| is_halved(*size)) {
         images.push(halved(last));
     }
-    let level = |(size, texels): Image| Level {
-        size,
-        extent: size.map(|side| side as f32),
-        texels: Texels::Rows(texels),
-    };
-    images.into_iter().map(level).collect()
+    let level =
+        |(size, texels): &Image| Level::of_rows(*size, size.map(|side| side as f32), texture.wrap, texels);
+    images.iter().map(level).collect()
 }
 
 /// Means of 2×2 texels in linear light; an odd last row or column is dropped.

@@ -9,7 +9,7 @@ use rayon::iter::{IndexedParallelIterator, ParallelIterator};
 use rayon::slice::{ParallelSlice, ParallelSliceMut};
 
 use super::minify::Minification;
-use super::paging::{Level, PagedImage, TILE, Texels, TilePool, Uploaded, origin};
+use super::paging::{Level, PagedImage, TILE, TilePool, Uploaded, origin};
 use super::tiled;
 use super::uniforms::MapTile;
 use crate::gpu::Gpu;
@@ -19,6 +19,8 @@ use crate::scene::texture::Wrap;
 /// Linear red, green and blue; if one of them is not finite, all are 0 and alpha is 1.
 pub(super) type Texel = [f16; 4];
 
+/// Maps do not repeat.
+const WRAP: [Wrap; 2] = [Wrap::ClampToEdge; 2];
 /// Texels per parallel task.
 const BLOCK: usize = 4096;
 /// Largest stored value, well below the largest half float, 65504.
@@ -64,7 +66,7 @@ impl DeviceMap {
         let peak_w_m2 = peak(&map.irradiance);
         let irradiance_scale = scale_for_half_floats(peak_w_m2);
         let levels = levels(map, &minification, irradiance_scale);
-        let (image, uploaded) = PagedImage::new(gpu, pool, levels, [Wrap::ClampToEdge; 2], finest);
+        let (image, uploaded) = PagedImage::new(gpu, pool, levels, WRAP, finest);
         let map = Self {
             image,
             chart: Arc::clone(&map.chart),
@@ -77,10 +79,10 @@ impl DeviceMap {
 
     /// Its tiles in their pool.
     pub(super) fn tiles(&self) -> Vec<MapTile> {
-        let tile = |(slot, level, tile): (u32, &Level<Texel>, [usize; 2])| MapTile {
+        let tile = |(slot, level, tile): (u32, &Level<Texel>, usize)| MapTile {
             corner: origin(slot),
             irradiance_scale: self.irradiance_scale,
-            first_texel: tile.map(|index| (index * TILE) as f32),
+            first_texel: level.place(tile).map(|index| (index * TILE) as f32),
             extent: level.extent,
         };
         self.image.held().map(tile).collect()
@@ -152,10 +154,9 @@ fn levels(map: &ShownMap, minification: &Minification, scale: f32) -> Vec<Level<
     (0..)
         .zip(sizes)
         .zip(all)
-        .map(|((level, size), irradiance)| Level {
-            size: *size,
-            extent: [width, height].map(|side| side * (-level as f32).exp2()),
-            texels: Texels::Rows(half_floats(irradiance, scale)),
+        .map(|((level, size), irradiance)| {
+            let extent = [width, height].map(|side| side * (-level as f32).exp2());
+            Level::of_rows(*size, extent, WRAP, &half_floats(irradiance, scale))
         })
         .collect()
 }

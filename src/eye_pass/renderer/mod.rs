@@ -35,10 +35,9 @@ mod web;
 pub use draws::EyeQuality;
 pub use draws::{EyeCounts, GpuMs};
 pub use objects::{Inspected, MapStyle};
-pub use offscreen::{render_counted, render_offscreen, render_sampled};
+pub use offscreen::render_counted;
 pub use paging::Uploaded;
 pub use probe::{ProbedHit, probe};
-pub use shaders::{Specialisation, programs, shared_structs, specialisations, vertex_attributes};
 pub use web::{Content, WebScene};
 
 use std::sync::Arc;
@@ -49,10 +48,10 @@ use self::draws::DrawState;
 use self::draws::Sample;
 use self::geometry::Geometry;
 use self::maps::ShownMap;
-use self::objects::Objects;
-use self::pipelines::SurfacePipelines;
+use self::objects::{Appearance, Objects};
+use self::pipelines::{PipelineFlags, SurfacePipelines};
 use self::sky::Sky;
-use self::targets::{Targets, TracedTargets};
+use self::targets::Targets;
 use self::timing::Timing;
 use self::tone_mapping::ToneMappingPipelines;
 use super::View;
@@ -84,7 +83,7 @@ pub struct Renderer {
     refusal: Option<Error>,
     sky: Option<Sky>,
     targets: Option<Targets>,
-    traced: Option<TracedTargets>,
+    traced: Option<Targets>,
     mean: Option<Mean>,
     /// Whether mirrors are grey instead of black while chains are switched off.
     has_stand_in: bool,
@@ -282,7 +281,7 @@ impl Renderer {
             .traced
             .as_ref()
             .filter(|_| self.drawn[1] > 0)
-            .map(|traced| u64::from(traced.width) * u64::from(traced.height));
+            .map(|traced| traced.size.map(u64::from).iter().product());
         let timed = self.timing.as_ref().and_then(Timing::latest);
         EyeCounts {
             pipelines: (self.surfaces.count() + self.tone_mapping.count()) as u64,
@@ -331,14 +330,17 @@ impl Renderer {
         }
         self.draw_radiance(gpu, encoder, view, exposure(view), Sample::CENTRE)?;
         if let Some(targets) = &self.targets {
-            let marks = self.timing.as_ref().map(Timing::around_tone_mapping);
+            let marks = self
+                .timing
+                .as_ref()
+                .map(|timing| timing.marks(timing::TONE_MAPPING));
             let radiance = &targets.resolved_view;
             self.tone_mapping
                 .draw(gpu, encoder, target, radiance, view.tone_map, marks);
         }
         let has_specular = self.drawn[1] > 0;
         if let Some(timing) = &mut self.timing {
-            timing.finish(encoder, has_specular, true, self.quality);
+            timing.finish(gpu, encoder, (has_specular, true), self.quality);
         }
         self.drawn_view = Some(view.clone());
         Ok(())
@@ -359,14 +361,7 @@ impl Renderer {
         if self.drawn_view.as_ref() != Some(view) {
             return self.draw(gpu, encoder, target, view);
         }
-        let mut mean = match self
-            .mean
-            .take()
-            .filter(|mean| mean.has_size(view.width, view.height))
-        {
-            Some(mean) => mean,
-            None => Mean::new(gpu, view.width, view.height),
-        };
+        let mut mean = Mean::of_size(self.mean.take(), gpu, [view.width, view.height]);
         if mean.count() == 0
             && let Some(targets) = &self.targets
         {
@@ -394,13 +389,18 @@ impl Renderer {
         DrawState {
             style: self.map_style,
             has_chains: self.chains != EffectSwitch::Off && self.refusal.is_none(),
-            traces_lights: self.traces_lights && self.map_style == MapStyle::Lit && self.refusal.is_none(),
-            is_scaled: self.quality.traced_scale != 1.0,
-            has_tinted_glass: self.objects.has_tinted_glass(),
-            has_bumps: self.objects.has_bumps(),
-            has_sky: self.shows_sky(),
-            has_masks: self.objects.has_masks(),
-            parts_wavelengths: self.dispersion != EffectSwitch::Off && !self.objects.glasses.is_empty(),
+            flags: PipelineFlags {
+                has_texture: self.objects.has_tinted_glass(),
+                is_scaled: self.quality.traced_scale != 1.0,
+                traces_lights: self.traces_lights
+                    && self.map_style == MapStyle::Lit
+                    && self.refusal.is_none(),
+                has_bumps: self.objects.list.iter().any(|look| look.has_bumps),
+                has_sky: self.shows_sky(),
+                is_dispersive: self.dispersion != EffectSwitch::Off && !self.objects.glasses.is_empty(),
+                has_mask: self.objects.list.iter().any(Appearance::has_mask),
+                is_logarithmic: self.map_style.is_logarithmic(),
+            },
         }
     }
 }

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::bindings::Storage;
 use super::geometry::Geometry;
-use super::images::{Images, NO_IMAGE};
+use super::images::Images;
 use super::maps::ShownMap;
 use super::paging::Uploaded;
 use super::uniforms::{ObjectRecord, rgb};
@@ -155,14 +155,6 @@ impl Objects {
         looks.any(|look| look.surface.is_specular() && !look.surface.is_receiver() && look.has_texture)
     }
 
-    pub(super) fn has_masks(&self) -> bool {
-        self.list.iter().any(Appearance::has_mask)
-    }
-
-    pub(super) fn has_bumps(&self) -> bool {
-        self.list.iter().any(|look| look.has_bumps)
-    }
-
     fn write_records(&mut self, gpu: &Gpu) -> Uploaded {
         let records: Vec<ObjectRecord> = (0..)
             .zip(&self.list)
@@ -211,25 +203,17 @@ impl Appearance {
                 surface: surface_code(material.surface),
                 absorption_per_m: absorption_per_m(material),
                 double_sided: u32::from(material.has_back()),
-                map: NO_IMAGE,
-                texture: NO_IMAGE,
                 roughness: material.roughness as f32,
-                bumps: NO_IMAGE,
                 polish: material.polish as f32,
-                back_map: NO_IMAGE,
-                glass: 0,
                 alpha_cutoff: alpha_cutoff(material),
-                variation: NO_IMAGE,
                 metallic: material.metallic as f32,
                 transmission: material.transmission as f32,
                 coverage: material.coverage.map_or(-1.0, |factor| factor as f32),
                 solid: u32::from(material.is_solid()),
-                glow: NO_IMAGE,
-                padding0: 0,
-                padding1: 0,
                 row_x,
                 row_y,
                 row_z,
+                ..ObjectRecord::default()
             },
             material: object.material,
             has_texture: material.base_colour_texture.is_some(),
@@ -362,15 +346,6 @@ pub enum Inspected {
 }
 
 impl Inspected {
-    pub const ALL: [Self; 6] = [
-        Self::Irradiance,
-        Self::Texels,
-        Self::TexelDensity,
-        Self::Normals,
-        Self::Uv,
-        Self::MapUv,
-    ];
-
     /// `INSPECTED_*` of the shader.
     pub(super) fn code(self) -> u32 {
         match self {

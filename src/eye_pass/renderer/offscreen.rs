@@ -72,21 +72,13 @@ impl Renderer {
             }
             let has_specular = self.drawn[1] > 0;
             if let Some(timing) = &mut self.timing {
-                timing.finish(&mut encoder, has_specular, false, self.quality);
+                timing.finish(gpu, &mut encoder, (has_specular, false), self.quality);
             }
             gpu.queue.submit([encoder.finish()]);
         }
-        let radiance = if pictures > 1 {
-            self.read_mean(gpu, scale)?
-        } else {
-            self.read_resolved(gpu, scale)?
-        };
+        let picture = self.read_radiance(gpu, view, scale, pictures > 1)?;
         self.collect_times(gpu);
-        Ok(Picture {
-            width: view.width,
-            height: view.height,
-            radiance,
-        })
+        Ok(picture)
     }
 
     /// Radiance of the last frame, or the mean of all frames of its view. Draws the view again if another one was drawn
@@ -100,20 +92,12 @@ impl Renderer {
         }
         let scale = view.exposure_stops.exp2();
         let is_mean = self.mean.as_ref().is_some_and(|mean| mean.count() > 0);
-        let radiance = if is_mean {
-            self.read_mean(gpu, scale)?
-        } else {
-            self.read_resolved(gpu, scale)?
-        };
-        let largest = radiance.iter().flatten().fold(0.0_f32, |a, b| a.max(*b));
+        let picture = self.read_radiance(gpu, view, scale, is_mean)?;
+        let largest = picture.radiance.iter().flatten().fold(0.0_f32, |a, b| a.max(*b));
         if f64::from(largest) * scale >= CUT_SCALED {
             return self.radiance_sampled(gpu, view, ANEW_SIDE);
         }
-        Ok(Picture {
-            width: view.width,
-            height: view.height,
-            radiance,
-        })
+        Ok(picture)
     }
 
     /// Number of frames for `places` samples per pixel, enough to cover the spectrum.
@@ -121,7 +105,7 @@ impl Renderer {
         let draw_state = self.draw_state();
         let is_chain = |object: &usize| draw_state.is_specular(&self.objects.list[*object]);
         let has_chains = || visible_objects(&self.objects, view).iter().any(is_chain);
-        if draw_state.parts_wavelengths && has_chains() {
+        if draw_state.flags.is_dispersive && has_chains() {
             MIN_PARTED.div_ceil(places) * places
         } else {
             places
@@ -159,11 +143,7 @@ impl Renderer {
 
     fn add_to_mean(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, is_first: bool) {
         let Some(targets) = &self.targets else { return };
-        let fits = |mean: &Mean| mean.has_size(targets.width, targets.height);
-        let mut mean = match self.mean.take().filter(fits) {
-            Some(mean) => mean,
-            None => Mean::new(gpu, targets.width, targets.height),
-        };
+        let mut mean = Mean::of_size(self.mean.take(), gpu, targets.size);
         if is_first {
             mean.clear();
         }
@@ -171,71 +151,38 @@ impl Renderer {
         self.mean = Some(mean);
     }
 
-    fn read_resolved(&self, gpu: &Gpu, scale: f64) -> Result<Vec<[f32; 3]>> {
-        let bytes = match &self.targets {
-            Some(targets) => readback::read_texture(gpu, &targets.resolved)?,
-            None => Vec::new(),
+    /// The last frame, or the mean of several, without its scale.
+    fn read_radiance(&self, gpu: &Gpu, view: &View, scale: f64, is_mean: bool) -> Result<Picture> {
+        let mean = self.mean.as_ref().filter(|_| is_mean);
+        let channels: Vec<f64> = match (mean, &self.targets) {
+            (Some(mean), _) => {
+                let bytes = readback::read_texture(gpu, mean.picture().0)?;
+                let floats = bytes.chunks_exact(4).map(bytemuck::pod_read_unaligned::<f32>);
+                floats.map(f64::from).collect()
+            }
+            (None, Some(targets)) => {
+                let bytes = readback::read_texture(gpu, &targets.resolved)?;
+                let halves = bytes.chunks_exact(2).map(bytemuck::pod_read_unaligned::<f16>);
+                halves.map(f64::from).collect()
+            }
+            (None, None) => Vec::new(),
         };
-        let channel = |texel: &[u8], channel: usize| {
-            let half = f16::from_le_bytes([texel[2 * channel], texel[2 * channel + 1]]);
-            (f64::from(half) / scale) as f32
-        };
-        let texels = bytes.chunks_exact(8);
-        Ok(texels
-            .map(|texel| std::array::from_fn(|index| channel(texel, index)))
-            .collect())
-    }
-
-    fn read_mean(&self, gpu: &Gpu, scale: f64) -> Result<Vec<[f32; 3]>> {
-        let bytes = match &self.mean {
-            Some(mean) => readback::read_texture(gpu, mean.picture().0)?,
-            None => Vec::new(),
-        };
-        let channel = |texel: &[u8], channel: usize| {
-            let value: f32 = bytemuck::pod_read_unaligned(&texel[4 * channel..4 * channel + 4]);
-            (f64::from(value) / scale) as f32
-        };
-        let texels = bytes.chunks_exact(16);
-        Ok(texels
-            .map(|texel| std::array::from_fn(|index| channel(texel, index)))
-            .collect())
+        let pixels = channels.chunks_exact(4);
+        Ok(Picture {
+            width: view.width,
+            height: view.height,
+            radiance: pixels
+                .map(|rgba| [0, 1, 2].map(|channel| (rgba[channel] / scale) as f32))
+                .collect(),
+        })
     }
 }
 
-/// Renders one picture through the pixel centres, in the quality of stills.
+/// Renders one picture in the quality of stills, with `samples_per_side`² samples per pixel and switches for chains and
+/// dispersion; also returns the renderer's counts.
 ///
 /// # Errors
 /// Those of [`Renderer::new`], [`Renderer::set_maps`] and [`Renderer::radiance`].
-pub fn render_offscreen(gpu: &Gpu, scene: &Scene, maps: &[IlluminationMap], view: &View) -> Result<Picture> {
-    render_sampled(gpu, scene, maps, view, 1)
-}
-
-/// Renders one picture with `samples_per_side`² samples per pixel.
-///
-/// # Errors
-/// Those of [`render_offscreen`].
-pub fn render_sampled(
-    gpu: &Gpu,
-    scene: &Scene,
-    maps: &[IlluminationMap],
-    view: &View,
-    samples_per_side: u32,
-) -> Result<Picture> {
-    let counted = render_counted(
-        gpu,
-        scene,
-        maps,
-        view,
-        samples_per_side,
-        &EffectSwitches::default(),
-    )?;
-    Ok(counted.0)
-}
-
-/// [`render_sampled`] with switches for chains and dispersion; also returns the renderer's counts.
-///
-/// # Errors
-/// Those of [`render_offscreen`].
 pub fn render_counted(
     gpu: &Gpu,
     scene: &Scene,

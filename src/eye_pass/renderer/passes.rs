@@ -11,8 +11,8 @@ use super::draws::{EyeQuality, Sample};
 use super::geometry::Segment;
 use super::pipelines::{PipelineKey, RenderTarget};
 use super::sky::Sky;
-use super::targets::{Targets, TracedTargets};
-use super::timing::Timing;
+use super::targets::Targets;
+use super::timing::{AFTER_CHAINS, BEFORE_CHAINS, SURFACES};
 use super::uniforms::{Frame, SeenWavelengths, rgb};
 use super::{MapStyle, Renderer};
 use crate::effect::EffectSwitch;
@@ -42,14 +42,15 @@ impl Renderer {
         let quality = self.quality;
         self.collect_times(gpu);
         self.drawn_view = None;
-        let size_fits = |targets: &Targets| (targets.width, targets.height) == (view.width, view.height);
-        let targets = match self.targets.take().filter(size_fits) {
-            Some(targets) => targets,
-            None => Targets::new(gpu, view.width, view.height, self.sample_count)?,
-        };
+        let size = [view.width, view.height];
+        let targets = Targets::of_size(self.targets.take(), gpu, "picture", size, self.sample_count)?;
         let list = self.prepare(gpu, view);
         if list.specular_objects > 0 {
-            self.make_traced_targets(gpu, view, quality)?;
+            let limit = gpu.limits().max_texture_dimension_2d;
+            let scaled = |pixels: u32| (f64::from(pixels) * quality.traced_scale).ceil() as u32;
+            let size = size.map(|pixels| scaled(pixels).clamp(1, limit));
+            let traced = Targets::of_size(self.traced.take(), gpu, "traced picture", size, 1)?;
+            self.traced = Some(traced);
         }
         let frame = self.frame(view, radiance_scale, sample, quality);
         let needs_scene = list.all().any(|draw| draw.key.writes.goes_through_scene());
@@ -67,7 +68,7 @@ impl Renderer {
         let background = view
             .background
             .map(|channel| (channel * radiance_scale).min(LARGEST_SCALED));
-        let marks = self.timing.as_ref().map(Timing::around_surfaces);
+        let marks = self.timing.as_ref().map(|timing| timing.marks(SURFACES));
         let mut pass = targets.begin_pass(encoder, background.to_array(), marks);
         pass.set_bind_group(0, &frame, &[]);
         if let Some(sky) = self.seen_sky() {
@@ -105,7 +106,7 @@ impl Renderer {
             ..ChainLimits::default()
         };
         let start = scene.start(view, &limits, self.traces_lights);
-        let wavelengths = if self.draw_state().parts_wavelengths {
+        let wavelengths = if self.draw_state().flags.is_dispersive {
             SeenWavelengths::of(&wavelengths::of_picture(sample.picture), &self.objects.glasses)
         } else {
             SeenWavelengths::default()
@@ -124,29 +125,18 @@ impl Renderer {
         let Some(targets) = self.traced.as_ref().filter(|_| !list.traced.is_empty()) else {
             return;
         };
-        let timing = self.timing.as_ref();
-        let mut pass = targets.begin_depth(encoder, timing.map(Timing::before_chains));
+        let marks = |of| self.timing.as_ref().map(|timing| timing.marks(of));
+        let mut pass = targets.begin_depth(encoder, marks(BEFORE_CHAINS));
         pass.set_bind_group(0, frame, &[]);
         self.draw_each(&mut pass, &list.depths);
         drop(pass);
-        let mut pass = targets.begin_chains(encoder, timing.map(Timing::after_chains));
+        let mut pass = targets.begin_chains(encoder, marks(AFTER_CHAINS));
         pass.set_bind_group(0, frame, &[]);
         pass.set_bind_group(1, chains, &[]);
         if let Some(sky) = self.seen_sky() {
             pass.set_bind_group(2, sky.bound(), &[]);
         }
         self.draw_each(&mut pass, &list.traced);
-    }
-
-    fn make_traced_targets(&mut self, gpu: &Gpu, view: &View, quality: EyeQuality) -> Result<()> {
-        let limit = gpu.limits().max_texture_dimension_2d;
-        let side = |pixels: u32| ((f64::from(pixels) * quality.traced_scale).ceil() as u32).clamp(1, limit);
-        let (width, height) = (side(view.width), side(view.height));
-        let size_fits = |targets: &TracedTargets| (targets.width, targets.height) == (width, height);
-        if !self.traced.as_ref().is_some_and(size_fits) {
-            self.traced = Some(TracedTargets::new(gpu, width, height)?);
-        }
-        Ok(())
     }
 
     /// Creates what a view needs and does not exist yet; returns its draw list.
@@ -161,10 +151,14 @@ impl Renderer {
             .keep_budget(gpu, view.camera.position, pixel_rad, &visible);
         let draw_state = self.draw_state();
         let is_specular = |object: &usize| draw_state.is_specular(&self.objects.list[*object]);
-        if draw_state.traces_lights || visible.iter().any(is_specular) {
+        if draw_state.flags.traces_lights || visible.iter().any(is_specular) {
             self.make_chain_scene(gpu);
         }
-        if let Some(scene) = self.chain_scene.as_mut().filter(|_| draw_state.traces_lights) {
+        if let Some(scene) = self
+            .chain_scene
+            .as_mut()
+            .filter(|_| draw_state.flags.traces_lights)
+        {
             scene.set_lights(gpu, &self.scene);
         }
         // Chains may have been refused just above, which changes the draw state.
@@ -254,7 +248,7 @@ impl Renderer {
         let traced = self
             .traced
             .as_ref()
-            .map_or([view.width, view.height], |traced| [traced.width, traced.height]);
+            .map_or([view.width, view.height], |traced| traced.size);
         let half_height = (0.5 * camera.vertical_fov_rad).tan();
         let traced_height = f64::from(traced[1]);
         let traced_per_pixel = [0, 1].map(|axis: usize| f64::from(traced[axis]) / size[axis]);
@@ -288,8 +282,7 @@ impl Renderer {
             },
             colour_scale: self.map_style.colour_scale().map(|number| number as f32),
             fault: (radiance_scale / view.exposure_stops.exp2()) as f32,
-            padding0: 0.0,
-            padding1: 0.0,
+            ..Frame::default()
         }
     }
 
@@ -308,7 +301,7 @@ impl Renderer {
 
     fn bind_composed(&self, gpu: &Gpu, list: &DrawList) -> Option<wgpu::BindGroup> {
         let traced = self.traced.as_ref().filter(|_| list.specular_objects > 0)?;
-        let resources = [wgpu::BindingResource::TextureView(&traced.view)];
+        let resources = [wgpu::BindingResource::TextureView(&traced.resolved_view)];
         Some(bind_group(
             gpu,
             "traced picture",

@@ -61,20 +61,6 @@ pub(super) enum RenderTarget {
 }
 
 impl RenderTarget {
-    pub(super) fn all() -> impl Iterator<Item = Self> {
-        let others = [
-            Self::Own,
-            Self::OwnUnderLights,
-            Self::MapValue,
-            Self::Depth,
-            Self::Traced,
-            Self::Composed,
-        ];
-        others
-            .into_iter()
-            .chain(Inspected::ALL.into_iter().map(Self::Inspected))
-    }
-
     /// Whether it is needed only for chains.
     pub(super) fn is_specular(self) -> bool {
         matches!(self, Self::Depth | Self::Traced | Self::Composed)
@@ -104,7 +90,7 @@ pub(super) struct PipelineKey {
     pub(super) faces: Faces,
     /// `Diffuse` where the pipeline does not depend on it.
     surface: SurfaceKind,
-    how: PipelineFlags,
+    flags: PipelineFlags,
 }
 
 /// Features that a pipeline supports.
@@ -121,7 +107,7 @@ pub(super) struct PipelineFlags {
     /// Whether chains that leave the scene end in an environment.
     pub(super) has_sky: bool,
     /// Whether chains split into wavelengths at dispersive surfaces.
-    pub(super) parts_wavelengths: bool,
+    pub(super) is_dispersive: bool,
     /// Whether the surface has an alpha mask; for chains, whether any surface of the scene has.
     pub(super) has_mask: bool,
     /// Whether the scale of false colours is logarithmic.
@@ -130,8 +116,13 @@ pub(super) struct PipelineFlags {
 
 impl PipelineKey {
     /// The key of a draw. Clears what does not affect its pipeline, so that draws share pipelines.
-    pub(super) fn new(writes: RenderTarget, surface: SurfaceKind, faces: Faces, how: PipelineFlags) -> Self {
-        let is_lit = how.traces_lights && surface != SurfaceKind::Mirror;
+    pub(super) fn new(
+        writes: RenderTarget,
+        surface: SurfaceKind,
+        faces: Faces,
+        flags: PipelineFlags,
+    ) -> Self {
+        let is_lit = flags.traces_lights && surface != SurfaceKind::Mirror;
         let writes = match writes {
             RenderTarget::Own if is_lit => RenderTarget::OwnUnderLights,
             other => other,
@@ -153,16 +144,16 @@ impl PipelineKey {
             } else {
                 SurfaceKind::Diffuse
             },
-            how: PipelineFlags {
-                has_texture: how.has_texture && looks_up,
-                is_scaled: how.is_scaled && writes == RenderTarget::Composed,
-                traces_lights: how.traces_lights && writes == RenderTarget::Traced,
-                has_bumps: how.has_bumps
+            flags: PipelineFlags {
+                has_texture: flags.has_texture && looks_up,
+                is_scaled: flags.is_scaled && writes == RenderTarget::Composed,
+                traces_lights: flags.traces_lights && writes == RenderTarget::Traced,
+                has_bumps: flags.has_bumps
                     && (writes == RenderTarget::Traced || (shows_itself && surface == SurfaceKind::Mixed)),
-                has_sky: how.has_sky && writes == RenderTarget::Traced,
-                parts_wavelengths: how.parts_wavelengths && writes == RenderTarget::Traced,
-                has_mask: how.has_mask,
-                is_logarithmic: how.is_logarithmic && matches!(writes, RenderTarget::Inspected(_)),
+                has_sky: flags.has_sky && writes == RenderTarget::Traced,
+                is_dispersive: flags.is_dispersive && writes == RenderTarget::Traced,
+                has_mask: flags.has_mask,
+                is_logarithmic: flags.is_logarithmic && matches!(writes, RenderTarget::Inspected(_)),
             },
         }
     }
@@ -174,7 +165,7 @@ impl PipelineKey {
             RenderTarget::OwnUnderLights => Some("own_under_lights"),
             RenderTarget::MapValue => Some("map_value"),
             RenderTarget::Inspected(_) => Some("inspected"),
-            RenderTarget::Depth => self.how.has_mask.then_some("masked_depth"),
+            RenderTarget::Depth => self.flags.has_mask.then_some("masked_depth"),
             RenderTarget::Traced => Some("traced"),
             RenderTarget::Composed => Some("composed"),
         }
@@ -185,7 +176,7 @@ impl PipelineKey {
             RenderTarget::Own | RenderTarget::MapValue | RenderTarget::Depth => SURFACE,
             RenderTarget::OwnUnderLights => UNDER_LIGHTS,
             RenderTarget::Inspected(_) => INSPECTED,
-            RenderTarget::Traced => match (self.how.parts_wavelengths, self.how.has_sky) {
+            RenderTarget::Traced => match (self.flags.is_dispersive, self.flags.has_sky) {
                 (false, false) => TRACED,
                 (false, true) => TRACED_UNDER_SKY,
                 (true, false) => PARTED,
@@ -223,12 +214,12 @@ impl PipelineKey {
 
     /// Whether chains end in an environment.
     pub(super) fn has_sky(self) -> bool {
-        self.how.has_sky
+        self.flags.has_sky
     }
 
     /// Values of the shader's overrides.
     pub(super) fn constants(self) -> Vec<(&'static str, f64)> {
-        let mask = ("HAS_MASK", flag(self.how.has_mask));
+        let mask = ("HAS_MASK", flag(self.flags.has_mask));
         match self.writes {
             RenderTarget::Own
             | RenderTarget::OwnUnderLights
@@ -236,21 +227,21 @@ impl PipelineKey {
             | RenderTarget::Depth => vec![
                 mask,
                 ("SURFACE", f64::from(surface_code(self.surface))),
-                ("HAS_TEXTURE", flag(self.how.has_texture)),
-                ("HAS_BUMPS", flag(self.how.has_bumps)),
+                ("HAS_TEXTURE", flag(self.flags.has_texture)),
+                ("HAS_BUMPS", flag(self.flags.has_bumps)),
             ],
             RenderTarget::Inspected(what) => vec![
                 mask,
                 ("INSPECTED", f64::from(what.code())),
-                ("IS_LOGARITHMIC", flag(self.how.is_logarithmic)),
+                ("IS_LOGARITHMIC", flag(self.flags.is_logarithmic)),
             ],
             RenderTarget::Traced => vec![
                 mask,
-                ("HAS_TINTED_GLASS", flag(self.how.has_texture)),
-                ("TRACES_LIGHTS", flag(self.how.traces_lights)),
-                ("HAS_BUMPS", flag(self.how.has_bumps)),
+                ("HAS_TINTED_GLASS", flag(self.flags.has_texture)),
+                ("TRACES_LIGHTS", flag(self.flags.traces_lights)),
+                ("HAS_BUMPS", flag(self.flags.has_bumps)),
             ],
-            RenderTarget::Composed => vec![mask, ("IS_SCALED", flag(self.how.is_scaled))],
+            RenderTarget::Composed => vec![mask, ("IS_SCALED", flag(self.flags.is_scaled))],
         }
     }
 }
@@ -335,7 +326,7 @@ impl SurfacePipelines {
             RenderTarget::OwnUnderLights | RenderTarget::Traced => self.traced_layout.as_ref(),
             RenderTarget::Composed => Some(&self.composed_layout),
         };
-        let third = key.how.has_sky.then(|| sky::layout(gpu));
+        let third = key.flags.has_sky.then(|| sky::layout(gpu));
         let groups: Vec<_> = std::iter::once(&self.frame_layout)
             .chain(second)
             .chain(&third)

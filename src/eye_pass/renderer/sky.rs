@@ -8,7 +8,7 @@ use wgpu::util::DeviceExt;
 use super::bindings::{Binding, bind_group, bind_group_layout, pipeline_layout, texture};
 use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
 use super::shaders::SKY;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, texture_of};
 use crate::scene::Environment;
 
 /// Radiance may exceed the range of half floats.
@@ -46,20 +46,12 @@ impl Sky {
         let (width, height, pixels) = fitted(source, gpu.limits().max_texture_dimension_2d as usize);
         let image = gpu.device.create_texture_with_data(
             &gpu.queue,
-            &wgpu::TextureDescriptor {
-                label: Some("sky"),
-                size: wgpu::Extent3d {
-                    width: width as u32,
-                    height: height as u32,
-                    depth_or_array_layers: 1,
-                },
-                mip_level_count: 1,
-                sample_count: 1,
-                dimension: wgpu::TextureDimension::D2,
-                format: FORMAT,
-                usage: wgpu::TextureUsages::TEXTURE_BINDING,
-                view_formats: &[],
-            },
+            &texture_of(
+                "sky",
+                [width as u32, height as u32, 1],
+                FORMAT,
+                wgpu::TextureUsages::TEXTURE_BINDING,
+            ),
             wgpu::util::TextureDataOrder::LayerMajor,
             bytemuck::cast_slice(&pixels),
         );

@@ -2,13 +2,12 @@
 
 use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
 use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, cleared, texture_of};
 
-/// Render targets of a frame.
+/// Render targets of a frame, or of the traced image, which has a resolution of its own.
 #[derive(Debug)]
 pub(super) struct Targets {
-    pub(super) width: u32,
-    pub(super) height: u32,
+    pub(super) size: [u32; 2],
     /// One sample per pixel: shown or read back.
     pub(super) resolved: wgpu::Texture,
     pub(super) resolved_view: wgpu::TextureView,
@@ -17,33 +16,41 @@ pub(super) struct Targets {
     depth: wgpu::TextureView,
 }
 
-/// Render targets of the traced image, in a resolution of its own.
-#[derive(Debug)]
-pub(super) struct TracedTargets {
-    pub(super) width: u32,
-    pub(super) height: u32,
-    pub(super) view: wgpu::TextureView,
-    depth: wgpu::TextureView,
-}
-
 const ATTACHMENT: wgpu::TextureUsages = wgpu::TextureUsages::RENDER_ATTACHMENT;
 
 impl Targets {
+    /// The targets that there are if they have the size, else new ones.
+    ///
     /// # Errors
     /// A side of 0 or above the device's limit.
-    pub(super) fn new(gpu: &Gpu, width: u32, height: u32, sample_count: u32) -> Result<Self> {
-        gpu.check_texture_size("picture", width, height)?;
-        let size = [width, height];
+    pub(super) fn of_size(
+        before: Option<Self>,
+        gpu: &Gpu,
+        label: &str,
+        size: [u32; 2],
+        sample_count: u32,
+    ) -> Result<Self> {
+        if let Some(before) = before.filter(|before| before.size == size) {
+            return Ok(before);
+        }
+        let [width, height] = size;
+        gpu.check_texture_size(label, width, height)?;
+        let texture = |format, sample_count, usage| {
+            gpu.device.create_texture(&wgpu::TextureDescriptor {
+                sample_count,
+                ..texture_of(label, [width, height, 1], format, ATTACHMENT | usage)
+            })
+        };
+        let view = |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         let read = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_SRC;
-        let resolved = texture(gpu, "radiance", size, HDR_FORMAT, 1, ATTACHMENT | read);
-        let samples = |label, format| texture(gpu, label, size, format, sample_count, ATTACHMENT);
+        let samples = |format| view(&texture(format, sample_count, wgpu::TextureUsages::empty()));
+        let resolved = texture(HDR_FORMAT, 1, read);
         Ok(Self {
-            width,
-            height,
+            size,
             resolved_view: view(&resolved),
             resolved,
-            multisampled: (sample_count > 1).then(|| view(&samples("radiance samples", HDR_FORMAT))),
-            depth: view(&samples("depth", DEPTH_FORMAT)),
+            multisampled: (sample_count > 1).then(|| samples(HDR_FORMAT)),
+            depth: samples(DEPTH_FORMAT),
         })
     }
 
@@ -59,42 +66,21 @@ impl Targets {
             Some(samples) => (samples, Some(&self.resolved_view), wgpu::StoreOp::Discard),
             None => (&self.resolved_view, None, wgpu::StoreOp::Store),
         };
+        let target = cleared(view, wgpu::Color { r, g, b, a: 1.0 });
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("surfaces"),
             color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view,
-                depth_slice: None,
                 resolve_target,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 }),
-                    store,
-                },
+                ops: wgpu::Operations { store, ..target.ops },
+                ..target
             })],
             depth_stencil_attachment: Some(depth(&self.depth, Some(0.0), wgpu::StoreOp::Discard)),
             timestamp_writes,
             ..Default::default()
         })
     }
-}
 
-impl TracedTargets {
-    /// # Errors
-    /// A side of 0 or above the device's limit.
-    pub(super) fn new(gpu: &Gpu, width: u32, height: u32) -> Result<Self> {
-        gpu.check_texture_size("traced picture", width, height)?;
-        let size = [width, height];
-        let read = wgpu::TextureUsages::TEXTURE_BINDING;
-        let picture = texture(gpu, "traced picture", size, HDR_FORMAT, 1, ATTACHMENT | read);
-        let depth = texture(gpu, "traced depth", size, DEPTH_FORMAT, 1, ATTACHMENT);
-        Ok(Self {
-            width,
-            height,
-            view: view(&picture),
-            depth: view(&depth),
-        })
-    }
-
-    /// Begins the depth prepass.
+    /// Begins the depth prepass of chains.
     pub(super) fn begin_depth<'a>(
         &self,
         encoder: &'a mut wgpu::CommandEncoder,
@@ -116,15 +102,7 @@ impl TracedTargets {
     ) -> wgpu::RenderPass<'a> {
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("chains"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: &self.view,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::TRANSPARENT),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
+            color_attachments: &[Some(cleared(&self.resolved_view, wgpu::Color::TRANSPARENT))],
             depth_stencil_attachment: Some(depth(&self.depth, None, wgpu::StoreOp::Discard)),
             timestamp_writes,
             ..Default::default()
@@ -145,32 +123,4 @@ fn depth(
         }),
         stencil_ops: None,
     }
-}
-
-fn view(texture: &wgpu::Texture) -> wgpu::TextureView {
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
-fn texture(
-    gpu: &Gpu,
-    label: &str,
-    [width, height]: [u32; 2],
-    format: wgpu::TextureFormat,
-    sample_count: u32,
-    usage: wgpu::TextureUsages,
-) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d {
-            width,
-            height,
-            depth_or_array_layers: 1,
-        },
-        mip_level_count: 1,
-        sample_count,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage,
-        view_formats: &[],
-    })
 }

@@ -4,7 +4,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::maps::{Texel, half_floats};
-use super::paging::{Level, TILE, Texels, is_halved, stored};
+use super::paging::{Level, TILE, is_halved, stored};
 use crate::illumination::Chart;
 use crate::illumination::lookup::{in_chart, mean};
 use crate::illumination::tiles::{SIDE, TileLayout};
@@ -40,7 +40,7 @@ fn level(map: (&Chart, &TileLayout, &[[f32; 3]]), index: u32, size: [usize; 2], 
     Level {
         size,
         extent: [chart.width, chart.height].map(|side| side as f32 * (-(index as f32)).exp2()),
-        texels: Texels::Tiles((0..across * down).into_par_iter().map(tile).collect()),
+        tiles: (0..across * down).into_par_iter().map(tile).collect(),
     }
 }
 

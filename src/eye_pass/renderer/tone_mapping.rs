@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::bindings::{Binding, bind_group, bind_group_layout, cover_pipeline, texture, uniform};
+use super::bindings::{Binding, bind_group, bind_group_layout, cover, cover_pipeline, texture, uniform};
 use super::shaders::TONE_MAPPING;
 use super::uniforms::DisplayWhite;
 use crate::eye_pass::ToneMap;
@@ -78,23 +78,12 @@ impl ToneMappingPipelines {
             self.white.as_entire_binding(),
         ];
         let bind_group = bind_group(gpu, "tone mapping", &self.layout, resources);
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("tone mapping"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
+        cover(
+            encoder,
+            target,
+            (&self.made[&tone_map], &bind_group),
             timestamp_writes,
-            ..Default::default()
-        });
-        pass.set_pipeline(&self.made[&tone_map]);
-        pass.set_bind_group(0, &bind_group, &[]);
-        pass.draw(0..3, 0..1);
+        );
     }
 }
 

@@ -172,7 +172,7 @@ impl Renderer {
             let start = scene.start(&view, &limits, false);
             buffers.push(("start", Content::plain(&[start])));
         }
-        let seen = |picture| match self.draw_state().parts_wavelengths {
+        let seen = |picture| match self.draw_state().flags.is_dispersive {
             true => SeenWavelengths::of(&wavelengths::of_picture(picture), &self.objects.glasses),
             false => SeenWavelengths::default(),
         };

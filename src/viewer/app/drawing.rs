@@ -33,26 +33,26 @@ impl App {
             return Ok(());
         };
         // On a software rasterizer, shadow rays take longer than the next bake.
-        let traces_lights = self.model.traces_lights() && !graphics.gpu().is_software();
+        let traces_lights = self.model.traces_lights() && !graphics.gpu.is_software();
         let wanted_maps = MapsOnDevice {
             shown: self.shown,
             traces_lights,
         };
         let before = self.on_device;
         if before.is_some_and(|before| before.traces_lights) != traces_lights {
-            graphics.set_traces_lights(traces_lights);
+            graphics.main.set_traces_lights(traces_lights);
         }
         let start = Instant::now();
-        let mut uploaded = graphics.set_scene(self.model.scene())?;
+        let mut uploaded = graphics.main.set_scene(&graphics.gpu, self.model.scene())?;
         let mut is_new = uploaded != Uploaded::default();
         let has_new_maps = before != Some(wanted_maps);
         self.on_device = Some(wanted_maps);
         if has_new_maps || is_new {
             let (maps, style) = self.model.maps_to_show(traces_lights);
-            uploaded += graphics.set_maps(&maps, style)?;
+            uploaded += graphics.main.set_maps(&graphics.gpu, &maps, style)?;
             is_new = true;
         } else {
-            graphics.set_map_style(self.model.map_style());
+            graphics.main.set_style(self.model.map_style());
         }
         if is_new {
             let seconds = start.elapsed().as_secs_f64();
@@ -81,15 +81,19 @@ impl App {
             graphics.set_beside(shown)?;
         }
         let is_compiling = wanted != EffectSwitch::Off && chains == EffectSwitch::Off;
-        graphics.set_stand_in(is_compiling && !self.model.maps().is_empty());
-        graphics.set_making(RenderOptions {
+        graphics
+            .main
+            .renderer
+            .set_stand_in(is_compiling && !self.model.maps().is_empty());
+        let options = RenderOptions {
             chains,
             dispersion: self.model.choices.settings.effects.get(Effect::Dispersion),
             white_balance,
-        })?;
+        };
+        graphics.main.set_options(&graphics.gpu, options)?;
         // Must come before `expose` and drawing, which would collect the times without reporting them.
         if let Some(ms) = graphics.take_times() {
-            if let Some(quality) = graphics.counts().timed_quality {
+            if let Some(quality) = graphics.main.renderer.counts().timed_quality {
                 self.pace.learn(ms, quality);
             }
             self.tell_time(ms);
@@ -121,8 +125,8 @@ impl App {
             self.is_refining = false;
             return Ok(());
         };
-        let samples = if graphics.quality() == self.pace.resting() {
-            graphics.counts().samples
+        let samples = if graphics.main.renderer.quality() == self.pace.resting() {
+            graphics.main.renderer.counts().samples
         } else {
             0
         };
@@ -197,7 +201,7 @@ impl App {
             return;
         };
         let times = graphics.take_times();
-        let is_complete = !graphics.awaits_times();
+        let is_complete = !graphics.main.renderer.awaits_times();
         if let Some(ms) = times {
             self.tell_time(ms);
         }
@@ -214,14 +218,14 @@ impl App {
     /// Reports how the picture was rendered, and tells the user once if chains are not available.
     pub(super) fn report_making(&mut self) {
         let Some(graphics) = &self.graphics else { return };
-        let (counts, quality) = (graphics.counts(), graphics.quality());
+        let (counts, quality) = (graphics.main.renderer.counts(), graphics.main.renderer.quality());
         if let Some(times) = &mut self.model.picture.frame_times {
-            times.set_made(FrameStats {
+            times.made = Some(FrameStats {
                 traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
                 samples: counts.samples,
             });
         }
-        let refusal = graphics.chain_refusal().map(ToString::to_string);
+        let refusal = graphics.main.renderer.chain_refusal().map(ToString::to_string);
         if refusal.is_some() && refusal != self.shown_refusal {
             self.notice.clone_from(&refusal);
             self.shown_refusal = refusal;

@@ -86,7 +86,7 @@ impl App {
         match saved {
             Ok(files) => {
                 self.model.log.write("saved", json!({"files": files}));
-                self.notice = Some(exporting::told(&files));
+                self.notice = Some(exporting::saved_in_words(&files));
             }
             Err(error) => self.tell_unsaved(&error.to_string()),
         }

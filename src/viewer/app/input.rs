@@ -34,7 +34,7 @@ impl App {
         let is_typing = self
             .graphics
             .as_mut()
-            .is_some_and(|graphics| graphics.interface().context.text_edit_focused());
+            .is_some_and(|graphics| graphics.interface.context.text_edit_focused());
         if is_typing && event.state.is_pressed() {
             return;
         }
@@ -150,12 +150,12 @@ impl App {
             return;
         }
         if self.model.choices.probes {
-            self.model.probe(self.gaze());
-        } else if let Some(gaze) = self
-            .gaze()
+            self.model.probe(self.view_ray());
+        } else if let Some(view_ray) = self
+            .view_ray()
             .filter(|_| self.model.choices.selection.placed().is_some())
         {
-            self.model.begin_placing(gaze);
+            self.model.begin_placing(view_ray);
         } else {
             self.clicks_at = Some(self.pointer);
         }
@@ -173,10 +173,10 @@ impl App {
         // Lights are drawn, and can be clicked, only while there are handles.
         let marks = self.model.choices.selection.held().is_some();
         let light = gizmo::light_at(&lens, self.model.scene(), place).filter(|_| marks);
-        let gaze = lens.gaze(place);
+        let view_ray = lens.view_ray(place);
         match light {
             Some(light) => self.model.hold(GizmoTarget::Light(light)),
-            None => self.model.pick(gaze),
+            None => self.model.pick(view_ray),
         }
         self.request_redraw();
     }
@@ -188,8 +188,8 @@ impl App {
         if self.clicks_at.is_some_and(is_drag) {
             self.clicks_at = None;
         }
-        if let Some(gaze) = self.gaze() {
-            self.model.go_on_placing(gaze);
+        if let Some(view_ray) = self.view_ray() {
+            self.model.go_on_placing(view_ray);
         }
     }
 
@@ -212,9 +212,9 @@ impl App {
     }
 
     /// The view ray under the pointer.
-    fn gaze(&self) -> Option<Ray> {
+    fn view_ray(&self) -> Option<Ray> {
         let camera = self.camera();
-        self.pointed(&camera).map(|(lens, place)| lens.gaze(place))
+        self.pointed(&camera).map(|(lens, place)| lens.view_ray(place))
     }
 
     pub(super) fn on_wheel(&mut self, delta: MouseScrollDelta) {
@@ -232,7 +232,7 @@ impl App {
             return false;
         };
         let is_background = |layer: egui::LayerId| layer.order == egui::Order::Background;
-        let layer = graphics.interface().context.layer_id_at(place);
+        let layer = graphics.interface.context.layer_id_at(place);
         self.picture_rect.contains(place) && layer.is_none_or(is_background)
     }
 

@@ -65,7 +65,7 @@ impl Model {
         }
         match outcome {
             Ok(None) => {}
-            Ok(Some(told)) => self.film_message = Some(told),
+            Ok(Some(message)) => self.film_message = Some(message),
             Err(error) => self.film_message = Some(error.to_string()),
         }
     }
@@ -97,9 +97,9 @@ impl Model {
             FilmCommand::Play(false) => self.end_play(),
             FilmCommand::Save => {
                 let path = self.choices.film.save(&working_folder(), &self.scene().name)?;
-                let told = format!("Written: {}", path.display());
+                let message = format!("Written: {}", path.display());
                 self.log.write("saved", json!({"files": [path]}));
-                return Ok(Some(told));
+                return Ok(Some(message));
             }
             FilmCommand::Load(path) => {
                 let plan = PathPlan::read(path)?;

@@ -114,7 +114,6 @@ impl Model {
         self.choices.selection = Selection::default();
         self.choices.film = Film::default();
         self.player = None;
-        self.picking = None;
         self.placing = DraggedLight::default();
         self.pending_tasks = PendingTasks::default();
         self.choices.watches = false;

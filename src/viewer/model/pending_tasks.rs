@@ -1,4 +1,4 @@
-//! Tasks that wait for the scene's surfaces: lights to add, and the search for the brightest spot.
+//! Tasks that wait for the scene's surfaces: objects to pick, lights to add, and the search for the brightest spot.
 
 use std::sync::Arc;
 
@@ -25,8 +25,10 @@ const OFF: f64 = 1e-6;
 const HALVINGS: i32 = 6;
 
 /// Tasks for when the collision surfaces are built.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct PendingTasks {
+    /// Picks the object along this ray.
+    pub pick: Option<Ray>,
     pub light: Option<NewLight>,
     pub brightest: bool,
 }
@@ -40,15 +42,25 @@ impl Model {
 
     /// Runs the pending tasks if the collision surfaces are built.
     pub(super) fn poll_pending(&mut self) {
-        if self.pending_tasks.light.is_none() && !self.pending_tasks.brightest {
+        if self.pending_tasks == PendingTasks::default() {
             return;
         }
         let Some(surfaces) = self.surfaces() else { return };
-        let pending_tasks = std::mem::take(&mut self.pending_tasks);
-        if let Some(light) = pending_tasks.light {
+        let PendingTasks {
+            pick,
+            light,
+            brightest,
+        } = std::mem::take(&mut self.pending_tasks);
+        if let Some(view_ray) = pick {
+            match surfaces.intersect(&view_ray) {
+                Some(hit) => self.hold(GizmoTarget::Object(hit.object as usize)),
+                None => self.choices.selection.hold(None),
+            }
+        }
+        if let Some(light) = light {
             self.add_light(light, &surfaces);
         }
-        if pending_tasks.brightest {
+        if brightest {
             self.show_brightest(&surfaces);
         }
     }
@@ -56,15 +68,15 @@ impl Model {
     /// Adds a light near what the camera looks at, and gives it handles.
     fn add_light(&mut self, light: NewLight, surfaces: &Arc<Tracer>) {
         let (camera, radius_m) = (self.navigator.camera(), self.navigator.radius_m());
-        let gaze = Ray {
+        let view_ray = Ray {
             origin: camera.position,
             direction: camera.forward,
         };
         let scene = Arc::clone(self.edits.scene());
         let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
-        let aim = ViewTarget::of(surfaces, &gaze, 0.5 * (low + high));
+        let target = ViewTarget::of(surfaces, &view_ray, 0.5 * (low + high));
         let stops = self.choices.display.exposure_stops;
-        let added = light.make((surfaces, radius_m), &aim, stops, &scene);
+        let added = light.make((surfaces, radius_m), &target, stops, &scene);
         let is_added = self.edit(&Edit::AddLight(Arc::new(added)));
         self.edits.release();
         if is_added {
@@ -94,12 +106,12 @@ impl Model {
         let level = DVec3::new(back.x, 0.0, back.z).normalize_or(DVec3::X);
         let ways = [back, spot.normal + level, spot.normal - level, spot.normal].map(DVec3::normalize);
         let is_seen = |eye: DVec3| {
-            let gaze = Ray {
+            let view_ray = Ray {
                 origin: eye,
                 direction: (spot.point - eye).normalize(),
             };
-            let seen = surfaces.closest_hit(&gaze);
-            let through = probe::seen(surfaces, &gaze).map(|seen| seen.hit);
+            let seen = surfaces.closest_hit(&view_ray);
+            let through = probe::seen(surfaces, &view_ray).map(|seen| seen.hit);
             [seen, through]
                 .into_iter()
                 .flatten()

@@ -10,6 +10,7 @@ use crate::scene::{Edit, LightEdit};
 use crate::transport::Tracer;
 use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::panel::PlaceTool;
+use crate::viewer::walking::Collider;
 use serde_json::json;
 
 /// Distance from surfaces at which a light without a useful distance of its own is placed, in scene radii.
@@ -24,7 +25,7 @@ pub(super) struct DraggedLight {
     /// Whether the mouse button is down.
     is_down: bool,
     /// Last ray under the mouse that has not been applied yet.
-    gaze: Option<Ray>,
+    view_ray: Option<Ray>,
     /// `None` when the button is up.
     hand: Option<DragTool>,
 }
@@ -49,8 +50,8 @@ enum DragAction {
 
 impl DragTool {
     /// The edit for a ray under the mouse; `None` if it meets no surface and the action needs one.
-    fn edit(&self, gaze: &Ray) -> Option<Edit> {
-        let met = met(&self.surfaces, gaze);
+    fn edit(&self, view_ray: &Ray) -> Option<Edit> {
+        let met = met(&self.surfaces, view_ray);
         match (self.does, met) {
             (DragAction::Put(light, distance_m), Some((point, normal))) => {
                 let position = point + normal * distance_m;
@@ -61,7 +62,9 @@ impl DragTool {
                 Some(Edit::Light(light, LightEdit::Direction(direction)))
             }
             (DragAction::TurnSun(light), met) => {
-                let seen = met.map_or(gaze.direction, |(_, normal)| gaze.direction.reflect(normal));
+                let seen = met.map_or(view_ray.direction, |(_, normal)| {
+                    view_ray.direction.reflect(normal)
+                });
                 let direction = -seen.try_normalize()?;
                 Some(Edit::Light(light, LightEdit::Direction(direction)))
             }
@@ -71,23 +74,20 @@ impl DragTool {
 }
 
 /// First surface point along a ray, and the unit normal that faces the ray's origin.
-fn met(surfaces: &Tracer, gaze: &Ray) -> Option<(DVec3, DVec3)> {
-    let place = surfaces.intersect(gaze)?;
-    let normal = surfaces.surface_at(&place).geometric_normal;
-    let point = gaze.origin + gaze.direction * place.distance_m;
-    Some((point, normal * -normal.dot(gaze.direction).signum()))
+fn met(surfaces: &Tracer, view_ray: &Ray) -> Option<(DVec3, DVec3)> {
+    let (distance_m, normal) = surfaces.meets(view_ray.origin, view_ray.direction, f64::INFINITY)?;
+    Some((view_ray.at(distance_m), normal))
 }
 
 impl Model {
     /// Picks the object along a ray, as soon as the collision surfaces are built.
-    pub fn pick(&mut self, gaze: Ray) {
-        self.picking = Some(gaze);
-        self.poll_pick();
+    pub fn pick(&mut self, view_ray: Ray) {
+        self.seek(|pending| pending.pick = Some(view_ray));
     }
 
     /// Selects a light or an object and gives it handles.
     pub fn hold(&mut self, held: GizmoTarget) {
-        self.picking = None;
+        self.pending_tasks.pick = None;
         self.choices.selection.hold(Some(held));
         let scene = self.edits.scene();
         let name = match held {
@@ -122,28 +122,16 @@ impl Model {
         }
     }
 
-    pub(super) fn poll_pick(&mut self) {
-        let Some(gaze) = self.picking else { return };
-        let Some(surfaces) = self.surfaces() else {
-            return;
-        };
-        self.picking = None;
-        match surfaces.intersect(&gaze) {
-            Some(place) => self.hold(GizmoTarget::Object(place.object as usize)),
-            None => self.choices.selection.hold(None),
-        }
-    }
-
     /// Begins to drag the panel's light over surfaces.
-    pub fn begin_placing(&mut self, gaze: Ray) {
+    pub fn begin_placing(&mut self, view_ray: Ray) {
         self.placing.is_down = true;
-        self.placing.gaze = Some(gaze);
+        self.placing.view_ray = Some(view_ray);
     }
 
     /// The mouse points along another ray.
-    pub fn go_on_placing(&mut self, gaze: Ray) {
+    pub fn go_on_placing(&mut self, view_ray: Ray) {
         if self.placing.is_down {
-            self.placing.gaze = Some(gaze);
+            self.placing.view_ray = Some(view_ray);
         }
     }
 
@@ -154,13 +142,13 @@ impl Model {
 
     /// The edit for the last ray of the drag, as soon as the collision surfaces are built.
     pub fn placed(&mut self) -> Option<Edit> {
-        let gaze = self.placing.gaze?;
+        let view_ray = self.placing.view_ray?;
         if self.placing.hand.is_none() {
-            self.placing.hand = self.take_light(&gaze);
+            self.placing.hand = self.take_light(&view_ray);
         }
         let hand = self.placing.hand.as_ref()?;
-        let edit = hand.edit(&gaze);
-        self.placing.gaze = None;
+        let edit = hand.edit(&view_ray);
+        self.placing.view_ray = None;
         if !self.placing.is_down {
             self.placing.hand = None;
         }
@@ -168,7 +156,7 @@ impl Model {
     }
 
     /// Begins a drag. A placed light keeps its present distance from the surface under the mouse.
-    fn take_light(&mut self, gaze: &Ray) -> Option<DragTool> {
+    fn take_light(&mut self, view_ray: &Ray) -> Option<DragTool> {
         let placed = self.choices.selection.placed()?;
         let (PlaceTool::At(light) | PlaceTool::Towards(light)) = placed;
         let position = self.scene().lights.get(light)?.kind.position();
@@ -182,7 +170,7 @@ impl Model {
             }
         };
         let radius_m = self.navigator.radius_m();
-        let distance_m = met(&surfaces, gaze).map(|(point, normal)| normal.dot(position - point).abs());
+        let distance_m = met(&surfaces, view_ray).map(|(point, normal)| normal.dot(position - point).abs());
         let distance_m = distance_m
             .filter(|distance_m| *distance_m > AT * radius_m)
             .unwrap_or(OFF * radius_m);

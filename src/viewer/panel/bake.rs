@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use egui::{Align, Button, Color32, Grid, Label, Layout, ProgressBar, RichText, Ui};
 
-use super::control::{ask, counted, grouped};
+use super::control::{about_button, ask, counted, grouped};
 use super::{Choices, Command, Model, file};
 use crate::bake::{BYTES_PER_TEXEL, StopReason};
 use crate::illumination::IlluminationMap;
@@ -26,11 +26,8 @@ fn show(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Co
         ask(ui, "Re-bake", invalid, commands, Command::Rebake);
         let idle = (!model.state.is_working()).then_some("No bake is running.");
         ask(ui, "Cancel", idle, commands, Command::Cancel);
-        ui.checkbox(&mut choices.automatic, "automatic")
-            .on_hover_text(
-                "Bakes every change of a setting or of the scene, at the pace of first levels while it is dragged. \
-                 Default: on.",
-            );
+        let automatic = ui.checkbox(&mut choices.automatic, "automatic");
+        automatic.on_hover_text(about_button("automatic"));
     });
     match &refused {
         Some(error) => drop(ui.colored_label(FAILED, error.to_string())),
@@ -250,8 +247,8 @@ pub fn header(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut 
     });
     show(ui, choices, model, commands);
     if model.picture.lost_device {
-        let told = "The graphics device was lost and came back; nothing else was.";
-        ui.colored_label(ATTENTION, told);
+        let message = "The graphics device was lost and came back; nothing else was.";
+        ui.colored_label(ATTENTION, message);
     }
     file::show_state(ui, model);
     if let Some(refusal) = model.refusal.as_deref() {

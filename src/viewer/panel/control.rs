@@ -3,9 +3,10 @@
 use std::any::type_name;
 use std::borrow::Cow;
 use std::collections::HashMap;
+use std::ops::RangeInclusive;
 use std::sync::LazyLock;
 
-use egui::{Button, ComboBox, EventFilter, Grid, Key, Response, RichText, Ui, vec2};
+use egui::{Button, ComboBox, EventFilter, Grid, Key, Response, RichText, Slider, SliderClamping, Ui, vec2};
 use serde::Deserialize;
 use strum::{EnumMessage, VariantArray};
 
@@ -148,6 +149,19 @@ pub fn setting<T: PartialEq + Clone>(
     ui.end_row();
 }
 
+/// A row for a value that is changed by a command: returns the value that is to take the place of the present one.
+pub fn edited<T: PartialEq + Clone>(
+    ui: &mut Ui,
+    label: &str,
+    unavailable: Option<&str>,
+    (present, default): (&T, &T),
+    add: impl FnOnce(&mut Ui, &mut T) -> Response,
+) -> Option<T> {
+    let mut value = present.clone();
+    setting(ui, label, unavailable, (&mut value, default), add);
+    (value != *present).then_some(value)
+}
+
 /// A reset button; returns whether it was clicked.
 pub fn reset_to(ui: &mut Ui, label: &str, default: &str) -> bool {
     let name = format!("Reset {label}");
@@ -274,21 +288,47 @@ pub fn listed<T>(ui: &mut Ui, value: &mut T) -> Response
 where
     T: VariantArray + EnumMessage + Into<&'static str> + PartialEq + Copy,
 {
-    let choices = T::VARIANTS.iter();
-    let choices = choices.map(|value| {
-        (
-            *value,
-            (*value).into(),
-            value.get_documentation().unwrap_or_default(),
-        )
-    });
-    choice(
-        ui,
-        type_name::<T>(),
-        value,
-        "custom",
-        &choices.collect::<Vec<_>>(),
-    )
+    listed_but(ui, value, |_| None)
+}
+
+/// The same; values that have a reason `why_not` cannot be picked.
+pub fn listed_but<T>(ui: &mut Ui, value: &mut T, why_not: impl Fn(T) -> Option<&'static str>) -> Response
+where
+    T: VariantArray + EnumMessage + Into<&'static str> + PartialEq + Copy,
+{
+    let entry = |value: &T| {
+        let hover = value.get_documentation().unwrap_or_default();
+        ((*value).into(), hover.into(), why_not(*value))
+    };
+    let entries: Vec<Entry> = T::VARIANTS.iter().map(entry).collect();
+    let shown = (
+        (*value).into(),
+        T::VARIANTS.iter().position(|listed| listed == value),
+    );
+    let (response, picked) = pick(ui, (type_name::<T>(), CONTROL_WIDTH), shown, &entries);
+    if let Some(index) = picked {
+        *value = T::VARIANTS[index];
+    }
+    response
+}
+
+/// A drop-down list of names without tooltips.
+pub fn pick_name(
+    ui: &mut Ui,
+    list: (&str, f32),
+    shown: (&str, Option<usize>),
+    names: &[&str],
+) -> (Response, Option<usize>) {
+    let entries: Vec<Entry> = names.iter().map(|name| (*name, "".into(), None)).collect();
+    pick(ui, list, shown, &entries)
+}
+
+/// A slider beyond whose ends can be typed.
+pub fn slider(range: RangeInclusive<f64>, decimals: usize) -> impl FnOnce(&mut Ui, &mut f64) -> Response {
+    move |ui, value| {
+        let slider = Slider::new(value, range).clamping(SliderClamping::Never);
+        ui.add(slider.fixed_decimals(decimals))
+    }
 }
 
 /// Four significant digits; scientific notation for very large and very small values.

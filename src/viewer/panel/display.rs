@@ -1,44 +1,17 @@
 //! Section *Display*: how the picture shows the maps. Nothing here changes a bake.
 
 use egui::{DragValue, Response, Slider, SliderClamping, Ui};
-use strum::{EnumMessage, VariantArray};
 
-use super::control::{CONTROL_WIDTH, Entry, about, choice, counted, pick, row, rows, setting, short};
+use super::control::{about, ask, choice, counted, listed, listed_but, row, rows, setting, short};
 use super::{Command, Display, LayerShown, Model, Quantity, bake};
-use crate::eye_pass::{ToneMap, WhiteBalance};
+use crate::eye_pass::WhiteBalance;
 use crate::optics::spectrum::temperature::CAMERA_KELVIN;
 use crate::settings::LayerKind;
 use crate::viewer::false_colours;
 use crate::viewer::views::{IrradianceUnit, ScaleChoice};
 
-const AUTO_EXPOSURE: &str = "Measures the present picture and sets the exposure once, so that brightness stays \
-                             comparable afterwards. Takes one small picture.";
 const NO_DIFFERENCE: &str = "Ask under Effects what an effect is worth.";
 const NO_ERRORS: &str = "These maps come without an estimate of their error.";
-
-const TONE_MAPS: [(ToneMap, &str, &str); 5] = [
-    (
-        ToneMap::Soft,
-        "soft",
-        "Exact in dark and middle tones; highlights up to 16 times white can be told apart",
-    ),
-    (
-        ToneMap::Neutral,
-        "neutral",
-        "Khronos PBR Neutral: keeps hues, rolls highlights off",
-    ),
-    (
-        ToneMap::AgX,
-        "AgX",
-        "Troy Sobotka's AgX: soft highlights; bright saturated light turns white",
-    ),
-    (
-        ToneMap::Aces,
-        "ACES",
-        "Stephen Hill's fit of ACES: more contrast, darker middle tones",
-    ),
-    (ToneMap::None, "none", "cut at the display's white"),
-];
 
 /// Range of values that can be typed for the ends of the scale [W/m²].
 const MIN_W_M2: f64 = 1e-9;
@@ -57,10 +30,7 @@ pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Ve
                 // Leaves room for the button.
                 ui.spacing_mut().slider_width = 74.0;
                 let slider = exposure(ui, &mut display.exposure_stops);
-                let auto = ui.button("Auto").on_hover_text(AUTO_EXPOSURE);
-                if auto.clicked() {
-                    commands.push(Command::MeasureExposure);
-                }
+                ask(ui, "Auto", None, commands, Command::MeasureExposure);
                 slider
             })
             .inner
@@ -69,9 +39,7 @@ pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Ve
         let white = (&mut display.white_balance, &default.white_balance);
         setting(ui, "White balance", None, white, white_balance);
         let tone_map = (&mut display.tone_map, &default.tone_map);
-        setting(ui, "Tone map", None, tone_map, |ui, tone_map| {
-            choice(ui, "tone map", tone_map, "custom", &TONE_MAPS)
-        });
+        setting(ui, "Tone map", None, tone_map, listed);
         let nothing = baked.is_empty().then_some("There are no maps yet.");
         let shown = (&mut display.layer, &default.layer);
         setting(ui, "Light shown", nothing, shown, |ui, shown| {
@@ -86,10 +54,10 @@ pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Ve
         }
     });
     if model.survey.faults > 0 {
-        let told = counted(model.survey.faults, "texel");
+        let faults = counted(model.survey.faults, "texel");
         ui.colored_label(
             bake::ATTENTION,
-            format!("{told} without a finite value, shown in magenta."),
+            format!("{faults} without a finite value, shown in magenta."),
         );
     }
 }
@@ -145,18 +113,7 @@ fn quantity(ui: &mut Ui, shown: &mut Quantity, model: &Model) -> Response {
         Quantity::Difference if !has_difference => Some(NO_DIFFERENCE),
         _ => None,
     };
-    let views = Quantity::VARIANTS;
-    let hover = |kind: &Quantity| kind.get_documentation().unwrap_or_default();
-    let entries = views
-        .iter()
-        .map(|kind| (kind.name(), hover(kind).into(), why_not(*kind)));
-    let entries: Vec<Entry> = entries.collect();
-    let at = views.iter().position(|kind| kind == shown);
-    let (response, picked) = pick(ui, ("view", CONTROL_WIDTH), (shown.name(), at), &entries);
-    if let Some(index) = picked {
-        *shown = views[index];
-    }
-    response
+    listed_but(ui, shown, why_not)
 }
 
 fn scale(ui: &mut Ui, choice: &mut ScaleChoice) -> Response {

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
 
 use super::bake::{FAILED, two_digits};
-use super::control::{grouped, reset_to, significant};
+use super::control::{about_button, grouped, reset_to, significant};
 use super::{Command, Model};
 use crate::bake::BakeCounts;
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
@@ -160,8 +160,6 @@ fn rays(effect: Effect, counts: &BakeCounts) -> Option<String> {
     (rays > 0).then(|| format!("{} {name}", grouped(rays)))
 }
 
-const BUTTON: &str = "Bakes once more without this effect, beside the maps that are shown, and shows in false colours \
-                      where it adds light and where it takes light away. Costs a whole bake; any change stops it.";
 const LINE: &str = "Light on all maps and layers with the effect minus without it, in luminous-equivalent watts; the \
                     root mean square of the difference over the mean with it.";
 
@@ -175,7 +173,7 @@ fn button(ui: &mut Ui, effect: Effect, model: &Model) -> bool {
     let is_ready = !model.state.is_working() && model.last.as_ref().is_some_and(|last| last.is_final);
     let button = ui
         .add_enabled(is_ready, Button::new("worth?").small())
-        .on_hover_text(BUTTON)
+        .on_hover_text(about_button("worth?"))
         .on_disabled_hover_text("Known once the bake is done.");
     let name = effect.name().replace('_', " ");
     button.widget_info(|| WidgetInfo::labeled(Role::Button, is_ready, format!("{name}: worth")));

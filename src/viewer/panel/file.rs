@@ -4,12 +4,9 @@ use std::path::Path;
 
 use egui::{Checkbox, Key, TextEdit, Ui, vec2};
 
-use super::control::{CONTROL_WIDTH, row, rows};
+use super::control::{CONTROL_WIDTH, about_button, ask, row, rows};
 use super::{Command, Model, bake};
 use crate::scene::builtin;
-
-const WATCH: &str = "Reads the scene again whenever its file, or a buffer or an image that the file refers to, is written. \
-                     Camera, settings and edits stay, as far as the new file has a place for them. Default: off.";
 
 /// Typed text of the row.
 #[derive(Clone, Debug, Default)]
@@ -59,17 +56,13 @@ pub fn show(
         buttons(ui, model, commands);
         let is_file = !model.scene().source.starts_with("builtin:");
         ui.add_enabled(is_file, Checkbox::new(watches, "watch"))
-            .on_hover_text(WATCH)
+            .on_hover_text(about_button("watch"))
             .on_disabled_hover_text("A built-in scene has no file that could change.");
     });
 }
 
 fn buttons(ui: &mut Ui, model: &Model, commands: &mut Vec<Command>) {
-    let open = ui.button("Open…");
-    let open = open.on_hover_text("Chooses a .glb or .gltf file in the system's own dialog.");
-    if open.clicked() {
-        commands.push(Command::Browse);
-    }
+    ask(ui, "Open…", None, commands, Command::Browse);
     ui.add_enabled_ui(!model.files.recent.paths().is_empty(), |ui| {
         ui.menu_button("Recent", |ui| {
             for path in model.files.recent.paths() {

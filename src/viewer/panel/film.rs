@@ -78,8 +78,8 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
         let idle = (!model.exporter.state.is_running()).then_some("Nothing is filmed now.");
         ask(ui, "Stop", idle, commands, FilmCommand::Stop);
     });
-    if let Some(told) = &model.film_message {
-        ui.label(RichText::new(told).small());
+    if let Some(message) = &model.film_message {
+        ui.label(RichText::new(message).small());
     }
     export::outcome(ui, model);
 }

@@ -4,7 +4,7 @@ use egui::{Align2, Color32, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo,
 
 use super::effects::COUNTER;
 use crate::eye_pass::renderer::GpuMs;
-use crate::viewer::timing::{FrameStats, FrameTimes, Latencies, PICTURES, Percentiles, sum_ms};
+use crate::viewer::timing::{FrameStats, FrameTimes, PICTURES};
 
 /// Height of the graph [points].
 const HEIGHT: f32 = 64.0;
@@ -42,7 +42,7 @@ pub fn title(times: Option<&FrameTimes>) -> String {
             let coarse = times
                 .and_then(coarseness)
                 .map_or(String::new(), |part| format!(", {part}"));
-            format!("Frame time ({:.2} ms{coarse})", sum_ms(*newest))
+            format!("Frame time ({:.2} ms{coarse})", newest.sum())
         }
         None => "Frame time".into(),
     }
@@ -59,14 +59,14 @@ pub fn show(ui: &mut Ui, times: Option<&FrameTimes>) {
         return;
     };
     graph(ui, times);
-    if let Some(made) = times.made() {
+    if let Some(made) = times.made {
         ui.label(RichText::new(made_how(made)).size(COUNTER))
             .on_hover_text(HOW);
     }
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 8.0;
         let text = |text: String| RichText::new(text).size(COUNTER);
-        ui.label(text(format!("{:.2} ms", sum_ms(*newest))).strong())
+        ui.label(text(format!("{:.2} ms", newest.sum())).strong())
             .on_hover_text("All passes of the newest picture.");
         for ((name, colour, what), ms) in PASSES.into_iter().zip(by_pass(*newest)) {
             ui.label(text(format!("{name} {ms:.2}")).color(colour))
@@ -75,37 +75,9 @@ pub fn show(ui: &mut Ui, times: Option<&FrameTimes>) {
     });
 }
 
-const WAITS: &str = "From a key, click or movement of the mouse until the frame that shows it was handed to the \
-                     system; of the last 10,000. Events that came while the window was busy count from the earliest \
-                     moment at which they can have come.";
-
-/// Shows the latencies from events to frames.
-pub fn waits(ui: &mut Ui, latencies: &Latencies) {
-    for (when, waits) in [
-        ("Baking", latencies.while_baking()),
-        ("Otherwise", latencies.otherwise()),
-    ] {
-        if let Some(waits) = waits {
-            ui.label(RichText::new(told_waits(when, &waits)).size(COUNTER))
-                .on_hover_text(WAITS);
-        }
-    }
-}
-
-fn told_waits(when: &str, waits: &Percentiles) -> String {
-    let Percentiles {
-        count,
-        p50_ms,
-        p95_ms,
-        p99_ms,
-        ..
-    } = waits;
-    format!("{when}: event to frame {p50_ms:.0} ms, 95 % {p95_ms:.0}, 99 % {p99_ms:.0} (of {count})")
-}
-
 /// Note for the title if reflections and refractions are traced below the frame's resolution.
 fn coarseness(times: &FrameTimes) -> Option<String> {
-    let scale = times.made()?.traced_scale?;
+    let scale = times.made?.traced_scale?;
     (scale < 1.0).then(|| format!("mirrors and glass at 1/{:.0}", 1.0 / scale))
 }
 

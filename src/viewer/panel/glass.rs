@@ -2,10 +2,10 @@
 
 use std::sync::Arc;
 
-use egui::{Response, Slider, SliderClamping, Ui};
+use egui::{Response, Ui};
 
 use super::Command;
-use super::control::{CONTROL_WIDTH, Entry, pick, setting};
+use super::control::{CONTROL_WIDTH, Entry, edited, pick, slider};
 use crate::optics::Glass;
 use crate::optics::glass::{Dispersion, catalogue};
 use crate::scene::{Edit, Material, MaterialEdit};
@@ -22,26 +22,19 @@ pub fn show(
     why_not: Option<&str>,
     commands: &mut Vec<Command>,
 ) {
-    let mut glass = shown.glass.clone();
-    let value = (&mut glass, &of_file.glass);
-    setting(ui, "Glass", why_not, value, by_name);
-    let mut dispersion = dispersion_of(shown);
-    let (before, default) = (dispersion, dispersion_of(of_file));
-    let value = (&mut dispersion, &default);
-    setting(ui, "Dispersion [20/V]", why_not, value, |ui, dispersion| {
-        let slider = Slider::new(dispersion, 0.0..=1.0).clamping(SliderClamping::Never);
-        ui.add(slider.fixed_decimals(3))
-    });
-    if dispersion != before {
+    let mut glass = edited(ui, "Glass", why_not, (&shown.glass, &of_file.glass), by_name);
+    let (before, default) = (dispersion_of(shown), dispersion_of(of_file));
+    let value = (&before, &default);
+    if let Some(dispersion) = edited(ui, "Dispersion [20/V]", why_not, value, slider(0.0..=1.0, 3)) {
         // The file's dispersion restores the file's glass.
-        glass = if dispersion == default && shown.ior == of_file.ior {
+        glass = Some(if dispersion == default && shown.ior == of_file.ior {
             of_file.glass.clone()
         } else {
             let is_dispersive = dispersion > 0.0;
             is_dispersive.then(|| Arc::new(Glass::with_abbe_number(shown.ior, 20.0 / dispersion)))
-        };
+        });
     }
-    if glass != shown.glass {
+    if let Some(glass) = glass.filter(|glass| *glass != shown.glass) {
         let ior = match &glass {
             Some(glass) => glass.dispersion.n_d(),
             None => shown.ior,

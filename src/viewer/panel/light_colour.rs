@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Response, Ui};
 
 use super::Command;
-use super::control::{CONTROL_WIDTH, Entry, pick, setting};
+use super::control::{CONTROL_WIDTH, edited, pick_name};
 use crate::optics::LinearSrgb;
 use crate::optics::spectrum::{Spectrum, illuminants};
 use crate::scene::{Edit, Light, LightEdit};
@@ -24,28 +24,24 @@ const BY_NUMBER: [&str; 7] = [
 
 /// Shows the rows of a light; their defaults are those of the file. Pushes edits to `commands`.
 pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), commands: &mut Vec<Command>) {
-    let mut colour = light.colour;
-    setting(ui, "Colour", None, (&mut colour, &of_file.colour), button);
-    let mut spectrum = light.spectrum.clone();
-    let value = (&mut spectrum, &of_file.spectrum);
-    setting(ui, "Spectrum", None, value, by_name);
-    let wanted = if spectrum != light.spectrum {
-        match &spectrum {
-            _ if spectrum == of_file.spectrum => (of_file.colour, spectrum),
-            Some(found) => (found.xyz().to_linear_srgb(), spectrum),
-            None => (within_reach(light.colour), None),
-        }
-    } else if colour == light.colour {
-        return;
-    } else if colour == of_file.colour {
-        (colour, of_file.spectrum.clone())
-    } else {
-        (colour, None)
+    let colour = edited(ui, "Colour", None, (&light.colour, &of_file.colour), button);
+    let spectrum = edited(
+        ui,
+        "Spectrum",
+        None,
+        (&light.spectrum, &of_file.spectrum),
+        by_name,
+    );
+    let (colour, spectrum) = match (colour, spectrum) {
+        (_, Some(spectrum)) if spectrum == of_file.spectrum => (of_file.colour, spectrum),
+        (_, Some(Some(found))) => (found.xyz().to_linear_srgb(), Some(found)),
+        (_, Some(None)) => (within_reach(light.colour), None),
+        (Some(colour), None) if colour == of_file.colour => (colour, of_file.spectrum.clone()),
+        (Some(colour), None) => (colour, None),
+        (None, None) => return,
     };
-    commands.push(Command::Edit(Edit::Light(
-        index,
-        LightEdit::Colour(wanted.0, wanted.1),
-    )));
+    let edit = LightEdit::Colour(colour, spectrum);
+    commands.push(Command::Edit(Edit::Light(index, edit)));
 }
 
 /// Clamps negative channels to zero.
@@ -73,8 +69,7 @@ fn by_name(ui: &mut Ui, spectrum: &mut Option<Arc<Spectrum>>) -> Response {
         Some(spectrum) => spectrum.name().unwrap_or("of the file"),
     };
     let at = names.iter().position(|name| *name == shown);
-    let entries: Vec<Entry> = names.iter().map(|name| (*name, "".into(), None)).collect();
-    let (response, picked) = pick(ui, ("spectrum", CONTROL_WIDTH), (shown, at), &entries);
+    let (response, picked) = pick_name(ui, ("spectrum", CONTROL_WIDTH), (shown, at), &names);
     if let Some(index) = picked {
         // All names in the list are valid.
         *spectrum = match index {

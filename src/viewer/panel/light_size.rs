@@ -3,7 +3,7 @@
 use egui::{DragValue, Response, Ui};
 
 use super::Command;
-use super::control::setting;
+use super::control::edited;
 use crate::scene::{Edit, Light, LightEdit, LightKind, LightSize};
 
 /// Change per point of a drag, as a fraction of the radius; [m] if the radius is 0.
@@ -13,16 +13,14 @@ const ANGLE_SPEED_DEG: f64 = 0.01;
 
 /// Shows the size of a light, if its kind has one; its default is that of the file. Pushes edits to `commands`.
 pub fn show(ui: &mut Ui, index: usize, (light, of_file): (&Light, &Light), commands: &mut Vec<Command>) {
-    let mut size = light.size;
-    let value = (&mut size, &of_file.size);
-    match light.kind {
-        LightKind::Point { .. } | LightKind::Spot { .. } => setting(ui, "Radius [m]", None, value, radius),
-        LightKind::Sun { .. } => setting(ui, "Diameter [°]", None, value, diameter),
-        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => {}
-    }
-    if size != light.size {
-        commands.push(Command::Edit(Edit::Light(index, LightEdit::Size(size))));
-    }
+    let value = (&light.size, &of_file.size);
+    let size = match light.kind {
+        LightKind::Point { .. } | LightKind::Spot { .. } => edited(ui, "Radius [m]", None, value, radius),
+        LightKind::Sun { .. } => edited(ui, "Diameter [°]", None, value, diameter),
+        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => None,
+    };
+    let edit = |size| Command::Edit(Edit::Light(index, LightEdit::Size(size)));
+    commands.extend(size.map(edit));
 }
 
 fn radius(ui: &mut Ui, size: &mut LightSize) -> Response {

@@ -225,6 +225,6 @@ pub fn compare(ui: &mut Ui, folder: &mut String, model: &Model, commands: &mut V
         }
     });
     if let Some(reference) = model.reference.as_ref() {
-        ui.label(reference.told());
+        ui.label(reference.in_words());
     }
 }

@@ -86,7 +86,7 @@ pub struct Panel {
     /// Whether probing was on in the last frame.
     probed: bool,
     /// The probe result that the section has scrolled to: its point, and whether paths were found.
-    probe_told: Option<(DVec3, bool)>,
+    probe_shown: Option<(DVec3, bool)>,
     /// Typed folder of the maps to compare with.
     compare_folder: String,
     /// Typed file of a camera path.
@@ -175,10 +175,7 @@ impl Panel {
         section(ui, "Display", true, |ui| {
             display::show(ui, &mut choices.display, model, commands);
             let times = model.picture.frame_times.as_ref();
-            part(ui, &frame_graph::title(times), |ui| {
-                frame_graph::show(ui, times);
-                frame_graph::waits(ui, &model.picture.latencies);
-            });
+            part(ui, &frame_graph::title(times), |ui| frame_graph::show(ui, times));
         });
         section(ui, "Export", true, |ui| {
             export::show(ui, &mut self.maps_folder, model, commands)
@@ -217,11 +214,11 @@ impl Panel {
             .show_unindented(ui, |ui| {
                 probe::show(ui, (&mut choices.probes, &mut choices.sketched), model, commands)
             });
-        let told = model
+        let probed = model
             .probed()
             .map(|probed| (probed.point, probed.explanation.is_some()));
-        let is_news = told.is_some() && told != self.probe_told;
-        self.probe_told = told;
+        let is_news = probed.is_some() && probed != self.probe_shown;
+        self.probe_shown = probed;
         if is_news || (is_switched && choices.probes) {
             shown.header_response.scroll_to_me(Some(Align::TOP));
         }

@@ -2,7 +2,7 @@
 
 use egui::{Grid, Ui};
 
-use super::control::{ask, counted, grouped, significant};
+use super::control::{about_button, ask, counted, grouped, significant};
 use super::{Command, Model};
 use crate::light_pass::explain::LightPath;
 use crate::transport::Event;
@@ -10,15 +10,6 @@ use crate::units::LUMENS_PER_WATT;
 use crate::viewer::probe::{Probed, ProbedTexel};
 use crate::viewer::sketching::PreviewFlags;
 
-const TURN_ON: &str = "Click on a surface to see what lights it (P): irradiance and its error, and the light paths that \
-                       come there, drawn through every glass surface. Looks through glass and over mirrors to what is \
-                       seen in them. Changes nothing in a bake; paths take a second or so on a thread of their own.";
-const HITS: &str = "Draws a dot wherever one of some thousand light rays lands that went over glass, mirrors or water: the \
-                    caustic's light before it is spread. The rays are evenly thin over each light, and not those of the \
-                    bake. Lamps shine from their middles, rough surfaces as if smooth. Changes nothing in a bake.";
-const PATCHES: &str = "Outlines what lies between four neighbouring light rays that met the same objects: small patches are \
-                       bright, folded ones are where the wavefront overlaps. Far thinner than the bake's patches; changes \
-                       nothing in a bake.";
 /// Limit of the paths that are listed; the strongest come first.
 const MAX_LISTED: usize = 8;
 
@@ -29,7 +20,8 @@ pub fn show(
     commands: &mut Vec<Command>,
 ) {
     ui.horizontal(|ui| {
-        ui.toggle_value(is_on, "Probe").on_hover_text(TURN_ON);
+        ui.toggle_value(is_on, "Probe")
+            .on_hover_text(about_button("Probe"));
         let none = model.probed().is_none().then_some("Nothing is probed yet.");
         ask(ui, "Clear probe", none, commands, Command::ClearProbe);
         let dark = model.maps().is_empty().then_some("No light is baked yet.");
@@ -59,16 +51,17 @@ pub fn show(
 fn sketch(ui: &mut Ui, sketched: &mut PreviewFlags, model: &Model) {
     ui.horizontal(|ui| {
         ui.label("Draw");
-        ui.checkbox(&mut sketched.hits, "hits").on_hover_text(HITS);
+        ui.checkbox(&mut sketched.hits, "hits")
+            .on_hover_text(about_button("hits"));
         ui.checkbox(&mut sketched.patches, "patches")
-            .on_hover_text(PATCHES);
+            .on_hover_text(about_button("patches"));
         if let Some(sketch) = model.sketch().filter(|_| sketched.is_any()) {
-            let told = format!(
+            let text = format!(
                 "{} rays, {} patches",
                 grouped(sketch.rays),
                 grouped(sketch.patches.len() as u64)
             );
-            ui.weak(told);
+            ui.weak(text);
         }
     });
 }
@@ -109,22 +102,24 @@ fn figures(ui: &mut Ui, texel: &ProbedTexel) {
 }
 
 fn paths(ui: &mut Ui, probed: &Probed, model: &Model) {
-    let Some(told) = &probed.explanation else { return };
-    if told.paths.is_empty() {
+    let Some(explanation) = &probed.explanation else {
+        return;
+    };
+    if explanation.paths.is_empty() {
         ui.label("No light path leads here.");
     }
-    for path in told.paths.iter().take(MAX_LISTED) {
+    for path in explanation.paths.iter().take(MAX_LISTED) {
         ui.label(format!("{}  {}", percent(probed.share(path)), chain(path, model)));
     }
-    if told.paths.len() > MAX_LISTED {
-        let rest: f64 = told.paths[MAX_LISTED..]
+    if explanation.paths.len() > MAX_LISTED {
+        let rest: f64 = explanation.paths[MAX_LISTED..]
             .iter()
             .map(|path| probed.share(path))
             .sum();
-        let more = counted(told.paths.len() - MAX_LISTED, "path");
+        let more = counted(explanation.paths.len() - MAX_LISTED, "path");
         ui.label(format!("{}  {more} more", percent(rest)));
     }
-    if !told.is_complete {
+    if !explanation.is_complete {
         ui.weak("Not all of it could be followed.");
     }
 }

@@ -2,8 +2,11 @@
 
 use egui::{DragValue, Response, RichText, Slider, SliderClamping, Ui};
 use glam::DVec3;
+use strum::EnumMessage;
 
-use super::control::{CONTROL_WIDTH, Entry, about, counted, pick, row, rows, setting, significant};
+use super::control::{
+    CONTROL_WIDTH, about, about_button, counted, edited, pick_name, row, rows, setting, significant, slider,
+};
 use super::{Command, Model, bake, glass, light_colour, light_size, waves};
 use crate::optics::LinearSrgb;
 use crate::scene::{Edit, LightEdit, LightKind, MaterialEdit, Motion, Scene, SurfaceKind, why_light_stays};
@@ -31,7 +34,7 @@ const NO_TURN: &str = "It is tilted.";
 pub struct Selection {
     light: usize,
     object: usize,
-    hand: MouseTool,
+    tool: MouseTool,
     /// Counts picks in the picture; each opens the section.
     pub picks: u32,
 }
@@ -63,7 +66,7 @@ enum MouseTool {
 impl Selection {
     /// What has handles in the picture.
     pub fn held(&self) -> Option<GizmoTarget> {
-        match self.hand {
+        match self.tool {
             MouseTool::Nothing => None,
             MouseTool::Light | MouseTool::Place | MouseTool::Aim => Some(GizmoTarget::Light(self.light)),
             MouseTool::Object => Some(GizmoTarget::Object(self.object)),
@@ -72,7 +75,7 @@ impl Selection {
 
     /// The light that clicks in the picture place or aim.
     pub fn placed(&self) -> Option<PlaceTool> {
-        match self.hand {
+        match self.tool {
             MouseTool::Place => Some(PlaceTool::At(self.light)),
             MouseTool::Aim => Some(PlaceTool::Towards(self.light)),
             MouseTool::Nothing | MouseTool::Light | MouseTool::Object => None,
@@ -81,7 +84,7 @@ impl Selection {
 
     /// Selects what was picked in the picture; `None` deselects.
     pub fn hold(&mut self, held: Option<GizmoTarget>) {
-        self.hand = match held {
+        self.tool = match held {
             None => MouseTool::Nothing,
             Some(GizmoTarget::Light(light)) => {
                 self.light = light;
@@ -130,7 +133,7 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mu
                 .inner
             });
             light(ui, selection.light, model, commands);
-            light_hand(ui, selection, model);
+            light_tools(ui, selection, model);
         }
         if !scene.objects.is_empty() {
             let names = scene.objects.iter().map(|object| object.name.as_str());
@@ -140,16 +143,9 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mu
             material(ui, selection.object, model, commands);
             place_of_object(ui, selection.object, model, commands);
             row(ui, "Handles", None, |ui| {
-                ui.horizontal(|ui| {
-                    hand(
-                        ui,
-                        &mut selection.hand,
-                        MouseTool::Object,
-                        ("Move object", "Move object"),
-                        about("Handles").what,
-                    );
-                })
-                .response
+                let (what, present) = (about("Handles").what, &mut selection.tool);
+                ui.horizontal(|ui| tool(ui, present, MouseTool::Object, "Move object", what))
+                    .response
             });
         }
     });
@@ -161,10 +157,11 @@ fn add_light(ui: &mut Ui, commands: &mut Vec<Command>) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 3.0;
             for light in NewLight::ALL {
+                let what = light.get_documentation().unwrap_or_default();
                 let button = ui
                     .button(light.name())
                     .accessible_name(format!("Add {}", light.name()))
-                    .on_hover_text(format!("{} {}", what_of(light), about("Add light").what));
+                    .on_hover_text(format!("{what} {}", about("Add light").what));
                 if button.clicked() {
                     commands.push(Command::AddLight(light));
                 }
@@ -174,22 +171,13 @@ fn add_light(ui: &mut Ui, commands: &mut Vec<Command>) {
     });
 }
 
-fn what_of(light: NewLight) -> &'static str {
-    match light {
-        NewLight::Lamp => "A point that shines the same in every direction.",
-        NewLight::Spot => "A cone of light, at what is looked at.",
-        NewLight::Sun => "Parallel light from infinitely far.",
-        NewLight::Panel => "A flat square lamp, turned to what is looked at.",
-    }
-}
-
 fn remove_light(ui: &mut Ui, selection: &mut Selection, scene: &Scene, commands: &mut Vec<Command>) {
     let light = &scene.lights[selection.light];
     let why_not = why_light_stays(&light.kind);
     let remove = ui.add_enabled(why_not.is_none(), egui::Button::new("Remove"));
     let remove = remove
         .accessible_name("Remove light")
-        .on_hover_text("Takes the light out of the scene; undo brings it back.")
+        .on_hover_text(about_button("Remove light"))
         .on_disabled_hover_text(format!("`{}` {}.", light.name, why_not.unwrap_or_default()));
     if remove.clicked() {
         commands.push(Command::Edit(Edit::RemoveLight(selection.light)));
@@ -206,8 +194,7 @@ fn one_of<'a>(
 ) -> Response {
     let names: Vec<&str> = names.collect();
     *chosen = (*chosen).min(names.len().saturating_sub(1));
-    let entries: Vec<Entry> = names.iter().map(|name| (*name, "".into(), None)).collect();
-    let (response, picked) = pick(ui, (name, width), (names[*chosen], Some(*chosen)), &entries);
+    let (response, picked) = pick_name(ui, (name, width), (names[*chosen], Some(*chosen)), &names);
     *chosen = picked.unwrap_or(*chosen);
     response
 }
@@ -224,21 +211,16 @@ fn light(ui: &mut Ui, light: usize, model: &Model, commands: &mut Vec<Command>) 
     ) {
         light_colour::show(ui, light, (shown, of_file), commands);
     }
+    let edit = |edit: LightEdit| Command::Edit(Edit::Light(light, edit));
     if let (Some(position), Some(default)) = (kind.position(), of_file.kind.position()) {
-        let mut moved = position;
-        setting(ui, "Position [m]", None, (&mut moved, &default), |ui, moved| {
-            place(ui, "Position [m]", moved, model.scene())
+        let moved = edited(ui, "Position [m]", None, (&position, &default), |ui, moved| {
+            coordinates(ui, "Position [m]", moved, model.scene())
         });
-        if moved != position {
-            commands.push(Command::Edit(Edit::Light(light, LightEdit::Position(moved))));
-        }
+        commands.extend(moved.map(LightEdit::Position).map(edit));
     }
     if let (Some(present), Some(default)) = (kind.direction(), of_file.kind.direction()) {
-        let mut turned = present;
-        setting(ui, "Direction [°]", None, (&mut turned, &default), angles);
-        if turned != present {
-            commands.push(Command::Edit(Edit::Light(light, LightEdit::Direction(turned))));
-        }
+        let rotated = edited(ui, "Direction [°]", None, (&present, &default), angles);
+        commands.extend(rotated.map(LightEdit::Direction).map(edit));
     }
 }
 
@@ -249,8 +231,7 @@ fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), c
         LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => "Brightness",
     };
     let (present, default) = (kind.strength(), of_file.strength());
-    let mut value = present;
-    setting(ui, about, None, (&mut value, &default), |ui, value| {
+    let strength = edited(ui, about, None, (&present, &default), |ui, value| {
         ui.add(
             Slider::new(value, default * POWER_FACTORS.0..=default * POWER_FACTORS.1)
                 .logarithmic(true)
@@ -258,13 +239,12 @@ fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), c
                 .custom_formatter(|value, _| significant(value)),
         )
     });
-    if value != present {
-        commands.push(Command::Edit(Edit::Light(light, LightEdit::Strength(value))));
-    }
+    let edit = |strength| Command::Edit(Edit::Light(light, LightEdit::Strength(strength)));
+    commands.extend(strength.map(edit));
 }
 
 /// A row of three coordinates [m].
-fn place(ui: &mut Ui, name: &str, place: &mut DVec3, scene: &Scene) -> Response {
+fn coordinates(ui: &mut Ui, name: &str, point: &mut DVec3, scene: &Scene) -> Response {
     let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
     let speed = DRAG_SHARE * (high - low).length().max(1e-6);
     ui.horizontal(|ui| {
@@ -272,7 +252,7 @@ fn place(ui: &mut Ui, name: &str, place: &mut DVec3, scene: &Scene) -> Response 
         let spacing = ui.spacing_mut();
         (spacing.item_spacing.x, spacing.button_padding.x) = (3.0, 2.0);
         spacing.interact_size.x = 58.0;
-        let axes = [("x", &mut place.x), ("y", &mut place.y), ("z", &mut place.z)];
+        let axes = [("x", &mut point.x), ("y", &mut point.y), ("z", &mut point.z)];
         axes.into_iter()
             .map(|(axis, value)| {
                 let decimals = if value.abs() < 10.0 { 3 } else { 2 };
@@ -305,10 +285,10 @@ fn angles(ui: &mut Ui, direction: &mut DVec3) -> Response {
             .clamp(-STEEPEST_DEG, STEEPEST_DEG)
             .to_radians()
             .sin_cos();
-        let turned = DVec3::new(azimuth.sin() * cosine, sine, -azimuth.cos() * cosine);
+        let rotated = DVec3::new(azimuth.sin() * cosine, sine, -azimuth.cos() * cosine);
         // Ignores the rounding error of the conversion to angles and back.
-        if turned.distance(*direction) > SAME_DIRECTION {
-            *direction = turned;
+        if rotated.distance(*direction) > SAME_DIRECTION {
+            *direction = rotated;
         }
     }
     response
@@ -322,39 +302,19 @@ fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Comman
     );
     let no_ior = matches!(shown.surface, SurfaceKind::Diffuse | SurfaceKind::Mirror)
         .then_some("Only glass, water and polish have one; this surface is matte or a mirror.");
-    let mut ior = shown.ior;
-    setting(
-        ui,
-        "Refractive index",
-        no_ior,
-        (&mut ior, &of_file.ior),
-        |ui, ior| {
-            let slider = Slider::new(ior, 1.0..=3.0).clamping(SliderClamping::Never);
-            ui.add(slider.fixed_decimals(3))
-        },
-    );
-    if ior != shown.ior {
-        commands.push(Command::Edit(Edit::Material(material, MaterialEdit::Ior(ior))));
-    }
+    let edit = |edit: MaterialEdit| Command::Edit(Edit::Material(material, edit));
+    let ior = (&shown.ior, &of_file.ior);
+    let ior = edited(ui, "Refractive index", no_ior, ior, slider(1.0..=3.0, 3));
+    commands.extend(ior.map(MaterialEdit::Ior).map(edit));
     glass::show(ui, material, (shown, of_file), no_ior, commands);
-    let mut roughness = shown.roughness;
-    let value = (&mut roughness, &of_file.roughness);
-    setting(ui, "Roughness", None, value, |ui, roughness| {
-        let slider = Slider::new(roughness, 0.0..=1.0).clamping(SliderClamping::Never);
-        ui.add(slider.fixed_decimals(2))
-    });
-    if roughness != shown.roughness {
-        commands.push(Command::Edit(Edit::Material(
-            material,
-            MaterialEdit::Roughness(roughness),
-        )));
-    }
+    let roughness = (&shown.roughness, &of_file.roughness);
+    let roughness = edited(ui, "Roughness", None, roughness, slider(0.0..=1.0, 2));
+    commands.extend(roughness.map(MaterialEdit::Roughness).map(edit));
     if let Some(waves) = shown.bending_waves() {
         waves::show(ui, material, (waves, of_file.bending_waves()), commands);
     }
-    let mut base_colour = shown.base_colour;
-    let value = (&mut base_colour, &of_file.base_colour);
-    setting(ui, "Base colour", None, value, |ui, base_colour| {
+    let base_colour = (&shown.base_colour, &of_file.base_colour);
+    let base_colour = edited(ui, "Base colour", None, base_colour, |ui, base_colour| {
         let mut colour = base_colour.to_array().map(|channel| channel as f32);
         let response = ui.color_edit_button_rgb(&mut colour);
         if response.changed() {
@@ -362,17 +322,13 @@ fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Comman
         }
         response
     });
-    if base_colour != shown.base_colour {
-        commands.push(Command::Edit(Edit::Material(
-            material,
-            MaterialEdit::BaseColour(base_colour),
-        )));
-    }
+    commands.extend(base_colour.map(MaterialEdit::BaseColour).map(edit));
 }
 
-/// A toggle for what the mouse does in the picture.
-fn hand(ui: &mut Ui, present: &mut MouseTool, own: MouseTool, (text, name): (&str, &str), what: &str) {
+/// A toggle for what the mouse does in the picture. Of the names "Move light" and the like, the row shows the verb.
+fn tool(ui: &mut Ui, present: &mut MouseTool, own: MouseTool, name: &str, what: &str) {
     let mut is_on = *present == own;
+    let text = name.strip_suffix(" light").unwrap_or(name);
     let switch = ui.toggle_value(&mut is_on, text).accessible_name(name);
     let switch = switch
         .on_hover_text(what)
@@ -382,32 +338,20 @@ fn hand(ui: &mut Ui, present: &mut MouseTool, own: MouseTool, (text, name): (&st
     }
 }
 
-fn light_hand(ui: &mut Ui, selection: &mut Selection, model: &Model) {
+fn light_tools(ui: &mut Ui, selection: &mut Selection, model: &Model) {
     let kind = &model.scene().lights[selection.light].kind;
     let (has_place, has_direction) = (kind.position().is_some(), kind.direction().is_some());
     let why_not = (!has_place && !has_direction).then_some(NO_PLACE);
     row(ui, "By mouse", why_not, |ui| {
         ui.horizontal(|ui| {
-            let what = about("By mouse").what;
+            let (what, present) = (about("By mouse").what, &mut selection.tool);
             ui.spacing_mut().item_spacing.x = 3.0;
             ui.add_enabled_ui(has_place, |ui| {
-                hand(
-                    ui,
-                    &mut selection.hand,
-                    MouseTool::Light,
-                    ("Move", "Move light"),
-                    what,
-                );
-                hand(
-                    ui,
-                    &mut selection.hand,
-                    MouseTool::Place,
-                    ("Place", "Place light"),
-                    what,
-                );
+                tool(ui, present, MouseTool::Light, "Move light", what);
+                tool(ui, present, MouseTool::Place, "Place light", what);
             });
             ui.add_enabled_ui(has_direction, |ui| {
-                hand(ui, &mut selection.hand, MouseTool::Aim, ("Aim", "Aim light"), AIM);
+                tool(ui, present, MouseTool::Aim, "Aim light", AIM);
             });
         })
         .response
@@ -420,13 +364,10 @@ fn place_of_object(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec
     let why_not = motion.yaw_rad().is_none().then_some(NO_TURN);
     let present = (motion.yaw_rad().unwrap_or_default(), motion.translation);
     let (mut yaw_rad, mut moved) = present;
-    setting(
-        ui,
-        "Offset [m]",
-        why_not,
-        (&mut moved, &DVec3::ZERO),
-        |ui, moved| place(ui, "Offset [m]", moved, model.scene()),
-    );
+    let offset = (&mut moved, &DVec3::ZERO);
+    setting(ui, "Offset [m]", why_not, offset, |ui, moved| {
+        coordinates(ui, "Offset [m]", moved, model.scene())
+    });
     // Rounded to the digits shown, so that displaying the number does not change it.
     let present_deg = (yaw_rad.to_degrees() * 1e2).round() / 1e2;
     let mut turn_deg = present_deg;

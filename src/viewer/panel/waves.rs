@@ -1,11 +1,11 @@
 //! Rows of section *Scene* for the waves of a material.
 
-use egui::{DragValue, Response, Slider, SliderClamping, Ui};
+use egui::{DragValue, Response, Ui};
 use glam::DVec3;
 
 use super::Command;
 use super::bake::FAILED;
-use super::control::setting;
+use super::control::{edited, setting, slider};
 use crate::scene::waves::STEEPEST_SLOPE;
 use crate::scene::{Edit, MaterialEdit, Wave, Waves};
 
@@ -52,14 +52,10 @@ fn slope(ui: &mut Ui, list: &mut [Wave], in_file: &[Wave]) {
     // Ignores rounding errors.
     let is_as_in_file = (present - in_file).abs() < SAME_SLOPE;
     let default = if is_as_in_file { present } else { in_file };
-    let mut wanted = present;
-    setting(ui, "Waves' slope", None, (&mut wanted, &default), |ui, wanted| {
-        let slider = Slider::new(wanted, 0.0..=STEEPEST_SLOPE).clamping(SliderClamping::Never);
-        ui.add(slider.fixed_decimals(3))
-    });
-    if wanted == present {
+    let add = slider(0.0..=STEEPEST_SLOPE, 3);
+    let Some(wanted) = edited(ui, "Waves' slope", None, (&present, &default), add) else {
         return;
-    }
+    };
     for wave in list.iter_mut() {
         // Flat waves get equal amplitudes, so that scaling can raise them.
         wave.amplitude_m = wave.amplitude_m.max(MIN_HEIGHT_M);

@@ -250,21 +250,10 @@ fn random_input_breaks_nothing() {
     for bad in ["fault", "device_lost"] {
         assert!(viewer.all(bad).is_empty(), "{:?}", viewer.all(bad));
     }
-    let (stderr, log) = viewer.close();
+    let (stderr, _) = viewer.close();
     for bad in ["alidation", "overflow"] {
         assert!(!stderr.contains(bad), "{stderr}");
     }
-    tell_waits(&log);
-}
-
-/// How long events waited while it baked: percentiles in order, of some events.
-fn tell_waits(log: &[Value]) {
-    let told = log.iter().rfind(|event| event["event"] == "latency");
-    let waits = &told.expect("it is told at the end")["while_baking"];
-    assert!(waits["count"].as_u64() > Some(20), "{waits}");
-    let ms = ["p50_ms", "p95_ms", "p99_ms", "max_ms"].map(|name| waits[name].as_f64().expect("a number"));
-    assert!(ms.is_sorted() && ms[0] > 0.0, "{waits}");
-    println!("events while it baked waited {ms:?} ms: half, 95 %, 99 %, all of them");
 }
 
 /// Both bakes would take minutes: whoever waited for one would see it done.
@@ -292,7 +281,6 @@ fn long_bake_leaves_room_for_input_and_ends() {
         log.iter().all(|event| event["event"] != "done"),
         "it baked all the time"
     );
-    tell_waits(&log);
 
     // So it does by a signal. The bake begins before the window is there.
     let viewer = Viewer::open(&screen, long);

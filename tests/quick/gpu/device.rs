@@ -1,16 +1,8 @@
-//! Every shader is valid and lays out its structs as Rust does; and faults of a device, and what it is too small for:
-//! refused in a sentence, and the rest is drawn.
+//! Faults of a device, and what it is too small for: refused in a sentence, and the rest is drawn.
 
-use std::collections::{BTreeMap, BTreeSet};
-
-use naga::back::pipeline_constants::process_overrides;
-use naga::valid::{Capabilities, ValidationFlags, Validator};
-use naga::{AddressSpace, Binding, Module, ShaderStage, TypeInner};
-use nephroid::effect::EffectSwitch;
+use nephroid::effect::{EffectSwitch, EffectSwitches};
 use nephroid::eye_pass::View;
-use nephroid::eye_pass::renderer::{
-    Renderer, programs, render_offscreen, shared_structs, specialisations, vertex_attributes,
-};
+use nephroid::eye_pass::renderer::{Renderer, render_counted};
 use nephroid::gpu::Gpu;
 use nephroid::illumination::{IlluminationMap, parametrise};
 
@@ -87,7 +79,8 @@ fn sizes_no_device_holds_are_refused() {
     }
     for (width, words) in [(1 << 24, "picture: 16777216×32 "), (0, "")] {
         let sized = View { width, ..ahead() };
-        let error = render_offscreen(gpu, &Scene::default(), &[], &sized).expect_err("no texture");
+        let drawn = render_counted(gpu, &Scene::default(), &[], &sized, 1, &EffectSwitches::default());
+        let error = drawn.expect_err("no texture");
         says(&error, words);
     }
     assert!(Renderer::new(gpu, &Scene::default(), FORMAT, 3).is_err());
@@ -194,128 +187,4 @@ fn windows_without_a_size_draw_nothing() {
         }
     }
     assert!(bits(&sized.picture(&ahead())) == bits(&rig().picture(&ahead())));
-}
-
-fn modules() -> BTreeMap<String, Module> {
-    let programs = programs();
-    assert!(!programs.is_empty(), "there are shaders to validate");
-    let parse = |program: &nephroid::gpu::shader::Program| {
-        let text = program.wgsl();
-        let module = naga::front::wgsl::parse_str(&text)
-            .unwrap_or_else(|error| panic!("{}: {}", program.name, error.emit_to_string(&text)));
-        (program.name.to_owned(), module)
-    };
-    programs.iter().map(parse).collect()
-}
-
-fn validator() -> Validator {
-    Validator::new(ValidationFlags::all(), Capabilities::empty())
-}
-
-/// As they are written, and as devices get them: the overrides replaced by their values.
-#[test]
-fn every_program_and_specialisation_is_valid() {
-    let modules = modules();
-    let validate = |(name, module): (&String, &Module)| {
-        assert!(!module.entry_points.is_empty(), "{name} draws something");
-        let info = validator().validate(module);
-        (
-            name.clone(),
-            info.unwrap_or_else(|error| panic!("{name}: {error:?}")),
-        )
-    };
-    let infos: BTreeMap<String, _> = modules.iter().map(validate).collect();
-    for found in specialisations() {
-        let constants = found.constants.iter();
-        let constants = constants.map(|(name, value)| ((*name).to_owned(), *value));
-        let entry_point = Some((ShaderStage::Fragment, found.entry_point));
-        let (module, info) = (&modules[found.program], &infos[found.program]);
-        let (resolved, _) = process_overrides(module, info, entry_point, &constants.collect())
-            .unwrap_or_else(|error| panic!("{found:?}: {error}"));
-        assert_eq!(resolved.entry_points.len(), 1, "{found:?}");
-        let is_valid = validator().validate_resolved_overrides(&resolved);
-        is_valid.unwrap_or_else(|error| panic!("{found:?}: {error:?}"));
-    }
-}
-
-/// Names of the structs in a module's buffers, those within arrays and other structs included.
-fn shared_in(module: &Module) -> BTreeSet<String> {
-    let variables = module.global_variables.iter().map(|(_, variable)| variable);
-    let is_shared =
-        |space: AddressSpace| matches!(space, AddressSpace::Uniform | AddressSpace::Storage { .. });
-    let shared = variables.filter(|variable| is_shared(variable.space));
-    let mut pending: Vec<_> = shared.map(|variable| variable.ty).collect();
-    let mut names = BTreeSet::new();
-    while let Some(handle) = pending.pop() {
-        let ty = &module.types[handle];
-        match &ty.inner {
-            TypeInner::Struct { members, .. } => {
-                names.insert(ty.name.clone().expect("structs have names"));
-                pending.extend(members.iter().map(|member| member.ty));
-            }
-            TypeInner::Array { base, .. } => pending.push(*base),
-            _ => {}
-        }
-    }
-    names
-}
-
-#[test]
-fn structs_lie_the_same_in_rust_and_shaders() {
-    let mut found = BTreeMap::new();
-    for module in modules().values() {
-        let shared = shared_in(module);
-        for (_, ty) in module.types.iter() {
-            let name = ty.name.clone().unwrap_or_default();
-            if let (TypeInner::Struct { members, span }, true) = (&ty.inner, shared.contains(&name)) {
-                let field = |m: &naga::StructMember| (m.name.clone().unwrap_or_default(), m.offset as usize);
-                let fields: Vec<_> = members.iter().map(field).collect();
-                found.insert(name, (*span as usize, fields));
-            }
-        }
-    }
-    let ours: BTreeMap<_, _> = shared_structs()
-        .iter()
-        .map(|layout| {
-            let fields = layout
-                .fields
-                .iter()
-                .map(|field| (field.name.to_owned(), field.offset));
-            (layout.name.to_owned(), (layout.size, fields.collect()))
-        })
-        .collect();
-    assert!(!ours.is_empty());
-    assert_eq!(ours, found, "every struct of a buffer is declared on both sides");
-}
-
-#[test]
-fn vertex_inputs_match_the_vertex_buffers() {
-    let surface = &modules()["surface"];
-    let mut stages = surface.entry_points.iter();
-    let vertex = stages.find(|entry| entry.stage == ShaderStage::Vertex);
-    let arguments = &vertex.expect("it has a vertex stage").function.arguments;
-    let TypeInner::Struct { members, .. } = &surface.types[arguments[0].ty].inner else {
-        panic!("corners come as a struct");
-    };
-    let input = |member: &naga::StructMember| match (&member.binding, &surface.types[member.ty].inner) {
-        (Some(Binding::Location { location, .. }), TypeInner::Vector { size, .. }) => {
-            (*location, *size as usize)
-        }
-        _ => panic!("{member:?}"),
-    };
-    let buffers = vertex_attributes();
-    let numbers = |format| match format {
-        wgpu::VertexFormat::Float32x2 => 2,
-        wgpu::VertexFormat::Float32x3 => 3,
-        wgpu::VertexFormat::Float32x4 | wgpu::VertexFormat::Unorm16x4 => 4,
-        other => panic!("{other:?}"),
-    };
-    let attributes = buffers
-        .iter()
-        .map(|found| (found.shader_location, numbers(found.format)));
-    let mut attributes: Vec<(u32, usize)> = attributes.collect();
-    attributes.sort_unstable();
-    let mut inputs: Vec<(u32, usize)> = members.iter().map(input).collect();
-    inputs.sort_unstable();
-    assert_eq!(inputs, attributes);
 }

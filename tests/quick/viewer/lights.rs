@@ -47,16 +47,16 @@ fn each_change_of_lights_is_one_step() {
     // As it came, and not as it is now.
     assert_eq!(scene.original_light(2, &loaded), &lamp("newer"));
     for before in states.iter().rev().skip(1) {
-        edits_of.turn(true).expect("it is taken back");
+        edits_of.step(true).expect("it is taken back");
         assert_eq!(state(&edits_of), *before);
     }
     for after in &states[1..] {
-        edits_of.turn(false).expect("it is done again");
+        edits_of.step(false).expect("it is done again");
         assert_eq!(state(&edits_of), *after);
     }
     for what in ["position of `newer`", "removal of `new`"] {
         assert_eq!(edits_of.history().next_undo(), Some(what));
-        edits_of.turn(true).expect("it is taken back");
+        edits_of.step(true).expect("it is taken back");
     }
 }
 

@@ -434,7 +434,7 @@ fn gazes_meet_what_is_seen() {
     let camera = camera();
     let lens = lens(&camera);
     for point in [DVec3::ZERO, dvec3(-1.0, 0.3, 0.5), dvec3(1.5, 2.0, -3.0)] {
-        let gaze = lens.gaze(lens.place(point));
+        let gaze = lens.view_ray(lens.project(point));
         let along = (point - gaze.origin).dot(gaze.direction);
         // Places are 32-bit numbers.
         near(gaze.origin + gaze.direction * along, point, 1e-4, "met");
@@ -443,7 +443,7 @@ fn gazes_meet_what_is_seen() {
     let scene = scene();
     let spot = 2;
     let position = scene.lights[spot].kind.position().expect("it has a place");
-    let at = lens.place(position);
+    let at = lens.project(position);
     assert_eq!(light_at(&lens, &scene, at + vec2(4.0, 3.0)), Some(spot));
     assert_eq!(light_at(&lens, &scene, at + vec2(40.0, 3.0)), None);
 }

@@ -1,11 +1,11 @@
-//! How well pictures are made by how long those before took, how long events wait, the graph of device times, and the plot
-//! of error against time.
+//! How well pictures are made by how long those before took, the graph of device times, and the plot of error against
+//! time.
 
 use nephroid::bake::CostPoint;
 use nephroid::bake::forecast::forecast;
 use nephroid::viewer::pace::Pace;
 use nephroid::viewer::panel::accuracy::course::{Curve, Frame};
-use nephroid::viewer::timing::{FrameTimes, Latencies, Percentiles};
+use nephroid::viewer::timing::FrameTimes;
 
 use super::*;
 
@@ -76,50 +76,6 @@ fn hands_do_not_wait_for_a_picture() {
     let early = start + Duration::from_millis(100);
     assert!(pace.pause(early) > Duration::ZERO);
     assert_eq!(pace.pause(early + pace.pause(early)), Duration::ZERO);
-}
-
-const MS: Duration = Duration::from_millis(1);
-
-#[test]
-fn percentiles_are_of_the_waits_by_nearest_rank() {
-    let waits = (1..=200).rev().map(|index| index * MS);
-    let told = Percentiles::of(waits).expect("there are some");
-    let found = [told.p50_ms, told.p95_ms, told.p99_ms, told.max_ms].map(f64::round);
-    assert_eq!((found, told.count), ([100.0, 190.0, 198.0, 200.0], 200));
-    let one = Percentiles::of([7 * MS]).expect("one is enough");
-    assert_eq!([one.p50_ms, one.max_ms].map(f64::round), [7.0, 7.0]);
-    assert_eq!(Percentiles::of([]), None);
-}
-
-/// What comes while a frame is made is met after it: it has waited since some moment of the frame, at worst its first.
-#[test]
-fn events_of_a_busy_window_count_from_when_they_can_have_come() {
-    let start = Instant::now();
-    let at = |ms: u32| start + ms * MS;
-    let mut latencies = Latencies::default();
-    latencies.begin_turn(at(0));
-    latencies.end_turn(at(1));
-    // It waited: the event has just come.
-    latencies.begin_turn(at(50));
-    latencies.meet(at(50), false);
-    latencies.show(at(90));
-    latencies.end_turn(at(90));
-    assert_eq!(latencies.otherwise().map(|told| told.max_ms.round()), Some(40.0));
-    assert_eq!(latencies.while_baking(), None);
-
-    // There at once: it may have come right after the last turn began.
-    latencies.begin_turn(at(90));
-    latencies.meet(at(91), true);
-    latencies.end_turn(at(92));
-    latencies.begin_turn(at(95));
-    latencies.show(at(100));
-    assert_eq!(
-        latencies.while_baking().map(|told| told.max_ms.round()),
-        Some(50.0)
-    );
-    // Shown once, counted once.
-    latencies.show(at(200));
-    assert_eq!(latencies.while_baking().map(|told| told.count), Some(1));
 }
 
 fn of<const N: usize>(pictures: [[f64; 3]; N]) -> FrameTimes {

@@ -426,7 +426,7 @@ fn values_have_a_button_that_resets_them() {
         Choose("Kernel", "gaussian"),
         Choose("Footprint", "disc"),
         Choose("Map size [texels]", "64"),
-        Choose("Tone map", "AgX"),
+        Choose("Tone map", "agx"),
         Check("direct"),
     ] {
         panel.make(gesture);

@@ -97,7 +97,7 @@ fn reference_tells_its_relative_rmse() {
         1e-6,
         "RMSE",
     );
-    says(reference.told(), " 25 %");
+    says(reference.in_words(), " 25 %");
     assert!(SavedMaps::kept(panel.model.scene(), &[]).is_err());
 }
 

@@ -1,6 +1,7 @@
 //! A tiled image, and which of its tiles are resident on the device.
 
 use bytemuck::Pod;
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 use super::{STORED, TILE, TilePool, Uploaded};
 use crate::gpu::Gpu;
@@ -22,7 +23,7 @@ pub(in super::super) struct PagedImage<T> {
     pages: Vec<Vec<u32>>,
 }
 
-impl<T: Pod + PartialEq> PagedImage<T> {
+impl<T: Pod> PagedImage<T> {
     /// Uploads an image from level `finest` on. There is at least one level, and each is half as large as the one
     /// before.
     pub(in super::super) fn new(
@@ -35,7 +36,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         let mut image = Self {
             pages: levels
                 .iter()
-                .map(|level| vec![EMPTY; level.tiles().iter().product()])
+                .map(|level| vec![EMPTY; level.tiles.len()])
                 .collect(),
             finest: levels.len(),
             levels,
@@ -61,9 +62,8 @@ impl<T: Pod + PartialEq> PagedImage<T> {
 
     /// Number of slots that a level takes when resident.
     pub(in super::super) fn tiles_of_level(&self, level: usize) -> u64 {
-        let level = &self.levels[level];
-        let tiles = level.places();
-        tiles.filter(|tile| !level.is_empty(self.wrap, *tile)).count() as u64
+        let tiles = self.levels[level].tiles.iter().flatten();
+        tiles.filter(|texels| !texels.iter().all(is_zero)).count() as u64
     }
 
     /// Replaces the texels of all levels, whose sizes stay, and uploads the tiles in which any bit differs.
@@ -81,20 +81,18 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         uploaded
     }
 
-    /// The tiles that take a slot: slot, level, column and row.
-    pub(in super::super) fn held(&self) -> impl Iterator<Item = (u32, &Level<T>, [usize; 2])> {
+    /// The tiles that take a slot: slot, level, and index within the level.
+    pub(in super::super) fn held(&self) -> impl Iterator<Item = (u32, &Level<T>, usize)> {
         self.levels.iter().zip(&self.pages).flat_map(|(level, pages)| {
-            let held = level.places().zip(pages).filter(|(_, page)| **page < COARSER);
+            let held = pages.iter().enumerate().filter(|(_, page)| **page < COARSER);
             held.map(move |(tile, page)| (*page, level, tile))
         })
     }
 
     /// Slot, width and texels of each tile that takes one.
     pub(in super::super) fn tiles(&self) -> impl Iterator<Item = (u32, usize, Vec<T>)> {
-        self.held().map(|(page, level, tile)| {
-            let mut texels = Vec::new();
-            level.gather(self.wrap, tile, &mut texels);
-            (page, stored(tile[0], level.size[0]), texels)
+        self.held().filter_map(|(page, level, tile)| {
+            Some((page, level.stored_across(tile), level.tiles[tile].clone()?))
         })
     }
 
@@ -110,6 +108,13 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         }
         self.finest = finest;
         uploaded
+    }
+
+    /// Uploads the resident levels into a pool that has taken the place of the one before.
+    pub(in super::super) fn move_to(&mut self, gpu: &Gpu, pool: &mut TilePool) -> Uploaded {
+        let finest = std::mem::replace(&mut self.finest, self.levels.len());
+        self.pages.iter_mut().for_each(|pages| pages.fill(EMPTY));
+        self.set_finest(gpu, pool, finest)
     }
 
     /// Frees all slots.
@@ -129,20 +134,17 @@ impl<T: Pod + PartialEq> PagedImage<T> {
         before: Option<&Level<T>>,
     ) -> Uploaded {
         let level = &self.levels[index];
-        let [across, _] = level.tiles();
         let mut uploaded = Uploaded::default();
-        let mut texels = Vec::with_capacity(STORED * STORED);
-        for tile in level.places() {
-            if before.is_some_and(|before| !level.differs(before, tile)) {
+        for (tile, texels) in level.tiles.iter().enumerate() {
+            if before.is_some_and(|before| bits(before.tiles[tile].as_deref()) == bits(texels.as_deref())) {
                 continue;
             }
-            let page = &mut self.pages[index][tile[1] * across + tile[0]];
-            texels.clear();
-            if !level.gather(self.wrap, tile, &mut texels) {
+            let page = &mut self.pages[index][tile];
+            let Some(texels) = texels else {
                 release(pool, page);
                 *page = COARSER;
                 continue;
-            }
+            };
             uploaded.tiles += 1;
             if texels.iter().all(is_zero) {
                 release(pool, page);
@@ -159,7 +161,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
                 }
                 *page = pool.take();
             }
-            pool.write(gpu, *page, &texels, stored(tile[0], level.size[0]));
+            pool.write(gpu, *page, texels, level.stored_across(tile));
             uploaded.tile_bytes += size_of_val(texels.as_slice()) as u64;
         }
         uploaded
@@ -187,7 +189,7 @@ impl<T: Pod + PartialEq> PagedImage<T> {
                 level.extent[0].to_bits(),
                 level.extent[1].to_bits(),
                 first_page as u32,
-                level.tiles()[0] as u32,
+                level.across() as u32,
             ]);
             first_page += pages.len();
         }
@@ -209,106 +211,68 @@ pub(in super::super) struct Level<T> {
     pub(in super::super) size: [usize; 2],
     /// Texels that the unit square of coordinates spans; the last ones may extend beyond it.
     pub(in super::super) extent: [f32; 2],
-    pub(in super::super) texels: Texels<T>,
+    /// Stored texels of each tile, row by row; `None` if it is no finer than the next level.
+    pub(in super::super) tiles: Vec<Option<Vec<T>>>,
 }
 
-#[derive(Clone, Debug, PartialEq)]
-pub(in super::super) enum Texels<T> {
-    /// Row by row.
-    Rows(Vec<T>),
-    /// By tile, its stored texels row by row; `None` if it is no finer than the next level.
-    Tiles(Vec<Option<Vec<T>>>),
+impl<T: Pod + Send + Sync> Level<T> {
+    /// A level of texels row by row, all of which are held.
+    pub(in super::super) fn of_rows(
+        size: [usize; 2],
+        extent: [f32; 2],
+        wrap: [Wrap; 2],
+        texels: &[T],
+    ) -> Self {
+        let [across, down] = size.map(|side| side.div_ceil(TILE));
+        let gather = |tile: usize| Some(stored_texels(size, wrap, [tile % across, tile / across], texels));
+        Self {
+            size,
+            extent,
+            tiles: (0..across * down).into_par_iter().map(gather).collect(),
+        }
+    }
 }
 
-impl<T: Pod> Level<T> {
-    /// Tiles across and down.
-    pub(in super::super) fn tiles(&self) -> [usize; 2] {
-        self.size.map(|side| side.div_ceil(TILE))
+impl<T> Level<T> {
+    /// Tiles across.
+    fn across(&self) -> usize {
+        self.size[0].div_ceil(TILE)
     }
 
-    /// Column and row of every tile, row by row.
-    pub(super) fn places(&self) -> impl Iterator<Item = [usize; 2]> + use<T> {
-        let [across, down] = self.tiles();
-        (0..down).flat_map(move |row| (0..across).map(move |column| [column, row]))
+    /// Column and row of a tile.
+    pub(in super::super) fn place(&self, tile: usize) -> [usize; 2] {
+        [tile % self.across(), tile / self.across()]
     }
 
-    /// Whether a tile takes no slot: it is all zero, or no finer than the next level.
-    pub(super) fn is_empty(&self, wrap: [Wrap; 2], tile: [usize; 2]) -> bool {
-        match &self.texels {
-            Texels::Rows(texels) => {
-                rows(self.size, wrap, tile).all(|mut row| row.all(|index| is_zero(&texels[index])))
-            }
-            Texels::Tiles(tiles) => tiles[self.index(tile)]
-                .as_ref()
-                .is_none_or(|texels| texels.iter().all(is_zero)),
-        }
+    /// Stored texels across a tile.
+    fn stored_across(&self, tile: usize) -> usize {
+        stored(tile % self.across(), self.size[0])
     }
+}
 
-    /// Whether any bit of a tile differs from that of a level of the same size. Texels stored beyond the image's border
-    /// are copies and need no comparison.
-    pub(super) fn differs(&self, before: &Self, tile: [usize; 2]) -> bool {
-        let bits = bytemuck::cast_slice::<T, u8>;
-        match (&self.texels, &before.texels) {
-            (Texels::Rows(new), Texels::Rows(old)) => {
-                let ([width, height], [column, row]) = (self.size, tile);
-                let columns = column * TILE..width.min(column * TILE + STORED);
-                let mut rows = row * TILE..height.min(row * TILE + STORED);
-                rows.any(|row| {
-                    let range = row * width + columns.start..row * width + columns.end;
-                    bits(&old[range.clone()]) != bits(&new[range])
-                })
-            }
-            (Texels::Tiles(new), Texels::Tiles(old)) => {
-                match (&old[self.index(tile)], &new[self.index(tile)]) {
-                    (Some(old), Some(new)) => bits(old) != bits(new),
-                    (old, new) => old.is_some() != new.is_some(),
-                }
-            }
-            _ => true,
-        }
-    }
-
-    /// Appends the stored texels of a tile; false if it is no finer than the next level.
-    pub(super) fn gather(&self, wrap: [Wrap; 2], tile: [usize; 2], gathered: &mut Vec<T>) -> bool {
-        match &self.texels {
-            Texels::Rows(texels) => {
-                for row in rows(self.size, wrap, tile) {
-                    gathered.extend(row.map(|index| texels[index]));
-                }
-                true
-            }
-            Texels::Tiles(tiles) => match &tiles[self.index(tile)] {
-                Some(texels) => {
-                    gathered.extend_from_slice(texels);
-                    true
-                }
-                None => false,
-            },
-        }
-    }
-
-    fn index(&self, [column, row]: [usize; 2]) -> usize {
-        row * self.tiles()[0] + column
-    }
+/// The bytes of a tile's texels, since texels that are not numbers never equal themselves.
+fn bits<T: Pod>(texels: Option<&[T]>) -> Option<&[u8]> {
+    texels.map(bytemuck::cast_slice)
 }
 
 pub(super) fn is_zero<T: Pod>(texel: &T) -> bool {
     bytemuck::bytes_of(texel) == bytemuck::bytes_of(&T::zeroed())
 }
 
-/// Indices of the stored texels of a tile, row by row: its own, and one more in each direction for bilinear lookups
-/// between its last ones.
-fn rows(
+/// The stored texels of a tile, row by row: its own, and one more in each direction for bilinear lookups between its last
+/// ones.
+fn stored_texels<T: Copy>(
     [width, height]: [usize; 2],
     wrap: [Wrap; 2],
     tile: [usize; 2],
-) -> impl Iterator<Item = impl Iterator<Item = usize>> {
+    texels: &[T],
+) -> Vec<T> {
     let [left, top] = tile.map(|index| index * TILE);
     let [across, down] = [stored(tile[0], width), stored(tile[1], height)];
-    (top..top + down).map(move |row| {
-        let row = beyond(row, height, wrap[1]);
-        (left..left + across).map(move |column| row * width + beyond(column, width, wrap[0]))
-    })
+    let rows = (top..top + down).map(|row| width * beyond(row, height, wrap[1]));
+    let columns = (left..left + across).map(|column| beyond(column, width, wrap[0]));
+    rows.flat_map(|row| columns.clone().map(move |column| texels[row + column]))
+        .collect()
 }
 
 /// Number of stored texels of a tile along a side of `size` texels: those that exist, and one more.

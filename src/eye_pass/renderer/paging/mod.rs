@@ -3,12 +3,12 @@
 
 use bytemuck::Pod;
 
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, texture_of};
 
 mod image;
 
 pub(super) use image::PagedImage;
-pub(super) use image::{Level, Texels, stored};
+pub(super) use image::{Level, stored};
 
 /// Side of a tile [texels]; `TILE` in the shader.
 pub(super) const TILE: usize = 64;
@@ -179,6 +179,16 @@ impl TilePool {
         })
     }
 
+    /// Whether most of it is free, so that a smaller one would do.
+    pub(in super::super) fn is_sparse(&self) -> bool {
+        self.rows > 1 && 4 * self.tiles() < u64::from(self.capacity())
+    }
+
+    /// An empty pool in its place.
+    pub(in super::super) fn emptied(&self, gpu: &Gpu) -> Self {
+        Self::new(gpu, self.label, self.format)
+    }
+
     fn capacity(&self) -> u32 {
         self.rows * ACROSS * self.layers
     }
@@ -191,20 +201,8 @@ pub(super) fn origin(place: u32) -> [u32; 3] {
 }
 
 fn texture(gpu: &Gpu, label: &str, format: wgpu::TextureFormat, rows: u32, layers: u32) -> wgpu::Texture {
-    gpu.device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
-        size: wgpu::Extent3d {
-            width: ACROSS * STORED as u32,
-            height: rows * STORED as u32,
-            depth_or_array_layers: layers,
-        },
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING
-            | wgpu::TextureUsages::COPY_DST
-            | wgpu::TextureUsages::COPY_SRC,
-        view_formats: &[],
-    })
+    let size = [ACROSS * STORED as u32, rows * STORED as u32, layers];
+    let usage =
+        wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+    gpu.device.create_texture(&texture_of(label, size, format, usage))
 }
