@@ -104,7 +104,8 @@ impl DirectCache {
         (0..lights).all(is_known)
     }
 
-    /// Bakes missing layers and drops those of other sizes.
+    /// Bakes missing layers and drops those of other sizes. After a deadline of `control`, layers are as good as a few
+    /// samples make them; a later bake with time left refines them.
     pub(super) fn complete(
         &mut self,
         tracer: &Tracer,
@@ -123,7 +124,11 @@ impl DirectCache {
             complete: true,
         };
         for (light, source) in lights.iter().enumerate() {
-            let is_missing = |chart: &&DirectChart| !self.layers.contains_key(&chart.key(light));
+            let is_late = control.is_cancelled();
+            let is_missing = |chart: &&DirectChart| {
+                let known = self.layers.get(&chart.key(light));
+                known.is_none_or(|layer| !layer.is_refined && !is_late)
+            };
             let missing: Vec<&DirectChart> = charts.values().filter(is_missing).collect();
             let on: Vec<_> = missing
                 .iter()
