@@ -35,6 +35,9 @@ const PATCH_COST_FRACTION: f64 = 0.5;
 /// some sixty lit texels, it reveals a bias of 10 %.
 const AUDIT_RMSE: f64 = 0.15;
 
+/// Most segments of the photons that audit patches, relative to the cost of the patches.
+const MAX_AUDIT_COST: f64 = 4.0;
+
 /// Range of the power of 1/error with which work grows.
 const POWERS: (f64, f64) = (1.0, 2.5);
 
@@ -144,14 +147,30 @@ impl CausticLayer<'_> {
             return Ok(false);
         };
         let is_first = light_progress.rival.is_none();
-        if is_first
-            || self.are_photons_sooner(light, light_progress)
-            || self.lacks_auditors(light, light_progress)
-        {
-            let before = (light_progress.rival.as_mut(), light_progress.aim);
+        let lacks_auditors = self.lacks_auditors(light, light_progress);
+        if is_first || self.are_photons_sooner(light, light_progress) || lacks_auditors {
+            let aim = if lacks_auditors {
+                Some(AUDIT_RMSE)
+            } else {
+                light_progress.aim
+            };
+            let before = (light_progress.rival.as_mut(), aim);
             let made = self.more_photons(light, sizes, state, before, course)?;
             let is_made = made.is_some();
             light_progress.rival = made.or(light_progress.rival.take());
+            if lacks_auditors && is_made {
+                eprintln!(
+                    "AUDITORS {:?} rmse {:?}",
+                    light_progress.rival.as_ref().and_then(|r| r.key.photons),
+                    light_progress
+                        .rival
+                        .as_ref()
+                        .and_then(|r| r.error.as_ref().map(|e| e.estimate.relative_rmse))
+                );
+                if let Some(level) = light_progress.levels.pop() {
+                    self.judge(light, level, state, light_progress, course)?;
+                }
+            }
             if is_made || !is_first {
                 return Ok(is_made);
             }
@@ -192,7 +211,7 @@ impl CausticLayer<'_> {
 
     /// Whether patches may have a bias that the first photons are too few to detect, and more photons cost less than
     /// the patches did.
-    fn lacks_auditors(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
+    pub(super) fn lacks_auditors(&self, light: &VisibleLight, light_progress: &LightProgress) -> bool {
         let Some(rival) = light_progress
             .rival
             .as_ref()
@@ -200,13 +219,12 @@ impl CausticLayer<'_> {
         else {
             return false;
         };
-        let is_coarse = rival
-            .error
-            .as_ref()
-            .is_some_and(|error| error.estimate.relative_rmse > AUDIT_RMSE);
-        let known = photon_segments(rival).filter(|_| is_coarse);
-        known.is_some_and(|(segments, per_photon)| {
-            GROWTH.1 * segments < cost_of(&light_progress.levels, per_photon)
+        let rmse = rival.error.as_ref().map(|error| error.estimate.relative_rmse);
+        let known = photon_segments(rival).zip(rmse.filter(|rmse| *rmse > AUDIT_RMSE));
+        let known = known.filter(|_| self.next_photons(light, Some(rival), Some(AUDIT_RMSE)).is_some());
+        known.is_some_and(|((segments, per_photon), rmse)| {
+            let growth = (rmse / AUDIT_RMSE).powi(2).clamp(GROWTH.0, GROWTH.1);
+            growth * segments < MAX_AUDIT_COST * cost_of(&light_progress.levels, per_photon)
         })
     }
 

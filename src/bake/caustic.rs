@@ -541,7 +541,19 @@ impl CausticLayer<'_> {
             light_progress.done = true;
             return Ok(());
         }
-        let predecessors = step.min(ESTIMATED_LEVELS - 1);
+        self.judge(light, level, state, light_progress, course)
+    }
+
+    /// Adds a level of patches or splats with its estimated error.
+    pub(super) fn judge(
+        &self,
+        light: &VisibleLight,
+        mut level: LightLevel,
+        state: &mut LightState,
+        light_progress: &mut LightProgress,
+        course: &mut BakeContext,
+    ) -> Result<()> {
+        let predecessors = light_progress.levels.len().min(ESTIMATED_LEVELS - 1);
         let auditors = light_progress.rival.as_ref().and_then(|rival| rival.key.photons);
         let is_known = |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
         if !level.error.as_ref().is_some_and(is_known) && !course.control.is_cancelled() {
@@ -570,7 +582,10 @@ impl CausticLayer<'_> {
                 continue;
             }
             light_progress.done = match goal {
-                Goal::Converged => true,
+                Goal::Converged => {
+                    light_progress.carrier != Carrier::Undecided
+                        || !self.lacks_auditors(light, light_progress)
+                }
                 Goal::NextLevel => !self.has_next_level(light, light_progress),
                 Goal::Refine(target) if light_progress.carrier == Carrier::Photons => {
                     let is_good = light_progress

@@ -388,8 +388,14 @@ impl Baker {
         if plan.is_on(Effect::Direct) {
             lamps.look_for_borders(tracer, &self.sizes, settings, control);
         }
+        let for_direct = limited(
+            control,
+            settings.max_time_s.map(|limit_s| PART_OF_DIRECT * limit_s),
+            began,
+        );
         let lights = &mut self.lights;
         let mut showing = Showing {
+            for_direct: &for_direct,
             finish: &finish,
             tracer,
             aim,
@@ -422,7 +428,7 @@ impl Baker {
         outcome.warnings.extend(memory_warning);
         if plan.is_on(Effect::Direct) {
             let direct_charts = finish.direct_charts(&charts);
-            let complete = lamps.shine(tracer, &direct_charts, direct, (progress, control));
+            let complete = lamps.shine(tracer, &direct_charts, direct, (progress, &for_direct));
             if !complete {
                 outcome.stopped = Some(Stopped::Cancelled);
             }
@@ -470,6 +476,9 @@ impl Baker {
         Ok(result)
     }
 }
+
+/// Fraction of the time limit after which direct light is not refined further.
+const PART_OF_DIRECT: f64 = 0.5;
 
 /// Cancellation by the user, or by a time limit since the bake began [s].
 fn limited(control: &Control, limit_s: Option<f64>, began: Instant) -> Control {

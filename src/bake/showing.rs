@@ -32,6 +32,8 @@ pub(super) struct Showing<'a, 'level> {
     pub(super) aim: &'a LightVisibility,
     pub(super) progress: &'a dyn Progress,
     pub(super) control: &'a Control,
+    /// After its deadline, direct light is not refined further.
+    pub(super) for_direct: &'a Control,
     /// Runs since the start of the bake.
     pub(super) watch: &'a Stopwatch,
     /// Tests that built the item buffers.
@@ -103,7 +105,7 @@ impl BakeObserver for Showing<'_, '_> {
         // The first picture after a change has to come soon; direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
         if !waits && plan.is_on(Effect::Direct) {
-            let on_whom = (self.progress, self.control);
+            let on_whom = (self.progress, self.for_direct);
             self.lamps
                 .shine(self.tracer, &direct_charts, self.direct, on_whom);
         }
@@ -126,7 +128,7 @@ impl BakeObserver for Showing<'_, '_> {
             return Backdrop::new();
         }
         let (charts, _) = finish.charts(levels);
-        let on_whom = (self.progress, self.control);
+        let on_whom = (self.progress, self.for_direct);
         if finish.plan.is_on(Effect::Direct) {
             self.lamps
                 .shine(self.tracer, &finish.direct_charts(&charts), self.direct, on_whom);
