@@ -5,7 +5,7 @@
 //! operations, so that the choice does not depend on the machine.
 
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{KeptError, LightLevel};
+use super::light_level::LightLevel;
 use super::photon_level::GROWTH;
 use crate::error::{Error, Result};
 use crate::light_pass::caustic::setup::VisibleLight;
@@ -33,6 +33,9 @@ const PATCH_COST_FRACTION: f64 = 0.5;
 /// Relative RMSE of the photons that audit patches which interpolate between wavelengths. On the map of a prism, with
 /// some sixty lit texels, it reveals a bias of 10 %.
 const AUDIT_RMSE: f64 = 0.15;
+
+/// Maximum segments of the photons that audit patches, relative to the cost of the patches.
+const MAX_AUDIT_COST: f64 = 4.0;
 
 /// Range of the power of 1/error with which work grows.
 const POWERS: (f64, f64) = (1.0, 2.5);
@@ -140,11 +143,20 @@ impl CausticLayer<'_> {
             return Ok(false);
         };
         let is_first = light.rival.is_none();
-        if is_first || self.are_photons_sooner(light) || self.lacks_auditors(light) {
+        let lacks_auditors = self.lacks_auditors(light);
+        if is_first || self.are_photons_sooner(light) || lacks_auditors {
+            let target_rmse = if lacks_auditors {
+                Some(AUDIT_RMSE)
+            } else {
+                light.target_rmse
+            };
             let mut rival = light.rival.take();
-            let made = self.more_photons(light, rival.as_mut(), context)?;
+            let made = self.more_photons(light, rival.as_mut(), target_rmse, context)?;
             let is_made = made.is_some();
             light.rival = made.or(rival);
+            if lacks_auditors && let Some(level) = light.levels.pop() {
+                self.push_judged(light, level, context)?;
+            }
             if is_made || !is_first {
                 return Ok(is_made);
             }
@@ -177,16 +189,23 @@ impl CausticLayer<'_> {
         Ok(false)
     }
 
-    /// Whether patches may have a bias that the first photons are too few to detect, and more photons cost less than
-    /// the patches did.
-    fn lacks_auditors(&self, light: &LightProgress) -> bool {
-        let rival = light.rival.as_ref();
-        let Some(rival) = rival.filter(|_| self.spectra.is_interpolated(light.visible.light)) else {
+    /// Whether patches may have a bias that the photons so far are too few to detect, and enough of them cost little
+    /// beside the patches.
+    pub(super) fn lacks_auditors(&self, light: &LightProgress) -> bool {
+        let interpolated = self.spectra.is_interpolated(light.visible.light);
+        let (true, Some(rival)) = (light.carrier == Carrier::Undecided && interpolated, &light.rival) else {
             return false;
         };
-        let is_coarse = |error: &KeptError| error.estimate.relative_rmse > AUDIT_RMSE;
-        let known = photon_segments(rival).filter(|_| rival.error.as_ref().is_some_and(is_coarse));
-        known.is_some_and(|(segments, per_photon)| GROWTH.1 * segments < cost_of(&light.levels, per_photon))
+        let rmse = rival.error.as_ref().map(|error| error.estimate.relative_rmse);
+        let (Some((segments, per_photon)), Some(rmse)) = (photon_segments(rival), rmse) else {
+            return false;
+        };
+        let growth = (rmse / AUDIT_RMSE).powi(2).clamp(GROWTH.0, GROWTH.1);
+        rmse > AUDIT_RMSE
+            && growth * segments < MAX_AUDIT_COST * cost_of(&light.levels, per_photon)
+            && self
+                .next_photons(light.visible, Some(rival), Some(AUDIT_RMSE))
+                .is_some()
     }
 
     /// Whether another level of photons costs less than the first level of patches.

@@ -496,6 +496,16 @@ impl CausticLayer<'_> {
             light.done = true;
             return Ok(());
         }
+        self.push_judged(light, level, context)
+    }
+
+    /// Adds a level with its estimated error.
+    pub(super) fn push_judged(
+        &self,
+        light: &mut LightProgress,
+        mut level: LightLevel,
+        context: &mut BakeContext,
+    ) -> Result<()> {
         let predecessors = light.levels.len().min(ESTIMATED_LEVELS - 1);
         let auditors = light.rival.as_ref().and_then(|rival| rival.key.photons);
         let is_known = |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
@@ -516,7 +526,7 @@ impl CausticLayer<'_> {
         let goals = self.goals(lights, errors);
         for (light, goal) in lights.iter_mut().zip(goals).filter(|(light, _)| !light.done) {
             light.done = match goal {
-                Goal::Converged => true,
+                Goal::Converged => !self.lacks_auditors(light),
                 Goal::NextLevel => !self.has_next_level(light),
                 Goal::Refine(target) if light.carrier == Carrier::Photons => {
                     let is_good = light.error().is_some_and(|error| error.relative_rmse <= target);

@@ -94,6 +94,11 @@ impl DirectCache {
         self.layers.is_empty()
     }
 
+    /// Whether every layer has all the samples that it needs.
+    pub(super) fn is_refined(&self) -> bool {
+        self.layers.values().all(|layer| layer.is_refined)
+    }
+
     /// Whether all lights are cached on all charts.
     pub(super) fn knows(&self, lights: usize, charts: &DirectCharts) -> bool {
         let is_known = |light: usize| {
@@ -104,7 +109,8 @@ impl DirectCache {
         (0..lights).all(is_known)
     }
 
-    /// Bakes missing layers and drops those of other sizes.
+    /// Bakes missing layers and drops those of other sizes. After a deadline of `control`, layers are as good as a few
+    /// samples make them; a later bake with time left refines them.
     pub(super) fn complete(
         &mut self,
         tracer: &Tracer,
@@ -123,7 +129,11 @@ impl DirectCache {
             complete: true,
         };
         for (light, source) in lights.iter().enumerate() {
-            let is_missing = |chart: &&DirectChart| !self.layers.contains_key(&chart.key(light));
+            let is_late = control.is_cancelled();
+            let is_missing = |chart: &&DirectChart| {
+                let known = self.layers.get(&chart.key(light));
+                known.is_none_or(|layer| !layer.is_refined && !is_late)
+            };
             let missing: Vec<&DirectChart> = charts.values().filter(is_missing).collect();
             let on: Vec<_> = missing
                 .iter()

@@ -43,7 +43,7 @@ pub use spectra::SpectralBand;
 pub use survey::{PresetForecast, Survey};
 
 use crate::effect::EffectSwitch;
-use crate::error::{Error, Result};
+use crate::error::{Error, Result, Warning};
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::light_pass::caustic::setup::{CullMode, LightVisibility};
 use crate::plan::{self, Effect, EffectPlan};
@@ -384,8 +384,14 @@ impl Baker {
         if plan.is_on(Effect::Direct) {
             lamps.look_for_borders(tracer, &self.sizes, settings, control);
         }
+        let for_direct = limited(
+            control,
+            settings.max_time_s.map(|limit_s| PART_OF_DIRECT * limit_s),
+            began,
+        );
         let lights = &mut self.lights;
         let mut showing = Showing {
+            for_direct: &for_direct,
             finish: &finish,
             bake: &ground,
             watch: &whole,
@@ -414,9 +420,15 @@ impl Baker {
         outcome.warnings.extend(memory_warning);
         if plan.is_on(Effect::Direct) {
             let direct_charts = finish.direct_charts(&charts);
-            let complete = lamps.shine(tracer, &direct_charts, direct, (progress, control));
+            let complete = lamps.shine(tracer, &direct_charts, direct, (progress, &for_direct));
             if !complete {
                 outcome.stopped = Some(Stopped::Cancelled);
+            } else if !direct.is_refined() {
+                outcome.warnings.push(Warning::new(
+                    "direct layer",
+                    "the time was up before all shadows had the samples that they need",
+                    "allow more --max-time",
+                ));
             }
         }
         let mut outcome = lamps.added_to(&outcome);
@@ -453,6 +465,9 @@ impl Baker {
         Ok(result)
     }
 }
+
+/// Fraction of the time limit after which direct light is not refined further.
+const PART_OF_DIRECT: f64 = 0.5;
 
 /// Cancellation by the user, or by a time limit since the bake began [s].
 fn limited(control: &Control, limit_s: Option<f64>, began: Instant) -> Control {

@@ -17,7 +17,7 @@ use crate::light_pass::photon::filter;
 use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::{HALVES, PhotonPass};
 use crate::light_pass::photon::walk::PhotonRules;
-use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
+use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::optics::LinearSrgb;
 use crate::transport::EffectSet;
 
@@ -158,7 +158,7 @@ impl CausticLayer<'_> {
             return Ok(());
         }
         let mut last = light.levels.pop();
-        let made = self.more_photons(light, last.as_mut(), context)?;
+        let made = self.more_photons(light, last.as_mut(), light.target_rmse, context)?;
         // The light is negligible: a better estimate is not worth its cost.
         light.done |= !light.is_underrated && made.is_some() && self.is_negligible(light.visible);
         light.levels.extend(last.into_iter().chain(made));
@@ -167,7 +167,8 @@ impl CausticLayer<'_> {
         Ok(())
     }
 
-    /// The next level of a light after its last one; `None` if nothing is left to do, or it was stopped.
+    /// The next level of a light after its last one, towards a relative RMSE; `None` if nothing is left to do, or it was
+    /// stopped.
     ///
     /// # Errors
     /// A power that is not finite.
@@ -175,9 +176,10 @@ impl CausticLayer<'_> {
         &self,
         light: &mut LightProgress,
         last: Option<&mut LightLevel>,
+        target_rmse: Option<f64>,
         context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
-        let Some(photons) = self.next_photons(light.visible, last.as_deref(), light.target_rmse) else {
+        let Some(photons) = self.next_photons(light.visible, last.as_deref(), target_rmse) else {
             return Ok(None);
         };
         let before = last.as_ref().and_then(|last| last.key.photons).unwrap_or(0);
@@ -281,22 +283,15 @@ impl CausticLayer<'_> {
         self.spectra
             .to_linear_srgb(light.light, &mut self.no_maps(), &mut ledger);
         let [first, second] = self.half_maps(light, &raw);
-        let is_filtered = |map: &ReceiverMap| self.settings.filters() && filter::takes(map);
-        let mut noise = {
-            let as_they_are = |maps: &ReceiverMaps| {
-                let maps = maps.iter().filter(|(_, map)| !is_filtered(map));
-                accuracy::images_of(maps, unit)
-            };
-            accuracy::half_set_noise(&as_they_are(&first), &as_they_are(&second))
-        };
         let is_signed = self.spectra.has(light.light);
         let mut maps = first.clone().into_owned();
         maps.add(&second);
         let mut left = [0; 3];
-        if self.settings.filters() {
-            let of_filter = filter::filter(&mut maps, [&first, &second], (unit, is_signed), &mut left);
-            noise.extend(of_filter);
-        }
+        let noise = if self.settings.filters() {
+            filter::filter(&mut maps, [&first, &second], (unit, is_signed), &mut left)
+        } else {
+            accuracy::half_set_noise(&accuracy::images(&first, unit), &accuracy::images(&second, unit))
+        };
         filter::without_negative(&mut maps, is_signed, &mut left);
         ledger.book_sum(Account::Sampling, left);
         ledger.book_sum(Account::Deposited, left.map(|count| -count));

@@ -16,6 +16,7 @@ use crate::illumination::IlluminationMap;
 use crate::light_pass::caustic::pass::Stopwatch;
 use crate::optics::luminance;
 use crate::plan::Effect;
+use crate::progress::Control;
 use crate::settings::LayerKind;
 
 /// Receives intermediate results.
@@ -27,6 +28,8 @@ pub(super) struct Showing<'a, 'level> {
     pub(super) bake: &'a PreparedBake<'a>,
     /// Runs since the start of the bake.
     pub(super) watch: &'a Stopwatch,
+    /// After its deadline, direct light is not refined further.
+    pub(super) for_direct: &'a Control,
     pub(super) level: Option<&'a mut LevelCallback<'level>>,
     pub(super) direct: &'a mut DirectCache,
     pub(super) indirect: &'a mut IndirectCache,
@@ -98,7 +101,7 @@ impl Showing<'_, '_> {
         // The first picture after a change has to come soon; direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
         if !waits && plan.is_on(Effect::Direct) {
-            let on_whom = (self.bake.progress, self.bake.control);
+            let on_whom = (self.bake.progress, self.for_direct);
             self.lamps
                 .shine(&self.bake.tracer, &direct_charts, self.direct, on_whom);
         }
@@ -121,7 +124,7 @@ impl Showing<'_, '_> {
             return Backdrop::new();
         }
         let (charts, _) = finish.charts(levels);
-        let on_whom = (self.bake.progress, self.bake.control);
+        let on_whom = (self.bake.progress, self.for_direct);
         if finish.plan.is_on(Effect::Direct) {
             self.lamps.shine(
                 &self.bake.tracer,

@@ -93,11 +93,7 @@ impl LightError {
 }
 
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
-    images_of(maps.iter(), unit)
-}
-
-pub fn images_of<'a>(maps: impl Iterator<Item = (Receiver, &'a ReceiverMap)>, unit: FluxUnit) -> Images {
-    maps.map(|(receiver, map)| {
+    let image = |(receiver, map): (Receiver, &ReceiverMap)| {
         let chart = &map.chart;
         let luminance = map
             .flux()
@@ -114,8 +110,8 @@ pub fn images_of<'a>(maps: impl Iterator<Item = (Receiver, &'a ReceiverMap)>, un
             })
             .collect();
         (receiver, Image::new(chart, luminance))
-    })
-    .collect()
+    };
+    maps.iter().map(image).collect()
 }
 
 impl Image {

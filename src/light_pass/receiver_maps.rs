@@ -196,11 +196,6 @@ impl ReceiverMap {
         self.levels.extend(empty);
     }
 
-    /// Whether neighbouring texels are neighbours on the surface.
-    pub fn is_one_piece(&self) -> bool {
-        self.chart.islands().is_none() && self.chart.layout.is_none()
-    }
-
     /// The coarsest level that still resolves a smooth kernel of the given spread [texels of the map].
     pub fn level_for(&self, spread_texels: f64) -> usize {
         let fits = |level: &usize| spread_texels / f64::from(1_u32 << level) >= MIN_SPREAD_TEXELS;

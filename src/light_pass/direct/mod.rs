@@ -44,11 +44,14 @@ pub struct DirectLayer {
     pub shadow_rays: u64,
     /// False if cancelled: missing rows are black.
     pub complete: bool,
+    /// False if the time was up before all texels had the samples that they need.
+    pub is_refined: bool,
 }
 
 /// Bakes the direct light of some lights, one layer per chart. A chart's companion, if there is one, maps the same
 /// surface with small texels, into which texels at shadow borders are subdivided. The result does not depend on the
-/// number of threads. Progress counts rows over all charts.
+/// number of threads, unless `control` has a deadline: after it, texels keep what a few samples found. Progress counts
+/// rows over all charts.
 pub fn bake_direct(
     tracer: &Tracer,
     lights: &[Light],
@@ -57,7 +60,8 @@ pub fn bake_direct(
     control: &Control,
 ) -> Vec<DirectLayer> {
     let sources = sources(tracer, lights);
-    let looks = if begins_with_glance(&sources) { 3 } else { 2 };
+    let first = FirstLook::of(&sources, control);
+    let looks = if first == FirstLook::Coarse { 2 } else { 3 };
     let rows = |(chart, smaller): &(&Chart, Option<&Chart>)| {
         looks * chart.height as u64 + smaller.map_or(0, |smaller| 2 * smaller.height as u64)
     };
@@ -65,8 +69,8 @@ pub fn bake_direct(
     let done = AtomicU64::new(0);
     let row_done = || progress.advance(Stage::Direct, done.fetch_add(1, Ordering::Relaxed) + 1, total);
     let of = |&(chart, smaller): &(&Chart, Option<&Chart>)| {
-        let smaller = smaller.map(|smaller| Baker::new(tracer, &sources, smaller));
-        Baker::new(tracer, &sources, chart).bake(smaller.as_ref(), &row_done, control)
+        let smaller = smaller.map(|smaller| Baker::new(tracer, (&sources, first), smaller));
+        Baker::new(tracer, (&sources, first), chart).bake(smaller.as_ref(), &row_done, control)
     };
     charts.iter().map(of).collect()
 }
@@ -80,9 +84,10 @@ pub fn find_borders(
     control: &Control,
 ) -> Option<(Vec<Vec<bool>>, u64)> {
     let sources = sources(tracer, std::slice::from_ref(light));
+    let first = FirstLook::of(&sources, control);
     let mut shadow_rays = 0;
     let of = |chart: &&Chart| {
-        let baker = Baker::new(tracer, &sources, chart);
+        let baker = Baker::new(tracer, (&sources, first), chart);
         let mut seen = ChartStatistics::new(chart);
         baker.look_around(&mut seen, &|| (), control);
         shadow_rays += seen.shadow_rays;
@@ -102,17 +107,41 @@ fn sources(tracer: &Tracer, lights: &[Light]) -> Vec<Option<DirectSource>> {
         .collect()
 }
 
-/// Whether there are extended lights, and a glance may be enough for each of them.
-fn begins_with_glance(sources: &[Option<DirectSource>]) -> bool {
-    let soft = sources
-        .iter()
-        .flatten()
-        .filter_map(|source| match &source.emission {
+/// How texels are sampled first.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum FirstLook {
+    Coarse,
+    /// At a glance, then coarsely where that was not enough.
+    Glance,
+    /// At a glance, then coarsely everywhere as far as the time allows.
+    Hurried,
+}
+
+impl FirstLook {
+    fn of(sources: &[Option<DirectSource>], control: &Control) -> Self {
+        let soft = sources.iter().flatten();
+        let soft = soft.filter_map(|source| match &source.emission {
             Emission::Extended(soft) => Some(soft.is_even),
             Emission::Single(_) => None,
         });
-    let even: Vec<bool> = soft.collect();
-    !even.is_empty() && even.iter().all(|is_even| *is_even)
+        let even: Vec<bool> = soft.collect();
+        if even.is_empty() {
+            Self::Coarse
+        } else if even.iter().all(|is_even| *is_even) {
+            Self::Glance
+        } else if control.time_left_s().is_some() {
+            Self::Hurried
+        } else {
+            Self::Coarse
+        }
+    }
+
+    fn detail(self) -> SamplingDetail {
+        match self {
+            Self::Coarse => SamplingDetail::COARSE,
+            Self::Glance | Self::Hurried => SamplingDetail::GLANCE,
+        }
+    }
 }
 
 /// Results for a chart so far.
@@ -121,6 +150,7 @@ struct ChartStatistics {
     texels: Vec<Texel>,
     shadow_rays: u64,
     complete: bool,
+    is_refined: bool,
 }
 
 impl ChartStatistics {
@@ -130,6 +160,7 @@ impl ChartStatistics {
             texels: vec![Texel::DARK; chart.width * chart.height],
             shadow_rays: 0,
             complete: true,
+            is_refined: true,
         }
     }
 
@@ -154,6 +185,7 @@ impl ChartStatistics {
     fn count(&mut self, row: &TexelRow) {
         self.shadow_rays += row.shadow_rays;
         self.complete &= !row.cancelled;
+        self.is_refined &= !row.is_late;
     }
 }
 
@@ -161,6 +193,7 @@ struct Baker<'a> {
     tracer: &'a Tracer,
     /// By light; `None` for one that emits nothing.
     sources: &'a [Option<DirectSource>],
+    first_look: FirstLook,
     chart: &'a Chart,
     material: &'a Material,
     /// Row r is overlapped by `triangles[first[r]..first[r + 1]]`.
@@ -169,7 +202,11 @@ struct Baker<'a> {
 }
 
 impl<'a> Baker<'a> {
-    fn new(tracer: &'a Tracer, sources: &'a [Option<DirectSource>], chart: &'a Chart) -> Self {
+    fn new(
+        tracer: &'a Tracer,
+        (sources, first_look): (&'a [Option<DirectSource>], FirstLook),
+        chart: &'a Chart,
+    ) -> Self {
         let size = DVec2::new(1.0, chart.height as f64);
         let reach = |uvs: &[DVec2; 3]| rows(uvs.map(|uv| uv * size), chart.height);
         let mut first = vec![0; chart.height + 1];
@@ -192,6 +229,7 @@ impl<'a> Baker<'a> {
         Self {
             tracer,
             sources,
+            first_look,
             chart,
             material: tracer.scene().material_of(chart.object()),
             first,
@@ -209,8 +247,7 @@ impl<'a> Baker<'a> {
             .map(|texel| texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.lit))
             .collect();
         let divided = smaller.map(|smaller| self.divide(smaller, &mut unclear, &mut seen, row_done, control));
-        let fine = self.pass(row_done, control, SamplingDetail::FINE, |texel| unclear[texel]);
-        seen.take(fine);
+        seen.take(self.refine(row_done, control, SamplingDetail::FINE, |texel| unclear[texel]));
         let irradiance = seen.texels.into_iter().map(|texel| texel.irradiance);
         let mut irradiance: Vec<[f32; 3]> = irradiance.collect();
         fill_gutter(self.chart, &mut irradiance);
@@ -219,27 +256,23 @@ impl<'a> Baker<'a> {
             divided: divided.map(|divided| divided.map(|texel| texel.irradiance)),
             shadow_rays: seen.shadow_rays,
             complete: seen.complete,
+            is_refined: seen.is_refined,
         }
     }
 
     /// The first pass over all texels. If that was a glance, a coarse pass follows where it was not enough.
     fn look_around(&self, seen: &mut ChartStatistics, row_done: &(impl Fn() + Sync), control: &Control) {
-        seen.take(self.pass(row_done, control, self.first_look(), |_| true));
-        if begins_with_glance(self.sources) {
-            let texels = &seen.texels;
-            let coarse = self.pass(row_done, control, SamplingDetail::COARSE, |texel| {
-                texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.soft_lit)
-            });
-            seen.take(coarse);
+        seen.take(self.pass(row_done, control, self.first_look.detail(), |_| true));
+        if self.first_look == FirstLook::Coarse {
+            return;
         }
-    }
-
-    fn first_look(&self) -> SamplingDetail {
-        if begins_with_glance(self.sources) {
-            SamplingDetail::GLANCE
-        } else {
-            SamplingDetail::COARSE
-        }
+        let texels = &seen.texels;
+        let coarse = self.refine(row_done, control, SamplingDetail::COARSE, |texel| {
+            self.first_look == FirstLook::Hurried
+                || texels[texel].is_uncertain
+                || self.meets_other(texels, texel, |texel| texel.soft_lit)
+        });
+        seen.take(coarse);
     }
 
     /// Subdivides the texels at shadow borders and samples their small texels. No more samples are needed there.
@@ -252,14 +285,16 @@ impl<'a> Baker<'a> {
         control: &Control,
     ) -> SubdividedTexels<Texel> {
         let texels = &seen.texels;
-        let steep = |texel: usize| is_steep(self.chart, texels, texel) && self.is_unclear(texels, texel);
+        let is_late = control.is_cancelled();
+        let steep =
+            |texel: usize| !is_late && is_steep(self.chart, texels, texel) && self.is_unclear(texels, texel);
         let steep: Vec<bool> = (0..unclear.len()).map(steep).collect();
         let side = smaller.chart.width / self.chart.width;
         let mut divided = SubdividedTexels::new(self.chart, side, &steep, Texel::DARK);
         let is_there = |small: usize| divided.get(small).is_some();
-        let rows = smaller.pass(row_done, control, self.first_look(), is_there);
+        let rows = smaller.pass(row_done, control, self.first_look.detail(), is_there);
         seen.take_small(rows, &mut divided);
-        let rows = smaller.pass(row_done, control, SamplingDetail::SMALL, |small| {
+        let rows = smaller.refine(row_done, control, SamplingDetail::SMALL, |small| {
             divided.is_unclear(small)
         });
         seen.take_small(rows, &mut divided);
@@ -288,6 +323,7 @@ impl<'a> Baker<'a> {
         lit(&texels[texel]).differs(around.map(|other| lit(&texels[other])))
     }
 
+    /// Samples the wanted texels, whether or not the time is up.
     fn pass(
         &self,
         row_done: &(impl Fn() + Sync),
@@ -295,12 +331,26 @@ impl<'a> Baker<'a> {
         look: SamplingDetail,
         wanted: impl Fn(usize) -> bool + Sync,
     ) -> Vec<TexelRow> {
+        self.refine(row_done, &control.without_deadline(), look, wanted)
+    }
+
+    /// Samples the wanted texels again, until the time is up.
+    fn refine(
+        &self,
+        row_done: &(impl Fn() + Sync),
+        control: &Control,
+        look: SamplingDetail,
+        wanted: impl Fn(usize) -> bool + Sync,
+    ) -> Vec<TexelRow> {
+        let whole = control.without_deadline();
         (0..self.chart.height)
             .into_par_iter()
             .map(|row| {
                 if control.is_cancelled() {
+                    let cancelled = whole.is_cancelled();
                     return TexelRow {
-                        cancelled: true,
+                        cancelled,
+                        is_late: !cancelled,
                         ..TexelRow::default()
                     };
                 }

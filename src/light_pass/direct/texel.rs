@@ -201,6 +201,8 @@ pub struct TexelRow {
     pub texels: Vec<(u32, Texel)>,
     pub shadow_rays: u64,
     pub cancelled: bool,
+    /// Not sampled, since the time was up.
+    pub is_late: bool,
 }
 
 #[cfg(test)]

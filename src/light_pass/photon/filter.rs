@@ -30,11 +30,6 @@ const MIN_LEFT: f32 = 1e-5;
 /// Floor of irradiance relative to the map's mean.
 const DARKEST: f32 = 1e-4;
 
-/// Whether a map can be filtered. Charts of several islands without tiles stay as they are, with their noise.
-pub fn takes(map: &ReceiverMap) -> bool {
-    map.chart.layout.is_some() || map.is_one_piece()
-}
-
 /// Filters the sum of two halves and returns the remaining squared error of each texel [W²/m⁴]. `is_signed`: channels
 /// may be negative. Adds counts that a map could not take to `left`.
 pub fn filter(
@@ -44,7 +39,7 @@ pub fn filter(
     left: &mut Sums,
 ) -> Noise {
     let mut noise = Noise::new();
-    for (receiver, map) in sum.iter_mut().filter(|(_, map)| takes(map)) {
+    for (receiver, map) in sum.iter_mut() {
         let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
         let kept = details.filtered();
         noise.insert(receiver, details.squares(&kept, map));

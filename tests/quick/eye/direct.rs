@@ -1,5 +1,7 @@
 //! Direct light against closed forms.
 
+use std::time::Instant;
+
 use nephroid::illumination::Side;
 use nephroid::light_pass::direct::bake_direct;
 use nephroid::optics::fresnel::dielectric_reflectance;
@@ -7,7 +9,7 @@ use nephroid::scene::Volume;
 use nephroid::units::RadiantIntensity;
 
 use crate::prelude::*;
-use support::meshes::{cuboid, floor, joined, moved, quad};
+use support::meshes::{cuboid, floor, joined, moved, quad, sphere};
 use support::scenes::{chart, diffuse, direct, flux_w, light, middles, point_light, sun, surface, tracer};
 
 /// The floor |x|, |z| ≤ 1 under lamps.
@@ -308,4 +310,33 @@ fn cancelled_bake_says_so() {
     control.cancel();
     let layers = bake_direct(&tracer, &tracer.scene().lights, &[(&chart, None)], &(), &control);
     assert!(!layers[0].complete);
+}
+
+/// Once the time is up, texels keep what a few samples found.
+#[test]
+fn late_layers_are_rough_but_right() {
+    let lamp = Light {
+        size: LightSize::Radius { radius_m: 0.3 },
+        ..point_light(dvec3(0.0, 1.5, 0.0), 1.0)
+    };
+    let ball = sphere(dvec3(0.0, 0.5, 0.0), 0.3, 24, 12);
+    let tracer = tracer(
+        vec![(floor(1.0, 0.0), diffuse(0.5)), (ball, diffuse(0.5))],
+        vec![lamp],
+    );
+    let chart = chart(&tracer, 0, 32, 32);
+    let bake = |control: &Control| {
+        bake_direct(&tracer, &tracer.scene().lights, &[(&chart, None)], &(), control).remove(0)
+    };
+    let (late, fine) = (
+        bake(&Control::default().with_deadline(Instant::now())),
+        bake(&Control::default()),
+    );
+    assert!(late.complete && !late.is_refined && fine.is_refined);
+    assert!(
+        late.shadow_rays <= 8 * 32 * 32,
+        "{} shadow rays",
+        late.shadow_rays
+    );
+    assert_close(flux_w(&chart, &late), flux_w(&chart, &fine), 0.01, "flux");
 }
