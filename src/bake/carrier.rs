@@ -8,8 +8,8 @@ use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::LightLevel;
 use super::photon_level::GROWTH;
 use crate::error::{Error, Result};
-use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::photon::pass::HALVES;
+use crate::light_pass::visibility::VisibleLight;
 use crate::plan::Effect;
 use crate::settings::Estimator;
 

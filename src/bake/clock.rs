@@ -1,7 +1,7 @@
 //! Wall and CPU time of a bake, by stage.
 
 use super::result::Timings;
-use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
+use crate::light_pass::pass_report::{Seconds, Stopwatch};
 
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Clock {

@@ -4,7 +4,7 @@ use super::caustic::CausticOutcome;
 use super::clock::Clock;
 use super::direct_cache::{DirectCache, DirectCharts};
 use super::sizes::ChartCache;
-use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
+use crate::light_pass::pass_report::{Seconds, Stopwatch};
 use crate::progress::{Control, Progress};
 use crate::settings::BakeSettings;
 use crate::transport::Tracer;

@@ -6,8 +6,8 @@ use std::collections::BTreeMap;
 use super::carrier::Carrier;
 use super::caustic::{CausticLayer, LightProgress};
 use super::metric::ErrorTerms;
-use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::ledger_sum::Account;
+use crate::light_pass::visibility::VisibleLight;
 
 /// A light whose share of the error is below this fraction of the limit skips its remaining lattices; one whose whole
 /// flux is below it is dim.

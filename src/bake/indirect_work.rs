@@ -8,10 +8,10 @@ use super::result::LightLayer;
 use super::sizes::ChartCache;
 use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Layer, Receiver};
-use crate::light_pass::caustic::pass::{Seconds, Stopwatch};
 use crate::light_pass::indirect::{
     Grid, MAX_BOUNCES, MIN_PASSES, Network, Resampling, Solution, TraceCounts,
 };
+use crate::light_pass::pass_report::{Seconds, Stopwatch};
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::settings::LayerKind;

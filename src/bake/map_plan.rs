@@ -9,7 +9,7 @@ use super::sizes::{LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE, MapMemory};
 use crate::error::Warning;
 use crate::illumination::tiles::COARSEST;
 use crate::illumination::{Chart, Receiver};
-use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::plan::Effect;
 use crate::settings::MapResolution;
 

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::sizes::MapMemory;
 use crate::illumination::Receiver;
 use crate::illumination::tiles::{self, COARSEST, TileLayout};
-use crate::light_pass::caustic::statistics::FootprintSample;
+use crate::light_pass::footprint_statistics::FootprintSample;
 
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct MapSize {

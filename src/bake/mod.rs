@@ -44,8 +44,8 @@ pub use survey::{PresetForecast, Survey};
 
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result, Warning};
-use crate::light_pass::caustic::pass::Stopwatch;
-use crate::light_pass::caustic::setup::{CullMode, LightVisibility};
+use crate::light_pass::pass_report::Stopwatch;
+use crate::light_pass::visibility::{CullMode, LightVisibility};
 use crate::plan::{self, Effect, EffectPlan};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;

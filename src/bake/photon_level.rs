@@ -10,14 +10,14 @@ use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images, LightError};
-use crate::light_pass::caustic::pass::ProgressScope;
-use crate::light_pass::caustic::setup::VisibleLight;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::light_pass::pass_report::ProgressScope;
 use crate::light_pass::photon::filter;
 use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::{HALVES, PhotonPass};
 use crate::light_pass::photon::walk::PhotonRules;
 use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::light_pass::visibility::VisibleLight;
 use crate::optics::LinearSrgb;
 use crate::transport::EffectSet;
 

@@ -13,7 +13,7 @@ use super::indirect_work::IndirectWork;
 use super::metric::{Backdrop, ComparisonView};
 use super::{Bake, LightLayer, PreparedBake, account};
 use crate::illumination::IlluminationMap;
-use crate::light_pass::caustic::pass::Stopwatch;
+use crate::light_pass::pass_report::Stopwatch;
 use crate::optics::luminance;
 use crate::plan::Effect;
 use crate::progress::Control;

@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 
 use super::band_layers::LevelBand;
 use crate::error::Result;
-use crate::light_pass::caustic::setup::{LightVisibility, VisibleLight};
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::photon::spectrum::PhotonSpectrum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::spectral_node::{SpectralNode, channels_within, to_linear_srgb};
+use crate::light_pass::visibility::{LightVisibility, VisibleLight};
 use crate::light_pass::wavefront::spectrum::{LightPart, LightSpectrum};
 use crate::optics::Nanometres;
 use crate::optics::spectrum::{Emission, Spectrum, WavelengthSampler, illuminant, xyz_bar};

@@ -8,15 +8,16 @@ use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{self, Images};
-use crate::light_pass::caustic::arrival_cache::ArrivalCache;
-use crate::light_pass::caustic::deposit::{Depositor, HalfBuffers};
-use crate::light_pass::caustic::lattice::Lattice;
-use crate::light_pass::caustic::pass::{self, PassInput, PassReport, ProgressScope};
-use crate::light_pass::caustic::setup::VisibleLight;
-use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::pass_report::{PassReport, ProgressScope};
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::shard_index::ShardIndex;
+use crate::light_pass::splat::arrival_cache::ArrivalCache;
+use crate::light_pass::splat::deposit::{Depositor, HalfBuffers};
+use crate::light_pass::splat::lattice::Lattice;
+use crate::light_pass::splat::pass::{self, PassInput};
+use crate::light_pass::visibility::VisibleLight;
 use crate::settings::{BakeSettings, Footprint, Sigma};
 
 /// Maximum stride of the lattice for mean footprints.

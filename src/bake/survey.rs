@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::forecast::{Forecast, forecast};
 use super::{Bake, BakeEstimate, Baker};
 use crate::error::Result;
-use crate::light_pass::caustic::pass::Stopwatch;
+use crate::light_pass::pass_report::Stopwatch;
 use crate::plan::Effect;
 use crate::progress::{Control, Progress, Stage};
 use crate::settings::{BakeSettings, Preset};

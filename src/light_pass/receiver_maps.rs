@@ -4,12 +4,23 @@ use rayon::prelude::*;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::caustic::path::Arrival;
-use super::caustic::splat::Coverage;
+use super::path::Arrival;
 use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 use crate::illumination::islands::Islands;
 use crate::illumination::{Chart, Receiver, smoothing};
 use crate::optics::LinearSrgb;
+
+/// Which texels of a map a surface covers.
+pub trait Coverage: Sync {
+    /// Texels across and down.
+    fn size(&self) -> (usize, usize);
+
+    /// Whether every texel is covered.
+    fn is_full(&self) -> bool;
+
+    /// Whether an island of the chart covers any part of a texel.
+    fn covers(&self, column: usize, row: usize, island: u32) -> bool;
+}
 
 /// The map of one surface, with its flux.
 #[derive(Clone, Debug)]

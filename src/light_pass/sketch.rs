@@ -8,9 +8,9 @@ use rayon::prelude::*;
 
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::caustic::path::{PathLimits, PathSignature, PathTracer};
-use crate::light_pass::caustic::setup::{CullMode, LightVisibility, VisibleLight};
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
+use crate::light_pass::path::{PathLimits, PathSignature, PathTracer};
+use crate::light_pass::visibility::{CullMode, LightVisibility, VisibleLight};
 use crate::progress::Control;
 use crate::settings::ItemBufferKind;
 use crate::transport::{EffectSet, Tracer};

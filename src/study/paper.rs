@@ -16,7 +16,7 @@ use crate::bake::Bake;
 use crate::error::{Error, Result};
 use crate::geometry::Ray;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::caustic::path::{PathLimits, PathTracer};
+use crate::light_pass::path::{PathLimits, PathTracer};
 use crate::optics::LinearSrgb;
 use crate::scene::builtin::{self, parts, pool, shapes};
 use crate::scene::{Camera, LightKind, Mesh, Scene};

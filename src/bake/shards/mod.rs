@@ -14,7 +14,7 @@ use crate::bake::clock::Clock;
 use crate::bake::light_level::LightStates;
 use crate::bake::{Bake, Baker, Timings};
 use crate::error::{Error, Result};
-use crate::light_pass::caustic::pass::Stopwatch;
+use crate::light_pass::pass_report::Stopwatch;
 use crate::light_pass::shard_index::ShardIndex;
 use crate::plan;
 use crate::progress::{Control, Progress};

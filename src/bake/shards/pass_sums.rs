@@ -6,7 +6,7 @@ use std::io::{self, BufReader, Read};
 use crate::bake::band_maps::BandMaps;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxAccumulator;
-use crate::light_pass::caustic::pass::{PassReport, Seconds};
+use crate::light_pass::pass_report::{PassReport, Seconds};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::shard_index::ShardIndex;
 

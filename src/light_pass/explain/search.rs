@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::clip::{is_in_square, share_in_square};
 use super::walk::{Arrival, LightPathWalker};
-use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::item_buffer::{CELLS_PER_SIDE, ItemBuffer};
+use crate::light_pass::path::PathSignature;
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 

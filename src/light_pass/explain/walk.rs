@@ -6,8 +6,8 @@ use super::target::Target;
 use super::{Limits, PathVertex};
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
-use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::launch::Launch;
+use crate::light_pass::path::PathSignature;
 use crate::optics::LinearSrgb;
 use crate::transport::{Event, MediumStack, Tracer};
 

@@ -11,7 +11,7 @@ use super::spectrum::PhotonSpectrum;
 use super::walk::PhotonRules;
 use crate::geometry::Ray;
 use crate::illumination::{Chart, Receiver, Side};
-use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::path::PathSignature;
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};

@@ -11,8 +11,8 @@ use super::regions::{Outline, regions, triangles};
 use super::spectrum::{LightPart, NODES};
 use super::subcell_features::SubcellFeatures;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::caustic::path::PathSignature;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::light_pass::path::PathSignature;
 use crate::optics::{ColourMatrix, LinearSrgb};
 
 /// Limits on splitting cells whose cuts leave open what lies in them. At the limit, each ray becomes one small patch.

@@ -8,7 +8,7 @@ use super::edge::{EdgeReach, mismatch};
 use super::lattice_ray::LatticeRay;
 use super::patch::PatchShape;
 use crate::geometry::Ray;
-use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::path::PathSignature;
 
 /// Light below this share of the brightest does not make a cell ambiguous: it is cut as is, and what the cuts leave
 /// open is booked.

@@ -6,7 +6,7 @@ use super::patch::PatchShape;
 use super::spread::{SpreadOutput, Spreader};
 use super::virtual_vertex::{VirtualRays, VirtualVertex};
 use crate::illumination::Receiver;
-use crate::light_pass::caustic::statistics::FootprintSample;
+use crate::light_pass::footprint_statistics::FootprintSample;
 use crate::optics::LinearSrgb;
 
 /// Largest deviation of triangles from the curve [texels].

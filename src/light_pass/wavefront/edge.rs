@@ -5,7 +5,7 @@ use glam::{DVec2, DVec3};
 use super::band::{Corner, SampleId, Workspace};
 use super::lattice_ray::{LatticeRay, PathSegment};
 use super::trace::StrandTracer;
-use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::path::PathSignature;
 
 /// An edge with more changes of the path than this is bisected more coarsely.
 const MANY_CHANGES: usize = 12;

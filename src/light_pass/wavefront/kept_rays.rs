@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use glam::{DVec2, DVec3};
 
 use crate::geometry::Ray;
-use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::path::PathSignature;
 use crate::transport::RayHit;
 
 /// Start of a light ray: face of the launch domain, bits of the position in the unit square, and number of the

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use super::kept_rays::TracedRay;
 use crate::geometry::Ray;
 use crate::illumination::Receiver;
-use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::path::PathSignature;
 use crate::optics::LinearSrgb;
 use crate::transport::{MediumStack, RayDifferential};
 

@@ -11,7 +11,7 @@ use super::lattice_ray::{LatticeRay, PathSegment, SegmentEnd};
 use super::overshoot::PatchOvershoot;
 use super::receivers::Receivers;
 use crate::illumination::Receiver;
-use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::path::PathSignature;
 
 /// Side of a tile [texels].
 pub const TILE_SIDE: usize = 16;

@@ -11,7 +11,7 @@ use super::lattice_ray::LatticeRay;
 use super::regions::{Outline, triangles};
 use super::spectrum::{LightPart, LightSpectrum, NODES};
 use super::subcell_features::SubcellFeatures;
-use crate::light_pass::caustic::path::PathSignature;
+use crate::light_pass::path::PathSignature;
 
 /// Samples at a cell's corners by wavelength.
 type NodeCorners = [[SampleId; 4]; NODES];

@@ -16,7 +16,7 @@ use super::spectrum::{LightPart, LightSpectrum, NODES, lands_alike};
 use super::virtual_vertex::VirtualRays;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
-use crate::light_pass::caustic::statistics::FootprintStatistics;
+use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::optics::{ColourMatrix, LinearSrgb};
 

@@ -9,8 +9,8 @@ use super::lattice_ray::{LatticeRay, PathSegment, SegmentEnd, SurfaceFluxRecord}
 use super::spectrum::LightPart;
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
-use crate::light_pass::caustic::path::{PathLimits, PathSignature};
 use crate::light_pass::launch::Launch;
+use crate::light_pass::path::{PathLimits, PathSignature};
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::transport::{

@@ -1,7 +1,7 @@
 //! Ray differentials against finite differences of traced rays.
 
-use nephroid::light_pass::caustic::path::PathLimits;
-use nephroid::light_pass::caustic::setup::{CullMode, LightVisibility};
+use nephroid::light_pass::path::PathLimits;
+use nephroid::light_pass::visibility::{CullMode, LightVisibility};
 use nephroid::light_pass::wavefront::lattice_ray::{PathSegment, SegmentEnd};
 use nephroid::light_pass::wavefront::trace::StrandTracer;
 use nephroid::settings::ItemBufferKind;

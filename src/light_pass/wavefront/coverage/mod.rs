@@ -17,7 +17,7 @@ mod tiles;
 
 use glam::DVec2;
 
-use super::super::caustic::splat::Coverage;
+use super::super::receiver_maps::Coverage;
 use super::super::receiver_maps::ReceiverMap;
 use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 

@@ -1,4 +1,4 @@
-//! The caustic layer: light that met at least one specular surface (LS+D), by the paper's method.
+//! The caustic layer by the paper's method: each ray lights a footprint, and spreads its flux with a kernel.
 
 pub mod arrival_cache;
 mod bivariate_normal;
@@ -11,8 +11,5 @@ pub mod lattice;
 mod neighbourhood;
 mod numeric;
 pub mod pass;
-pub mod path;
-pub mod setup;
-pub mod splat;
-pub mod statistics;
 mod surface;
+mod window;

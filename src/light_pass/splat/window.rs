@@ -8,6 +8,7 @@ use super::gaussian::{Centred, Cornered, WIDE_TEXELS};
 use super::kernel::Profile;
 use super::numeric::{floor, round};
 use crate::illumination::accumulator::FluxCount;
+use crate::light_pass::receiver_maps::Coverage;
 use crate::settings::KernelSampling;
 
 /// Footprints thinner than this [texels] are widened to it: far below what a texel can show, and enough for the inverse
@@ -26,18 +27,6 @@ pub struct Splat {
     pub flux: FluxCount,
     /// Island of the chart; other islands get none of the flux.
     pub island: u32,
-}
-
-/// Which texels of a map a surface covers.
-pub trait Coverage: Sync {
-    /// Texels across and down.
-    fn size(&self) -> (usize, usize);
-
-    /// Whether every texel is covered.
-    fn is_full(&self) -> bool;
-
-    /// Whether an island of the chart covers any part of a texel.
-    fn covers(&self, column: usize, row: usize, island: u32) -> bool;
 }
 
 /// Weights of a splat in the texels that it reaches; reused from splat to splat.

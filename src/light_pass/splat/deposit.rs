@@ -8,12 +8,12 @@ use super::footprint::{Neighbours, footprint};
 use super::kernel::Profile;
 use super::lattice::{Lattice, TracedRow};
 use super::neighbourhood::Neighbourhood;
-use super::path::Arrival;
-use super::splat::Splat;
-use super::statistics::FootprintStatistics;
 use super::surface::{Surface, Surfaces};
+use super::window::Splat;
 use crate::illumination::Receiver;
+use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::light_pass::path::Arrival;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::settings::{BakeSettings, Kernel, KernelSampling, Sigma};
 

@@ -6,9 +6,10 @@ use std::sync::{Mutex, PoisonError};
 use rayon::prelude::*;
 
 use super::deposit::PlacedSplat;
-use super::splat::{Coverage, Splat, Window, fold};
+use super::window::{Splat, Window, fold};
 use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::light_pass::receiver_maps::Coverage;
 use crate::settings::KernelSampling;
 
 /// Most splats of a task.

@@ -3,7 +3,7 @@
 use super::deposit::RowContext;
 use super::footprint::Neighbours;
 use super::lattice::TracedRow;
-use super::path::Arrival;
+use crate::light_pass::path::Arrival;
 
 /// Finds neighbours along a row, from its first arrival to its last.
 pub(super) struct Neighbourhood<'a> {

@@ -3,8 +3,8 @@
 use glam::DVec2;
 
 use super::footprint::TexelFromWorld;
-use super::path::Arrival;
 use crate::illumination::Receiver;
+use crate::light_pass::path::Arrival;
 use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
 use crate::scene::Scene;
 

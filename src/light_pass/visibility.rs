@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::pass::{Seconds, Stopwatch};
+use super::pass_report::{Seconds, Stopwatch};
 use crate::geometry::sampling::even_point;
 use crate::light_pass::emitter::Emitter;
 use crate::light_pass::item_buffer::{HiddenCellPolicy, ItemBuffer};

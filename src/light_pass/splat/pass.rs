@@ -2,20 +2,16 @@
 
 use std::collections::BTreeSet;
 
-use cpu_time::ProcessTime;
 use rayon::prelude::*;
-use std::time::Instant;
 
 use super::arrival_cache::ArrivalCache;
 use super::deposit::{DepositReport, Depositor, HalfBuffers, RowContext};
 use super::lattice::{Lattice, TracedRow};
-use super::statistics::FootprintStatistics;
 use crate::illumination::Receiver;
-use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::shard_index::ShardIndex;
-use crate::light_pass::wavefront::overshoot::PatchOvershoot;
-use crate::progress::{Control, Progress, Stage};
+use crate::progress::Stage;
 
 /// Target number of rays per band: enough work for all cores, and few enough that the arrivals stay in their caches.
 const RAYS_PER_BAND: usize = 1 << 14;
@@ -23,90 +19,6 @@ const RAYS_PER_BAND: usize = 1 << 14;
 /// Limits on the rows of a band, whatever their number of rays.
 const MIN_ROWS: usize = 4;
 const MAX_ROWS: usize = 4096;
-
-/// Result of the pass of one light.
-#[derive(Clone, Debug, Default)]
-pub struct PassReport {
-    pub ledger: LedgerSum,
-    /// Rays launched.
-    pub rays: u64,
-    /// Closest-hit queries.
-    pub segments: u64,
-    /// Kernels deposited.
-    pub splats: u64,
-    /// Wavefront cells.
-    pub cells: u64,
-    /// Interpolated rays that were intersected with receivers.
-    pub receiver_queries: u64,
-    /// Sizes of footprints.
-    pub statistics: FootprintStatistics,
-    /// Patches that reach farther than their traced rays.
-    pub overshoots: Vec<PatchOvershoot>,
-    /// Luminous flux [counts] of all patches, and of those that concentrate a part of the spectrum in one place.
-    pub lumped_flux: [i128; 2],
-    /// Of tracing.
-    pub trace_s: Seconds,
-    /// Of depositing.
-    pub deposit_s: Seconds,
-    /// Whether it was stopped before the end.
-    pub cancelled: bool,
-}
-
-/// Wall-clock and CPU time [s].
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Seconds {
-    pub wall: f64,
-    /// Of all threads of the process.
-    pub cpu: f64,
-}
-
-/// Measures wall-clock and CPU time.
-#[derive(Clone, Copy, Debug)]
-pub struct Stopwatch {
-    wall: Instant,
-    cpu: Option<ProcessTime>,
-}
-
-impl Stopwatch {
-    /// Starts both clocks. Without a CPU clock on the system, CPU time stays at zero.
-    pub fn start() -> Self {
-        Self {
-            wall: Instant::now(),
-            cpu: ProcessTime::try_now().ok(),
-        }
-    }
-
-    /// Since the start.
-    pub fn elapsed(&self) -> Seconds {
-        let cpu = self
-            .cpu
-            .and_then(|start| start.try_elapsed().ok())
-            .map_or(0.0, |time| time.as_secs_f64());
-        Seconds {
-            wall: self.wall.elapsed().as_secs_f64(),
-            cpu,
-        }
-    }
-}
-
-impl Seconds {
-    pub fn add(&mut self, other: Self) {
-        self.wall += other.wall;
-        self.cpu += other.cpu;
-    }
-}
-
-/// Progress callback and cancel token of a pass.
-#[derive(Clone, Copy)]
-pub struct ProgressScope<'a> {
-    pub progress: &'a dyn Progress,
-    /// Checked for cancellation.
-    pub control: &'a Control,
-    /// Rays of previous passes (arrivals, where they were cached).
-    pub done: u64,
-    /// Rays (or arrivals) of all passes.
-    pub total: u64,
-}
 
 /// Source of the light of a pass.
 #[derive(Clone, Copy, Debug)]
@@ -332,23 +244,6 @@ fn deposit_rows(
 }
 
 impl PassReport {
-    /// Adds the result of another pass over the same light.
-    pub fn merge(&mut self, other: Self) {
-        self.ledger.merge(&other.ledger);
-        self.rays += other.rays;
-        self.segments += other.segments;
-        self.splats += other.splats;
-        self.cells += other.cells;
-        self.receiver_queries += other.receiver_queries;
-        self.statistics.merge(&other.statistics);
-        self.overshoots.extend(other.overshoots);
-        let flux = self.lumped_flux.iter_mut().zip(other.lumped_flux);
-        flux.for_each(|(sum, flux)| *sum += flux);
-        self.trace_s.add(other.trace_s);
-        self.deposit_s.add(other.deposit_s);
-        self.cancelled |= other.cancelled;
-    }
-
     fn count(&mut self, traced: &[TracedRow]) {
         for row in traced {
             self.ledger.merge(&row.ledger);

@@ -5,11 +5,11 @@ use glam::{DVec2, DVec3};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use super::path::{Arrival, PathLimits, PathTracer};
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::launch::Launch;
 use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::path::{Arrival, PathLimits, PathTracer};
 use crate::light_pass::spectral_node::SpectralNode;
 use crate::scene::Scene;
 use crate::settings::RayPlacement;

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::path::Arrival;
+use crate::light_pass::path::Arrival;
 use crate::settings::Footprint;
 
 /// A symmetric 2×2 matrix M in texel coordinates: the footprint is the ellipse dᵀM⁻¹d ≤ 1, of area π√det M texels.

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::super::ledger_sum::{Account, LedgerSum};
+use super::ledger_sum::{Account, LedgerSum};
 use crate::geometry::Ray;
 use crate::geometry::sampling::{GOLDEN_64, mix64};
 use crate::illumination::accumulator::FluxUnit;

@@ -4,9 +4,9 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::lattice::{Lattice, Points, TracedRow};
-use super::path::{Arrival, PathSignature};
 use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
+use crate::light_pass::path::{Arrival, PathSignature};
 use crate::optics::LinearSrgb;
 
 /// All arrivals of one light at diffuse surfaces, row by row of its lattice.
