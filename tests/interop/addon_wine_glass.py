@@ -154,7 +154,10 @@ def flux_w(addon):
     for packed in bpy.data.images[addon.lightmaps.IMAGE].packed_files:
         file.write_bytes(packed.packed_file.data)
         tiles[packed.tile_number] = math.pi * pixels(file) @ LUMINANCE
-    random, total, read = numpy.random.default_rng(1), 0.0, addon.scene.read
+    # Evenly over the area, by an additive recurrence within triangles.
+    index, total, read = numpy.arange(PLACES), 0.0, addon.scene.read
+    s, t = numpy.sqrt(index * 0.7548776662 % 1.0), index * 0.5698402910 % 1.0
+    shares = numpy.stack([1 - s, s * (1 - t), s * t], axis=1)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     for item in [item for item in bpy.context.scene.objects if item.type == "MESH"]:
         mesh = item.evaluated_get(depsgraph).data
@@ -163,10 +166,8 @@ def flux_w(addon):
         places = read(mesh.vertices, "co", "f", 3) @ numpy.array(item.matrix_world.to_3x3()).T
         a, b, c = places[read(mesh.loops, "vertex_index", "i", 1)[loops]].swapaxes(0, 1)
         area = 0.5 * numpy.linalg.norm(numpy.cross(b - a, c - a), axis=1)
+        chosen = numpy.searchsorted(area.cumsum(), (index + 0.5) / PLACES * area.sum())
         for layer in {addon.scene.UV_LAYER, addon.scene.BACK_UV_LAYER} & set(mesh.uv_layers.keys()):
-            chosen = random.choice(len(area), PLACES, p=area / area.sum())
-            s, t = numpy.sqrt(random.random(PLACES)), random.random(PLACES)
-            shares = numpy.stack([1 - s, s * (1 - t), s * t], axis=1)
             uv = (read(mesh.uv_layers[layer].uv, "vector", "f", 2)[loops][chosen] * shares[..., None]).sum(axis=1)
             numbers = (1001 + numpy.floor(uv) @ (1, 10)).astype(int)
             for number in numpy.unique(numbers):
