@@ -136,7 +136,7 @@ fn part_of_light(text: &str) -> std::result::Result<f64, String> {
     (0.0..1.0)
         .contains(&part)
         .then_some(part)
-        .ok_or_else(|| "give 0 % to below 100 %".into())
+        .ok_or_else(|| "give a share from 0 % to below 100 %".into())
 }
 
 /// Result of a .glb for `--json`.
