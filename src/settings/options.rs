@@ -153,7 +153,8 @@ pub const OPTIONS: &[OptionInfo] = &[
                 as far as the time allows (not splat)",
         range: "1ms to 1e7s",
         default: "as long as it takes",
-        accuracy: "the finest complete maps are kept, with their estimated error",
+        accuracy: "the finest complete maps are kept, with their estimated error; shadows of large lamps may stay \
+                    grainy",
         cost: "that time, unless the maps cannot improve",
         limits: Some((1e-3, 1e7, |s| s.max_time_s.into_iter().collect())),
         set: |s, text| seconds(text).map(|time_s| s.max_time_s = Some(time_s)),

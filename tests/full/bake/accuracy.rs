@@ -8,7 +8,7 @@ use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, RayPla
 
 use crate::bake::common::{caustic_like, same_map, towards};
 use support::random_scenes;
-use support::tools::{at, bake, builtin_scene, caustic, photons, settings};
+use support::tools::{at, bake, builtin_scene, caustic, photons, set, settings};
 
 /// Side of all maps [texels].
 const SIDE: usize = 128;
@@ -250,4 +250,24 @@ fn a_weak_light_in_focus_is_not_coarse() {
         let estimate = result.estimated_relative_rmse.expect("an estimate");
         assert!(estimate <= target, "{estimate} where {target} is said to be met");
     }
+}
+
+/// Patches interpolate a spectrum between three wavelengths, which no difference between their lattices shows: photons
+/// check them before they count as done.
+#[test]
+fn a_spectrum_is_hardly_worse_than_its_estimate() {
+    let auto = |target, seed| {
+        let settings = set(towards(target, 256), |s| s.seed = seed);
+        set(settings, |s| s.estimator = Estimator::Auto)
+    };
+    let truth = bake(builtin_scene("prism"), &auto(0.03, 2));
+    let result = bake(builtin_scene("prism"), &auto(0.1, 1));
+    let (error, estimate) = (
+        true_error(&result, &truth),
+        result.estimated_relative_rmse.expect("an estimate"),
+    );
+    assert!(
+        estimate <= 0.1 && error <= 2.0 * estimate,
+        "true {error}, estimated {estimate}"
+    );
 }

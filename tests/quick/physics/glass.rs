@@ -287,7 +287,7 @@ fn faults_say_what_is_wrong() {
         ("12345", "`12345` is not a glass number of six digits"),
     ] {
         let error = Glass::parse(text).expect_err(text);
-        assert!(error.to_string().starts_with(expected), "{text}: {error}");
+        assert!(error.what.starts_with(expected), "{text}: {error}");
         let reported = error.at("--glass");
         assert!(!reported.remedy.is_empty() && reported.location == "--glass");
     }

@@ -114,7 +114,7 @@ fn display_controls_set_the_display() {
     let is_warm: IsSet = |set| matches!(set.white_balance, WhiteBalance::Kelvin(..5000.0));
     let rows: [(Gesture, IsSet); 6] = [
         (Drag("Exposure [stops]", 0.5, 0.7), |set| set.exposure_stops > 1.0),
-        (Choose("Tone map", "ACES"), |set| set.tone_map == ToneMap::Aces),
+        (Choose("Tone map", "aces"), |set| set.tone_map == ToneMap::Aces),
         (Choose("White balance", "temperature"), is_kelvin),
         (Drag("White balance [K]", 0.58, 0.3), is_warm),
         (Radio("caustic"), |set| {
