@@ -182,7 +182,7 @@ struct SizeOption {
 #[derive(Debug, Args)]
 struct RepeatOption {
     /// Bakes for each median of CPU time [default: 5; quick 1]
-    #[arg(long, value_name = "N", value_parser = values::within(1..=1000, "bakes"), allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = values::within(1..=1000_usize, "bakes"), allow_negative_numbers = true)]
     repeat: Option<usize>,
 }
 
