@@ -245,7 +245,7 @@ fn nothing_is_cut_off_or_overlaps() {
                     model.apply(Command::Edit(edit));
                 }
             });
-            panel.choose("Tone map", "ACES");
+            panel.choose("Tone map", "aces");
             panel.click(Role::RadioButton, "caustic");
             panel.assert_layout();
         }
