@@ -93,6 +93,10 @@ impl LightError {
 }
 
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
+    images_of(maps.iter(), unit)
+}
+
+pub fn images_of<'a>(maps: impl Iterator<Item = (Receiver, &'a ReceiverMap)>, unit: FluxUnit) -> Images {
     let image = |(receiver, map): (Receiver, &ReceiverMap)| {
         let chart = &map.chart;
         let luminance = map
@@ -111,7 +115,7 @@ pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
             .collect();
         (receiver, Image::new(chart, luminance))
     };
-    maps.iter().map(image).collect()
+    maps.map(image).collect()
 }
 
 impl Image {

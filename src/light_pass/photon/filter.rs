@@ -30,6 +30,12 @@ const MIN_LEFT: f32 = 1e-5;
 /// Floor of irradiance relative to the map's mean.
 const DARKEST: f32 = 1e-4;
 
+/// Whether a map can be filtered. On charts of several islands, texels that a surface hardly covers upset the statistics
+/// of those around.
+pub fn is_filterable(map: &ReceiverMap) -> bool {
+    map.chart.layout.is_some() || map.chart.islands().is_none()
+}
+
 /// Filters the sum of two halves and returns the remaining squared error of each texel [W²/m⁴]. `is_signed`: channels
 /// may be negative. Adds counts that a map could not take to `left`.
 pub fn filter(
@@ -39,7 +45,7 @@ pub fn filter(
     left: &mut Sums,
 ) -> Noise {
     let mut noise = Noise::new();
-    for (receiver, map) in sum.iter_mut() {
+    for (receiver, map) in sum.iter_mut().filter(|(_, map)| is_filterable(map)) {
         let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
         let kept = details.filtered();
         noise.insert(receiver, details.squares(&kept, map));
