@@ -66,6 +66,9 @@ use showing::{LevelCallback, Showing};
 use sizes::ChartCache;
 use spectra::Spectra;
 
+/// Fraction of the time limit after which direct light is not refined further.
+const PART_OF_DIRECT: f64 = 0.5;
+
 /// Owns a scene and everything derived from it, and bakes it again whenever scene or settings change. What a change
 /// does not affect is kept: hierarchy, parametrisations, item buffers, hits of rays, patches, maps and their errors.
 #[derive(Debug)]
@@ -465,9 +468,6 @@ impl Baker {
         Ok(result)
     }
 }
-
-/// Fraction of the time limit after which direct light is not refined further.
-const PART_OF_DIRECT: f64 = 0.5;
 
 /// Cancellation by the user, or by a time limit since the bake began [s].
 fn limited(control: &Control, limit_s: Option<f64>, began: Instant) -> Control {

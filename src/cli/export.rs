@@ -240,23 +240,18 @@ impl ExportArguments {
         }
     }
 
-    /// The scene at each moment of the maps, at least one.
-    fn scenes(&self, scene: &Scene) -> Result<Vec<Scene>> {
+    /// The scene at each moment of a sequence; none for maps of one moment.
+    fn frames(&self, scene: &Scene) -> Result<Vec<Scene>> {
         let sequence = MapSet::sequence_of(&self.maps)?;
-        let scenes = sequence.map_or(Vec::new(), |sequence| sequence.scenes(scene));
-        Ok(if scenes.is_empty() {
-            vec![scene.clone()]
-        } else {
-            scenes
-        })
+        Ok(sequence.map_or(Vec::new(), |sequence| sequence.scenes(scene)))
     }
 
-    /// The maps of each moment, given the scene at them.
-    fn moments<'a>(&self, scenes: &'a [Scene]) -> Result<Vec<MapSet<'a>>> {
-        if MapSet::sequence_of(&self.maps)?.is_none_or(|sequence| sequence.frames.is_empty()) {
-            return Ok(vec![MapSet::open(&self.maps, &scenes[0])?]);
+    /// The maps of each moment.
+    fn moments<'a>(&self, scene: &'a Scene, frames: &'a [Scene]) -> Result<Vec<MapSet<'a>>> {
+        if frames.is_empty() {
+            return Ok(vec![MapSet::open(&self.maps, scene)?]);
         }
-        let frames = scenes.iter().enumerate();
+        let frames = frames.iter().enumerate();
         frames
             .map(|(frame, scene)| MapSet::open_frame(&self.maps, scene, frame))
             .collect()
@@ -289,8 +284,8 @@ impl ExportArguments {
         if self.single_file {
             check_target(&output, &scene)?;
         }
-        let scenes = self.scenes(&scene)?;
-        let moments = self.moments(&scenes)?;
+        let frames = self.frames(&scene)?;
+        let moments = self.moments(&scene, &frames)?;
         let exposure_stops = exposure_of(&scene, &moments[0].read_all()?);
         let site = Site::new(&scene, &moments, exposure_stops, console.control())?;
         let report = if self.single_file {
@@ -337,8 +332,9 @@ impl ExportArguments {
     }
 
     fn write_textures(&self, console: &Console) -> Result<()> {
-        let scenes = self.scenes(&self.load()?)?;
-        let readers = self.moments(&scenes)?;
+        let scene = self.load()?;
+        let frames = self.frames(&scene)?;
+        let readers = self.moments(&scene, &frames)?;
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(self.format));
         let folder = TextureFolder::open(&output, self.force)?;
         let report = textures::write(&readers, self.texture_options(), folder, console.control())?;

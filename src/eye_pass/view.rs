@@ -37,11 +37,6 @@ pub enum ToneMap {
     Soft,
 }
 
-impl ToneMap {
-    /// All tone maps.
-    pub const ALL: [Self; 5] = [Self::None, Self::Neutral, Self::AgX, Self::Aces, Self::Soft];
-}
-
 /// A camera, and the size and display settings of its picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {

@@ -95,6 +95,7 @@ mod tests {
     use naga::back::pipeline_constants::process_overrides;
     use naga::valid::{Capabilities, ValidationFlags, Validator};
     use naga::{AddressSpace, Binding, Module, ShaderStage, TypeInner};
+    use strum::VariantArray;
 
     use super::*;
     use crate::eye_pass::ToneMap;
@@ -222,7 +223,7 @@ mod tests {
                 }
             }
         }
-        for tone_map in ToneMap::ALL {
+        for &tone_map in ToneMap::VARIANTS {
             for encode_srgb in [false, true] {
                 all.push(Specialisation {
                     program: TONE_MAPPING.name,

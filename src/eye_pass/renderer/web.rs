@@ -3,6 +3,7 @@
 
 use bytemuck::Pod;
 use serde_json::{Map, Value, json};
+use strum::VariantArray;
 
 use super::accumulation;
 use super::bindings::Binding;
@@ -217,9 +218,9 @@ impl Renderer {
         });
         let buffers = [CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT].map(|layout| vertices(&layout));
         let surfaces: Vec<Value> = keys.iter().map(|key| surface(*key)).collect();
-        let tone_maps: Map<String, Value> = ToneMap::ALL
-            .into_iter()
-            .map(|tone_map| {
+        let tone_maps: Map<String, Value> = ToneMap::VARIANTS
+            .iter()
+            .map(|&tone_map| {
                 let values = tone_mapping::constants(tone_map, true);
                 (<&str>::from(tone_map).into(), constants(&values))
             })

@@ -247,7 +247,7 @@ impl<'a> Baker<'a> {
             .map(|texel| texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.lit))
             .collect();
         let divided = smaller.map(|smaller| self.divide(smaller, &mut unclear, &mut seen, row_done, control));
-        seen.take(self.refine(row_done, control, SamplingDetail::FINE, |texel| unclear[texel]));
+        seen.take(self.pass(row_done, control, SamplingDetail::FINE, |texel| unclear[texel]));
         let irradiance = seen.texels.into_iter().map(|texel| texel.irradiance);
         let mut irradiance: Vec<[f32; 3]> = irradiance.collect();
         fill_gutter(self.chart, &mut irradiance);
@@ -262,12 +262,17 @@ impl<'a> Baker<'a> {
 
     /// The first pass over all texels. If that was a glance, a coarse pass follows where it was not enough.
     fn look_around(&self, seen: &mut ChartStatistics, row_done: &(impl Fn() + Sync), control: &Control) {
-        seen.take(self.pass(row_done, control, self.first_look.detail(), |_| true));
+        seen.take(self.pass(
+            row_done,
+            &control.without_deadline(),
+            self.first_look.detail(),
+            |_| true,
+        ));
         if self.first_look == FirstLook::Coarse {
             return;
         }
         let texels = &seen.texels;
-        let coarse = self.refine(row_done, control, SamplingDetail::COARSE, |texel| {
+        let coarse = self.pass(row_done, control, SamplingDetail::COARSE, |texel| {
             self.first_look == FirstLook::Hurried
                 || texels[texel].is_uncertain
                 || self.meets_other(texels, texel, |texel| texel.soft_lit)
@@ -292,9 +297,14 @@ impl<'a> Baker<'a> {
         let side = smaller.chart.width / self.chart.width;
         let mut divided = SubdividedTexels::new(self.chart, side, &steep, Texel::DARK);
         let is_there = |small: usize| divided.get(small).is_some();
-        let rows = smaller.pass(row_done, control, self.first_look.detail(), is_there);
+        let rows = smaller.pass(
+            row_done,
+            &control.without_deadline(),
+            self.first_look.detail(),
+            is_there,
+        );
         seen.take_small(rows, &mut divided);
-        let rows = smaller.refine(row_done, control, SamplingDetail::SMALL, |small| {
+        let rows = smaller.pass(row_done, control, SamplingDetail::SMALL, |small| {
             divided.is_unclear(small)
         });
         seen.take_small(rows, &mut divided);
@@ -323,19 +333,8 @@ impl<'a> Baker<'a> {
         lit(&texels[texel]).differs(around.map(|other| lit(&texels[other])))
     }
 
-    /// Samples the wanted texels, whether or not the time is up.
+    /// Samples the wanted texels, until the time is up.
     fn pass(
-        &self,
-        row_done: &(impl Fn() + Sync),
-        control: &Control,
-        look: SamplingDetail,
-        wanted: impl Fn(usize) -> bool + Sync,
-    ) -> Vec<TexelRow> {
-        self.refine(row_done, &control.without_deadline(), look, wanted)
-    }
-
-    /// Samples the wanted texels again, until the time is up.
-    fn refine(
         &self,
         row_done: &(impl Fn() + Sync),
         control: &Control,

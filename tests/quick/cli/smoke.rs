@@ -3,6 +3,7 @@
 
 use nephroid::export::FloatImage;
 use nephroid::eye_pass::{Picture, ToneMap, WhiteBalance, tone_mapping};
+use strum::VariantArray;
 
 use super::without_card;
 use crate::export::boxes;
@@ -351,11 +352,11 @@ fn a_png_shows_radiance_as_its_options_say() {
     let mut all = vec![auto];
     for (name, tone_map) in ["none", "neutral", "agx", "aces", "soft"]
         .into_iter()
-        .zip(ToneMap::ALL)
+        .zip(ToneMap::VARIANTS)
     {
         let (picture, stops) = shown(&format!("--exposure 1 --tone-map {name}"));
         assert!(
-            picture == tone_mapping::display_rgba8(&seen, 1.0, tone_map),
+            picture == tone_mapping::display_rgba8(&seen, 1.0, *tone_map),
             "{name}"
         );
         assert!(
