@@ -41,13 +41,11 @@ def gltf(lamp, scale, fault):
     entry = {"name": lamp.name_full, "color": [max(float(channel), 0.0) / brightest for channel in channels]}
     extras, is_normalized = custom_properties(lamp), getattr(lamp, "normalize", True)
     if lamp.type == "SUN":
-        if lamp.angle > 0.0:
-            extras.setdefault("angular_diameter_deg", min(math.degrees(lamp.angle), 180.0))
+        extras.setdefault("angular_diameter_deg", min(math.degrees(lamp.angle), 180.0))
         return PUNCTUAL, dict(entry, type="directional", intensity=brightest * LUMENS_PER_WATT), extras
     if lamp.type in {"POINT", "SPOT"}:
         radius_m = lamp.shadow_soft_size
-        if radius_m > 0.0:
-            extras.setdefault("radius_m", radius_m)
+        extras.setdefault("radius_m", radius_m)
         power_w = brightest if is_normalized else brightest * math.pi * radius_m ** 2
         entry.update(type=lamp.type.lower(), intensity=power_w / (4.0 * math.pi) * LUMENS_PER_WATT)
         if lamp.type == "SPOT":
@@ -92,21 +90,17 @@ def write_world(world, path):
     try:
         scene.collection.objects.link(camera)
         scene.camera, scene.world = camera, world
-        scene.render.engine = "CYCLES"
         lens.type = "PANO"
         owner = lens if hasattr(lens, "panorama_type") else lens.cycles
         owner.panorama_type = "EQUIRECTANGULAR"
         camera.rotation_euler = (math.radians(90.0), 0.0, math.radians(180.0))
         render = scene.render
+        render.engine = "CYCLES"
         render.resolution_x, render.resolution_y = WORLD_SIZE
-        render.resolution_percentage = 100
         render.image_settings.file_format = "OPEN_EXR"
         render.image_settings.color_mode, render.image_settings.color_depth = "RGB", "32"
         render.filepath = str(path)
-        render.use_file_extension = False
         scene.cycles.samples, scene.cycles.use_denoising = WORLD_SAMPLES, False
         bpy.ops.render.render(scene=scene.name, write_still=True)
     finally:
-        bpy.data.scenes.remove(scene)
-        bpy.data.objects.remove(camera)
-        bpy.data.cameras.remove(lens)
+        bpy.data.batch_remove((scene, camera, lens))

@@ -74,8 +74,8 @@ class Surface:
 
     def __init__(self, material):
         self.material, self.faults = material, []
-        self.node = self.volume_node = self.colour_socket = None
-        self.has_unread_colour = False
+        self.fault = self.faults.append
+        self.node = self.volume_node = self.colour_socket = self.colour_fault = None
         self.values = dict(DEFAULTS, color=tuple(material.diffuse_color)[:3], roughness=1.0)
         # Image texture nodes by property.
         self.images = {}
@@ -83,10 +83,6 @@ class Surface:
         if end is not None:
             self.volume_node, _ = source(end.inputs["Volume"])
             self.read(source(end.inputs["Surface"])[0])
-
-    def fault(self, text):
-        if text not in self.faults:
-            self.faults.append(text)
 
     def read(self, node):
         """Reads a shader node, if there is one, into `values`."""
@@ -117,36 +113,30 @@ class Surface:
         """A constant, or what stands for one beside an image."""
         node, origin = source(socket)
         if node is None:
-            return number(socket.default_value) if hasattr(socket, "default_value") and name != "normal" else None
+            return None if name == "normal" else number(socket.default_value)
         if node.type in {"RGB", "VALUE"}:
             value = number(origin.default_value)
             return value if isinstance(value, tuple) == isinstance(DEFAULTS[name], tuple) else DEFAULTS[name]
-        strength = 1.0
+        # Factors beside images that are kept; other images give their mean.
+        beside = {"color": (1.0, 1.0, 1.0), "emission": (1.0, 1.0, 1.0), "alpha": 1.0, "normal": 1.0}
         if name == "normal" and node.type == "NORMAL_MAP":
-            strength = node.inputs["Strength"].default_value
+            beside["normal"] = node.inputs["Strength"].default_value
             node, origin = source(node.inputs["Color"])
         outcome = "was ignored" if name == "normal" else "default was baked"
         if node is None or node.type != "TEX_IMAGE" or node.image is None:
             self.fault(f"the nodes at its {socket.name} are not read; its {outcome}")
-            self.has_unread_colour |= name == "color"
+            self.colour_fault = self.faults[-1] if name == "color" else self.colour_fault
         elif not node.image.size[0] or node.image.source == "TILED":
             self.fault(f"the image {node.image.name} at its {socket.name} is missing or tiled; its {outcome}")
-        else:
+        elif name in beside:
             self.images[name] = node
-            if name in {"color", "emission"}:
-                return (1.0, 1.0, 1.0)
-            return strength if name == "normal" else self.mean(name, node, origin)
+            return beside[name]
+        else:
+            pixels = numpy.empty(len(node.image.pixels), dtype=numpy.float32)
+            node.image.pixels.foreach_get(pixels)
+            pixels = pixels.reshape(-1, node.image.channels)
+            return float(pixels[:, 3:].mean() if origin.name == "Alpha" and pixels.shape[1] > 3 else pixels[:, :3].mean())
         return DEFAULTS[name]
-
-    def mean(self, name, node, origin):
-        """Of the image that a factor follows; alpha keeps its image."""
-        if name == "alpha":
-            return 1.0
-        del self.images[name]
-        pixels = numpy.empty(len(node.image.pixels), dtype=numpy.float32)
-        node.image.pixels.foreach_get(pixels)
-        pixels = pixels.reshape(-1, node.image.channels)
-        return float(pixels[:, 3:].mean() if origin.name == "Alpha" and pixels.shape[1] > 3 else pixels[:, :3].mean())
 
     def mix(self, node):
         """One of two shaders, or a shader that covers in part."""
@@ -176,18 +166,13 @@ class Surface:
     def add(self, node):
         """A shader and what it emits."""
         parts = [source(socket)[0] for socket in node.inputs]
-        parts = sorted(filter(None, parts), key=lambda part: part.type == "EMISSION") or [None]
-        glow, glow_images = {}, {}
-        if len(parts) == 2 and parts[1].type == "EMISSION" and parts[0].type != "EMISSION":
-            self.read(parts[1])
-            glow = {name: self.values[name] for name in ("emission", "emission_strength")}
-            glow_images = self.images
-            self.images = {}
-        elif len(parts) == 2:
+        first, *second = sorted(filter(None, parts), key=lambda part: part.type == "EMISSION") or [None]
+        self.read(first)
+        if second and second[0].type == "EMISSION" and first.type != "EMISSION":
+            for name in ("emission", "emission_strength"):
+                self.values[name] = self.value(name, second[0].inputs[NODES["EMISSION"][name]])
+        elif second:
             self.fault("its Add Shader was read as its first shader")
-        self.read(parts[0])
-        self.values.update(glow)
-        self.images.update(glow_images)
 
     def absorption(self):
         """What its volume adds to KHR_materials_volume."""
@@ -225,8 +210,9 @@ class Surface:
             color = [math.sqrt(channel) for channel in color]
         pbr = {"baseColorFactor": [*color, unit(values["alpha"])], "metallicFactor": unit(values["metallic"]),
                "roughnessFactor": unit(values["roughness"])}
-        extensions = {}
-        result = {"name": self.material.name_full, "pbrMetallicRoughness": pbr, "doubleSided": True, "extensions": extensions}
+        extensions, extras = {}, custom_properties(self.material)
+        result = {"name": self.material.name_full, "pbrMetallicRoughness": pbr, "doubleSided": True,
+                  "extensions": extensions, "extras": extras}
         if "color" in images:
             pbr["baseColorTexture"] = texture(images["color"])
         same = "alpha" in images and "color" in images and images["alpha"].image == images["color"].image
@@ -254,13 +240,10 @@ class Surface:
             extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": brightest * LUMENS_PER_WATT}
             if "emission" in images:
                 result["emissiveTexture"] = texture(images["emission"])
-        extras = custom_properties(self.material)
         if own.glass:
             extras["glass"] = own.glass
         if own.metal != "NONE":
             extras["metal"] = own.metal.lower()
-        if extras:
-            result["extras"] = extras
         return result
 
 

@@ -22,7 +22,7 @@ BAKED_MESH = "Nephroid baked mesh"
 TURN = numpy.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]], dtype=numpy.float64)
 
 COMPONENTS = {"f": 5126, "I": 5125}
-SHAPES = {1: "SCALAR", 2: "VEC2", 3: "VEC3"}
+SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3"}
 WRAPS = {"EXTEND": 33071, "CLIP": 33071, "MIRROR": 33648, "REPEAT": 10497}
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
@@ -33,12 +33,13 @@ class Glb:
     def __init__(self):
         self.binary = bytearray()
         self.used = set()
-        self.document = {"asset": {"version": "2.0", "generator": "Nephroid for Blender"}, "scene": 0,
+        self.document = {"asset": {"version": "2.0", "generator": "Nephroid for Blender"},
                          "scenes": [{"nodes": []}], "extensions": {}}
 
-    def push(self, kind, entry):
-        """Adds an entry to a list of the document; its index."""
-        items = self.document.setdefault(kind, [])
+    def push(self, kind, entry, extension=None):
+        """Adds an entry to a list of the document or of one of its extensions; its index."""
+        owner = self.document["extensions"].setdefault(extension, {}) if extension else self.document
+        items = owner.setdefault(kind, [])
         items.append(entry)
         return len(items) - 1
 
@@ -50,9 +51,9 @@ class Glb:
 
     def accessor(self, values, **bounds):
         """Adds an array of one row an element."""
-        width = values.shape[1] if values.ndim > 1 else 1
-        kind = {"componentType": COMPONENTS[values.dtype.char], "type": SHAPES[width]}
-        return self.push("accessors", {"bufferView": self.view(values.tobytes()), "count": len(values), **kind, **bounds})
+        return self.push("accessors", {
+            "bufferView": self.view(values.tobytes()), "count": len(values), "componentType": COMPONENTS[values.dtype.char],
+            "type": SHAPES[values.shape[1:]], **bounds})
 
     def node(self, name, matrix, **entry):
         """Adds a node of the scene, placed by Blender's matrix. Lamps and cameras look along −z in both programs, and
@@ -64,20 +65,10 @@ class Glb:
         self.document["scenes"][0]["nodes"].append(index)
         return index
 
-    def light(self, extension, entry):
-        """Adds a lamp to the list of an extension; its index there."""
-        lights = self.document["extensions"].setdefault(extension, {"lights": []})["lights"]
-        lights.append(entry)
-        return len(lights) - 1
-
     def write(self, path):
         """Writes the file in one step, so that nobody reads half of it."""
-        document = {key: value for key, value in self.document.items() if value}
-        document["buffers"] = [{"byteLength": len(self.binary)}]
-        used = self.used.union(self.document["extensions"], *(one["extensions"] for one in document.get("materials", [])))
-        if used:
-            document["extensionsUsed"] = sorted(used)
-        text = json.dumps(document).encode()
+        document = dict(self.document, buffers=[{"byteLength": len(self.binary)}], extensionsUsed=sorted(self.used))
+        text = json.dumps({key: value for key, value in document.items() if value}).encode()
         text += b" " * (-len(text) % 4)
         head = struct.pack("<4sIIII", b"glTF", 2, 28 + len(text) + len(self.binary), len(text), 0x4E4F534A)
         half = path.with_suffix(".part")
@@ -109,10 +100,6 @@ class Geometry:
         layers = [layer for layer in mesh.uv_layers if layer.name not in {UV_LAYER, BACK_UV_LAYER}]
         self.uvs = {layer.name: read(layer.uv, "vector", "f", 2) for layer in layers}
         self.active_uv = next((layer.name for layer in layers if layer.active_render), None)
-
-    def sets(self, wanted):
-        """Names of the UV layers that are written: the one for renders, then one that a texture names, or the next."""
-        return sorted(self.uvs, key=lambda name: (name != self.active_uv, name not in wanted))[:2]
 
     def primitive(self, glb, slot, sets):
         """Writes the triangles of a slot, with corners that agree as one vertex."""
@@ -146,20 +133,18 @@ class Part:
 def as_rendered(objects):
     """Modifiers as renders have them, for as long as it takes."""
     kept = []
-
-    def change(modifier, name, value):
-        if getattr(modifier, name) != value:
-            kept.append((modifier, name, getattr(modifier, name)))
-            setattr(modifier, name, value)
-
     for modifier in [modifier for item in objects if item.library is None for modifier in item.modifiers]:
-        change(modifier, "show_viewport", modifier.show_render and not modifier.name.startswith(BAKED_MESH))
+        wanted = {"show_viewport": modifier.show_render and not modifier.name.startswith(BAKED_MESH)}
         if hasattr(modifier, "render_levels"):
-            change(modifier, "levels", modifier.render_levels)
+            wanted["levels"] = modifier.render_levels
+        for name, value in wanted.items():
+            if getattr(modifier, name) != value:
+                kept.append((modifier, name, getattr(modifier, name)))
+                setattr(modifier, name, value)
     try:
         yield
     finally:
-        for modifier, name, value in reversed(kept):
+        for modifier, name, value in kept:
             setattr(modifier, name, value)
 
 
@@ -204,7 +189,9 @@ class Export:
         if kind is not None:
             rigid = turn.to_matrix().to_4x4()
             rigid.translation = place
-            self.glb.node(owner.name, rigid, extensions={kind: {"light": self.glb.light(kind, entry)}}, extras=extras)
+            self.glb.used.add(kind)
+            light = self.glb.push("lights", entry, extension=kind)
+            self.glb.node(owner.name, rigid, extensions={kind: {"light": light}}, extras=extras)
 
     def add_object(self, item, instance, owner):
         slots = tuple(slot.material.original if slot.material else None for slot in item.material_slots)
@@ -222,7 +209,9 @@ class Export:
         """The index of a mesh, its geometry, its UV layers in the file, and the slot of each of its primitives."""
         geometry = Geometry(mesh, len(materials))
         trees = [nodes_of(material) for material in materials if material]
-        sets = geometry.sets([node.uv_map for tree in trees if tree for node in tree.nodes if node.type == "UVMAP"])
+        named = {node.uv_map for tree in trees if tree for node in tree.nodes if node.type == "UVMAP"}
+        # The UV layer for renders, then one that a texture names, or the next.
+        sets = sorted(geometry.uvs, key=lambda layer: (layer != geometry.active_uv, layer not in named))[:2]
         slots = numpy.unique(geometry.slots).tolist()
         primitives = [dict(geometry.primitive(self.glb, slot, sets), material=self.material((materials or [None])[slot], sets))
                       for slot in slots]
@@ -239,10 +228,11 @@ class Export:
                 surface = Surface(material)
                 entry = surface.gltf(lambda node: self.texture(node, sets, surface.fault))
                 # Where nothing but light maps shows a colour, its own nodes multiply them.
-                is_shown = surface.is_matte() and self.settings.layers == "CAUSTIC"
+                shown = surface.colour_fault if surface.is_matte() and self.settings.layers == "CAUSTIC" else None
                 for text in surface.faults:
-                    if not (is_shown and surface.has_unread_colour and "Color are not read" in text):
+                    if text != shown:
                         self.fault("material", material.name_full)(text)
+            self.glb.used.update(entry["extensions"])
             self.materials[key] = self.glb.push("materials", entry)
         return self.materials[key]
 
