@@ -13,8 +13,6 @@ import bpy
 from . import lamps, lightmaps
 from .scene import Export
 
-# How the program names what a message is about.
-NAMES = re.compile(r"(node|light|mesh|material) `([^`]*)`")
 # What to do in Blender where the program names an option. Other options are not in the user's hands.
 REMEDIES = {
     "--environment": "add a lamp that shows in renders, or let the World shine",
@@ -22,8 +20,6 @@ REMEDIES = {
     "--map-resolution": "choose a smaller Map Size",
     "--density": "choose a better Quality if it should be there",
 }
-NO_MAPS = ("no light falls on a surface by way of glass, mirrors or water; give an object such a material, or see which "
-           "collections Lamps and Objects name")
 
 # The Job and the LiveView that are under way.
 running = live = None
@@ -92,7 +88,8 @@ class Job:
         try:
             self.run("bake", self.files.scene, "-o", folder / "maps", "--progress", "json", *self.files.options)
             if not json.loads((folder / "maps" / "manifest.json").read_text())["maps"]:
-                raise RuntimeError(NO_MAPS)
+                raise RuntimeError("no light falls on a surface by way of glass, mirrors or water; give an object such a material, "
+                                   "or see which collections Lamps and Objects name")
             self.run("export", folder / "maps", "--format", "exr", "--bits", "32", "--units", "E/pi", "-o", folder / "textures")
         except (OSError, ValueError, RuntimeError) as error:
             self.failed = str(error)
@@ -148,9 +145,9 @@ class Job:
 
 
 def addressed(level, owner, text):
-    """A message for each object that it is about: the owner, (kind, name), or what the text names."""
-    names, start = [], text.partition(": ")[0]
-    for kind, name in [owner] if owner else [*NAMES.findall(text), ("node", start)]:
+    """A message for each object that it is about: the owner, (kind, name), or what the program names in its text."""
+    names, named = [], [*re.findall(r"(node|light|mesh|material) `([^`]*)`", text), ("node", text.partition(": ")[0])]
+    for kind, name in [owner] if owner else named:
         for item in bpy.context.scene.objects:
             data = item.data.name if item.data else None
             materials = [slot.material.name_full for slot in item.material_slots if slot.material]
@@ -184,14 +181,6 @@ class NEPHROID_OT_bake(WhileIdle, bpy.types.Operator):
     bl_idname, bl_label = "nephroid.bake", "Bake Caustics"
     bl_options = {"REGISTER", "UNDO"}
 
-    def begin(self, context):
-        global running
-        try:
-            running = Job(context)
-        except (OSError, RuntimeError) as error:
-            report(self, context, [("ERROR", "", str(error))])
-        return running is not None
-
     def end(self, context):
         global running
         job, running = running, None
@@ -204,11 +193,18 @@ class NEPHROID_OT_bake(WhileIdle, bpy.types.Operator):
         return {"CANCELLED"} if messages[-1][0] == "ERROR" else {"FINISHED"}
 
     def execute(self, context):
-        return self.end(context) if self.begin(context) else {"CANCELLED"}
+        return self.invoke(context, None)
 
     def invoke(self, context, event):
-        if not self.begin(context):
+        """Bakes beside Blender, or at once where a script asks and there is no event."""
+        global running
+        try:
+            running = Job(context)
+        except (OSError, RuntimeError) as error:
+            report(self, context, [("ERROR", "", str(error))])
             return {"CANCELLED"}
+        if event is None:
+            return self.end(context)
         manager = context.window_manager
         manager.progress_begin(0, 100)
         self.timer = manager.event_timer_add(0.1, window=context.window)
@@ -281,22 +277,19 @@ class NEPHROID_OT_select(bpy.types.Operator):
 class LiveView:
     """The program's window, and a scene that is written again whenever it changes."""
 
-    # Between two looks whether something changed [s].
-    PERIOD_S = 0.3
-
     def __init__(self, context):
         self.is_changed, self.files = False, Files(context)
         self.process = self.files.start("view", self.files.scene, "--watch", "--fresh", *self.files.options,
                                         stderr=subprocess.DEVNULL)
         bpy.app.handlers.depsgraph_update_post.append(self.note)
-        bpy.app.timers.register(self.look, first_interval=self.PERIOD_S)
+        bpy.app.timers.register(self.look)
 
     def note(self, scene, depsgraph):
         self.is_changed |= any(update.is_updated_geometry or update.is_updated_transform or update.is_updated_shading
                                for update in depsgraph.updates)
 
     def look(self):
-        """Writes what changed; seconds until the next look, or None where the window was closed."""
+        """Writes what changed; time until the next look [s], or None where the window was closed."""
         if live is self and self.process.poll() is not None:
             self.close()
         if live is not self:
@@ -306,7 +299,7 @@ class LiveView:
             # Its own switching of modifiers is no change.
             bpy.context.view_layer.update()
             self.is_changed = False
-        return self.PERIOD_S
+        return 0.3
 
     def close(self):
         global live

@@ -6,7 +6,6 @@ else of a copy of the baked mesh, which a modifier shows in its place.
 """
 
 import json
-from pathlib import Path
 
 import bpy
 import numpy
@@ -32,7 +31,7 @@ def put_back(context, export, folder, keeps_lamps, fault):
     `fault(object name, text)` is told of surfaces that cannot show theirs.
     """
     remove(context)
-    shown, files, coordinates = {}, [], {}
+    shown, files = {}, []
     for texture in json.loads((folder / "textures" / "index.json").read_text())["textures"]:
         place, = texture["maps"]
         part = export.parts[place["node"]]
@@ -41,17 +40,17 @@ def put_back(context, export, folder, keeps_lamps, fault):
             fault(part.object, why or "there are too many maps; its was left out")
             continue
         files.append(folder / "textures" / texture["file"])
-        uvs = coordinates.setdefault(part.object, {}).setdefault(place["side"], numpy.zeros((len(part.geometry.loops), 3, 2)))
+        _, sides = shown.setdefault(part.object, (part, {}))
+        uvs = sides.setdefault(place["side"], numpy.zeros((len(part.geometry.loops), 3, 2)))
         write_tile(uvs, part, place, folder, len(files))
-        shown[part.object] = part
     if not shown:
         return 0
     group = light_map_group(load_tiles(files, folder), keeps_lamps)
     users = {}
-    for name, part in shown.items():
+    for name, (part, sides) in shown.items():
         item = bpy.data.objects[name]
         give_material(item)
-        write_layers(item, part, coordinates[name])
+        write_layers(item, part.geometry, sides)
         for material in {slot.material for slot in item.material_slots if slot.material}:
             users.setdefault(material, []).append(name)
     for material, names in users.items():
@@ -93,60 +92,54 @@ def write_tile(uvs, part, place, folder, tile):
 
 def load_tiles(files, folder):
     """One image of a tile a file, packed into the .blend, after a black one."""
-    black = bpy.data.images.new(IMAGE, 1, 1, float_buffer=True)
-    black.file_format = "OPEN_EXR"
-    black.save(filepath=str(folder / f"light.{FIRST_TILE}.exr"))
-    bpy.data.images.remove(black)
+    image = bpy.data.images.new(IMAGE, 1, 1, float_buffer=True, tiled=True)
+    image.file_format = "OPEN_EXR"
+    image.filepath_raw = str(folder / "light.<UDIM>.exr")
+    image.save()
     for number, file in enumerate(files, FIRST_TILE + 1):
-        Path(file).rename(folder / f"light.{number}.exr")
-    image = bpy.data.images.load(str(folder / f"light.{FIRST_TILE}.exr"))
-    image.name = IMAGE
-    image.source = "TILED"
-    image.filepath = str(folder / "light.<UDIM>.exr")
-    for number in range(len(files)):
-        image.tiles.new(FIRST_TILE + 1 + number)
+        file.rename(folder / f"light.{number}.exr")
+        image.tiles.new(number)
     image.colorspace_settings.name = "Linear Rec.709"
     image.pack()
     return image
 
 
+
+def node_group(name, kind, sockets, nodes, links):
+    """A node group of sockets (name, direction, type), nodes {key: (type, values)} and links (key, output, key, input)."""
+    tree = bpy.data.node_groups.new(name, kind)
+    for socket, way, what in sockets:
+        tree.interface.new_socket(socket, in_out=way, socket_type=f"NodeSocket{what}")
+    made = {}
+    for key, (what, values) in nodes.items():
+        made[key] = tree.nodes.new(what)
+        made[key].location.x = 200.0 * len(made)
+        for attribute, value in values.items():
+            setattr(made[key], attribute, value)
+    for start, origin, end, target in links:
+        tree.links.new(made[start].outputs[origin], made[end].inputs[target])
+    return tree
+
+
 def light_map_group(image, keeps_lamps):
     """Adds albedo · E/π to a shader, or shows nothing else."""
-    tree = bpy.data.node_groups.new(LIGHT_MAP_GROUP, "ShaderNodeTree")
-    for name, kind, way in [("Shader", "Shader", "INPUT"), ("Color", "Color", "INPUT"), ("Strength", "Float", "INPUT"),
-                            ("Shader", "Shader", "OUTPUT")]:
-        tree.interface.new_socket(name, in_out=way, socket_type=f"NodeSocket{kind}")
-
-    def node(kind, **values):
-        made = tree.nodes.new(kind)
-        made.location.x = 200.0 * len(tree.nodes)
-        for name, value in values.items():
-            setattr(made, name, value)
-        return made.inputs, made.outputs
-
-    def socket(sockets, name, kind):
-        # A Mix node has sockets of one name for each type.
-        return next(one for one in sockets if one.name == name and one.type == kind)
-
-    _, given = node("NodeGroupInput")
-    _, front = node("ShaderNodeUVMap", uv_map=UV_LAYER)
-    _, back = node("ShaderNodeUVMap", uv_map=BACK_UV_LAYER)
-    _, side = node("ShaderNodeNewGeometry")
-    choice, place = node("ShaderNodeMix", data_type="VECTOR")
-    at, light = node("ShaderNodeTexImage", image=image, extension="EXTEND")
-    factors, product = node("ShaderNodeVectorMath", operation="MULTIPLY")
-    shown, glow = node("ShaderNodeEmission")
-    parts, both = node("ShaderNodeAddShader")
-    result, _ = node("NodeGroupOutput")
-    for start, end in [
-            (side["Backfacing"], socket(choice, "Factor", "VALUE")), (front["UV"], socket(choice, "A", "VECTOR")),
-            (back["UV"], socket(choice, "B", "VECTOR")), (socket(place, "Result", "VECTOR"), at["Vector"]),
-            (light["Color"], factors[0]), (given["Color"], factors[1]), (product["Vector"], shown["Color"]),
-            (given["Strength"], shown["Strength"]), (glow["Emission"], parts[1]), (both["Shader"], result["Shader"])]:
-        tree.links.new(start, end)
+    sockets = [("Shader", "INPUT", "Shader"), ("Color", "INPUT", "Color"), ("Strength", "INPUT", "Float"),
+               ("Shader", "OUTPUT", "Shader")]
+    nodes = {
+        "given": ("NodeGroupInput", {}), "front": ("ShaderNodeUVMap", {"uv_map": UV_LAYER}),
+        "back": ("ShaderNodeUVMap", {"uv_map": BACK_UV_LAYER}), "side": ("ShaderNodeNewGeometry", {}),
+        "place": ("ShaderNodeMix", {"data_type": "VECTOR"}),
+        "light": ("ShaderNodeTexImage", {"image": image, "extension": "EXTEND"}),
+        "product": ("ShaderNodeVectorMath", {"operation": "MULTIPLY"}), "glow": ("ShaderNodeEmission", {}),
+        "sum": ("ShaderNodeAddShader", {}), "result": ("NodeGroupOutput", {})}
+    links = [
+        ("side", "Backfacing", "place", "Factor"), ("front", "UV", "place", "A"), ("back", "UV", "place", "B"),
+        ("place", "Result", "light", "Vector"), ("light", "Color", "product", 0), ("given", "Color", "product", 1),
+        ("product", "Vector", "glow", "Color"), ("given", "Strength", "glow", "Strength"), ("glow", "Emission", "sum", 1),
+        ("sum", "Shader", "result", "Shader")]
     if keeps_lamps:
-        tree.links.new(given["Shader"], parts[0])
-    return tree
+        links.append(("given", "Shader", "sum", 0))
+    return node_group(LIGHT_MAP_GROUP, "ShaderNodeTree", sockets, nodes, links)
 
 
 def add_node(material, group):
@@ -187,28 +180,25 @@ def give_material(item):
         item.data[MATTE] = True
 
 
-def write_layers(item, part, sides):
-    """Writes coordinates into the mesh that shows them."""
-    geometry, mesh = part.geometry, item.data
+def write_layers(item, geometry, sides):
+    """Writes coordinates into the mesh that shows them: its own where no modifier changed it and no other object has it,
+    and where the triangles of a polygon agree at its corners."""
+    mesh, layers = item.data, {}
     is_own = item.type == "MESH" and mesh.users == 1 and not item.modifiers and len(mesh.loops) == len(geometry.vertices)
-    layers = {side: by_loop(uvs, geometry) for side, uvs in sides.items()}
-    if not is_own or any(layer is None for layer in layers.values()):
+    for side, uvs in sides.items():
+        layers[side] = numpy.zeros((len(geometry.vertices), 2))
+        layers[side][geometry.loops] = uvs
+        is_own = is_own and numpy.abs(layers[side][geometry.loops] - uvs).max() < 1e-6
+    if not is_own:
         layers = {side: uvs.reshape(-1, 2) for side, uvs in sides.items()}
         mesh = copy_of(geometry, f"{item.name} as baked", [slot.material for slot in item.material_slots])
         modifier = item.modifiers.new(BAKED_MESH, "NODES")
-        modifier.node_group = baked_mesh_group()
+        modifier.node_group = bpy.data.node_groups.get(BAKED_MESH) or baked_mesh_group()
         modifier.show_in_editmode = False
         socket = next(entry for entry in modifier.node_group.interface.items_tree if entry.name == "Object")
         modifier[socket.identifier] = bpy.data.objects.new(mesh.name, mesh)
     for side, layer in layers.items():
         add_layer(mesh, UV_LAYER if side == "front" else BACK_UV_LAYER, layer)
-
-
-def by_loop(uvs, geometry):
-    """Coordinates of each corner of a mesh's polygons; None where the triangles of one disagree."""
-    layer = numpy.zeros((len(geometry.vertices), 2))
-    layer[geometry.loops] = uvs
-    return layer if numpy.abs(layer[geometry.loops] - uvs).max() < 1e-6 else None
 
 
 def add_layer(mesh, name, values):
@@ -233,41 +223,33 @@ def copy_of(geometry, name, materials):
 
 def baked_mesh_group():
     """Shows another object's mesh instead of one's own."""
-    known = bpy.data.node_groups.get(BAKED_MESH)
-    if known is not None:
-        return known
-    tree = bpy.data.node_groups.new(BAKED_MESH, "GeometryNodeTree")
+    tree = node_group(
+        BAKED_MESH, "GeometryNodeTree",
+        [("Geometry", "INPUT", "Geometry"), ("Object", "INPUT", "Object"), ("Geometry", "OUTPUT", "Geometry")],
+        {"given": ("NodeGroupInput", {}), "shown": ("GeometryNodeObjectInfo", {}), "result": ("NodeGroupOutput", {})},
+        [("given", "Object", "shown", "Object"), ("shown", "Geometry", "result", "Geometry")])
     tree.is_modifier = True
-    tree.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
-    tree.interface.new_socket("Object", in_out="INPUT", socket_type="NodeSocketObject")
-    tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
-    inputs, shown, outputs = (tree.nodes.new(name) for name in ("NodeGroupInput", "GeometryNodeObjectInfo", "NodeGroupOutput"))
-    tree.links.new(inputs.outputs["Object"], shown.inputs["Object"])
-    tree.links.new(shown.outputs["Geometry"], outputs.inputs["Geometry"])
     return tree
 
 
 def remove(context):
     """Takes away everything that `put_back` added; whether there was anything."""
-    groups = [group for group in bpy.data.node_groups if is_ours(group, LIGHT_MAP_GROUP)]
+    named = [(bpy.data.node_groups, LIGHT_MAP_GROUP), (bpy.data.node_groups, BAKED_MESH), (bpy.data.images, IMAGE)]
+    ours = [block for blocks, name in named for block in blocks if is_ours(block, name)]
     for material in bpy.data.materials:
         tree = material.node_tree
-        for node in [node for node in (tree.nodes if tree else ()) if node.type == "GROUP" and node.node_tree in groups]:
+        for node in [node for node in (tree.nodes if tree else ()) if node.type == "GROUP" and node.node_tree in ours]:
             if "emission_sampling" in node:
                 material.cycles.emission_sampling = node["emission_sampling"]
-            before = node.inputs["Shader"].links[0].from_socket if node.inputs["Shader"].is_linked else None
-            for link in list(node.outputs["Shader"].links):
-                if before is not None:
-                    tree.links.new(before, link.to_socket)
+            for before in list(node.inputs["Shader"].links):
+                for after in list(node.outputs["Shader"].links):
+                    tree.links.new(before.from_socket, after.to_socket)
             tree.nodes.remove(node)
-    copies = []
     for item in bpy.data.objects:
         for modifier in [one for one in item.modifiers if one.type == "NODES" and is_ours(one, BAKED_MESH)]:
-            copies += [value for value in modifier.values() if isinstance(value, bpy.types.Object)]
+            for copy in [value for value in modifier.values() if isinstance(value, bpy.types.Object)]:
+                ours += copy, copy.data
             item.modifiers.remove(modifier)
-    for mesh in [copy.data for copy in copies]:
-        # Its object goes with it.
-        bpy.data.meshes.remove(mesh)
     for mesh in bpy.data.meshes:
         for name in (UV_LAYER, BACK_UV_LAYER):
             if mesh.library is None and name in mesh.uv_layers:
@@ -277,12 +259,8 @@ def remove(context):
         for owner in (*bpy.data.meshes, *bpy.data.curves, *bpy.data.metaballs):
             if owner.pop(MATTE, False) and list(owner.materials) == [matte]:
                 owner.materials.clear()
-        bpy.data.materials.remove(matte)
-    for blocks, name in [(bpy.data.node_groups, LIGHT_MAP_GROUP), (bpy.data.node_groups, BAKED_MESH), (bpy.data.images, IMAGE)]:
-        for block in [block for block in blocks if is_ours(block, name)]:
-            blocks.remove(block)
-    kept = context.scene.pop(CAUSTICS, None)
-    if kept is not None:
-        for name, value in zip(CAUSTIC_FLAGS, kept):
-            setattr(context.scene.cycles, name, bool(value))
-    return bool(groups)
+        ours.append(matte)
+    bpy.data.batch_remove(ours)
+    for name, value in zip(CAUSTIC_FLAGS, context.scene.pop(CAUSTICS, ())):
+        setattr(context.scene.cycles, name, bool(value))
+    return bool(ours)

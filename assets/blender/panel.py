@@ -28,13 +28,10 @@ class NEPHROID_PT_render(bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("nephroid.remove", icon="TRASH")
         row.operator("nephroid.live", icon="HIDE_OFF", depress=bake.live is not None)
-        self.messages(context)
-
-    def messages(self, context):
-        """What the last bake had to say, with a button to the object that it is about."""
+        # Characters in a line of a message.
         width = max(20, int(context.region.width / 8)) if context.region else 60
         for message in context.window_manager.nephroid_messages:
-            box = self.layout.box().column(align=True)
+            box = layout.box().column(align=True)
             box.alert = message.level == "ERROR"
             if message.object:
                 box.operator("nephroid.select", text=message.object, icon="RESTRICT_SELECT_OFF").name = message.object
