@@ -88,8 +88,8 @@ class Job:
         try:
             self.run("bake", self.files.scene, "-o", folder / "maps", "--progress", "json", *self.files.options)
             if not json.loads((folder / "maps" / "manifest.json").read_text())["maps"]:
-                raise RuntimeError("no light falls on a surface by way of glass, mirrors or water; give an object such a material, "
-                                   "or see which collections Lamps and Objects name")
+                raise RuntimeError("no light falls on a surface by way of glass, mirrors or water; give an object such a "
+                                   "material, or see which collections Lamps and Objects name")
             self.run("export", folder / "maps", "--format", "exr", "--bits", "32", "--units", "E/pi", "-o", folder / "textures")
         except (OSError, ValueError, RuntimeError) as error:
             self.failed = str(error)
@@ -149,9 +149,8 @@ def addressed(level, owner, text):
     names, named = [], [*re.findall(r"(node|light|mesh|material) `([^`]*)`", text), ("node", text.partition(": ")[0])]
     for kind, name in [owner] if owner else named:
         for item in bpy.context.scene.objects:
-            data = item.data.name if item.data else None
             materials = [slot.material.name_full for slot in item.material_slots if slot.material]
-            if name in {"material": materials, "mesh": [item.name, data]}.get(kind, [item.name]):
+            if name in {"material": materials, "mesh": [item.name, getattr(item.data, "name", None)]}.get(kind, [item.name]):
                 names.append(item.name)
     return [(level, name, text.removeprefix(f"{name}: ")) for name in dict.fromkeys(names)] or [(level, "", text)]
 

@@ -7,8 +7,6 @@ import numpy
 
 from .materials import LUMENS_PER_WATT, custom_properties, number, output, source
 
-PUNCTUAL, FLAT = "KHR_lights_punctual", "EXT_lights_area"
-
 WORLD_SIZE = (1024, 512)
 # Enough to find a sun in a sky within its pixel.
 WORLD_SAMPLES = 16
@@ -42,7 +40,7 @@ def gltf(lamp, scale, fault):
     extras, is_normalized = custom_properties(lamp), getattr(lamp, "normalize", True)
     if lamp.type == "SUN":
         extras.setdefault("angular_diameter_deg", min(math.degrees(lamp.angle), 180.0))
-        return PUNCTUAL, dict(entry, type="directional", intensity=brightest * LUMENS_PER_WATT), extras
+        return "KHR_lights_punctual", dict(entry, type="directional", intensity=brightest * LUMENS_PER_WATT), extras
     if lamp.type in {"POINT", "SPOT"}:
         radius_m = lamp.shadow_soft_size
         extras.setdefault("radius_m", radius_m)
@@ -54,7 +52,7 @@ def gltf(lamp, scale, fault):
             outer = 0.5 * min(lamp.spot_size, math.pi)
             # glTF has no hard edge.
             entry["spot"] = {"outerConeAngle": outer, "innerConeAngle": outer * (1.0 - max(lamp.spot_blend, 1e-4))}
-        return PUNCTUAL, entry, extras
+        return "KHR_lights_punctual", entry, extras
     has_sides = lamp.shape in {"RECTANGLE", "ELLIPSE"}
     width, height = lamp.size * scale[0], (lamp.size_y if has_sides else lamp.size) * scale[1]
     is_disc = lamp.shape in {"DISK", "ELLIPSE"}
@@ -70,7 +68,7 @@ def gltf(lamp, scale, fault):
     kind = "disk" if is_disc else "rect"
     entry.update(type=kind, shape=kind, intensity=radiance * LUMENS_PER_WATT,
                  size=math.sqrt(width * height) if is_disc else height, rect={"aspect": 1.0 if is_disc else width / height})
-    return FLAT, entry, extras
+    return "EXT_lights_area", entry, extras
 
 
 def world_shines(world, wish):

@@ -79,12 +79,12 @@ def unusable(item, part):
 def write_tile(uvs, part, place, folder, tile):
     """Writes the coordinates of a map, moved to its tile, into those of its object."""
     geometry = part.geometry
-    rows = numpy.flatnonzero(geometry.slots == part.slots[place["primitive"]])
+    rows = numpy.flatnonzero(geometry.slots == geometry.filled_slots[place["primitive"]])
     if place["uv_file"]:
         data = (folder / "textures" / place["uv_file"]).read_bytes()
         own = numpy.frombuffer(data, dtype="<f8", offset=16).reshape(-1, 3, 2) * (1.0, -1.0) + (0.0, 1.0)
     else:
-        own = geometry.uvs[part.sets[int(place["uv_set"][-1])]][geometry.loops[rows]]
+        own = geometry.uvs[geometry.sets[int(place["uv_set"][-1])]][geometry.loops[rows]]
     if len(own) != len(rows):
         raise ValueError(f"the light map of {part.object} has {len(own)} triangles instead of {len(rows)}; bake again")
     uvs[rows] = numpy.clip(own, INSET, 1.0 - INSET) + (tile % 10, tile // 10)

@@ -5,7 +5,7 @@ import json
 import math
 import os
 import struct
-from dataclasses import dataclass
+from collections import namedtuple
 from pathlib import Path
 
 import bpy
@@ -25,6 +25,9 @@ COMPONENTS = {"f": 5126, "I": 5125}
 SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3"}
 WRAPS = {"EXTEND": 33071, "CLIP": 33071, "MIRROR": 33648, "REPEAT": 10497}
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+
+# What a node of the file shows: the name of the object that it came from, whether that is an instance, and its Geometry.
+Part = namedtuple("Part", "object is_instance geometry")
 
 
 class Glb:
@@ -86,47 +89,41 @@ def read(collection, attribute, kind, width):
 class Geometry:
     """An evaluated mesh, triangle by triangle."""
 
-    def __init__(self, mesh, slot_count):
+    def __init__(self, mesh, materials):
         mesh.calc_loop_triangles()
         self.loops = read(mesh.loop_triangles, "loops", "i", 3)
-        self.slots = numpy.minimum(read(mesh.loop_triangles, "material_index", "i", 1), max(slot_count - 1, 0))
+        self.slots = numpy.minimum(read(mesh.loop_triangles, "material_index", "i", 1), max(len(materials) - 1, 0))
         self.positions = read(mesh.vertices, "co", "f", 3)
         self.vertices = read(mesh.loops, "vertex_index", "i", 1)
         # The program drops triangles without area; here they are not even counted.
         a, b, c = (self.positions[self.vertices[self.loops[:, corner]]].astype(numpy.float64) for corner in range(3))
         has_area = numpy.cross(b - a, c - a).any(axis=1)
         self.loops, self.slots = self.loops[has_area], self.slots[has_area]
+        # Of each primitive.
+        self.filled_slots = numpy.unique(self.slots).tolist()
         self.normals = read(mesh.corner_normals, "vector", "f", 3)
         layers = [layer for layer in mesh.uv_layers if layer.name not in {UV_LAYER, BACK_UV_LAYER}]
         self.uvs = {layer.name: read(layer.uv, "vector", "f", 2) for layer in layers}
         self.active_uv = next((layer.name for layer in layers if layer.active_render), None)
+        trees = [nodes_of(material) for material in materials if material]
+        named = {node.uv_map for tree in trees if tree for node in tree.nodes if node.type == "UVMAP"}
+        # In the file: the UV layer for renders, then one that a texture names, or the next.
+        self.sets = sorted(self.uvs, key=lambda name: (name != self.active_uv, name not in named))[:2]
 
-    def primitive(self, glb, slot, sets):
+    def primitive(self, glb, slot):
         """Writes the triangles of a slot, with corners that agree as one vertex."""
         corners = self.loops[self.slots == slot].ravel()
         columns = [part @ TURN[:3, :3].T for part in (self.positions[self.vertices[corners]], self.normals[corners])]
         # glTF's v points down.
-        columns += [self.uvs[name][corners] * (1.0, -1.0) + (0.0, 1.0) for name in sets]
+        columns += [self.uvs[name][corners] * (1.0, -1.0) + (0.0, 1.0) for name in self.sets]
         # Zeros lose their signs, so that equal rows have equal bytes.
         table = numpy.ascontiguousarray(numpy.hstack(columns), dtype=numpy.float32) + 0.0
         _, first, index = numpy.unique(table.view(f"V{4 * table.shape[1]}"), return_index=True, return_inverse=True)
         position, normal, *uvs = numpy.split(table[first], [3, 6, 8], axis=1)
         attributes = {"POSITION": glb.accessor(position, min=position.min(axis=0).tolist(), max=position.max(axis=0).tolist()),
                       "NORMAL": glb.accessor(normal)}
-        attributes.update((f"TEXCOORD_{number}", glb.accessor(uvs[number])) for number in range(len(sets)))
+        attributes.update((f"TEXCOORD_{number}", glb.accessor(uvs[number])) for number in range(len(self.sets)))
         return {"attributes": attributes, "indices": glb.accessor(index.ravel().astype(numpy.uint32))}
-
-
-@dataclass
-class Part:
-    """A node of the file and the object that it came from."""
-
-    object: str
-    is_instance: bool
-    geometry: Geometry
-    # Names of the UV layers in the file, and the material slot of each primitive.
-    sets: list
-    slots: list
 
 
 @contextlib.contextmanager
@@ -201,21 +198,16 @@ class Export:
             self.meshes[key] = self.add_mesh(item.name, mesh, slots) if mesh is not None and len(mesh.polygons) else None
             item.to_mesh_clear()
         if self.meshes[key]:
-            index, *rest = self.meshes[key]
+            index, geometry = self.meshes[key]
             node = self.glb.node(owner.name, instance.matrix_world, mesh=index)
-            self.parts[node] = Part(owner.name, instance.is_instance, *rest)
+            self.parts[node] = Part(owner.name, instance.is_instance, geometry)
 
     def add_mesh(self, name, mesh, materials):
-        """The index of a mesh, its geometry, its UV layers in the file, and the slot of each of its primitives."""
-        geometry = Geometry(mesh, len(materials))
-        trees = [nodes_of(material) for material in materials if material]
-        named = {node.uv_map for tree in trees if tree for node in tree.nodes if node.type == "UVMAP"}
-        # The UV layer for renders, then one that a texture names, or the next.
-        sets = sorted(geometry.uvs, key=lambda layer: (layer != geometry.active_uv, layer not in named))[:2]
-        slots = numpy.unique(geometry.slots).tolist()
-        primitives = [dict(geometry.primitive(self.glb, slot, sets), material=self.material((materials or [None])[slot], sets))
-                      for slot in slots]
-        return self.glb.push("meshes", {"name": name, "primitives": primitives}), geometry, sets, slots
+        """The index of a mesh, and its geometry."""
+        geometry, materials = Geometry(mesh, materials), materials or [None]
+        primitives = [dict(geometry.primitive(self.glb, slot), material=self.material(materials[slot], geometry.sets))
+                      for slot in geometry.filled_slots]
+        return self.glb.push("meshes", {"name": name, "primitives": primitives}), geometry
 
     def material(self, material, sets):
         """The index of a material whose textures follow these UV layers."""
@@ -275,8 +267,7 @@ class Export:
         lens = {"type": "perspective", "perspective": {
             "yfov": 2.0 * math.atan(0.5 * height / depth), "aspectRatio": (max(xs) - min(xs)) / height,
             "znear": scene.camera.data.clip_start}}
-        matrix = scene.camera.matrix_world.normalized()
-        self.glb.node(scene.camera.name, matrix, camera=self.glb.push("cameras", lens))
+        self.glb.node(scene.camera.name, scene.camera.matrix_world.normalized(), camera=self.glb.push("cameras", lens))
 
 
 def encoded(image):
