@@ -15,13 +15,15 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+# Where maturin looks for it; git ignores it.
 LICENCES = HERE / "LICENSES.txt"
-# Folders of crates have licences by these names.
+# Starts of their names in the folders of crates.
 LICENCE_FILES = ("license", "licence", "copying", "notice", "unlicense", "copyright", "ofl", "ufl")
 
 # Platforms of wheels as Blender calls them.
-BLENDER_PLATFORMS = {("linux", "x86_64"): "linux-x64", ("macosx", "arm64"): "macos-arm64", ("macosx", "x86_64"): "macos-x64",
-                     ("win", "amd64"): "windows-x64", ("win", "arm64"): "windows-arm64"}
+BLENDER_PLATFORMS = {
+    ("linux", "x86_64"): "linux-x64", ("macosx", "arm64"): "macos-arm64", ("macosx", "x86_64"): "macos-x64",
+    ("win", "amd64"): "windows-x64", ("win", "arm64"): "windows-arm64"}
 
 
 def cargo(*command):
@@ -37,8 +39,8 @@ def licences(target):
         if (package["name"], f"v{package['version']}") not in linked or package["name"] == "nephroid":
             continue
         name = f"{package['name']} {package['version']} ({package['license'] or 'see its licence file'})"
-        folder = Path(package["manifest_path"]).parent
-        files = [file for file in sorted(folder.rglob("*")) if file.name.lower().startswith(LICENCE_FILES) and file.is_file()]
+        paths = sorted(Path(package["manifest_path"]).parent.rglob("*"))
+        files = [path for path in paths if path.name.lower().startswith(LICENCE_FILES) and path.is_file()]
         for file in files:
             texts.setdefault(file.read_text(errors="replace").strip(), []).append(f"{name}: {file.name}")
         if not files:
@@ -88,13 +90,10 @@ def main():
     LICENCES.write_text(licences(arguments[place:place + 2]))
     for wheel in output.glob("nephroid-*.whl"):
         wheel.unlink()
-    try:
-        for command in ["sdist"], ["build", "--release", *arguments]:
-            subprocess.run([sys.executable, "-m", "maturin", *command, "--out", output], cwd=HERE, check=True)
-        wheel = next(output.glob("nephroid-*.whl"))
-        made = [wheel, *output.glob("nephroid-*.tar.gz"), tarball(wheel, output), extension(wheel, output)]
-    finally:
-        LICENCES.unlink()
+    for command in ["sdist"], ["build", "--release", *arguments]:
+        subprocess.run([sys.executable, "-m", "maturin", *command, "--out", output], cwd=HERE, check=True)
+    wheel = next(output.glob("nephroid-*.whl"))
+    made = [wheel, *output.glob("nephroid-*.tar.gz"), tarball(wheel, output), extension(wheel, output)]
     for file in dict.fromkeys(made):
         print(f"{file.stat().st_size / 1e6:6.1f} MB  {file}")
 
