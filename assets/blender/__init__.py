@@ -42,7 +42,8 @@ class NephroidMaterial(bpy.types.PropertyGroup):
     glass: StringProperty(name="Glass", description="Name in the catalogue, such as N-BK7, water or diamond: its index "
                           "and dispersion replace the material's")
     metal: EnumProperty(name="Metal", default="NONE", items=[("NONE", "By Its Colour", "")] + [
-        (name.upper(), name.title(), f"Measured reflectance of {name}") for name in ("gold", "silver", "copper", "aluminium")])
+        (name.upper(), name.title(), f"Measured reflectance of {name}")
+        for name in ("gold", "silver", "copper", "aluminium")])
 
 
 class NephroidMessage(bpy.types.PropertyGroup):
@@ -51,12 +52,12 @@ class NephroidMessage(bpy.types.PropertyGroup):
     text: StringProperty()
 
 
-CLASSES = (NephroidPreferences, NephroidSettings, NephroidMaterial, NephroidMessage, *bake.CLASSES, *panel.CLASSES)
+register_classes, unregister_classes = bpy.utils.register_classes_factory((
+    NephroidPreferences, NephroidSettings, NephroidMaterial, NephroidMessage, *bake.CLASSES, *panel.CLASSES))
 
 
 def register():
-    for item in CLASSES:
-        bpy.utils.register_class(item)
+    register_classes()
     bpy.types.Scene.nephroid = PointerProperty(type=NephroidSettings)
     bpy.types.Material.nephroid = PointerProperty(type=NephroidMaterial)
     bpy.types.WindowManager.nephroid_messages = CollectionProperty(type=NephroidMessage)
@@ -65,5 +66,4 @@ def register():
 def unregister():
     bake.stop()
     del bpy.types.Scene.nephroid, bpy.types.Material.nephroid, bpy.types.WindowManager.nephroid_messages
-    for item in reversed(CLASSES):
-        bpy.utils.unregister_class(item)
+    unregister_classes()

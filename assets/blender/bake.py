@@ -36,7 +36,7 @@ def program():
     try:
         import nephroid
     except ImportError:
-        raise FileNotFoundError("the program nephroid is not there; name it in the preferences of this add-on") from None
+        raise FileNotFoundError("the program nephroid is not there; name it in the preferences of this add-on")
     path = nephroid.program()
     if not path.stat().st_mode & 0o100:
         # Blender unpacks wheels without this bit.
@@ -76,7 +76,6 @@ class Job:
     def __init__(self, context):
         self.keeps_lamps = context.scene.nephroid.layers == "CAUSTIC"
         self.files = Files(context)
-        self.messages = list(self.files.export.messages)
         self.stage, self.share = "start", 0.0
         self.process, self.failed, self.is_cancelled = None, None, False
         self.thread = threading.Thread(target=self.work, daemon=True)
@@ -84,13 +83,13 @@ class Job:
 
     def work(self):
         """Bakes the maps and writes them as Blender reads them. Touches nothing of Blender's."""
-        folder = self.files.folder
+        maps, textures = self.files.folder / "maps", self.files.folder / "textures"
         try:
-            self.run("bake", self.files.scene, "-o", folder / "maps", "--progress", "json", *self.files.options)
-            if not json.loads((folder / "maps" / "manifest.json").read_text())["maps"]:
-                raise RuntimeError("no light falls on a surface by way of glass, mirrors or water; give an object such a "
-                                   "material, or see which collections Lamps and Objects name")
-            self.run("export", folder / "maps", "--format", "exr", "--bits", "32", "--units", "E/pi", "-o", folder / "textures")
+            self.run("bake", self.files.scene, "-o", maps, "--progress", "json", *self.files.options)
+            if not json.loads((maps / "manifest.json").read_text())["maps"]:
+                raise RuntimeError("no light falls on a surface by way of glass, mirrors or water; give an object such "
+                                   "a material, or see which collections Lamps and Objects name")
+            self.run("export", maps, "--format", "exr", "--bits", "32", "--units", "E/pi", "-o", textures)
         except (OSError, ValueError, RuntimeError) as error:
             self.failed = str(error)
 
@@ -104,7 +103,7 @@ class Job:
                 told = json.loads(line)
                 self.stage, self.share = told["stage"], told["done"] / max(told["total"], 1)
             elif kind == "warning" and "so it is a thin pane" not in text:
-                self.messages.append((None, self.in_blender(text)))
+                self.files.export.messages.append((None, self.in_blender(text)))
             elif kind == "error":
                 error = self.in_blender(text)
         if self.process.wait() != 0 or self.is_cancelled:
@@ -130,11 +129,12 @@ class Job:
     def finish(self, context):
         """Puts the maps back; messages as (level, object name or '', text)."""
         self.thread.join()
-        found = [message for owner, text in self.messages for message in addressed("WARNING", owner, text)]
+        export = self.files.export
+        found = [message for owner, text in export.messages for message in addressed("WARNING", owner, text)]
         try:
             if self.failed:
                 return found + addressed("ERROR", None, self.failed)
-            count = lightmaps.put_back(context, self.files.export, self.files.folder, self.keeps_lamps,
+            count = lightmaps.put_back(context, export, self.files.folder, self.keeps_lamps,
                                        lambda name, text: found.append(("WARNING", name, text)))
             return found + [("INFO", "", f"{count} light maps")]
         except (OSError, ValueError, RuntimeError) as error:
@@ -150,7 +150,8 @@ def addressed(level, owner, text):
     for kind, name in [owner] if owner else named:
         for item in bpy.context.scene.objects:
             materials = [slot.material.name_full for slot in item.material_slots if slot.material]
-            if name in {"material": materials, "mesh": [item.name, getattr(item.data, "name", None)]}.get(kind, [item.name]):
+            meant = {"material": materials, "mesh": [item.name, getattr(item.data, "name", None)]}
+            if name in meant.get(kind, [item.name]):
                 names.append(item.name)
     return [(level, name, text.removeprefix(f"{name}: ")) for name in dict.fromkeys(names)] or [(level, "", text)]
 

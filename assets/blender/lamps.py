@@ -47,8 +47,6 @@ def gltf(lamp, scale, fault):
         power_w = brightest if is_normalized else brightest * math.pi * radius_m ** 2
         entry.update(type=lamp.type.lower(), intensity=power_w / (4.0 * math.pi) * LUMENS_PER_WATT)
         if lamp.type == "SPOT":
-            if lamp.spot_size > math.pi:
-                fault("its cone is wider than 180 degrees and was narrowed to that")
             outer = 0.5 * min(lamp.spot_size, math.pi)
             # glTF has no hard edge.
             entry["spot"] = {"outerConeAngle": outer, "innerConeAngle": outer * (1.0 - max(lamp.spot_blend, 1e-4))}
@@ -65,9 +63,8 @@ def gltf(lamp, scale, fault):
     if lamp.spread < math.pi - 1e-3:
         fault("its spread was ignored; it was baked with one of 180 degrees")
     radiance = brightest / math.pi / (area_m2 if is_normalized else 1.0)
-    kind = "disk" if is_disc else "rect"
-    entry.update(type=kind, shape=kind, intensity=radiance * LUMENS_PER_WATT,
-                 size=math.sqrt(width * height) if is_disc else height, rect={"aspect": 1.0 if is_disc else width / height})
+    kind, size, aspect = ("disk", math.sqrt(width * height), 1.0) if is_disc else ("rect", height, width / height)
+    entry.update(type=kind, shape=kind, intensity=radiance * LUMENS_PER_WATT, size=size, rect={"aspect": aspect})
     return "EXT_lights_area", entry, extras
 
 
@@ -89,8 +86,7 @@ def write_world(world, path):
         scene.collection.objects.link(camera)
         scene.camera, scene.world = camera, world
         lens.type = "PANO"
-        owner = lens if hasattr(lens, "panorama_type") else lens.cycles
-        owner.panorama_type = "EQUIRECTANGULAR"
+        (lens if hasattr(lens, "panorama_type") else lens.cycles).panorama_type = "EQUIRECTANGULAR"
         camera.rotation_euler = (math.radians(90.0), 0.0, math.radians(180.0))
         render = scene.render
         render.engine = "CYCLES"

@@ -46,17 +46,16 @@ def put_back(context, export, folder, keeps_lamps, fault):
     if not shown:
         return 0
     group = light_map_group(load_tiles(files, folder), keeps_lamps)
-    users = {}
+    lost = {}
     for name, (part, sides) in shown.items():
         item = bpy.data.objects[name]
         give_material(item)
         write_layers(item, part.geometry, sides)
         for material in {slot.material for slot in item.material_slots if slot.material}:
-            users.setdefault(material, []).append(name)
-    for material, names in users.items():
-        why = add_node(material, group)
-        for name in names if why else ():
-            fault(name, why)
+            if material not in lost:
+                lost[material] = add_node(material, group)
+            if lost[material]:
+                fault(name, lost[material])
     if hasattr(context.scene, "cycles"):
         # Cycles' own caustics would be there twice.
         context.scene[CAUSTICS] = [int(getattr(context.scene.cycles, name)) for name in CAUSTIC_FLAGS]
@@ -106,7 +105,7 @@ def load_tiles(files, folder):
 
 
 def node_group(name, kind, sockets, nodes, links):
-    """A node group of sockets (name, direction, type), nodes {key: (type, values)} and links (key, output, key, input)."""
+    """A node group of sockets (name, direction, type), nodes {key: (type, values)}, links (key, output, key, input)."""
     tree = bpy.data.node_groups.new(name, kind)
     for socket, way, what in sockets:
         tree.interface.new_socket(socket, in_out=way, socket_type=f"NodeSocket{what}")
@@ -135,8 +134,8 @@ def light_map_group(image, keeps_lamps):
     links = [
         ("side", "Backfacing", "place", "Factor"), ("front", "UV", "place", "A"), ("back", "UV", "place", "B"),
         ("place", "Result", "light", "Vector"), ("light", "Color", "product", 0), ("given", "Color", "product", 1),
-        ("product", "Vector", "glow", "Color"), ("given", "Strength", "glow", "Strength"), ("glow", "Emission", "sum", 1),
-        ("sum", "Shader", "result", "Shader")]
+        ("product", "Vector", "glow", "Color"), ("given", "Strength", "glow", "Strength"),
+        ("glow", "Emission", "sum", 1), ("sum", "Shader", "result", "Shader")]
     if keeps_lamps:
         links.append(("given", "Shader", "sum", 0))
     return node_group(LIGHT_MAP_GROUP, "ShaderNodeTree", sockets, nodes, links)
@@ -181,15 +180,15 @@ def give_material(item):
 
 
 def write_layers(item, geometry, sides):
-    """Writes coordinates into the mesh that shows them: its own where no modifier changed it and no other object has it,
-    and where the triangles of a polygon agree at its corners."""
+    """Writes coordinates into the mesh that shows them: the object's own where no modifier and no other object uses it
+    and triangles agree at the corners of their polygon, else a copy of the baked one."""
     mesh, layers = item.data, {}
-    is_own = item.type == "MESH" and mesh.users == 1 and not item.modifiers and len(mesh.loops) == len(geometry.vertices)
+    fits = item.type == "MESH" and mesh.users == 1 and not item.modifiers and len(mesh.loops) == len(geometry.vertices)
     for side, uvs in sides.items():
         layers[side] = numpy.zeros((len(geometry.vertices), 2))
         layers[side][geometry.loops] = uvs
-        is_own = is_own and numpy.abs(layers[side][geometry.loops] - uvs).max() < 1e-6
-    if not is_own:
+        fits = fits and numpy.abs(layers[side][geometry.loops] - uvs).max() < 1e-6
+    if not fits:
         layers = {side: uvs.reshape(-1, 2) for side, uvs in sides.items()}
         mesh = copy_of(geometry, f"{item.name} as baked", [slot.material for slot in item.material_slots])
         modifier = item.modifiers.new(BAKED_MESH, "NODES")

@@ -17,13 +17,13 @@ NODES = {
         "emission": "Emission Color", "emission_strength": "Emission Strength",
     },
     "BSDF_GLASS": {"color": "Color", "roughness": "Roughness", "ior": "IOR", "transmission": 1.0, "normal": "Normal"},
-    "BSDF_REFRACTION": {"color": "Color", "roughness": "Roughness", "ior": "IOR", "transmission": 1.0, "normal": "Normal"},
     "BSDF_GLOSSY": {"color": "Color", "roughness": "Roughness", "metallic": 1.0, "normal": "Normal"},
     "BSDF_METALLIC": {"color": "Base Color", "roughness": "Roughness", "metallic": 1.0, "normal": "Normal"},
     "BSDF_DIFFUSE": {"color": "Color", "roughness": 1.0},
     "BSDF_TRANSPARENT": {"color": 0.0, "roughness": 1.0, "alpha": 0.0},
     "EMISSION": {"color": 0.0, "roughness": 1.0, "emission": "Color", "emission_strength": "Strength"},
 }
+NODES["BSDF_REFRACTION"] = NODES["BSDF_GLASS"]
 # Of any other.
 MATTE = {"color": "Color", "roughness": 1.0}
 
@@ -53,14 +53,9 @@ def source(socket):
     return None, None
 
 
-def nodes_of(block):
-    """The node tree of a material, lamp or world that uses one."""
-    return block.node_tree if getattr(block, "use_nodes", True) else None
-
-
 def output(block):
-    """The output node that renders take; None without nodes."""
-    tree = nodes_of(block)
+    """The output node of a material, lamp or world that renders take; None without nodes."""
+    tree = block.node_tree if getattr(block, "use_nodes", True) else None
     return tree and (tree.get_output_node("CYCLES") or tree.get_output_node("ALL"))
 
 
@@ -134,8 +129,8 @@ class Surface:
         else:
             pixels = numpy.empty(len(node.image.pixels), dtype=numpy.float32)
             node.image.pixels.foreach_get(pixels)
-            pixels = pixels.reshape(-1, node.image.channels)
-            return float(pixels[:, 3:].mean() if origin.name == "Alpha" and pixels.shape[1] > 3 else pixels[:, :3].mean())
+            colour, alpha = numpy.split(pixels.reshape(-1, node.image.channels), [3], axis=1)
+            return float((alpha if origin.name == "Alpha" and alpha.size else colour).mean())
         return DEFAULTS[name]
 
     def mix(self, node):
@@ -150,18 +145,16 @@ class Surface:
             return
         is_constant = by is None or by.type == "VALUE"
         share = number((factor if by is None else origin).default_value) if is_constant else factor.default_value
-        if is_clear[0] == is_clear[1]:
-            if not is_constant or 0.0 < share < 1.0:
-                self.fault("its Mix Shader was read as the shader with the greater share")
-            self.read(shaders[share > 0.5])
-            return
-        self.read(shaders[is_clear[0]])
-        if is_constant:
+        covers = is_clear[0] != is_clear[1]
+        self.read(shaders[is_clear[0] if covers else share > 0.5])
+        if covers and is_constant:
             self.values["alpha"] *= share if is_clear[0] else 1.0 - share
-        elif by.type == "TEX_IMAGE" and is_clear[0] and origin.name == "Alpha":
+        elif covers and by.type == "TEX_IMAGE" and is_clear[0] and origin.name == "Alpha":
             self.images["alpha"] = by
-        else:
+        elif covers:
             self.fault("the nodes that mix it with a Transparent BSDF are not read; it was baked opaque")
+        elif not is_constant or 0.0 < share < 1.0:
+            self.fault("its Mix Shader was read as the shader with the greater share")
 
     def add(self, node):
         """A shader and what it emits."""
@@ -194,7 +187,8 @@ class Surface:
     def is_matte(self):
         """Whether only its light map shows its colour, since no caustic leaves it."""
         values = self.values
-        return values["metallic"] < 0.5 and values["transmission"] < 0.5 and values["roughness"] > 0.3 and values["coat"] == 0.0
+        passes_light = max(values["metallic"], values["transmission"]) >= 0.5 or values["coat"] > 0.0
+        return values["roughness"] > 0.3 and not passes_light
 
     def diffuse_share(self):
         """What part of its base colour reflects diffusely; metals do where the program takes them for matte."""
@@ -210,7 +204,8 @@ class Surface:
             color = [math.sqrt(channel) for channel in color]
         pbr = {"baseColorFactor": [*color, unit(values["alpha"])], "metallicFactor": unit(values["metallic"]),
                "roughnessFactor": unit(values["roughness"])}
-        extensions, extras = {}, custom_properties(self.material)
+        extensions = {"KHR_materials_ior": {"ior": max(values["ior"], 1.0)}}
+        extras = custom_properties(self.material)
         result = {"name": self.material.name_full, "pbrMetallicRoughness": pbr, "doubleSided": True,
                   "extensions": extensions, "extras": extras}
         if "color" in images:
@@ -225,8 +220,6 @@ class Surface:
         if transmission > 0.0:
             extensions["KHR_materials_transmission"] = {"transmissionFactor": unit(transmission)}
             extensions["KHR_materials_volume"] = {"thicknessFactor": 0.0 if own.is_thin else 1.0, **self.absorption()}
-        if values["ior"] != 1.5:
-            extensions["KHR_materials_ior"] = {"ior": max(values["ior"], 1.0)}
         if values["specular"] != 0.5 and transmission == 0.0:
             extensions["KHR_materials_specular"] = {"specularFactor": unit(2.0 * values["specular"])}
         if values["coat"] > 0.0:

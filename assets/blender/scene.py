@@ -12,7 +12,7 @@ import bpy
 import numpy
 
 from . import lamps
-from .materials import Surface, nodes_of, source
+from .materials import Surface, source
 
 UV_LAYER, BACK_UV_LAYER = "Nephroid", "Nephroid back"
 # The modifier that shows a baked mesh.
@@ -26,7 +26,7 @@ SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3"}
 WRAPS = {"EXTEND": 33071, "CLIP": 33071, "MIRROR": 33648, "REPEAT": 10497}
 GEOMETRY = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 
-# What a node of the file shows: the name of the object that it came from, whether that is an instance, and its Geometry.
+# What a node of the file shows: the name of the object that it comes from, whether that is an instance, its Geometry.
 Part = namedtuple("Part", "object is_instance geometry")
 
 
@@ -34,8 +34,8 @@ class Glb:
     """A glTF document and its binary chunk."""
 
     def __init__(self):
-        self.binary = bytearray()
-        self.used = set()
+        # `used` names extensions.
+        self.binary, self.used = bytearray(), set()
         self.document = {"asset": {"version": "2.0", "generator": "Nephroid for Blender"},
                          "scenes": [{"nodes": []}], "extensions": {}}
 
@@ -55,12 +55,11 @@ class Glb:
     def accessor(self, values, **bounds):
         """Adds an array of one row an element."""
         return self.push("accessors", {
-            "bufferView": self.view(values.tobytes()), "count": len(values), "componentType": COMPONENTS[values.dtype.char],
-            "type": SHAPES[values.shape[1:]], **bounds})
+            "bufferView": self.view(values.tobytes()), "count": len(values), "type": SHAPES[values.shape[1:]],
+            "componentType": COMPONENTS[values.dtype.char], **bounds})
 
     def node(self, name, matrix, **entry):
-        """Adds a node of the scene, placed by Blender's matrix. Lamps and cameras look along −z in both programs, and
-        meshes are turned."""
+        """Adds a node, placed by Blender's matrix. Meshes are turned; lamps and cameras look along −z in glTF, too."""
         placed = TURN @ numpy.array(matrix, dtype=numpy.float64)
         if "mesh" in entry:
             placed = placed @ TURN.T
@@ -92,7 +91,7 @@ class Geometry:
     def __init__(self, mesh, materials):
         mesh.calc_loop_triangles()
         self.loops = read(mesh.loop_triangles, "loops", "i", 3)
-        self.slots = numpy.minimum(read(mesh.loop_triangles, "material_index", "i", 1), max(len(materials) - 1, 0))
+        self.slots = numpy.minimum(read(mesh.loop_triangles, "material_index", "i", 1), len(materials) - 1)
         self.positions = read(mesh.vertices, "co", "f", 3)
         self.vertices = read(mesh.loops, "vertex_index", "i", 1)
         # The program drops triangles without area; here they are not even counted.
@@ -105,12 +104,12 @@ class Geometry:
         layers = [layer for layer in mesh.uv_layers if layer.name not in {UV_LAYER, BACK_UV_LAYER}]
         self.uvs = {layer.name: read(layer.uv, "vector", "f", 2) for layer in layers}
         self.active_uv = next((layer.name for layer in layers if layer.active_render), None)
-        trees = [nodes_of(material) for material in materials if material]
-        named = {node.uv_map for tree in trees if tree for node in tree.nodes if node.type == "UVMAP"}
+        trees = [material.node_tree for material in materials if material and material.node_tree]
+        named = {node.uv_map for tree in trees for node in tree.nodes if node.type == "UVMAP"}
         # In the file: the UV layer for renders, then one that a texture names, or the next.
         self.sets = sorted(self.uvs, key=lambda name: (name != self.active_uv, name not in named))[:2]
 
-    def primitive(self, glb, slot):
+    def primitive(self, glb, slot, material):
         """Writes the triangles of a slot, with corners that agree as one vertex."""
         corners = self.loops[self.slots == slot].ravel()
         columns = [part @ TURN[:3, :3].T for part in (self.positions[self.vertices[corners]], self.normals[corners])]
@@ -120,10 +119,11 @@ class Geometry:
         table = numpy.ascontiguousarray(numpy.hstack(columns), dtype=numpy.float32) + 0.0
         _, first, index = numpy.unique(table.view(f"V{4 * table.shape[1]}"), return_index=True, return_inverse=True)
         position, normal, *uvs = numpy.split(table[first], [3, 6, 8], axis=1)
-        attributes = {"POSITION": glb.accessor(position, min=position.min(axis=0).tolist(), max=position.max(axis=0).tolist()),
-                      "NORMAL": glb.accessor(normal)}
+        bounds = {"min": position.min(axis=0).tolist(), "max": position.max(axis=0).tolist()}
+        attributes = {"POSITION": glb.accessor(position, **bounds), "NORMAL": glb.accessor(normal)}
         attributes.update((f"TEXCOORD_{number}", glb.accessor(uvs[number])) for number in range(len(self.sets)))
-        return {"attributes": attributes, "indices": glb.accessor(index.ravel().astype(numpy.uint32))}
+        indices = glb.accessor(index.ravel().astype(numpy.uint32))
+        return {"attributes": attributes, "indices": indices, "material": material}
 
 
 @contextlib.contextmanager
@@ -151,10 +151,8 @@ class Export:
     def __init__(self, context, path):
         scene, self.glb = context.scene, Glb()
         self.settings = scene.nephroid
-        # Of what is lost, (owner, text) with the owner as (kind, name).
-        self.messages = []
-        # By index of the node.
-        self.parts = {}
+        # What is lost, as (owner, text) with the owner as (kind, name); and a Part by index of its node.
+        self.messages, self.parts = [], {}
         self.materials, self.textures, self.images, self.meshes = {}, {}, {}, {}
         with as_rendered([item for item in scene.objects if item.type in GEOMETRY]):
             for instance in context.evaluated_depsgraph_get().object_instances:
@@ -191,23 +189,20 @@ class Export:
             self.glb.node(owner.name, rigid, extensions={kind: {"light": light}}, extras=extras)
 
     def add_object(self, item, instance, owner):
-        slots = tuple(slot.material.original if slot.material else None for slot in item.material_slots)
-        key = item.data.original if item.type == "MESH" and not item.modifiers else item.original, slots
+        materials = tuple(slot.material.original if slot.material else None for slot in item.material_slots) or (None,)
+        key = item.data.original if item.type == "MESH" and not item.modifiers else item.original, materials
         if key not in self.meshes:
-            mesh = item.to_mesh()
-            self.meshes[key] = self.add_mesh(item.name, mesh, slots) if mesh is not None and len(mesh.polygons) else None
+            mesh, self.meshes[key] = item.to_mesh(), None
+            if mesh and mesh.polygons:
+                geometry = Geometry(mesh, materials)
+                primitives = [geometry.primitive(self.glb, slot, self.material(materials[slot], geometry.sets))
+                              for slot in geometry.filled_slots]
+                self.meshes[key] = self.glb.push("meshes", {"name": item.name, "primitives": primitives}), geometry
             item.to_mesh_clear()
         if self.meshes[key]:
             index, geometry = self.meshes[key]
             node = self.glb.node(owner.name, instance.matrix_world, mesh=index)
             self.parts[node] = Part(owner.name, instance.is_instance, geometry)
-
-    def add_mesh(self, name, mesh, materials):
-        """The index of a mesh, and its geometry."""
-        geometry, materials = Geometry(mesh, materials), materials or [None]
-        primitives = [dict(geometry.primitive(self.glb, slot), material=self.material(materials[slot], geometry.sets))
-                      for slot in geometry.filled_slots]
-        return self.glb.push("meshes", {"name": name, "primitives": primitives}), geometry
 
     def material(self, material, sets):
         """The index of a material whose textures follow these UV layers."""
@@ -241,8 +236,7 @@ class Export:
             self.glb.used.add("KHR_texture_transform")
             origin, socket = source(origin.inputs["Vector"])
         if origin is not None and origin.type == "UVMAP":
-            if origin.uv_map in sets[1:]:
-                info["texCoord"] = 1
+            info["texCoord"] = int(origin.uv_map in sets[1:])
         elif origin is not None and not (origin.type == "TEX_COORD" and socket.name == "UV"):
             fault(f"the coordinates of its image {node.image.name} are not read; its UV map was taken")
         return info
@@ -260,9 +254,8 @@ class Export:
         return self.textures[image, wrap]
 
     def add_camera(self, scene):
-        # Of the frame in the camera's own plane, one metre ahead [m].
-        frame = scene.camera.data.view_frame(scene=scene)
-        xs, ys, zs = zip(*frame)
+        # Of the corners of its frame, in its own coordinates [m].
+        xs, ys, zs = zip(*scene.camera.data.view_frame(scene=scene))
         height, depth = max(ys) - min(ys), -zs[0]
         lens = {"type": "perspective", "perspective": {
             "yfov": 2.0 * math.atan(0.5 * height / depth), "aspectRatio": (max(xs) - min(xs)) / height,
