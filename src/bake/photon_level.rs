@@ -16,7 +16,7 @@ use crate::light_pass::photon::filter;
 use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::{HALVES, PhotonPass};
 use crate::light_pass::photon::walk::PhotonRules;
-use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
+use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::visibility::VisibleLight;
 use crate::optics::LinearSrgb;
 use crate::transport::EffectSet;
@@ -287,17 +287,11 @@ impl CausticLayer<'_> {
         let mut maps = first.clone().into_owned();
         maps.add(&second);
         let mut left = [0; 3];
-        let mut noise = {
-            let is_filtered = |map: &ReceiverMap| self.settings.filters() && filter::is_filterable(map);
-            let as_they_are = |maps: &ReceiverMaps| {
-                accuracy::images_of(maps.iter().filter(|(_, map)| !is_filtered(map)), unit)
-            };
-            accuracy::half_set_noise(&as_they_are(&first), &as_they_are(&second))
+        let noise = if self.settings.filters() {
+            filter::filter(&mut maps, [&first, &second], (unit, is_signed), &mut left)
+        } else {
+            accuracy::half_set_noise(&accuracy::images(&first, unit), &accuracy::images(&second, unit))
         };
-        if self.settings.filters() {
-            let of_filter = filter::filter(&mut maps, [&first, &second], (unit, is_signed), &mut left);
-            noise.extend(of_filter);
-        }
         filter::without_negative(&mut maps, is_signed, &mut left);
         ledger.book_sum(Account::Sampling, left);
         ledger.book_sum(Account::Deposited, left.map(|count| -count));

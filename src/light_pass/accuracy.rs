@@ -93,10 +93,6 @@ impl LightError {
 }
 
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
-    images_of(maps.iter(), unit)
-}
-
-pub fn images_of<'a>(maps: impl Iterator<Item = (Receiver, &'a ReceiverMap)>, unit: FluxUnit) -> Images {
     let image = |(receiver, map): (Receiver, &ReceiverMap)| {
         let chart = &map.chart;
         let luminance = map
@@ -115,7 +111,7 @@ pub fn images_of<'a>(maps: impl Iterator<Item = (Receiver, &'a ReceiverMap)>, un
             .collect();
         (receiver, Image::new(chart, luminance))
     };
-    maps.map(image).collect()
+    maps.iter().map(image).collect()
 }
 
 impl Image {

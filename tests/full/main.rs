@@ -11,6 +11,7 @@ mod bake {
     mod indirect;
     mod live;
     mod motion;
+    mod photon;
     mod plan;
     mod probe;
     mod soft;

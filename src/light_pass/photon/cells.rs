@@ -42,6 +42,8 @@ pub(super) struct Level {
     texels: Vec<u32>,
     /// Surface area in each cell [m²].
     areas_m2: Vec<f32>,
+    /// That of the cell with most.
+    largest_m2: f32,
 }
 
 impl Level {
@@ -81,6 +83,7 @@ impl Level {
             shift: side.trailing_zeros(),
             begins,
             areas_m2: vec![0.0; places.len()],
+            largest_m2: 0.0,
             places,
             texels,
         }
@@ -93,6 +96,15 @@ impl Level {
         let (first_column, first_row) = (tile_column << self.shift, tile_row << self.shift);
         let across = (1 << self.shift).min(self.size.0 - first_column);
         (begin != NONE).then(|| begin as usize + (row - first_row) * across + column - first_column)
+    }
+
+    /// Area of a cell, relative to the largest of the level: 1 wherever a surface of even resolution covers it.
+    fn share(&self, index: usize) -> f32 {
+        if self.largest_m2 > 0.0 {
+            self.areas_m2[index] / self.largest_m2
+        } else {
+            0.0
+        }
     }
 
     /// Sum over the cells of the finer level in one cell.
@@ -131,6 +143,7 @@ impl Cells {
         let areas = cells.sums(|texel| [chart.texel_area_m2(texel) as f32]);
         for (level, areas) in cells.levels.iter_mut().zip(areas) {
             level.areas_m2 = areas.into_iter().map(|[area_m2]| area_m2).collect();
+            level.largest_m2 = level.areas_m2.iter().copied().fold(0.0, f32::max);
         }
         cells
     }
@@ -191,8 +204,22 @@ impl Cells {
                 index
             });
             let (number, index) = coarser?;
-            (self.levels[number].areas_m2[index] > 0.0).then(|| values[number][index])
+            Some((self.levels[number].share(index), values[number][index]))
         })
+    }
+
+    /// For each texel, the value of the cell of a level in which it lies; its own if it is larger.
+    pub fn inherited<const N: usize>(&self, level: usize, mut values: Values<N>) -> Vec<[f32; N]> {
+        for number in (0..level).rev() {
+            let coarser = &self.levels[number + 1];
+            let parent = |&(column, row): &(u32, u32)| coarser.index(column as usize / 2, row as usize / 2);
+            for (index, place) in self.levels[number].places.iter().enumerate() {
+                if let Some(parent) = parent(place) {
+                    values[number][index] = values[number + 1][parent];
+                }
+            }
+        }
+        self.texels(&values)
     }
 
     /// Densities of a level's cells, averaged over cells `steps` levels coarser and interpolated back.
@@ -228,21 +255,56 @@ impl Cells {
         for number in (level..last).rev() {
             let (coarse, areas) = (&self.levels[number + 1], &areas[number + 1 - level]);
             sums = self.interpolated(number, |column, row| {
-                let index = coarse.index(column, row).filter(|index| areas[*index][0] > 0.0)?;
-                Some(sums[index])
+                let index = coarse.index(column, row)?;
+                Some((
+                    areas[index][0] / coarse.largest_m2.max(f32::MIN_POSITIVE),
+                    sums[index],
+                ))
             });
         }
         sums
     }
 
-    /// [`Self::pooled`] without a cell's own contribution; exact where the surface covers the coarser cells completely.
-    pub fn around<const N: usize>(&self, level: usize, values: &[[f32; N]]) -> Vec<[f32; N]> {
+    /// Area of each texel, relative to the largest of its size.
+    pub fn shares(&self) -> Vec<[f32; 1]> {
+        let of_level = |level: &Level| {
+            (0..level.places.len())
+                .map(|index| [level.share(index)])
+                .collect()
+        };
+        self.texels(&self.levels.iter().map(of_level).collect())
+    }
+
+    /// Area of a level's cells, relative to the harmonic mean of those around.
+    pub fn relative_areas(&self, level: usize) -> Vec<f32> {
+        let of_level = &self.levels[level];
+        let shares: Vec<f32> = (0..of_level.places.len())
+            .map(|index| of_level.share(index))
+            .collect();
+        if shares.iter().all(|share| *share == 1.0) {
+            return shares;
+        }
+        let per_share = shares
+            .iter()
+            .map(|share| [if *share > 0.0 { 1.0 / share } else { 0.0 }]);
+        let around = self.pooled(level, per_share.collect(), STEPS_AROUND);
+        shares
+            .iter()
+            .zip(around)
+            .map(|(share, [per_share])| share * per_share)
+            .collect()
+    }
+
+    /// [`Self::pooled`] without a cell's own contribution, given [`Self::relative_areas`]; exact where the surface covers
+    /// the coarser cells evenly.
+    pub fn around<const N: usize>(&self, level: usize, values: &[[f32; N]], areas: &[f32]) -> Vec<[f32; N]> {
         let mut means = self.pooled(level, values.to_vec(), STEPS_AROUND);
         if level + STEPS_AROUND < self.levels.len() {
             let own = |place: u32| OWN_WEIGHTS[place as usize % OWN_WEIGHTS.len()];
-            let cells = means.par_iter_mut().zip(values).zip(&self.levels[level].places);
-            cells.for_each(|((means, values), place)| {
-                let weight = own(place.0) * own(place.1);
+            let places = areas.par_iter().zip(&self.levels[level].places);
+            let cells = means.par_iter_mut().zip(values).zip(places);
+            cells.for_each(|((means, values), (area, place))| {
+                let weight = own(place.0) * own(place.1) * area;
                 means
                     .iter_mut()
                     .zip(values)
@@ -252,11 +314,12 @@ impl Cells {
         means
     }
 
-    /// Values at the centres of a level's cells, interpolated linearly between the centres of the next coarser level's.
+    /// Values at the centres of a level's cells, interpolated linearly between the centres of the next coarser level's,
+    /// whose weights are their shares of surface: a sliver says little about the cells around it.
     fn interpolated<const N: usize>(
         &self,
         level: usize,
-        at: impl Fn(usize, usize) -> Option<[f32; N]> + Sync,
+        at: impl Fn(usize, usize) -> Option<(f32, [f32; N])> + Sync,
     ) -> Vec<[f32; N]> {
         let (width, height) = self.levels[level + 1].size;
         // The parent, and its neighbour on the side of the cell.
@@ -274,11 +337,12 @@ impl Cells {
             let (mut sum, mut weights) = ([0.0; N], 0.0);
             for (row, down) in near(row, height) {
                 for (column, across) in near(column, width) {
-                    if let Some(values) = at(column, row) {
-                        weights += down * across;
+                    if let Some((share, values)) = at(column, row) {
+                        let weight = down * across * share;
+                        weights += weight;
                         sum.iter_mut()
                             .zip(values)
-                            .for_each(|(sum, value)| *sum += down * across * value);
+                            .for_each(|(sum, value)| *sum += weight * value);
                     }
                 }
             }

@@ -5,7 +5,8 @@
 //! which noise adds nothing, and the noise N = ⟨(d_A − d_B)²⟩/4. A detail is scaled by S/(S + N), as by a Wiener filter
 //! (Wiener 1949). The error is the part of S that is dropped and the part of N that is left. S and N are averaged over
 //! the cells around: a cell that judged itself would keep whatever happens to agree in both halves, and its error would
-//! be underestimated.
+//! be underestimated. Noise is inversely proportional to the surface in a cell, which at the edge of an island may be a
+//! sliver: it is averaged as noise times area, and cells are weighted by the square of their area.
 
 use rayon::prelude::*;
 
@@ -27,14 +28,13 @@ const ERROR_BY_LIGHT: f32 = 1.5;
 /// Minimum fraction of a cell's luminance that its details leave, where channels may be negative.
 const MIN_LEFT: f32 = 1e-5;
 
+/// Cells of this level that no photon reached are dark if less than [`DARK`] of the map's mean is left there: their
+/// light is a remainder of what coarser cells have. It lies below what exposure shows, but would lower the exposure.
+const DARK_LEVEL: usize = 3;
+const DARK: f32 = 1.0 / 256.0;
+
 /// Floor of irradiance relative to the map's mean.
 const DARKEST: f32 = 1e-4;
-
-/// Whether a map can be filtered. On charts of several islands, texels that a surface hardly covers upset the statistics
-/// of those around.
-pub fn is_filterable(map: &ReceiverMap) -> bool {
-    map.chart.layout.is_some() || map.chart.islands().is_none()
-}
 
 /// Filters the sum of two halves and returns the remaining squared error of each texel [W²/m⁴]. `is_signed`: channels
 /// may be negative. Adds counts that a map could not take to `left`.
@@ -45,7 +45,7 @@ pub fn filter(
     left: &mut Sums,
 ) -> Noise {
     let mut noise = Noise::new();
-    for (receiver, map) in sum.iter_mut().filter(|(_, map)| is_filterable(map)) {
+    for (receiver, map) in sum.iter_mut() {
         let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
         let kept = details.filtered();
         noise.insert(receiver, details.squares(&kept, map));
@@ -166,7 +166,19 @@ impl Details {
         for level in (0..coarsest).rev() {
             kept[level] = self.refined(level, &kept);
         }
-        self.cells.texels(&kept)
+        let mut texels = self.cells.texels(&kept);
+        let reached = self.raw.iter().map(|level| {
+            let is_reached = |raw: &Raw| raw.iter().any(|channel| *channel != 0.0);
+            level.iter().map(|raw| [f32::from(is_reached(raw))]).collect()
+        });
+        let reached = self.cells.inherited(DARK_LEVEL.min(coarsest), reached.collect());
+        for (texel, [reached]) in texels.iter_mut().zip(reached) {
+            let [.., a, b, _] = *texel;
+            if reached == 0.0 && 0.5 * (a + b) < DARK {
+                *texel = [0.0; 6];
+            }
+        }
+        texels
     }
 
     /// The filtered cells of a level, given those of all coarser levels.
@@ -181,15 +193,17 @@ impl Details {
         };
         // Noise is proportional to light where photons carry equal flux.
         let light = |smooth: &FilteredCell| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
-        let both = details
-            .par_iter()
-            .zip(&refined)
-            .map(|(detail, smooth)| [noise(detail), light(smooth)]);
+        let areas = self.cells.relative_areas(level);
+        let cells = details.par_iter().zip(&refined).zip(&areas);
+        let both = cells
+            .clone()
+            .map(|((detail, smooth), area)| [noise(detail) * area, light(smooth)]);
         let by_light = self.cells.pooled(level, both.collect(), PHOTONS_POOLED);
-        let power = details.par_iter().zip(&refined).zip(&by_light).map(
-            |((detail, smooth), [noise_of_all, light])| {
-                let photon = if *light > 0.0 {
-                    2.0 * noise_of_all / light
+        let power = cells
+            .zip(&by_light)
+            .map(|(((detail, smooth), area), [noise_of_all, light])| {
+                let photon = if *light > 0.0 && *area > 0.0 {
+                    2.0 * noise_of_all / (light * area)
                 } else {
                     0.0
                 };
@@ -197,39 +211,42 @@ impl Details {
                 let product = a * b;
                 let [first, second] = tints(detail, smooth);
                 let chance = CHANCE_PAIRS * photon * photon;
+                let signal = if product > 0.0 {
+                    (product - chance).max(0.0)
+                } else {
+                    product
+                };
                 [
-                    if product > 0.0 {
-                        (product - chance).max(0.0)
-                    } else {
-                        product
-                    },
-                    noise(detail),
-                    (0..3).map(|i| first[i] * second[i]).sum(),
-                    (0..3).map(|i| 0.25 * (first[i] - second[i]).powi(2)).sum(),
+                    signal * area,
+                    noise(detail) * area * area,
+                    (0..3).map(|i| first[i] * second[i]).sum::<f32>() * area,
+                    (0..3).map(|i| 0.25 * (first[i] - second[i]).powi(2)).sum::<f32>() * area * area,
                 ]
-            },
-        );
+            });
         let power: Vec<[f32; 4]> = power.collect();
         drop(by_light);
-        let pooled = self.cells.around(level, &power);
+        let pooled = self.cells.around(level, &power, &areas);
         drop(power);
-        let cells = refined.par_iter_mut().zip(&details).zip(&pooled);
-        cells.for_each(|((kept, detail), [signal, noise, tint_signal, tint_noise])| {
-            let part = |signal: f32, noise: f32| {
-                if signal > 0.0 {
-                    signal / (signal + noise.max(0.0))
-                } else {
-                    0.0
-                }
-            };
-            let share = part(*signal, *noise);
-            let [first, second] = luminances(detail);
-            let missed = (1.0 - share) * (1.0 - share) * first * second;
-            let [red, green, blue] = self.channels_of(kept, detail, [share, part(*tint_signal, *tint_noise)]);
-            let [.., a, b, missed_before] = *kept;
-            let [a, b] = [a + share * first, b + share * second];
-            *kept = [red, green, blue, a, b, missed_before + missed];
-        });
+        let cells = refined.par_iter_mut().zip(&details).zip(&pooled).zip(&areas);
+        cells.for_each(
+            |(((kept, detail), [signal, noise, tint_signal, tint_noise]), area)| {
+                let part = |signal: f32, noise: f32| {
+                    if signal > 0.0 && *area > 0.0 {
+                        signal / (signal + noise.max(0.0) / area)
+                    } else {
+                        0.0
+                    }
+                };
+                let share = part(*signal, *noise);
+                let [first, second] = luminances(detail);
+                let missed = (1.0 - share) * (1.0 - share) * first * second;
+                let [red, green, blue] =
+                    self.channels_of(kept, detail, [share, part(*tint_signal, *tint_noise)]);
+                let [.., a, b, missed_before] = *kept;
+                let [a, b] = [a + share * first, b + share * second];
+                *kept = [red, green, blue, a, b, missed_before + missed];
+            },
+        );
         refined
     }
 
@@ -256,17 +273,15 @@ impl Details {
         if luminance(&lit) < 0.0 { [least; 3] } else { lit }
     }
 
-    /// The squared error of each texel [W²/m⁴], bias and remaining noise: averaged over the texels around and
-    /// distributed among them by their irradiance.
+    /// The squared error of each texel [W²/m⁴], bias and remaining noise: averaged over the texels around, weighted by
+    /// the square of their area, and distributed among them by their irradiance.
     fn squares(&self, of_texels: &[FilteredCell], map: &ReceiverMap) -> Vec<f64> {
         let expected = |[.., a, b, _]: &FilteredCell| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
         let square = |[.., a, b, missed]: &FilteredCell| missed + 0.25 * (a - b) * (a - b);
+        let shares = self.cells.shares();
         let mut ratios = self.cells.densities(|texel| {
-            let area_m2 = map.chart.texel_area_m2(texel) as f32;
-            [
-                square(&of_texels[texel]) * area_m2,
-                expected(&of_texels[texel]) * area_m2,
-            ]
+            let weight = shares[texel][0] * map.chart.texel_area_m2(texel) as f32;
+            [square(&of_texels[texel]), expected(&of_texels[texel])].map(|value| value * weight)
         });
         let pool = self.cells.pool();
         for level in (0..pool).rev() {

@@ -1,125 +1,18 @@
-//! Photons against brute force, against the law of energy, and against themselves.
+//! Photons against the law of energy and against themselves. `full` holds them against brute force.
 
-use nephroid::bake::Bake;
-use nephroid::illumination::IlluminationMap;
 use nephroid::optics::luminance;
 use nephroid::scene::Scene;
-use nephroid::scene::builtin::{parts, shapes};
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
 
-use support::hard_scenes::{cut_glass, roughened, under_square_lamp, under_the_suns_disc};
-use support::tools::{bake, bits, brute, builtin_scene, caustic, energy_fault, map_of, photons};
+use support::hard_scenes::roughened;
+use support::tools::{bake, bits, builtin_scene, energy_fault, photons};
 
 const SIDE: usize = 64;
-const BLOCK: usize = 8;
 /// Fine enough that light is smooth from texel to texel.
 const FINE: MapResolution = MapResolution::Fixed {
     width: 256,
     height: 256,
 };
-
-/// Green glass around a lamp, so that paths absorb, split and start inside a body.
-fn lamp_in_green_glass() -> Scene {
-    let mut scene = builtin_scene("mirror");
-    scene.objects.truncate(1);
-    let lamp = scene.lights[0].kind.position().expect("a point light");
-    let mut glass = parts::dielectric("green glass", 1.5);
-    glass.volume = Some(nephroid::scene::Volume {
-        attenuation_colour: nephroid::optics::LinearSrgb::new(0.2, 0.8, 0.3),
-        attenuation_distance_m: 0.3,
-    });
-    parts::add(&mut scene, "bulb", shapes::sphere(lamp, 0.2, 3), glass);
-    scene
-}
-
-/// Blocks of a map whose means are more than three standard errors apart.
-fn outliers(result: &Bake, reference: &Bake, scene: &Scene, receiver: &str) -> usize {
-    let [ours, theirs] = [result, reference].map(|result| map_of(result, scene, receiver));
-    let [a, b] = [ours, theirs].map(caustic);
-    let square = |map: &IlluminationMap, texel: usize| {
-        map.error
-            .as_ref()
-            .map_or(0.0, |error| f64::from(error[texel]).powi(2))
-    };
-    let differences = block_sums(|texel| a[texel] - b[texel]);
-    let variances = block_sums(|texel| square(ours, texel) + square(theirs, texel));
-    let blocks = differences.iter().zip(&variances);
-    blocks
-        .filter(|(difference, variance)| difference.abs() > 3.0 * variance.sqrt())
-        .count()
-}
-
-fn block_sums(of_texel: impl Fn(usize) -> f64) -> Vec<f64> {
-    let mut sums = vec![0.0; (SIDE / BLOCK).pow(2)];
-    for texel in 0..SIDE * SIDE {
-        sums[texel / SIDE / BLOCK * (SIDE / BLOCK) + texel % SIDE / BLOCK] += of_texel(texel);
-    }
-    sums
-}
-
-/// Of 64 blocks chance alone puts more than three beyond three standard errors once in 20,000 times.
-#[test]
-fn photons_are_unbiased() {
-    for (what, scene, density_per_sr) in [
-        ("glass ball", builtin_scene("ball"), 1e6),
-        ("cut glass", cut_glass(), 1e6),
-        ("square lamp", under_square_lamp("ring", 0.3), 1e5),
-        ("disc of the sun", under_the_suns_disc(), 2e6),
-        ("rough mirror", roughened("mirror", 0.2), 1e6),
-        ("frosted ball", roughened("ball", 0.3), 1e6),
-        ("ball as rough as can be", roughened("ball", 1.0), 1e6),
-        ("lamp in green glass", lamp_in_green_glass(), 3e4),
-    ] {
-        let result = bake(scene.clone(), &photons(density_per_sr, SIDE));
-        assert_eq!(energy_fault(&result), None, "{what}");
-        let reference = brute(&scene, &photons(density_per_sr, SIDE), 60_000);
-        let count = outliers(&result, &reference, &scene, "floor");
-        assert!(count <= 3, "{what}: {count} blocks");
-    }
-}
-
-/// Few photons have no bundles: the mean of many bakes with few is that of one with many, which has some. Brute force parts
-/// no wavelengths.
-#[test]
-fn bundles_of_a_spectrum_are_unbiased() {
-    const SEEDS: u64 = 24;
-    let mut scene = builtin_scene("ball");
-    let glass = scene.materials.iter_mut().find(|it| it.surface.is_specular());
-    *glass.expect("glass") = parts::glass("N-SF11");
-    let blocks_of = |result: &Bake| {
-        let light = caustic(map_of(result, &scene, "floor"));
-        block_sums(|texel| light[texel])
-    };
-    let baked = |seed: u64, density_per_sr: f64| {
-        let settings = BakeSettings {
-            seed,
-            ..photons(density_per_sr, SIDE)
-        };
-        bake(scene.clone(), &settings)
-    };
-    let bundled = |result: &Bake| result.ledgers[0].carried_w.bundles / result.ledgers[0].energy_w.deposited;
-    let few: Vec<Vec<f64>> = (0..SEEDS)
-        .map(|seed| {
-            let result = baked(seed, 3e4);
-            assert_eq!(bundled(&result), 0.0);
-            blocks_of(&result)
-        })
-        .collect();
-    let many = baked(SEEDS, 1e6);
-    assert_eq!(energy_fault(&many), None);
-    assert!(bundled(&many) > 0.5, "{}", bundled(&many));
-    let blocks = blocks_of(&many);
-    let outliers = blocks.iter().enumerate().filter(|(block, e)| {
-        let mean = few.iter().map(|blocks| blocks[*block]).sum::<f64>() / SEEDS as f64;
-        let square = few
-            .iter()
-            .map(|blocks| (blocks[*block] - mean).powi(2))
-            .sum::<f64>();
-        (*e - mean).abs() > 3.0 * (square / (SEEDS * (SEEDS - 1)) as f64).sqrt()
-    });
-    let count = outliers.count();
-    assert!(count <= 3, "{count} blocks");
-}
 
 #[test]
 fn threads_change_no_photon() {
@@ -134,43 +27,6 @@ fn threads_change_no_photon() {
     assert_eq!(one.maps.len(), three.maps.len());
     for (a, b) in one.maps.iter().zip(&three.maps) {
         assert_eq!(bits(a), bits(b));
-    }
-}
-
-/// The target is met by the true error too, within a factor of two; and filtering reaches it with fewer photons.
-#[test]
-fn targets_are_met_and_filtering_saves_photons() {
-    let scene = roughened("ball", 0.3);
-    let [raw, filtered] = [false, true].map(|filter| {
-        let settings = BakeSettings {
-            max_error: Some(0.15),
-            map_resolution: FINE,
-            filter: Some(filter),
-            ..photons(1e4, SIDE)
-        };
-        let result = bake(scene.clone(), &settings);
-        assert_eq!(energy_fault(&result), None);
-        assert!(result.estimated_relative_rmse.expect("an estimate") <= 0.15);
-        result
-    });
-    assert!(
-        filtered.counts.rays < raw.counts.rays,
-        "{} and {}",
-        filtered.counts.rays,
-        raw.counts.rays
-    );
-    let fine = BakeSettings {
-        map_resolution: FINE,
-        ..photons(1e7, SIDE)
-    };
-    let reference = bake(scene.clone(), &fine);
-    let truth = caustic(map_of(&reference, &scene, "floor"));
-    for result in [&raw, &filtered] {
-        let map = caustic(map_of(result, &scene, "floor"));
-        let squares = map.iter().zip(&truth).map(|(a, b)| (a - b) * (a - b));
-        let mean = truth.iter().sum::<f64>() / truth.len() as f64;
-        let off = (squares.sum::<f64>() / truth.len() as f64).sqrt() / mean;
-        assert!(off <= 0.3, "{off}");
     }
 }
 
