@@ -69,7 +69,7 @@ impl Effect {
             }
             Self::Refraction => "Light that goes through glass, water and panes.",
             Self::Dispersion => "Glass bends each colour another way, and light is traced by wavelength.",
-            Self::Reflection => "Light that mirrors, polish and glass send back.",
+            Self::Reflection => "Light that mirrors, coats and glass send back.",
             Self::Absorption => "Coloured bodies take light along the way through them (Beer and Lambert).",
             Self::Textures => "Images on mirrors and glass tint the light that goes on from them.",
             Self::Roughness => {

@@ -184,7 +184,7 @@ function fillPanel() {
   open(innerWidth > 600);
   const kinds = new Set(about.objects.map((object) => object.kind));
   const has = (...names) => names.some((name) => kinds.has(name));
-  if (has("glass", "pane", "mirror", "mixed")) {
+  if (has("glass", "pane", "mirror", "coated")) {
     by("missing").textContent = "Mirrors and glass are approximated: they show what is around them, but no other glass.";
   }
 }

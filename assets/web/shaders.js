@@ -56,7 +56,7 @@ uniform sampler2D caustic, direct, indirect, caustic_back, direct_back, indirect
 uniform samplerCube probe;
 uniform vec3 base, glow, absorption_per_m, weights, probe_at, box_low, box_high, false_scale;
 uniform vec2 pixels;
-uniform float gain, line, ior, polish, roughness, cutoff, opacity, inner_m;
+uniform float gain, line, ior, coat, roughness, cutoff, opacity, inner_m;
 uniform mat4 clip_from_world;
 varying vec2 map_uv, look_uv;
 varying vec3 place, normal_world, tint;
@@ -161,7 +161,7 @@ void main() {
   light += reflectance * around(place, reflect(gaze, normal), blur);
   alpha = 0.0;
 #else
-  float mirrored = polish > 0.0 ? polish * fresnel(cosine, ior) : 0.0;
+  float mirrored = coat > 0.0 ? coat * fresnel(cosine, ior) : 0.0;
   vec3 bright = caustics();
   vec3 all = bright + others();
   light += (1.0 - mirrored) * colour * all / PI;

@@ -171,7 +171,7 @@ export class Stage {
     const vector = (list) => ({ value: new THREE.Vector3(...list) });
     const uniforms = { ...this.common, base: vector(look.base), glow: vector(look.glow),
       absorption_per_m: vector(look.absorption_per_m), ior: { value: look.ior }, roughness: { value: look.roughness },
-      polish: { value: look.kind === "mixed" ? look.polish : 0 }, cutoff: { value: had.alphaTest },
+      coat: { value: look.kind === "coated" ? look.coat : 0 }, cutoff: { value: had.alphaTest },
       opacity: { value: had.opacity }, inner_m: { value: 0 }, look: { value: base }, glow_look: { value: had.emissiveMap ?? this.white },
       look_matrix: { value: base.matrix }, probe: { value: this.blackCube }, probe_at: vector([0, 0, 0]),
       box_low: vector([0, 0, 0]), box_high: vector([0, 0, 0]) };
@@ -189,7 +189,7 @@ export class Stage {
       mesh.layers.enable(SPECULAR);
       if (!isClear) mesh.layers.enable(MIRRORS);
     }
-    if (isSpecular || look.kind === "mixed") this.probes.push({ mesh, isSpecular });
+    if (isSpecular || look.kind === "coated") this.probes.push({ mesh, isSpecular });
   }
 
   /** What stands within other glass, as wine does, is drawn over it, tinted and not refracted. */

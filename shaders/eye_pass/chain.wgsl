@@ -139,7 +139,7 @@ fn go_on(walk: ptr<function, Walk>, point: SurfacePoint, next: Interaction) -> b
 }
 
 fn has_map(surface: u32) -> bool {
-    return surface == SURFACE_DIFFUSE || surface == SURFACE_MIXED || surface == SURFACE_VARIED;
+    return surface == SURFACE_DIFFUSE || surface == SURFACE_COATED || surface == SURFACE_VARIED;
 }
 
 fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {

@@ -150,11 +150,11 @@ fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors:
     }
     let cos_incident = -dot(gaze.direction, facing.shading);
     let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
-    let polish = mixture.polish * dielectric_reflectance(cos_incident, eta);
-    let back = mixture.metal * metal_reflectance(cos_incident, tint) + vec3f(mixture.body * polish);
+    let coat = mixture.coat * dielectric_reflectance(cos_incident, eta);
+    let back = mixture.metal * metal_reflectance(cos_incident, tint) + vec3f(mixture.body * coat);
     met.reflection = reflection(point, facing, gaze, met.reflection.share + back, lobe);
     // The map already accounts for the body's share.
-    met.own = 1.0 - polish;
+    met.own = 1.0 - coat;
     return met;
 }
 
@@ -169,9 +169,9 @@ fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
             let share = metal_reflectance(cos_incident, tint);
             return Interaction(0.0, reflection(point, facing, gaze, share, lobe), no_branch());
         }
-        case SURFACE_MIXED: {
+        case SURFACE_COATED: {
             let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
-            let reflectance = object.polish * dielectric_reflectance(cos_incident, eta);
+            let reflectance = object.coat * dielectric_reflectance(cos_incident, eta);
             let back = reflection(point, facing, gaze, vec3f(reflectance), lobe);
             return Interaction(1.0 - reflectance, back, no_branch());
         }

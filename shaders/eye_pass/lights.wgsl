@@ -74,8 +74,8 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
         let cosine = dot(to_light, point.shading_normal);
         var taken = select(0.0, 1.0, dot(to_light, point.geometric_normal) >= 0.0);
         taken *= point.response.share;
-        if point.response.polish > 0.0 {
-            taken *= 1.0 - point.response.polish * dielectric_reflectance(cosine, object.ior / light.ior);
+        if point.response.coat > 0.0 {
+            taken *= 1.0 - point.response.coat * dielectric_reflectance(cosine, object.ior / light.ior);
         }
         let share = across_beam * cosine * taken;
         if share > 0.0 {

@@ -11,7 +11,7 @@ struct Mixture {
     body: f32,
     hole: f32,
     // Coverage of the body by the coat.
-    polish: f32,
+    coat: f32,
 }
 
 // Composition with factors of transmission, roughness and metallic from an image, and the alpha of the base colour.
@@ -21,23 +21,23 @@ fn mixture_of(object: ObjectRecord, factors: vec3f, alpha: f32) -> Mixture {
     let metallic = object.metallic * factors.z;
     let metal = select(0.0, there * metallic, roughness <= METAL_ROUGHNESS_LIMIT);
     let clear = there * (1.0 - metallic) * object.transmission * factors.x;
-    let polish = select(0.0, object.polish, roughness <= SPECULAR_ROUGHNESS_LIMIT);
-    return Mixture(metal, clear, max(there - metal - clear, 0.0), 1.0 - there, polish);
+    let coat = select(0.0, object.coat, roughness <= SPECULAR_ROUGHNESS_LIMIT);
+    return Mixture(metal, clear, max(there - metal - clear, 0.0), 1.0 - there, coat);
 }
 
 // What the body receives of incident light: its share of the surface, and its coverage by the coat.
 struct DiffuseResponse {
     share: f32,
-    polish: f32,
+    coat: f32,
 }
 
 fn diffuse_response_of(object: ObjectRecord, mixture: Mixture) -> DiffuseResponse {
     switch object.surface {
-        case SURFACE_MIXED: {
-            return DiffuseResponse(1.0, object.polish);
+        case SURFACE_COATED: {
+            return DiffuseResponse(1.0, object.coat);
         }
         case SURFACE_VARIED: {
-            return DiffuseResponse(mixture.body, mixture.polish);
+            return DiffuseResponse(mixture.body, mixture.coat);
         }
         default: {
             return DiffuseResponse(1.0, 0.0);

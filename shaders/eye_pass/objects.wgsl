@@ -11,7 +11,7 @@ struct ObjectRecord {
     texture: u32,
     roughness: f32,
     bumps: u32,
-    polish: f32,
+    coat: f32,
     back_map: u32,
     // Number of its glass if that is dispersive; else 0.
     glass: u32,
@@ -39,7 +39,7 @@ const SURFACE_DIFFUSE: u32 = 0u;
 const SURFACE_MIRROR: u32 = 1u;
 const SURFACE_DIELECTRIC: u32 = 2u;
 const SURFACE_THIN_WALL: u32 = 3u;
-const SURFACE_MIXED: u32 = 4u;
+const SURFACE_COATED: u32 = 4u;
 const SURFACE_VARIED: u32 = 5u;
 
 const PI: f32 = 3.14159265358979;

@@ -7,7 +7,7 @@ fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0
         let lit = own_irradiance(fragment, is_front);
         is_fault = lit.a > 0.0;
         let diffuse = own_base_colour(fragment) * lit.rgb / PI;
-        radiance += (1.0 - own_polish(fragment)) * diffuse;
+        radiance += (1.0 - own_coat(fragment)) * diffuse;
     } else {
         // Brighter towards the top, so that the shape of curved mirrors is visible.
         let up = reflect(normalize(fragment.from_camera), normalize(fragment.normal)).y;

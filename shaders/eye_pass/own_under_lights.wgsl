@@ -21,7 +21,7 @@ fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -
     let baked = own_irradiance(fragment, is_front);
     let irradiance = baked.rgb + direct_irradiance(point, object);
     let diffuse = own_base_colour(fragment) * irradiance / PI;
-    let radiance = own_emission(fragment) + (1.0 - own_polish(fragment)) * diffuse;
+    let radiance = own_emission(fragment) + (1.0 - own_coat(fragment)) * diffuse;
     cut_out(fragment);
     return vec4f(select(scaled(radiance), fault_colour(), baked.a > 0.0), 1.0);
 }

@@ -30,8 +30,8 @@ fn own_irradiance(fragment: Fragment, is_front: bool) -> vec4f {
 }
 
 // Share of light that the coat reflects towards the eye, seen from vacuum; 0 without one.
-fn own_polish(fragment: Fragment) -> f32 {
-    if SURFACE == SURFACE_MIXED {
+fn own_coat(fragment: Fragment) -> f32 {
+    if SURFACE == SURFACE_COATED {
         var normal = normalize(fragment.normal);
         if HAS_BUMPS {
             let steps = array(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
@@ -41,7 +41,7 @@ fn own_polish(fragment: Fragment) -> f32 {
         }
         let cos_view = abs(dot(normal, normalize(fragment.from_camera)));
         let object = objects[fragment.object];
-        return object.polish * dielectric_reflectance(cos_view, object.ior);
+        return object.coat * dielectric_reflectance(cos_view, object.ior);
     }
     return 0.0;
 }

@@ -52,7 +52,7 @@ fn is_within_parting_glass(media: vec4u) -> bool {
 // others wait, and will hit the same surface again.
 fn part(walk: ptr<function, Walk>, object: u32) {
     let surface = objects[object].surface;
-    let goes_by_index = is_clear(surface) || surface == SURFACE_MIXED || surface == SURFACE_VARIED;
+    let goes_by_index = is_clear(surface) || surface == SURFACE_COATED || surface == SURFACE_VARIED;
     if (*walk).gaze.wavelength != 0u || !goes_by_index {
         return;
     }

@@ -111,7 +111,7 @@ fn have_same_shares(a: &Material, b: &Material) -> bool {
         && a.metallic == b.metallic
         && a.roughness == b.roughness
         && a.transmission == b.transmission
-        && a.polish == b.polish
+        && a.coat == b.coat
         && a.volume == b.volume
 }
 

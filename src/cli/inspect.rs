@@ -180,9 +180,9 @@ fn object_report(scene: &Scene, index: usize, lines: &mut Lines) -> Value {
 }
 
 fn material_report(material: &Material, objects: usize, lines: &mut Lines) -> Value {
-    use SurfaceKind::{Dielectric, Mixed, ThinWall, Varied};
+    use SurfaceKind::{Coated, Dielectric, ThinWall, Varied};
     let (name, surface) = (&material.name, surface_name(material.surface));
-    let ior = matches!(material.surface, Dielectric | ThinWall | Mixed | Varied).then_some(material.ior);
+    let ior = matches!(material.surface, Dielectric | ThinWall | Coated | Varied).then_some(material.ior);
     let glass = material.glass.as_deref().map(glass_report);
     let metal = material.metal.map(Metal::name);
     let made_of = [
@@ -294,7 +294,7 @@ fn surface_name(surface: SurfaceKind) -> &'static str {
         SurfaceKind::Mirror => "mirror",
         SurfaceKind::Dielectric => "dielectric",
         SurfaceKind::ThinWall => "thin wall",
-        SurfaceKind::Mixed => "mixed",
+        SurfaceKind::Coated => "coated",
         SurfaceKind::Varied => "varied",
     }
 }

@@ -58,7 +58,7 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> 
             Effect::Textures,
             &|material| {
                 let has_tint =
-                    material.surface != SurfaceKind::Mixed && material.base_colour_texture.is_some();
+                    material.surface != SurfaceKind::Coated && material.base_colour_texture.is_some();
                 has_tint || material.variation.is_some()
             },
             "no lit mirror or glass has a texture",
@@ -66,12 +66,12 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> 
         on_paths(
             Effect::Roughness,
             &Material::is_rough,
-            "no lit mirror, glass or polish is rough",
+            "no lit mirror, glass or coat is rough",
         ),
         on_paths(
             Effect::Bumps,
             &Material::has_bumps,
-            "no lit mirror, glass or polish has waves or a normal texture",
+            "no lit mirror, glass or coat has waves or a normal texture",
         ),
         decision.area_lights(pass.on),
         decision.direct(),

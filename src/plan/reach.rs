@@ -162,7 +162,7 @@ impl<'a> SceneReach<'a> {
         match self.scene.material_of(from).surface {
             SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Varied => true,
             SurfaceKind::Diffuse => false,
-            SurfaceKind::Mirror | SurfaceKind::Mixed => {
+            SurfaceKind::Mirror | SurfaceKind::Coated => {
                 let mesh = self.scene.objects[from].in_scene();
                 self.specular.len() > MAX_RELAYS || self.reflects_into(mesh, lit_by, bounds)
             }

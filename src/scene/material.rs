@@ -42,7 +42,7 @@ pub enum SurfaceKind {
     /// Pane without thickness: reflects, and transmits without deflection.
     ThinWall,
     /// Coat over a diffuse body: the map receives (1 − F)Φ and the ray carries FΦ on.
-    Mixed,
+    Coated,
     /// Any of the others or a blend of them, varying over the surface: see [`Mixture`](super::Mixture).
     Varied,
 }
@@ -65,7 +65,7 @@ impl SurfaceKind {
 
     /// Whether it has an illumination map.
     pub fn is_receiver(self) -> bool {
-        matches!(self, Self::Diffuse | Self::Mixed | Self::Varied)
+        matches!(self, Self::Diffuse | Self::Coated | Self::Varied)
     }
 }
 
@@ -111,8 +111,8 @@ pub struct Material {
     /// Spectrum of the emission, scaled to one luminous-equivalent watt; `emitted_radiance` has its colour. `None` if
     /// only the colour is known.
     pub emission_spectrum: Option<Arc<Spectrum>>,
-    /// Share of the surface that the coat covers, [0, 1]; multiplies the reflection of a mixed surface.
-    pub polish: f64,
+    /// Share of the surface that the coat covers, [0, 1]; multiplies the reflection of a coated one.
+    pub coat: f64,
     /// Waves that perturb the normals of specular surfaces; irradiance is always that of the surface itself.
     pub waves: Option<Waves>,
     /// Normal map, to the same effect.
@@ -202,7 +202,7 @@ impl Material {
         } else if transmission >= 0.5 {
             SurfaceKind::ThinWall
         } else if roughness <= SPECULAR_ROUGHNESS_LIMIT {
-            SurfaceKind::Mixed
+            SurfaceKind::Coated
         } else {
             SurfaceKind::Diffuse
         }
@@ -261,7 +261,7 @@ impl Default for Material {
             emitted_radiance: LinearSrgb::BLACK,
             emission_texture: None,
             emission_spectrum: None,
-            polish: 1.0,
+            coat: 1.0,
             waves: None,
             normal_map: None,
             double_sided: true,
@@ -315,7 +315,7 @@ pub struct Mixture {
     /// Absent (alpha).
     pub hole: f64,
     /// Share of the body that is coated.
-    pub polish: f64,
+    pub coat: f64,
 }
 
 impl Material {
@@ -334,8 +334,8 @@ impl Material {
             clear,
             body: (there - metal - clear).max(0.0),
             hole: 1.0 - there,
-            polish: if roughness <= SPECULAR_ROUGHNESS_LIMIT {
-                self.polish
+            coat: if roughness <= SPECULAR_ROUGHNESS_LIMIT {
+                self.coat
             } else {
                 0.0
             },

@@ -62,8 +62,8 @@ pub enum NormalSource {
 pub struct DiffuseResponse {
     /// Diffuse fraction of the surface, [0, 1].
     pub share: f64,
-    /// Fraction of it under a coat of polish, [0, 1].
-    pub polish: f64,
+    /// Fraction of it under a coat, [0, 1].
+    pub coat: f64,
     /// Refractive index of the coat.
     pub ior: f64,
 }
@@ -71,10 +71,10 @@ pub struct DiffuseResponse {
 impl DiffuseResponse {
     /// Fraction of light taken at an angle of incidence from a medium of index `ior_around`.
     pub fn of(&self, cosine: f64, ior_around: f64) -> f64 {
-        if self.polish == 0.0 {
+        if self.coat == 0.0 {
             return self.share;
         }
-        self.share * (1.0 - self.polish * fresnel::dielectric_reflectance(cosine, self.ior / ior_around))
+        self.share * (1.0 - self.coat * fresnel::dielectric_reflectance(cosine, self.ior / ior_around))
     }
 }
 
@@ -409,11 +409,11 @@ impl Tracer {
                 meeting.absorbed = LinearSrgb::WHITE - share;
                 meeting.add_reflection(effects, share);
             }
-            SurfaceKind::Mixed => {
+            SurfaceKind::Coated => {
                 let eta = material.ior / media.ior(self.scene());
                 let cos_incident = meeting.frame.cos_incident(incident);
                 let reflectance = fresnel::dielectric_reflectance(cos_incident, eta);
-                let share = LinearSrgb::grey(material.polish * reflectance);
+                let share = LinearSrgb::grey(material.coat * reflectance);
                 meeting.deposit = LinearSrgb::WHITE - share;
                 meeting.add_reflection(effects, share);
             }
@@ -464,11 +464,11 @@ impl Tracer {
             meeting.add_reflection(effects, share * mixture.metal);
         }
         let eta = material.ior / media.ior(self.scene());
-        let polish = mixture.polish * fresnel::dielectric_reflectance(cos_incident, eta);
-        meeting.leaving = Some(LinearSrgb::grey(1.0 - polish));
-        meeting.deposit = LinearSrgb::grey(mixture.body * (1.0 - polish));
-        if mixture.body * polish > 0.0 {
-            meeting.add_reflection(effects, LinearSrgb::grey(mixture.body * polish));
+        let coat = mixture.coat * fresnel::dielectric_reflectance(cos_incident, eta);
+        meeting.leaving = Some(LinearSrgb::grey(1.0 - coat));
+        meeting.deposit = LinearSrgb::grey(mixture.body * (1.0 - coat));
+        if mixture.body * coat > 0.0 {
+            meeting.add_reflection(effects, LinearSrgb::grey(mixture.body * coat));
         }
     }
 

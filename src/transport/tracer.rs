@@ -498,17 +498,17 @@ impl Tracer {
     /// Response of the diffuse component at a point of a triangle.
     pub fn diffuse_response(&self, object: usize, triangle: usize, barycentric: [f64; 3]) -> DiffuseResponse {
         let material = self.scene.material_of(object);
-        let (share, polish) = match material.surface {
-            SurfaceKind::Mixed => (1.0, material.polish),
+        let (share, coat) = match material.surface {
+            SurfaceKind::Coated => (1.0, material.coat),
             SurfaceKind::Varied => {
                 let mixture = self.mixture(object, (triangle, barycentric), true);
-                (mixture.body, mixture.polish)
+                (mixture.body, mixture.coat)
             }
             _ => (1.0, 0.0),
         };
         DiffuseResponse {
             share,
-            polish,
+            coat,
             ior: material.ior,
         }
     }

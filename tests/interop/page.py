@@ -23,12 +23,12 @@ import websocket
 PATIENCE_S = 300
 SIZE = (960, 540)
 PHONE = (390, 844)
-# Mean FLIP of matt surfaces with maps beside `nephroid render` [1]: what is seen in mirrors, glass and polish is
+# Mean FLIP of matt surfaces with maps beside `nephroid render` [1]: what is seen in mirrors, glass and coat is
 # approximated in the page.
 FLIP = 0.03
-# In false colours, polished surfaces are as grey as mirrors and glass.
+# In false colours, coated surfaces are as grey as mirrors and glass.
 MATT = """nephroid.stage.meshes.forEach(({ material }) => {
-  if (material.uniforms.polish.value > 0) { delete material.defines.LIT; material.needsUpdate = true; }
+  if (material.uniforms.coat.value > 0) { delete material.defines.LIT; material.needsUpdate = true; }
 })"""
 # What has no map, in false colours: 1 % in linear light.
 NO_MAP = 25

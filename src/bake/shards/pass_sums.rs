@@ -11,13 +11,13 @@ use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::shard_index::ShardIndex;
 
 /// Upper limit of a texel's count; units are chosen so that all flux of a light stays below 2⁶⁰.
-const MOST_OF_A_TEXEL: i64 = 1 << 61;
+const MAX_TEXEL_SUM: i64 = 1 << 61;
 
 /// Upper limit of an account, over all wavefronts and shards.
-const MOST_OF_AN_ACCOUNT: i128 = 1 << 100;
+const MAX_ACCOUNT_SUM: i128 = 1 << 100;
 
 /// Upper limit of a counter.
-const MOST_OF_A_COUNT: u64 = 1 << 56;
+const MAX_COUNT: u64 = 1 << 56;
 
 /// Upper limit of a time [s].
 const MAX_SECONDS: f64 = 1e12;
@@ -137,13 +137,13 @@ fn write_report(bytes: &mut Vec<u8>, report: &PassReport) {
 fn read_report(reader: &mut impl Read, report: &mut PassReport) -> io::Result<()> {
     for count in counts_of(report) {
         *count = checked(count.checked_add(whole(reader)?))?;
-        if *count > MOST_OF_A_COUNT {
+        if *count > MAX_COUNT {
             return Err(damaged("a count is too large"));
         }
     }
     for count in report.ledger.counts_mut() {
         *count = checked(count.checked_add(i128::from_le_bytes(read(reader)?)))?;
-        if count.unsigned_abs() > MOST_OF_AN_ACCOUNT.unsigned_abs() {
+        if count.unsigned_abs() > MAX_ACCOUNT_SUM.unsigned_abs() {
             return Err(damaged("an account is too large"));
         }
     }
@@ -214,7 +214,7 @@ fn add_texels(reader: &mut impl Read, level: &mut FluxAccumulator) -> io::Result
                 *red = value;
             }
             let sum = checked(texel[channel].checked_add(value))?;
-            if sum.unsigned_abs() > MOST_OF_A_TEXEL.unsigned_abs() {
+            if sum.unsigned_abs() > MAX_TEXEL_SUM.unsigned_abs() {
                 return Err(damaged("a texel holds more light than the lamp sends"));
             }
             texel[channel] = sum;

@@ -41,7 +41,7 @@ const MARK: &str = "name=\"generator\" content=\"nephroid";
 /// Where its scripts' data begins.
 const ABOUT: &str = "<script type=\"application/json\" id=\"about\">";
 /// Most that a page of a folder has [bytes].
-const MOST_PAGE_BYTES: u64 = 16 << 20;
+const MAX_PAGE_BYTES: u64 = 16 << 20;
 
 /// What names of textures and packed files end with.
 const ENDS: [&str; 2] = [".ktx2", ".gz"];
@@ -207,7 +207,7 @@ impl Site {
         let sky = scene.environment.as_ref().map(|_| "sky.ktx2");
         if let Some(environment) = &scene.environment {
             let mut texels = Texels::of(environment.size(), environment.pixels().to_vec());
-            while texels.size().0 > sizes::MOST_SIDE {
+            while texels.size().0 > sizes::MAX_SIDE {
                 texels = texels.halved();
             }
             site.files.push(("sky.ktx2".into(), texture("sky", &texels)?));
@@ -409,7 +409,7 @@ impl Site {
 
 /// Files that an earlier page of ours in a folder names as its data; `None` where there is none.
 fn files_of_ours(path: &Path) -> Option<Vec<String>> {
-    let page = files::read_file(&path.join("index.html"), MOST_PAGE_BYTES).ok()?;
+    let page = files::read_file(&path.join("index.html"), MAX_PAGE_BYTES).ok()?;
     let page = String::from_utf8_lossy(&page);
     let (_, about) = page.split_once(MARK)?.1.split_once(ABOUT)?;
     let about: Value = serde_json::from_str(about.split_once("</script>")?.0).ok()?;
@@ -471,7 +471,7 @@ fn look(scene: &Scene, object: &Object) -> Value {
     let material = &scene.materials[object.material];
     let kind = match material.surface {
         SurfaceKind::Diffuse | SurfaceKind::Varied => "diffuse",
-        SurfaceKind::Mixed => "mixed",
+        SurfaceKind::Coated => "coated",
         SurfaceKind::Mirror => "mirror",
         SurfaceKind::Dielectric => "glass",
         SurfaceKind::ThinWall => "pane",
@@ -487,7 +487,7 @@ fn look(scene: &Scene, object: &Object) -> Value {
         "base": material.base_colour.to_array(),
         "glow": material.emitted_radiance.to_array(),
         "ior": material.ior,
-        "polish": material.polish,
+        "coat": material.coat,
         "roughness": material.roughness,
         "absorption_per_m": absorption.to_array(),
     })

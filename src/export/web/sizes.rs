@@ -5,13 +5,13 @@ use crate::illumination::IlluminationMap;
 use crate::optics::luminance;
 
 /// Longest side of a texture of the page [texels]: graphics cards of phones hold no more of many.
-pub(super) const MOST_SIDE: usize = 2048;
+pub(super) const MAX_SIDE: usize = 2048;
 /// A layer is made half as fine as long as it differs by no more than this, or than half of the error that the bake
 /// estimates: root mean squares, relative to the light there and a tenth of the mean of all layers [1].
 const ALIKE: f64 = 0.01;
 const SHARE_OF_ERROR: f64 = 0.5;
 /// Below, nothing is gained [texels].
-const LEAST_SIDE: usize = 32;
+const MIN_SIDE: usize = 32;
 
 /// Each layer of a map in the size that it needs.
 pub(super) fn fitted(map: &IlluminationMap) -> Vec<Texels> {
@@ -37,11 +37,11 @@ fn rms(values: impl Iterator<Item = f64>) -> f64 {
 fn shrunk(mut texels: Texels, floor: f64, tolerance: f64) -> Texels {
     loop {
         let (width, height) = texels.size();
-        if width % 2 != 0 || height % 2 != 0 || width.min(height) <= LEAST_SIDE {
+        if width % 2 != 0 || height % 2 != 0 || width.min(height) <= MIN_SIDE {
             return texels;
         }
         let half = texels.halved();
-        if width.max(height) <= MOST_SIDE && difference(&texels, &half, floor) > tolerance {
+        if width.max(height) <= MAX_SIDE && difference(&texels, &half, floor) > tolerance {
             return texels;
         }
         texels = half;

@@ -305,7 +305,7 @@ impl SpectralScene {
         let scene = tracer.scene();
         let is_dispersive = |object: usize| scene.material_of(object).is_dispersive();
         let goes_by_index = match scene.material_of(hit.object).surface {
-            SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Mixed | SurfaceKind::Varied => {
+            SurfaceKind::Dielectric | SurfaceKind::ThinWall | SurfaceKind::Coated | SurfaceKind::Varied => {
                 true
             }
             SurfaceKind::Diffuse | SurfaceKind::Mirror => false,

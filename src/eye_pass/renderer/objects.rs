@@ -204,7 +204,7 @@ impl Appearance {
                 absorption_per_m: absorption_per_m(material),
                 double_sided: u32::from(material.has_back()),
                 roughness: material.roughness as f32,
-                polish: material.polish as f32,
+                coat: material.coat as f32,
                 alpha_cutoff: alpha_cutoff(material),
                 metallic: material.metallic as f32,
                 transmission: material.transmission as f32,
@@ -239,7 +239,7 @@ pub(super) fn surface_code(surface: SurfaceKind) -> u32 {
         SurfaceKind::Mirror => 1,
         SurfaceKind::Dielectric => 2,
         SurfaceKind::ThinWall => 3,
-        SurfaceKind::Mixed => 4,
+        SurfaceKind::Coated => 4,
         SurfaceKind::Varied => 5,
     }
 }

@@ -192,7 +192,7 @@ mod tests {
             SurfaceKind::Mirror,
             SurfaceKind::Dielectric,
             SurfaceKind::ThinWall,
-            SurfaceKind::Mixed,
+            SurfaceKind::Coated,
             SurfaceKind::Varied,
         ];
         let alone = |program: Program, entry_point| Specialisation {

@@ -125,7 +125,7 @@ shader_struct! {
         /// Record of its bumps.
         bumps: u32,
         /// Coverage of the coat [0, 1].
-        polish: f32,
+        coat: f32,
         /// Record of the illumination map of its back.
         back_map: u32,
         /// Number of its glass, from 1 on, if that is dispersive; else 0.

@@ -209,7 +209,7 @@ impl<'a> VirtualRays<'a> {
         let kind = tracer.scene().material_of(hit.object).surface;
         let deposit = match kind {
             SurfaceKind::Diffuse => 1.0,
-            SurfaceKind::Mixed | SurfaceKind::Varied => {
+            SurfaceKind::Coated | SurfaceKind::Varied => {
                 tracer.interact(&hit, direction, &self.media).deposit.luminance()
             }
             _ => 0.0,

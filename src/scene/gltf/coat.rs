@@ -92,8 +92,8 @@ fn apply_coat(material: &mut Material, factor: f64, roughness: f64) -> std::resu
         SurfaceKind::Diffuse => {
             // The body below the coat is diffuse, whatever it was.
             (material.metallic, material.transmission, material.volume) = (0.0, 0.0, None);
-            (material.roughness, material.ior, material.polish) = (roughness, IOR, factor);
-            material.surface = SurfaceKind::Mixed;
+            (material.roughness, material.ior, material.coat) = (roughness, IOR, factor);
+            material.surface = SurfaceKind::Coated;
             Ok(())
         }
         SurfaceKind::Mirror => {
@@ -102,8 +102,8 @@ fn apply_coat(material: &mut Material, factor: f64, roughness: f64) -> std::resu
             material.base_colour = LinearSrgb::WHITE - (LinearSrgb::WHITE - material.base_colour) * left;
             Ok(())
         }
-        SurfaceKind::Mixed => {
-            material.polish = factor + (1.0 - factor) * material.polish;
+        SurfaceKind::Coated => {
+            material.coat = factor + (1.0 - factor) * material.coat;
             Ok(())
         }
         SurfaceKind::Dielectric | SurfaceKind::ThinWall => {

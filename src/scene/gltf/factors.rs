@@ -20,7 +20,7 @@ const CLASSES: [SurfaceKind; 4] = [
     SurfaceKind::Diffuse,
     SurfaceKind::Mirror,
     SurfaceKind::ThinWall,
-    SurfaceKind::Mixed,
+    SurfaceKind::Coated,
 ];
 
 /// A factor texture with its linear channels.

@@ -179,7 +179,7 @@ impl<'a> MaterialReader<'a, '_> {
             emitted_radiance: self.emission(extensions),
             emission_texture: None,
             emission_spectrum: None,
-            polish: 1.0,
+            coat: 1.0,
             normal_map: None,
             waves: self
                 .stated(waves::KEY)
@@ -203,9 +203,9 @@ impl<'a> MaterialReader<'a, '_> {
         if !material.transmits() {
             material.volume = None;
         }
-        let is_polish = matches!(material.surface, SurfaceKind::Mixed | SurfaceKind::Varied);
-        if let (true, Some(specular)) = (is_polish, &extensions.specular) {
-            material.polish = self.polish(specular)?;
+        let is_coat = matches!(material.surface, SurfaceKind::Coated | SurfaceKind::Varied);
+        if let (true, Some(specular)) = (is_coat, &extensions.specular) {
+            material.coat = self.specular_weight(specular)?;
         }
         self.coat(&mut material, extensions)?;
         self.warn_of_ignored(extensions, &material);
@@ -237,7 +237,7 @@ impl<'a> MaterialReader<'a, '_> {
     }
 
     /// Factor on the reflection of a coat, by KHR_materials_specular.
-    fn polish(&mut self, stated: &extension::Specular) -> Result<f64> {
+    fn specular_weight(&mut self, stated: &extension::Specular) -> Result<f64> {
         let factor = self.share(stated.specular_factor.0, "specular factor");
         let colour = LinearSrgb::from(stated.specular_color_factor.0.map(widen));
         let alpha = |[.., alpha]: [u8; 4]| LinearSrgb::grey(f64::from(alpha) / 255.0);
@@ -414,7 +414,7 @@ impl<'a> MaterialReader<'a, '_> {
                 ),
                 "expect no reflections; lower its roughness for them",
             ),
-            SurfaceKind::Mirror | SurfaceKind::Diffuse | SurfaceKind::Mixed if material.glass.is_some() => {
+            SurfaceKind::Mirror | SurfaceKind::Diffuse | SurfaceKind::Coated if material.glass.is_some() => {
                 self.warn(
                     "names a glass but transmits no light, so nothing is dispersed",
                     "give it transmission and a volume",

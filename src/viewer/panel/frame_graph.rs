@@ -20,7 +20,7 @@ const PASSES: [(&str, Color32, &str); 3] = [
     (
         "specular",
         Color32::from_rgb(240, 180, 80),
-        "Mirrors, polish and clear bodies.",
+        "Mirrors, coats and clear bodies.",
     ),
     (
         "tone mapping",

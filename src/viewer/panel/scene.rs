@@ -301,7 +301,7 @@ fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Comman
         &model.loaded().materials[material],
     );
     let no_ior = matches!(shown.surface, SurfaceKind::Diffuse | SurfaceKind::Mirror)
-        .then_some("Only glass, water and polish have one; this surface is matte or a mirror.");
+        .then_some("Only glass, water and coats have one; this surface is matte or a mirror.");
     let edit = |edit: MaterialEdit| Command::Edit(Edit::Material(material, edit));
     let ior = (&shown.ior, &of_file.ior);
     let ior = edited(ui, "Refractive index", no_ior, ior, slider(1.0..=3.0, 3));

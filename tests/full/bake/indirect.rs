@@ -137,7 +137,7 @@ fn under_even_light(parts: Vec<(Mesh, Material)>, maps: &[(usize, usize)], rays:
     network.solve(&vec![LinearSrgb::WHITE; count], &passes).irradiance
 }
 
-/// In light that is the same everywhere, what stands in it (glass, a mirror, polish) changes nothing.
+/// In light that is the same everywhere, what stands in it (glass, a mirror, coat) changes nothing.
 #[test]
 fn anything_clear_changes_no_even_light() {
     let albedo = 0.7;

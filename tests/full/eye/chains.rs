@@ -78,10 +78,10 @@ fn without_chains_clear_bodies_are_left_out() {
 }
 
 #[test]
-fn without_chains_polish_shows_its_diffuse_part() {
+fn without_chains_a_coat_shows_its_diffuse_part() {
     let wall = quad(DVec3::new(-1.0, -1.0, 0.0), DVec3::Y * 2.0, DVec3::X * 2.0);
-    let polish = surface(SurfaceKind::Mixed, 1.5);
-    let lit = Lit::new(tracer(vec![(wall, polish)], vec![]));
+    let coat = surface(SurfaceKind::Coated, 1.5);
+    let lit = Lit::new(tracer(vec![(wall, coat)], vec![]));
     let view = looking([0.0, 0.0, 3.0], [0.0; 3], 0.01);
     let [with, without] = [EffectSwitch::Auto, EffectSwitch::Off].map(|switch| lit.seen(&view, switch).0);
     let r = dielectric_reflectance(1.0, 1.5);

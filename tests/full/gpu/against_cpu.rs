@@ -221,7 +221,7 @@ fn masks() -> Vec<Case> {
     cases
 }
 
-/// Sheets that are metal, clear, polished or not there from place to place, over a lit floor, and lit themselves.
+/// Sheets that are metal, clear, coated or not there from place to place, over a lit floor, and lit themselves.
 fn mixtures() -> Vec<Case> {
     let mut image = four_colours();
     image.rgba[1][3] = 120;

@@ -158,9 +158,9 @@ fn nested_glass_looks_as_on_the_cpu() {
     compare(scene);
 }
 
-/// A wavy mirror and a matte pillar on a polished wavy floor.
+/// A wavy mirror and a matte pillar on a coated wavy floor.
 #[test]
-fn wavy_mirror_and_polish_look_as_on_the_cpu() {
+fn wavy_mirror_and_coat_look_as_on_the_cpu() {
     let waves = |direction: DVec3| {
         let of = |wavelength_m, direction| wave(0.03 * wavelength_m, wavelength_m, direction, 0.4);
         let across = direction.cross(DVec3::ONE);
@@ -172,7 +172,7 @@ fn wavy_mirror_and_polish_look_as_on_the_cpu() {
     };
     let mut scene = hall(wavy, [DVec3::new(0.2, 0.0, -0.1), DVec3::new(0.4, 0.7, 0.1)]);
     let floor = &mut scene.materials[0];
-    (floor.surface, floor.roughness, floor.polish) = (SurfaceKind::Mixed, 0.0, 0.6);
+    (floor.surface, floor.roughness, floor.coat) = (SurfaceKind::Coated, 0.0, 0.6);
     floor.waves = waves(DVec3::X);
     compare(scene);
 }
@@ -183,7 +183,7 @@ fn normal_images_bend_chains_as_on_the_cpu() {
     // Polish as well, seen by itself.
     let normal_map = scene.materials[1].normal_map.clone();
     let floor = &mut scene.materials[0];
-    (floor.surface, floor.roughness, floor.normal_map) = (SurfaceKind::Mixed, 0.0, normal_map);
+    (floor.surface, floor.roughness, floor.normal_map) = (SurfaceKind::Coated, 0.0, normal_map);
     let mesh = scene.objects[0].mesh_in_scene_mut();
     let uv = |place: &DVec3| DVec2::new(place.x, place.z);
     mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());

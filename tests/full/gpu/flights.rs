@@ -15,7 +15,7 @@ use support::tools::{bake, builtin_scene, photons, set};
 
 const PLACES: usize = 12;
 
-/// Files of the collection, those with mirrors, polish, panes or glass.
+/// Files of the collection, those with mirrors, coats, panes or glass.
 const FILES: [&str; 5] = [
     "AttenuationTest",
     "DispersionTest",

@@ -153,11 +153,11 @@ fn roughness_blurs_what_is_reflected() {
         assert!((mean / lambert(1.0, 0.5) - 1.0).abs() < 0.05, "{mean}");
         Some(spread / mean)
     };
-    let [Some(smooth), Some(polished), Some(rough)] = [0.0, 0.07, 0.3].map(contrast) else {
+    let [Some(smooth), Some(coated), Some(rough)] = [0.0, 0.07, 0.3].map(contrast) else {
         return;
     };
     assert!(smooth > 0.2 && rough < 0.01 * smooth, "{smooth} {rough}");
-    assert!((0.1..0.9).contains(&(polished / smooth)), "{polished} {smooth}");
+    assert!((0.1..0.9).contains(&(coated / smooth)), "{coated} {smooth}");
 }
 
 #[test]

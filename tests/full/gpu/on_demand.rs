@@ -21,8 +21,8 @@ use support::scenes::{bits, seen, view};
 /// A lit floor; what is specular lies far out along +x, a matte box along −x.
 fn hall() -> (Scene, Vec<IlluminationMap>) {
     let mut scene = floor_scene(diffuse(LinearSrgb::new(0.8, 0.5, 0.2)));
-    let polish = Material {
-        surface: SurfaceKind::Mixed,
+    let coat = Material {
+        surface: SurfaceKind::Coated,
         base_colour: LinearSrgb::grey(0.5),
         emitted_radiance: LinearSrgb::new(0.1, 0.2, 0.3),
         ..Default::default()
@@ -38,7 +38,7 @@ fn hall() -> (Scene, Vec<IlluminationMap>) {
         ("mirror", [4.0, 0.3, 0.0], parts::mirror()),
         ("glass", [4.0, 0.3, 0.5], glass),
         ("tinted", [4.0, 0.3, 1.0], tinted),
-        ("polish", [4.0, 0.8, 0.5], polish),
+        ("coat", [4.0, 0.8, 0.5], coat),
     ] {
         let ball = shapes::sphere(place.into(), 0.2, 3);
         parts::add(&mut scene, name, ball, material);
@@ -140,7 +140,7 @@ fn switched_off_everything_is_given_up() {
         .count();
     assert!(wrong <= 5, "{wrong} pixels differ");
     let distinct: BTreeSet<_> = off.radiance.iter().map(|rgb| rgb.map(f32::to_bits)).collect();
-    assert!(distinct.len() > 3, "floor, background, mirror and polish");
+    assert!(distinct.len() > 3, "floor, background, mirror and coat");
 
     rig.set_chains(EffectSwitch::Auto);
     assert_eq!(specular(&rig), (0, 0), "nothing was looked at since");

@@ -83,7 +83,7 @@ fn boards_are_half_of_each_kind() {
             [0, 255, 0, 255],
         ),
         (
-            "mirror and polish",
+            "mirror and coat",
             varied(of(0.0, 0.0, 1.0)),
             [0, 0, 255, 255],
             [0, 0, 0, 255],

@@ -92,11 +92,11 @@ fn sun_gives_irradiance_times_cosine() {
     assert_even(&lit(&smooth, 8), 1, 700.0 * -direction.dot(lean), 1e-6);
 
     // Polish sends its share away.
-    let polished = surface(SurfaceKind::Mixed, 1.5);
+    let coated = surface(SurfaceKind::Coated, 1.5);
     let lamp = sun(dvec3(3.0, -4.0, 0.0), 1.0);
-    let polished = tracer(vec![(floor(1.0, 0.0), polished)], vec![lamp]);
+    let coated = tracer(vec![(floor(1.0, 0.0), coated)], vec![lamp]);
     let taken = 1.0 - dielectric_reflectance(0.8, 1.5);
-    assert_even(&lit(&polished, 4), 0, 0.8 * taken, 1e-7);
+    assert_even(&lit(&coated, 4), 0, 0.8 * taken, 1e-7);
 }
 
 #[test]
@@ -223,10 +223,10 @@ fn texels_are_divided_where_a_shadow_ends() {
 /// Light that comes through glass or off a mirror is caustic light: every surface stops direct light.
 #[test]
 fn glass_and_mirrors_stop_direct_light() {
-    use SurfaceKind::{Dielectric, Mirror, Mixed, ThinWall};
+    use SurfaceKind::{Coated, Dielectric, Mirror, ThinWall};
     let black = shadow_of(diffuse(0.0));
     assert_eq!((black[32 * 64 + 32], share_within(31)), ([0.0; 3], 1.0));
-    for kind in [Dielectric, ThinWall, Mirror, Mixed] {
+    for kind in [Dielectric, ThinWall, Mirror, Coated] {
         assert_eq!(shadow_of(surface(kind, 1.5)), black, "{kind:?}");
     }
 }
@@ -247,7 +247,7 @@ fn light_stays_on_its_side_of_a_sheet() {
     assert_even(&lit(&leaning, 8), 0, 0.0, 0.0);
 }
 
-/// A lamp under water: its light crosses no surface, the water takes its share on the way, and a polish reflects less
+/// A lamp under water: its light crosses no surface, the water takes its share on the way, and a coat reflects less
 /// than in air.
 #[test]
 fn water_around_a_lamp_takes_its_share() {
@@ -260,8 +260,8 @@ fn water_around_a_lamp_takes_its_share() {
         ..surface(SurfaceKind::Dielectric, 1.33)
     };
     let body = cuboid(dvec3(-3.0, -0.5, -3.0), dvec3(3.0, 2.0, 3.0));
-    let polished = surface(SurfaceKind::Mixed, 1.5);
-    let parts = vec![(floor(1.0, 0.0), polished), (body, water)];
+    let coated = surface(SurfaceKind::Coated, 1.5);
+    let parts = vec![(floor(1.0, 0.0), coated), (body, water)];
     let tracer = tracer(parts, vec![point_light(DVec3::Y, 2.0)]);
     for (e, middle) in lit(&tracer, 64).iter().zip(middles(64)) {
         let distance_m = (2.0 * middle - 1.0).extend(1.0).length();

@@ -231,12 +231,12 @@ fn thin_wall_reflects_all_orders_and_tints() {
 }
 
 #[test]
-fn polished_floor_sends_what_polish_lets_out() {
-    let polished = Material {
+fn coated_floor_sends_what_coat_lets_out() {
+    let coated = Material {
         base_colour: ALBEDO.into(),
-        ..surface(SurfaceKind::Mixed, 1.5)
+        ..surface(SurfaceKind::Coated, 1.5)
     };
-    let lit = Lit::with_map(scene(vec![(floor(100.0, 0.0), polished)], vec![]), 2, vec![E; 4]);
+    let lit = Lit::with_map(scene(vec![(floor(100.0, 0.0), coated)], vec![]), 2, vec![E; 4]);
     lit.assert_sends(&looking([0.0, 2.0, 3.0], [0.0; 3], 40.0, [5, 5]), |direction| {
         let f = dielectric_reflectance(-direction.y, 1.5);
         (1.0 - f) * floor_sends() + f * SKY

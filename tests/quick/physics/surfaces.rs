@@ -1,4 +1,4 @@
-//! What becomes of light at a floor: interfaces within other bodies, polish, micro-facets; how lamps fall off, and how
+//! What becomes of light at a floor: interfaces within other bodies, coat, micro-facets; how lamps fall off, and how
 //! units multiply.
 
 use std::f64::consts::TAU;
@@ -34,10 +34,10 @@ fn met(material: Material, direction: DVec3, media: &MediumStack) -> Interaction
     tracer.interact(&hit(&tracer, direction), direction, media)
 }
 
-fn smooth(surface: SurfaceKind, polish: f64) -> Material {
+fn smooth(surface: SurfaceKind, coat: f64) -> Material {
     Material {
         surface,
-        polish,
+        coat,
         roughness: 0.0,
         ior: 1.5,
         ..Material::default()
@@ -45,21 +45,21 @@ fn smooth(surface: SurfaceKind, polish: f64) -> Material {
 }
 
 #[test]
-fn polish_reflects_where_it_covers() {
-    for polish in [0.0, 0.3, 1.0] {
+fn coat_reflects_where_it_covers() {
+    for coat in [0.0, 0.3, 1.0] {
         for tangent in [0.0, 0.5, 2.0, 20.0] {
             let direction = dvec3(tangent, -1.0, 0.0).normalize();
             let shares = met(
-                smooth(SurfaceKind::Mixed, polish),
+                smooth(SurfaceKind::Coated, coat),
                 direction,
                 &MediumStack::default(),
             );
             let back = shares.reflection.map_or(0.0, |branch| branch.share.g);
             near(
                 back,
-                polish * dielectric_reflectance(-direction.y, 1.5),
+                coat * dielectric_reflectance(-direction.y, 1.5),
                 1e-12,
-                polish,
+                coat,
             );
             near(back + shares.deposit.g, 1.0, 1e-12, "the rest is deposited");
         }
@@ -89,7 +89,7 @@ fn mixtures_are_the_sum_of_their_classes() {
         ]
     };
     let alone = |surface| of(surface, 0.0, 0.0, None);
-    let [metal, clear, body] = [SurfaceKind::Mirror, SurfaceKind::ThinWall, SurfaceKind::Mixed].map(alone);
+    let [metal, clear, body] = [SurfaceKind::Mirror, SurfaceKind::ThinWall, SurfaceKind::Coated].map(alone);
     let passed = [
         LinearSrgb::BLACK,
         LinearSrgb::WHITE,

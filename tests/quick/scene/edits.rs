@@ -168,7 +168,7 @@ fn roughness_changes_the_class() {
     for (material, to, expected) in [
         (&glass, 0.3, SurfaceKind::Dielectric),
         (&glass, 1.0, SurfaceKind::Dielectric),
-        (&floor, 0.3, SurfaceKind::Mixed),
+        (&floor, 0.3, SurfaceKind::Coated),
         (&parts::mirror(), 0.2, SurfaceKind::Mirror),
         (&parts::mirror(), 0.5, SurfaceKind::Mirror),
         (&parts::mirror(), 0.7, SurfaceKind::Diffuse),

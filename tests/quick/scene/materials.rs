@@ -26,7 +26,7 @@ fn surfaces_are_classified() {
     };
     let (solid, flat) = (with_thickness(0.1), with_thickness(0.0));
     let (none, unlit) = (json!({}), json!({ "KHR_materials_unlit": {} }));
-    use SurfaceKind::{Dielectric, Diffuse, Mirror, Mixed, ThinWall};
+    use SurfaceKind::{Coated, Dielectric, Diffuse, Mirror, ThinWall};
     for (metallic, roughness, extensions, expected, warned) in [
         (1.0, 0.0, &none, Mirror, ""),
         (0.5, 0.3, &none, Mirror, ""),
@@ -34,7 +34,7 @@ fn surfaces_are_classified() {
         (1.0, 0.61, &none, Diffuse, "is a metal rougher than 0.6"),
         (1.0, 1.0, &none, Diffuse, ""),
         (0.0, 1.0, &none, Diffuse, ""),
-        (0.0, 0.1, &none, Mixed, ""),
+        (0.0, 0.1, &none, Coated, ""),
         (0.0, 0.0, &unlit, Diffuse, ""),
         (0.0, 0.0, &solid, Dielectric, ""),
         (0.0, 0.0, &clear, ThinWall, "thin pane"),
@@ -408,12 +408,12 @@ fn normal_textures_of_what_is_specular_are_read() {
         [60, 128, 220, 255],
     ];
     let image = png(&relief, 2);
-    let polish = factors(0.0, 0.0);
+    let coat = factors(0.0, 0.0);
     let transform = json!({ "offset": [0.5, 0.0], "scale": [2.0, 3.0] });
     let normals = json!({
         "index": 0, "scale": 0.5, "extensions": { "KHR_texture_transform": transform },
     });
-    let scene = embossed(&image, normals, polish.clone());
+    let scene = embossed(&image, normals, coat.clone());
     let map = scene.material_of(0).bending_map().expect("it has one");
     assert_eq!(map.scale, 0.5);
     near(
@@ -437,22 +437,22 @@ fn normal_textures_of_what_is_specular_are_read() {
         ),
         (
             &plain,
-            polish.clone(),
+            coat.clone(),
             b"no image",
             "image `picture` | replaced by grey",
         ),
-        (&fourth, polish.clone(), &image, "material `m` | TEXCOORD_3"),
+        (&fourth, coat.clone(), &image, "material `m` | TEXCOORD_3"),
     ] {
         let scene = embossed(image, normals.clone(), factors);
         assert!(scene.material_of(0).normal_map.is_none());
         warns(&scene, why);
     }
     // A flat one bends nothing, and there is nothing to say of it.
-    let scene = embossed(&png(&[[128, 128, 255, 255]; 4], 2), plain.clone(), polish.clone());
+    let scene = embossed(&png(&[[128, 128, 255, 255]; 4], 2), plain.clone(), coat.clone());
     assert!(scene.material_of(0).normal_map.is_none());
     warns_not(&scene);
     // Each image has coordinates of its own.
-    let mut coloured = polish;
+    let mut coloured = coat;
     coloured["baseColorTexture"] = json!({ "index": 0, "texCoord": 1 });
     let scene = embossed(&image, plain, coloured);
     let sets = scene
@@ -463,7 +463,7 @@ fn normal_textures_of_what_is_specular_are_read() {
 }
 
 #[test]
-fn lacquer_is_polish_over_matte_and_adds_to_metal() {
+fn lacquer_is_coat_over_matte_and_adds_to_metal() {
     let lacquered = |metallic: f64, roughness: f64, coat: Value| {
         let mut json = json!({ "name": "m", "pbrMetallicRoughness": factors(metallic, roughness) });
         json["pbrMetallicRoughness"]["baseColorFactor"] = json!([0.5, 0.25, 0.0, 1.0]);
@@ -473,10 +473,10 @@ fn lacquer_is_polish_over_matte_and_adds_to_metal() {
     let coat = json!({ "clearcoatFactor": 0.75, "clearcoatRoughnessFactor": 0.125 });
     for metallic in [0.0, 1.0] {
         let (matte, scene) = lacquered(metallic, 1.0, coat.clone());
-        assert_eq!(matte.surface, SurfaceKind::Mixed);
-        assert_eq!((matte.polish, matte.roughness, matte.ior), (0.75, 0.125, 1.5));
+        assert_eq!(matte.surface, SurfaceKind::Coated);
+        assert_eq!((matte.coat, matte.roughness, matte.ior), (0.75, 0.125, 1.5));
         assert_eq!(matte.base_colour.to_array(), [0.5, 0.25, 0.0]);
-        assert_eq!(matte.classified(), SurfaceKind::Mixed, "edits keep it");
+        assert_eq!(matte.classified(), SurfaceKind::Coated, "edits keep it");
         warns_not(&scene);
     }
     // 1 - R = (1 - 0.75·0.04)(1 - metal).
@@ -484,15 +484,15 @@ fn lacquer_is_polish_over_matte_and_adds_to_metal() {
     assert_eq!(metal.surface, SurfaceKind::Mirror);
     let expected = [0.5, 0.25, 0.0].map(|bare| 1.0 - 0.97 * (1.0 - bare));
     near(metal.base_colour.to_array(), expected, 1e-12, "lacquered metal");
-    let (polished, _) = lacquered(0.0, 0.0, coat.clone());
-    assert_eq!((polished.surface, polished.polish), (SurfaceKind::Mixed, 1.0));
+    let (coated, _) = lacquered(0.0, 0.0, coat.clone());
+    assert_eq!((coated.surface, coated.coat), (SurfaceKind::Coated, 1.0));
     let dulled = |extensions: Value| {
         material(json!({ "pbrMetallicRoughness": factors(0.0, 0.0), "extensions": extensions })).0
     };
     let dull = json!({ "specularFactor": 0.5 });
-    assert_eq!(dulled(json!({ "KHR_materials_specular": dull })).polish, 0.5);
+    assert_eq!(dulled(json!({ "KHR_materials_specular": dull })).coat, 0.5);
     let both = json!({ "KHR_materials_specular": dull, "KHR_materials_clearcoat": coat });
-    assert_eq!(dulled(both).polish, 0.875, "dull where no lacquer covers it");
+    assert_eq!(dulled(both).coat, 0.875, "dull where no lacquer covers it");
     for (coat, why) in rows(
         r#"
         {"clearcoatFactor": 2.0} => clearcoat factor of 2
@@ -524,7 +524,7 @@ fn lacquer_is_polish_over_matte_and_adds_to_metal() {
         let mut json = json!({ "name": "m", "pbrMetallicRoughness": factors(0.0, roughness) });
         json["extensions"] = json!({ extension: stated });
         let (read, scene) = with_image(pixels, json);
-        near(read.polish, expected.0, 1e-6, extension);
+        near(read.coat, expected.0, 1e-6, extension);
         near(read.roughness, expected.1, 1e-6, extension);
         warns(&scene, "material `m` | as their means");
     }
@@ -543,7 +543,7 @@ fn with_image(pixels: [[u8; 4]; 2], stated: Value) -> (Material, Scene) {
 
 #[test]
 fn textures_of_factors_make_surfaces_vary() {
-    use SurfaceKind::{Diffuse, Mirror, Mixed, ThinWall, Varied};
+    use SurfaceKind::{Coated, Diffuse, Mirror, ThinWall, Varied};
     let stated = |factors: Value, transmission: Value| {
         let extensions = json!({ "KHR_materials_transmission": transmission });
         json!({ "name": "m", "pbrMetallicRoughness": factors, "extensions": extensions })
@@ -570,7 +570,14 @@ fn textures_of_factors_make_surfaces_vary() {
             Mirror,
             true,
         ),
-        ([0, 9, 0], [0, 50, 0], &metallic_roughness, json!({}), Mixed, true),
+        (
+            [0, 9, 0],
+            [0, 50, 0],
+            &metallic_roughness,
+            json!({}),
+            Coated,
+            true,
+        ),
         (
             [0, 200, 0],
             [0, 255, 0],

@@ -74,10 +74,10 @@ fn dispersion_needs_a_clear_solid() {
             json!({ "name": "lacquer", "pbrMetallicRoughness": parsed(SMOOTH), "extensions": extensions });
         Glb::tetrahedron().with_material(json)
     };
-    let polished = of(dispersion(1.0)).scene();
-    assert_eq!(material(&polished).surface, SurfaceKind::Mixed);
-    assert!(!material(&polished).is_dispersive());
-    warns(&polished, "material `lacquer` | transmits no light");
+    let coated = of(dispersion(1.0)).scene();
+    assert_eq!(material(&coated).surface, SurfaceKind::Coated);
+    assert!(!material(&coated).is_dispersive());
+    warns(&coated, "material `lacquer` | transmits no light");
     let mut pane = dispersion(1.0);
     pane["KHR_materials_transmission"] = json!({ "transmissionFactor": 1.0 });
     let pane = of(pane);

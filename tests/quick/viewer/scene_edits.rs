@@ -139,7 +139,7 @@ fn rows_are_those_of_the_light() {
     }
     assert!(panel.is_disabled(Role::Slider, "Refractive index"));
     panel.hover(Role::Slider, "Refractive index");
-    panel.assert_says(&["Only glass, water and polish have one"]);
+    panel.assert_says(&["Only glass, water and coats have one"]);
 }
 
 #[test]

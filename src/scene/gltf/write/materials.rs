@@ -83,10 +83,10 @@ fn write_dielectric(material: &Material, written: &mut Value) {
         }
         extend("KHR_materials_volume", stated);
     }
-    if material.polish != 1.0 && material.metallic < 0.5 {
+    if material.coat != 1.0 && material.metallic < 0.5 {
         extend(
             "KHR_materials_specular",
-            json!({ "specularFactor": material.polish }),
+            json!({ "specularFactor": material.coat }),
         );
     }
 }
