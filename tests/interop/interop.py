@@ -1,6 +1,6 @@
-"""What other programs make of our files: Khronos' validator, three.js in a browser, Blender; and our own page.
+"""What other programs make of our files: Khronos' validator, three.js in a browser, Blender, Bevy; and our own page.
 
-Usage: interop.py NEPHROID MODULES BROWSER SCENES... (SCENES: other files to export and validate)
+Usage: interop.py NEPHROID BEVY MODULES BROWSER SCENES... (SCENES: other files to export and validate)
 Each figure is a mean over blocks of pixels of the floor, against the radiance that our own maps say.
 """
 
@@ -8,6 +8,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
 
 import numpy
@@ -150,6 +151,19 @@ def check_blender(name, nephroid, folder):
     return [file]
 
 
+def check_bevy(name, nephroid, bevy, folder):
+    """`Lightmap` in lux/pi, in luminance [cd/m²], on the .glb that three.js had."""
+    albedo = 0.5
+    light, texel_m, _ = baked(folder / name, "floor")
+    textures = folder / f"{name}_lux_pi"
+    run(nephroid, "export", folder / name, "-o", textures, "--format", "ktx2", "--units", "lux/pi", "--exposure", STOPS)
+    out = folder / f"{name}_bevy.f32"
+    run(bevy, folder / f"{name}.glb", textures.name, out, 0.5 * SIDE * texel_m, SIDE)
+    found = numpy.fromfile(out, numpy.float32).reshape(SIDE, SIDE, 4)[..., :3].astype(numpy.float64)
+    version = tomllib.loads((HERE / "bevy/Cargo.toml").read_text())["dependencies"]["bevy"]["version"].lstrip("=")
+    compare(f"Bevy {version}, {name}, Lightmap in RGB9E5", found, light * LUMENS_PER_WATT * albedo / numpy.pi)
+
+
 def check_sequence(nephroid, browser, folder):
     """Maps of moving water on a plane in Blender, where each frame shows its own, and in the page."""
     frames = 3
@@ -172,15 +186,15 @@ def check_sequence(nephroid, browser, folder):
 
 
 def main():
-    nephroid, modules, browser, *others = sys.argv[1:]
-    modules = Path(modules).resolve()
-    nephroid = Path(nephroid).resolve()
+    nephroid, bevy, modules, browser, *others = sys.argv[1:]
+    nephroid, bevy, modules = (Path(path).resolve() for path in (nephroid, bevy, modules))
     with tempfile.TemporaryDirectory() as folder:
         folder = Path(folder)
         files = []
         for name in SCENES:
             files += check_three(name, nephroid, modules, browser, folder)
             files += check_blender(name, nephroid, folder)
+            check_bevy(name, nephroid, bevy, folder)
             page.check(nephroid, browser, f"builtin:{name}", folder / f"{name}_direct", folder / f"{name}_page", run, faults)
             textures.check(nephroid, modules, folder / name, folder / f"{name}_textures", run, faults)
         for name in chains_pixels.SCENES:
