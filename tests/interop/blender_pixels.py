@@ -58,7 +58,7 @@ def main():
     scene.collection.objects.link(camera)
     scene.camera = camera
     scene.render.engine = "CYCLES"
-    scene.cycles.samples = 16
+    scene.cycles.samples = 144
     scene.cycles.use_denoising = False
     scene.cycles.max_bounces = 0
     scene.render.resolution_x = scene.render.resolution_y = side

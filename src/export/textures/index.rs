@@ -24,7 +24,7 @@ pub const KIND: &str = "nephroid textures";
 const HOW_TO_LOAD: [(&str, &str); 4] = [
     (
         "three.js",
-        "ktx2 with --units lux: light = await new KTX2Loader().detectSupport(renderer).loadAsync(file); \
+        "ktx2 with --units lux, since r180: light = await new KTX2Loader().detectSupport(renderer).loadAsync(file); \
          (exr: EXRLoader, hdr: HDRLoader) light.channel = 1 (0 for TEXCOORD_0); material.lightMap = light; \
          material.lightMapIntensity = 2 ** -exposure_stops",
     ),
