@@ -271,10 +271,17 @@ def encoded(image):
         for start, kind in [(b"\x89PNG", "image/png"), (b"\xff\xd8\xff", "image/jpeg")]:
             if data.startswith(start):
                 return data, kind
-    path, kept = Path(bpy.app.tempdir) / "nephroid.png", image.file_format
-    image.file_format = "PNG"
+    # Saving the image itself would change where the file says it comes from.
+    path = Path(bpy.app.tempdir) / "nephroid.png"
+    copy = bpy.data.images.new("nephroid", *image.size, alpha=True, float_buffer=image.is_float)
     try:
-        image.save(filepath=str(path), save_copy=True)
+        copy.colorspace_settings.name = image.colorspace_settings.name
+        texels = numpy.array(image.pixels[:], numpy.float32).reshape(-1, image.channels)
+        rgba = numpy.ones((len(texels), 4), numpy.float32)
+        rgba[:, :max(3, image.channels)] = texels
+        copy.pixels.foreach_set(rgba.ravel())
+        copy.filepath_raw, copy.file_format = str(path), "PNG"
+        copy.save()
     finally:
-        image.file_format = kept
+        bpy.data.images.remove(copy)
     return path.read_bytes(), "image/png"
