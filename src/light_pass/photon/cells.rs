@@ -98,13 +98,9 @@ impl Level {
         (begin != NONE).then(|| begin as usize + (row - first_row) * across + column - first_column)
     }
 
-    /// Area of a cell, relative to the largest of the level: 1 wherever a surface of even resolution covers it.
-    fn share(&self, index: usize) -> f32 {
-        if self.largest_m2 > 0.0 {
-            self.areas_m2[index] / self.largest_m2
-        } else {
-            0.0
-        }
+    /// An area relative to that of the level's largest cell: 1 for every cell that a surface of even resolution covers.
+    fn share(&self, area_m2: f32) -> f32 {
+        area_m2 / self.largest_m2.max(f32::MIN_POSITIVE)
     }
 
     /// Sum over the cells of the finer level in one cell.
@@ -157,14 +153,39 @@ impl Cells {
     }
 
     pub fn texels<const N: usize>(&self, values: &Values<N>) -> Vec<[f32; N]> {
-        let own = |level: usize| {
-            let cells = self.levels[level].texels.iter().zip(&values[level]);
-            cells.filter(|(texel, _)| **texel != NONE)
-        };
-        let count = (0..self.levels.len()).map(|level| own(level).count()).sum();
-        let mut of_texels = vec![[0.0; N]; count];
-        for (&texel, &value) in (0..self.levels.len()).flat_map(own) {
-            of_texels[texel as usize] = value;
+        self.inherited(0, [0.0; N], |level, index| values[level][index])
+    }
+
+    /// Area of each texel, relative to the largest of its size.
+    pub fn shares(&self) -> Vec<f32> {
+        self.inherited(0, 0.0, |level, index| {
+            let level = &self.levels[level];
+            level.share(level.areas_m2[index])
+        })
+    }
+
+    /// For each texel, the value of a cell, given its level and index: the cell of a level in which the texel lies, or
+    /// the texel's own if that is larger. `blank` is overwritten.
+    pub fn inherited<T: Copy>(&self, level: usize, blank: T, value: impl Fn(usize, usize) -> T) -> Vec<T> {
+        let is_texel = |texel: &&u32| **texel != NONE;
+        let count = self
+            .levels
+            .iter()
+            .map(|own| own.texels.iter().filter(is_texel).count());
+        let mut of_texels = vec![blank; count.sum()];
+        for (number, own) in self.levels.iter().enumerate() {
+            let steps = level.saturating_sub(number);
+            let above = &self.levels[number + steps];
+            for (&texel, &(column, row)) in own
+                .texels
+                .iter()
+                .zip(&own.places)
+                .filter(|(texel, _)| **texel != NONE)
+            {
+                let cell = above.index(column as usize >> steps, row as usize >> steps);
+                of_texels[texel as usize] =
+                    value(number + steps, cell.expect("coarser cells cover finer ones"));
+            }
         }
         of_texels
     }
@@ -204,22 +225,9 @@ impl Cells {
                 index
             });
             let (number, index) = coarser?;
-            Some((self.levels[number].share(index), values[number][index]))
+            let level = &self.levels[number];
+            Some((level.share(level.areas_m2[index]), values[number][index]))
         })
-    }
-
-    /// For each texel, the value of the cell of a level in which it lies; its own if it is larger.
-    pub fn inherited<const N: usize>(&self, level: usize, mut values: Values<N>) -> Vec<[f32; N]> {
-        for number in (0..level).rev() {
-            let coarser = &self.levels[number + 1];
-            let parent = |&(column, row): &(u32, u32)| coarser.index(column as usize / 2, row as usize / 2);
-            for (index, place) in self.levels[number].places.iter().enumerate() {
-                if let Some(parent) = parent(place) {
-                    values[number][index] = values[number + 1][parent];
-                }
-            }
-        }
-        self.texels(&values)
     }
 
     /// Densities of a level's cells, averaged over cells `steps` levels coarser and interpolated back.
@@ -256,31 +264,17 @@ impl Cells {
             let (coarse, areas) = (&self.levels[number + 1], &areas[number + 1 - level]);
             sums = self.interpolated(number, |column, row| {
                 let index = coarse.index(column, row)?;
-                Some((
-                    areas[index][0] / coarse.largest_m2.max(f32::MIN_POSITIVE),
-                    sums[index],
-                ))
+                Some((coarse.share(areas[index][0]), sums[index]))
             });
         }
         sums
     }
 
-    /// Area of each texel, relative to the largest of its size.
-    pub fn shares(&self) -> Vec<[f32; 1]> {
-        let of_level = |level: &Level| {
-            (0..level.places.len())
-                .map(|index| [level.share(index)])
-                .collect()
-        };
-        self.texels(&self.levels.iter().map(of_level).collect())
-    }
-
     /// Area of a level's cells, relative to the harmonic mean of those around.
     pub fn relative_areas(&self, level: usize) -> Vec<f32> {
         let of_level = &self.levels[level];
-        let shares: Vec<f32> = (0..of_level.places.len())
-            .map(|index| of_level.share(index))
-            .collect();
+        let shares = of_level.areas_m2.iter().map(|area_m2| of_level.share(*area_m2));
+        let shares: Vec<f32> = shares.collect();
         if shares.iter().all(|share| *share == 1.0) {
             return shares;
         }

@@ -167,14 +167,12 @@ impl Details {
             kept[level] = self.refined(level, &kept);
         }
         let mut texels = self.cells.texels(&kept);
-        let reached = self.raw.iter().map(|level| {
-            let is_reached = |raw: &Raw| raw.iter().any(|channel| *channel != 0.0);
-            level.iter().map(|raw| [f32::from(is_reached(raw))]).collect()
-        });
-        let reached = self.cells.inherited(DARK_LEVEL.min(coarsest), reached.collect());
-        for (texel, [reached]) in texels.iter_mut().zip(reached) {
+        let is_reached =
+            |level: usize, cell: usize| self.raw[level][cell].iter().any(|channel| *channel != 0.0);
+        let reached = self.cells.inherited(DARK_LEVEL.min(coarsest), false, is_reached);
+        for (texel, is_reached) in texels.iter_mut().zip(reached) {
             let [.., a, b, _] = *texel;
-            if reached == 0.0 && 0.5 * (a + b) < DARK {
+            if !is_reached && 0.5 * (a + b) < DARK {
                 *texel = [0.0; 6];
             }
         }
@@ -280,7 +278,7 @@ impl Details {
         let square = |[.., a, b, missed]: &FilteredCell| missed + 0.25 * (a - b) * (a - b);
         let shares = self.cells.shares();
         let mut ratios = self.cells.densities(|texel| {
-            let weight = shares[texel][0] * map.chart.texel_area_m2(texel) as f32;
+            let weight = shares[texel] * map.chart.texel_area_m2(texel) as f32;
             [square(&of_texels[texel]), expected(&of_texels[texel])].map(|value| value * weight)
         });
         let pool = self.cells.pool();

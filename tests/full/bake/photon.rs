@@ -4,7 +4,7 @@ use nephroid::bake::Bake;
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::settings::{BakeSettings, MapResolution};
+use nephroid::settings::BakeSettings;
 
 use support::hard_scenes::{cut_glass, roughened, under_square_lamp, under_the_suns_disc};
 use support::tools::{bake, brute, builtin_scene, caustic, energy_fault, map_of, photons};
@@ -12,10 +12,7 @@ use support::tools::{bake, brute, builtin_scene, caustic, energy_fault, map_of, 
 const SIDE: usize = 64;
 const BLOCK: usize = 8;
 /// Fine enough that light is smooth from texel to texel.
-const FINE: MapResolution = MapResolution::Fixed {
-    width: 256,
-    height: 256,
-};
+const FINE: usize = 256;
 
 /// Green glass around a lamp, so that paths absorb, split and start inside a body.
 fn lamp_in_green_glass() -> Scene {
@@ -127,9 +124,8 @@ fn targets_are_met_and_filtering_saves_photons() {
     let [raw, filtered] = [false, true].map(|filter| {
         let settings = BakeSettings {
             max_error: Some(0.15),
-            map_resolution: FINE,
             filter: Some(filter),
-            ..photons(1e4, SIDE)
+            ..photons(1e4, FINE)
         };
         let result = bake(scene.clone(), &settings);
         assert_eq!(energy_fault(&result), None);
@@ -142,11 +138,7 @@ fn targets_are_met_and_filtering_saves_photons() {
         filtered.counts.rays,
         raw.counts.rays
     );
-    let fine = BakeSettings {
-        map_resolution: FINE,
-        ..photons(1e7, SIDE)
-    };
-    let reference = bake(scene.clone(), &fine);
+    let reference = bake(scene.clone(), &photons(1e7, FINE));
     let truth = caustic(map_of(&reference, &scene, "floor"));
     for result in [&raw, &filtered] {
         let map = caustic(map_of(result, &scene, "floor"));

@@ -2,17 +2,14 @@
 
 use nephroid::optics::luminance;
 use nephroid::scene::Scene;
-use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution};
+use nephroid::settings::{BakeSettings, Estimator, LayerKind};
 
 use support::hard_scenes::roughened;
 use support::tools::{bake, bits, builtin_scene, energy_fault, photons};
 
 const SIDE: usize = 64;
 /// Fine enough that light is smooth from texel to texel.
-const FINE: MapResolution = MapResolution::Fixed {
-    width: 256,
-    height: 256,
-};
+const FINE: usize = 256;
 
 #[test]
 fn threads_change_no_photon() {
@@ -35,9 +32,8 @@ fn threads_change_no_photon() {
 fn errors_of_few_filtered_photons_are_numbers() {
     let settings = BakeSettings {
         max_error: Some(1.0),
-        map_resolution: FINE,
         filter: Some(true),
-        ..photons(1e4, SIDE)
+        ..photons(1e4, FINE)
     };
     let result = bake(builtin_scene("ring"), &settings);
     for error in [result.estimated_relative_rmse, result.estimated_visible] {
