@@ -1,21 +1,25 @@
 // Normals perturbed by waves and by a normal map; twin of transport/bend.rs, transport/normal_texture.rs and
 // scene/waves.rs. A record in the image table consists of
-//   texture reference of the normal map, scale of its normals, number of waves,
+//   texture reference of the normal map, record of the lights that shade it, scale of its normals, number of waves,
 // and for each wave
 //   wave vector x, y, z [rad/m], phase [rad], amplitude [m].
 
 // Whether any surface to be drawn has bumps.
 override HAS_BUMPS: bool;
 
-const BUMP_WORDS: u32 = 3u;
+const BUMP_WORDS: u32 = 4u;
 const WAVE_WORDS: u32 = 5u;
 const STEEPEST_TEXEL: f32 = 8.0;
+// A level below all others.
+const FINEST: f32 = -1e3;
 
 // A patch of a surface: two vectors along it, in any unit, and the changes of texture coordinates along them.
 struct Piece {
     steps: array<vec3f, 2>,
     changes: array<vec4f, 2>,
     uvs: vec4f,
+    // Level of the normal map.
+    level: f32,
 }
 
 // Derivatives of a height field at a point of a surface.
@@ -55,7 +59,19 @@ fn image_gradient(look: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f {
     let x = along * inverseSqrt(size);
     let across = cross(normal, x);
     let y = select(across, -across, dot(by_v, across) > 0.0);
-    let spot = locate(image_table[look], 0u, placed(look, piece.uvs, false));
+    let record = image_table[look];
+    let uv = placed(look, piece.uvs, false);
+    let at = levels(record, piece.level);
+    var slope = level_slope(record, at.fine, uv, scale);
+    if at.share > 0.0 {
+        slope = mix(slope, level_slope(record, at.coarse, uv, scale), at.share);
+    }
+    return x * slope.x + y * slope.y;
+}
+
+// Slope in one level of a normal map.
+fn level_slope(record: u32, level: u32, uv: vec2f, scale: f32) -> vec2f {
+    let spot = locate(record, level, uv);
     let top = mix(
         texel_slope(spot.texel, spot.layer, scale),
         texel_slope(spot.texel + vec2i(1, 0), spot.layer, scale),
@@ -66,8 +82,7 @@ fn image_gradient(look: u32, scale: f32, piece: Piece, normal: vec3f) -> vec3f {
         texel_slope(spot.texel + vec2i(1, 1), spot.layer, scale),
         spot.weight.x,
     );
-    let slope = mix(top, bottom, spot.weight.y);
-    return x * slope.x + y * slope.y;
+    return mix(top, bottom, spot.weight.y);
 }
 
 // Sum of all bumps at a position in scene coordinates [m], on a patch with a unit normal.
@@ -75,9 +90,9 @@ fn bump_at(record: u32, place_m: vec3f, piece: Piece, normal: vec3f) -> Bump {
     var bump = Bump(vec3f(0.0), 0.0);
     let look = image_table[record];
     if look != NO_IMAGE {
-        bump.gradient = image_gradient(look, table_float(record + 1u), piece, normal);
+        bump.gradient = image_gradient(look, table_float(record + 2u), piece, normal);
     }
-    let count = image_table[record + 2u];
+    let count = image_table[record + 3u];
     for (var wave = 0u; wave < count; wave += 1u) {
         let at = record + BUMP_WORDS + wave * WAVE_WORDS;
         let vector = vec3f(table_float(at), table_float(at + 1u), table_float(at + 2u));

@@ -161,7 +161,7 @@ fn lit_point(point: SurfacePoint, is_front: bool, gaze: Gaze) -> LitPoint {
         point.place,
         margin,
         side * point.geometric_normal,
-        side * point.interpolated_normal,
+        side * point.shading_normal,
         diffuse_response_of(object, mixture),
     );
 }
@@ -215,6 +215,13 @@ fn chain_radiance(first: Gaze) -> vec3f {
             let level = footprint_level(record, point.map_density, gaze.width, cos_view);
             let baked = irradiance(record, point.map_uv, level);
             var lit = baked.rgb;
+            let bumps = objects[point.object].bumps;
+            if HAS_BUMPS && bumps != NO_IMAGE {
+                let side = select(-1.0, 1.0, is_front);
+                let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
+                let normals = array(side * point.interpolated_normal, side * point.shading_normal);
+                lit = in_relief(lit, bumps, place_m, normals);
+            }
             if TRACES_LIGHTS {
                 lit += direct_irradiance(lit_point(point, is_front, gaze), objects[point.object]);
             }

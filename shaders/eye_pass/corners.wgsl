@@ -94,7 +94,7 @@ fn surface_point(hit: Hit) -> SurfacePoint {
         if record != NO_IMAGE {
             let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
             let steps = array(triangle.b - triangle.a, triangle.c - triangle.a);
-            let piece = Piece(steps, array(uv_b - uv_a, uv_c - uv_a), point.uvs);
+            let piece = Piece(steps, array(uv_b - uv_a, uv_c - uv_a), point.uvs, FINEST);
             let bump = bump_at(record, place_m, piece, point.shading_normal);
             point.shading_normal = bent(point.shading_normal, bump.gradient);
             point.curvature -= 0.5 * bump.laplacian * start.unit_m;

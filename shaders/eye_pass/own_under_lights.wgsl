@@ -6,7 +6,8 @@ fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -
     // Normal of the triangle's plane, which contains both derivatives.
     let across = cross(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
     let towards_eye = select(1.0, -1.0, dot(across, fragment.from_camera) > 0.0);
-    let shading_normal = select(-1.0, 1.0, is_front) * normalize(fragment.normal);
+    let normals = own_normals(fragment);
+    let shading_normal = select(-1.0, 1.0, is_front) * normals[1];
     let offset = fragment.from_camera / start.unit_m;
     let place = start.eye + offset;
     // Rasterisers interpolate positions to a relative precision of about 2⁻²⁰.
@@ -21,7 +22,7 @@ fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -
     let baked = own_irradiance(fragment, is_front);
     let irradiance = baked.rgb + direct_irradiance(point, object);
     let diffuse = own_base_colour(fragment) * irradiance / PI;
-    let radiance = own_emission(fragment) + (1.0 - own_coat(fragment)) * diffuse;
+    let radiance = own_emission(fragment) + (1.0 - own_coat(fragment, normals[1])) * diffuse;
     cut_out(fragment);
     return vec4f(select(scaled(radiance), fault_colour(), baked.a > 0.0), 1.0);
 }

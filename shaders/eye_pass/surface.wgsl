@@ -29,16 +29,25 @@ fn own_irradiance(fragment: Fragment, is_front: bool) -> vec4f {
     return irradiance(record, fragment.map_uv, level);
 }
 
+// Normal, and the same perturbed by bumps.
+fn own_normals(fragment: Fragment) -> array<vec3f, 2> {
+    let normal = normalize(fragment.normal);
+    if !HAS_BUMPS {
+        return array(normal, normal);
+    }
+    let record = objects[fragment.object].bumps;
+    let across = dpdx(fragment.uvs);
+    let down = dpdy(fragment.uvs);
+    let steps = array(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
+    let level = look_level(image_table[record], across, down);
+    let piece = Piece(steps, array(across, down), fragment.uvs, level);
+    let place_m = frame.camera_position + fragment.from_camera;
+    return array(normal, bent(normal, bump_at(record, place_m, piece, normal).gradient));
+}
+
 // Share of light that the coat reflects towards the eye, seen from vacuum; 0 without one.
-fn own_coat(fragment: Fragment) -> f32 {
+fn own_coat(fragment: Fragment, normal: vec3f) -> f32 {
     if SURFACE == SURFACE_COATED {
-        var normal = normalize(fragment.normal);
-        if HAS_BUMPS {
-            let steps = array(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
-            let piece = Piece(steps, array(dpdx(fragment.uvs), dpdy(fragment.uvs)), fragment.uvs);
-            let place_m = frame.camera_position + fragment.from_camera;
-            normal = bent(normal, bump_at(objects[fragment.object].bumps, place_m, piece, normal).gradient);
-        }
         let cos_view = abs(dot(normal, normalize(fragment.from_camera)));
         let object = objects[fragment.object];
         return object.coat * dielectric_reflectance(cos_view, object.ior);

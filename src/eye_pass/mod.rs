@@ -3,6 +3,7 @@
 #[cfg(feature = "gpu")]
 pub mod frame_times;
 pub mod reference;
+mod relief;
 #[cfg(feature = "gpu")]
 pub mod renderer;
 pub mod tone_mapping;

@@ -26,6 +26,25 @@ pub struct Environment {
     columns: Vec<f64>,
     /// ∫ L dω of the luminance [W/m²].
     total: f64,
+    smooth: SmoothIrradiance,
+}
+
+/// Irradiance of an unoccluded surface as a linear function of its normal: the first two bands of spherical harmonics
+/// (Ramamoorthi and Hanrahan, "An Efficient Representation for Irradiance Environment Maps", SIGGRAPH 2001).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SmoothIrradiance {
+    /// Mean over all normals [W/m²].
+    pub mean: LinearSrgb,
+    /// Change with each component of the normal [W/m²].
+    pub by_normal: [LinearSrgb; 3],
+}
+
+impl SmoothIrradiance {
+    /// E of a surface with a unit normal [W/m²].
+    pub fn at(&self, normal: DVec3) -> LinearSrgb {
+        let [x, y, z] = self.by_normal;
+        (self.mean + x * normal.x + y * normal.y + z * normal.z).map(|channel| channel.max(0.0))
+    }
 }
 
 /// A direction sampled from an environment.
@@ -52,14 +71,24 @@ impl Environment {
             rows: Vec::with_capacity(height),
             columns: Vec::with_capacity(width * height),
             total: 0.0,
+            smooth: SmoothIrradiance::default(),
         };
         for row in 0..height {
             let solid_angle_sr = environment.pixel_solid_angle_sr(row);
             let mut sum = 0.0;
             let start = environment.columns.len();
+            let (sine, cosine) = ((row as f64 + 0.5) / height as f64 * PI).sin_cos();
             for column in 0..width {
-                sum += environment.pixel(column, row).luminance();
+                let pixel = environment.pixel(column, row);
+                sum += pixel.luminance();
                 environment.columns.push(sum);
+                let azimuth = (column as f64 + 0.5) / width as f64 * TAU;
+                let to_light = [sine * azimuth.sin(), cosine, -sine * azimuth.cos()];
+                let smooth = &mut environment.smooth;
+                smooth.mean += pixel * (0.25 * solid_angle_sr);
+                for (sum, share) in smooth.by_normal.iter_mut().zip(to_light) {
+                    *sum += pixel * (0.5 * solid_angle_sr * share);
+                }
             }
             if sum > 0.0 {
                 environment.columns[start..]
@@ -89,6 +118,11 @@ impl Environment {
     /// ∫ L dω over all directions, of the luminance [W/m²].
     pub fn total_w_per_m2(&self) -> f64 {
         self.total
+    }
+
+    /// Irradiance of unoccluded surfaces.
+    pub fn smooth_irradiance(&self) -> &SmoothIrradiance {
+        &self.smooth
     }
 
     fn pixel(&self, column: usize, row: usize) -> LinearSrgb {

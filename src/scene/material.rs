@@ -115,7 +115,7 @@ pub struct Material {
     pub coat: f64,
     /// Waves that perturb the normals of specular surfaces; irradiance is always that of the surface itself.
     pub waves: Option<Waves>,
-    /// Normal map, to the same effect.
+    /// Normal map, to the same effect. On diffuse surfaces it shades pictures: see [`Self::relief`].
     pub normal_map: Option<NormalMap>,
     /// Whether its back is drawn; transport always treats both sides.
     pub double_sided: bool,
@@ -132,13 +132,18 @@ impl Material {
         self.normal_map.as_ref().filter(|_| self.surface.is_specular())
     }
 
-    /// Images of the base colour, the factors, the emission, and the normals if it is specular.
+    /// Normal map that shades the diffuse light of pictures; `None` without a diffuse part.
+    pub fn relief(&self) -> Option<&NormalMap> {
+        self.normal_map.as_ref().filter(|_| self.surface.is_receiver())
+    }
+
+    /// Images of the base colour, the factors, the emission, and the normals.
     pub fn images(&self) -> [Option<&TextureRef>; 4] {
         [
             self.base_colour_texture.as_ref(),
             self.variation.as_ref().map(|variation| &variation.image),
             self.emission_texture.as_ref(),
-            self.bending_map().map(|map| &map.image),
+            self.normal_map.as_ref().map(|map| &map.image),
         ]
     }
 

@@ -40,7 +40,7 @@ pub use animation::{Animated, Clip, ClipNode, Interpolation, Track};
 pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
 pub use edit::{Edit, EditState, LightEdit, MaterialEdit, why_light_stays};
-pub use environment::Environment;
+pub use environment::{Environment, SmoothIrradiance};
 pub use glow::Glow;
 pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};

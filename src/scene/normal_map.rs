@@ -4,6 +4,9 @@ use glam::DVec2;
 
 use super::texture::{Texture, TextureRef};
 
+/// Number of texels whose slopes tell the detail of a large image well enough.
+const MEASURED: usize = 1 << 20;
+
 /// Limit of the slope of a texel [1]: 83°. Normals in or below the tangent plane have no slope of their own.
 const STEEPEST_TEXEL: f64 = 8.0;
 
@@ -70,7 +73,10 @@ fn texel_slope([red, green, blue, _]: [u8; 4], scale: f64) -> DVec2 {
 fn detail_texels(texture: &Texture, scale: f64) -> f64 {
     let slope = |x: u32, y: u32| texel_slope(texture.code(f64::from(x), f64::from(y)), scale);
     let (mut mean, mut squares, mut changes) = (DVec2::ZERO, 0.0, 0.0_f64);
-    for y in 0..texture.height {
+    let step = (texture.width as usize * texture.height as usize).div_ceil(MEASURED);
+    let mut count = 0.0;
+    for y in (0..texture.height).step_by(step) {
+        count += f64::from(texture.width);
         for x in 0..texture.width {
             let here = slope(x, y);
             mean += here;
@@ -80,7 +86,6 @@ fn detail_texels(texture: &Texture, scale: f64) -> f64 {
                 .max((slope(x, y + 1) - here).length_squared());
         }
     }
-    let count = f64::from(texture.width) * f64::from(texture.height);
     let variance = squares / count - (mean / count).length_squared();
     if variance <= 0.0 || changes <= 0.0 {
         return f64::INFINITY;

@@ -18,7 +18,7 @@ use crate::geometry::{Ray, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
 use crate::scene::{
-    Adjacency, AlphaMask, Material, Mixture, Scene, SurfaceKind, TextureRef, Waves, instances,
+    Adjacency, AlphaMask, Material, Mixture, NormalMap, Scene, SurfaceKind, TextureRef, Waves, instances,
 };
 
 /// A scene with its hierarchies and shape data. Edited copies share what the edits leave unchanged.
@@ -401,7 +401,21 @@ impl Tracer {
     }
 
     fn texture_bump(&self, hit: &SurfaceHit) -> Option<TextureBump> {
-        let map = self.scene.material_of(hit.object).bending_map()?;
+        self.bump_of(self.scene.material_of(hit.object).bending_map()?, hit)
+    }
+
+    /// Unit normal by which pictures shade diffuse light; `None` without a normal map.
+    pub fn relief_normal(&self, hit: &SurfaceHit) -> Option<DVec3> {
+        let material = self.scene.material_of(hit.object);
+        let map = material.relief()?;
+        if material.surface.is_specular() {
+            return Some(hit.shading_normal);
+        }
+        let bump = self.bump_of(map, hit)?;
+        Some(bend::bent(hit.interpolated_normal, bump.gradient()))
+    }
+
+    fn bump_of(&self, map: &NormalMap, hit: &SurfaceHit) -> Option<TextureBump> {
         let mesh = self.scene.objects[hit.object].in_scene();
         let place = (hit.triangle, hit.barycentric);
         TextureBump::at((&self.scene, mesh), map, place, hit.interpolated_normal)

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::effect::EffectSwitch;
+use crate::eye_pass::relief::ReliefLights;
 use crate::eye_pass::wavelengths::{self, SeenWavelength};
 use crate::geometry::Ray;
 use crate::illumination::lookup::in_chart;
@@ -65,6 +66,7 @@ pub struct LitScene<'a> {
     maps: Vec<Option<MapTotal<'a>>>,
     /// Emitted radiance by object [W/(m² sr)].
     emitted: Vec<LinearSrgb>,
+    relief: ReliefLights,
     background: LinearSrgb,
     limits: ChainLimits,
 }
@@ -120,6 +122,7 @@ impl<'a> LitScene<'a> {
             tracer,
             maps: by_receiver,
             emitted: emitted.collect(),
+            relief: ReliefLights::of(tracer.scene()),
             background,
             limits,
         }
@@ -217,7 +220,11 @@ impl<'a> LitScene<'a> {
         };
         let chart = map.chart;
         let uv = chart.uv(hit.triangle, hit.barycentric);
-        let irradiance = in_chart(chart, &map.irradiance, uv);
+        let mut irradiance = in_chart(chart, &map.irradiance, uv);
+        if let Some(bent) = self.tracer.relief_normal(hit) {
+            let normals = [hit.interpolated_normal, bent].map(|normal| normal * side.sign());
+            irradiance = self.relief.shaded(irradiance, hit.point, normals);
+        }
         emitted + share * self.tracer.base_colour(hit) * irradiance / std::f64::consts::PI
     }
 

@@ -9,7 +9,7 @@ use super::bindings::Storage;
 use super::bindings::bind_group;
 use super::geometry::{Geometry, Segment};
 use super::objects::absorption_per_m;
-use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle, rgb};
+use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle};
 use super::web::Content;
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
@@ -17,7 +17,7 @@ use crate::eye_pass::reference::ChainLimits;
 use crate::geometry::PackedNode;
 use crate::geometry::bvh::Frame;
 use crate::gpu::Gpu;
-use crate::scene::emitter::{Emitter, EmitterKind};
+use crate::scene::emitter::Emitter;
 use crate::scene::{Object, Scene};
 use crate::transport::{MediumStack, PackedInstance, PackedMesh, Tracer, media_at};
 
@@ -265,49 +265,16 @@ impl ChainScene {
     }
 
     fn record(&self, emitter: &Emitter, scene: &Scene) -> LightRecord {
-        let single = |direction: DVec3| direction.as_vec3().to_array();
         let within = match emitter.kind.position() {
             Some(place) => media_at(&self.tracer, place),
             None => MediumStack::default(),
         };
-        let record = LightRecord {
-            strength: rgb(emitter.strength),
+        LightRecord {
             absorption_per_m: within
                 .top()
                 .map_or([0.0; 3], |body| absorption_per_m(scene.material_of(body))),
             ior: within.ior(scene) as f32,
-            ..Default::default()
-        };
-        match emitter.kind {
-            EmitterKind::Point { position } => LightRecord {
-                place: self.local(position),
-                kind: 0,
-                ..record
-            },
-            EmitterKind::Spot {
-                position,
-                direction,
-                inner_cone_rad,
-                outer_cone_rad,
-            } => LightRecord {
-                place: self.local(position),
-                kind: 1,
-                cos_inner: inner_cone_rad.cos() as f32,
-                axis: single(direction),
-                cos_outer: outer_cone_rad.cos() as f32,
-                ..record
-            },
-            EmitterKind::Parallel { direction } => LightRecord {
-                place: single(direction),
-                kind: 2,
-                ..record
-            },
-            EmitterKind::Facet { position, normal } => LightRecord {
-                place: self.local(position),
-                kind: 3,
-                axis: single(normal),
-                ..record
-            },
+            ..LightRecord::of(emitter, |place| self.local(place))
         }
     }
 

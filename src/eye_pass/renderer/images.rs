@@ -5,10 +5,12 @@ use std::sync::Arc;
 use super::bindings::Storage;
 use super::maps::{self, DeviceMap, ShownMap};
 use super::paging::{Level, PagedImage, TILE, TilePool, Uploaded, is_halved};
+use super::uniforms::{LightRecord, rgb};
+use crate::eye_pass::relief::ReliefLights;
 use crate::gpu::Gpu;
 use crate::illumination::Receiver;
 use crate::optics::LinearSrgb;
-use crate::scene::{Material, Scene, Texture, TextureRef};
+use crate::scene::{Material, Scene, SmoothIrradiance, Texture, TextureRef};
 
 /// Stands for a missing image; `NO_IMAGE` in the shaders.
 pub(super) const NO_IMAGE: u32 = u32::MAX;
@@ -27,9 +29,11 @@ pub(super) struct Images {
     textures: Vec<PagedImage<Texel>>,
     /// Texture references by material, in the order of [`Material::images`].
     looks: Vec<[Option<TextureRef>; 4]>,
+    /// Lights that shade relief, as `relief.wgsl` reads them; `None` if no surface has one.
+    relief_lights: Option<Vec<u32>>,
     /// Bumps by object: the material, and the words that follow its texture reference in the record.
     bumps: Vec<Option<(usize, Vec<u32>)>>,
-    /// Records of images with their pages, of texture references, and of bumps.
+    /// Records of images with their pages, of texture references, of lights, and of bumps.
     pub(super) table: Storage,
     /// Where records start in the table: of maps by receiver, of texture references by material, of bumps by object.
     map_records: Vec<u32>,
@@ -48,6 +52,7 @@ impl Images {
             sources: Vec::new(),
             textures: Vec::new(),
             looks: Vec::new(),
+            relief_lights: None,
             bumps: Vec::new(),
             table: Storage::new(gpu, "image table"),
             map_records: Vec::new(),
@@ -81,8 +86,15 @@ impl Images {
                 .for_each(|image| image.release(&mut self.texture_pool));
             self.sources.clone_from(&scene.textures);
             self.textures.clear();
-            for texture in &self.sources {
-                let (image, bytes) = upload(gpu, &mut self.texture_pool, texture);
+            let is_normals = |index: usize| {
+                let mut maps = scene
+                    .materials
+                    .iter()
+                    .filter_map(|material| material.normal_map.as_ref());
+                maps.any(|map| map.image.texture == index)
+            };
+            for (index, texture) in self.sources.iter().enumerate() {
+                let (image, bytes) = upload(gpu, &mut self.texture_pool, texture, is_normals(index));
                 self.textures.push(image);
                 uploaded += bytes;
             }
@@ -101,6 +113,8 @@ impl Images {
             Some((material, bumps(&scene.materials[material])?))
         };
         self.bumps = (0..scene.objects.len()).map(bumps).collect();
+        let has_relief = scene.materials.iter().any(|material| material.relief().is_some());
+        self.relief_lights = has_relief.then(|| relief_lights(&ReliefLights::of(scene)));
         uploaded += self.write_table(gpu);
         uploaded
     }
@@ -261,12 +275,20 @@ impl Images {
             [0, 1, 2, 3].map(|which: usize| looks[which].as_ref().map_or(NO_IMAGE, &mut write_look))
         };
         self.look_records = self.looks.iter().map(records).collect();
+        let lights = match &self.relief_lights {
+            Some(lights) => {
+                let record = words.len() as u32;
+                words.extend(lights);
+                record
+            }
+            None => NO_IMAGE,
+        };
         self.bump_records.clear();
         for bumps in &self.bumps {
             let record = words.len() as u32;
             self.bump_records.push(match bumps {
                 Some((material, rest)) => {
-                    words.push(self.look_records[*material][3]);
+                    words.extend([self.look_records[*material][3], lights]);
                     words.extend(rest);
                     record
                 }
@@ -277,13 +299,31 @@ impl Images {
     }
 }
 
-/// A material's bumps, as `bumps.wgsl` reads them after the texture reference.
+fn relief_lights(lights: &ReliefLights) -> Vec<u32> {
+    let SmoothIrradiance { mean, by_normal } = lights.sky;
+    let sky = [mean]
+        .into_iter()
+        .chain(by_normal)
+        .flat_map(rgb)
+        .map(f32::to_bits);
+    let records: Vec<LightRecord> = lights
+        .emitters
+        .iter()
+        .map(|emitter| LightRecord::of(emitter, |place| place.as_vec3().to_array()))
+        .collect();
+    let mut words = vec![records.len() as u32];
+    words.extend(sky);
+    words.extend(bytemuck::cast_slice::<LightRecord, u32>(&records));
+    words
+}
+
+/// A material's bumps, as `bumps.wgsl` reads them after texture reference and lights.
 fn bumps(material: &Material) -> Option<Vec<u32>> {
-    if !material.has_bumps() {
+    if !material.has_bumps() && material.relief().is_none() {
         return None;
     }
     let waves = material.bending_waves().map_or(&[][..], |waves| waves.list());
-    let scale = material.bending_map().map_or(0.0, |map| map.scale);
+    let scale = material.normal_map.as_ref().map_or(0.0, |map| map.scale);
     let mut words = vec![(scale as f32).to_bits(), waves.len() as u32];
     for wave in waves {
         let [x, y, z] = wave.wave_vector().to_array();
@@ -338,8 +378,13 @@ pub(super) fn finest_levels(costs: &[Cost], budget: u64) -> Vec<usize> {
 pub(super) type Texel = [u8; 4];
 
 /// Uploads an image with its mip levels.
-pub(super) fn upload(gpu: &Gpu, pool: &mut TilePool, texture: &Texture) -> (PagedImage<Texel>, Uploaded) {
-    let (image, uploaded) = PagedImage::new(gpu, pool, mip_chain(texture), texture.wrap, 0);
+pub(super) fn upload(
+    gpu: &Gpu,
+    pool: &mut TilePool,
+    texture: &Texture,
+    is_normals: bool,
+) -> (PagedImage<Texel>, Uploaded) {
+    let (image, uploaded) = PagedImage::new(gpu, pool, mip_chain(texture, is_normals), texture.wrap, 0);
     (image, Uploaded::other(uploaded.tile_bytes as usize))
 }
 
@@ -347,19 +392,19 @@ pub(super) fn upload(gpu: &Gpu, pool: &mut TilePool, texture: &Texture) -> (Page
 type Image = ([usize; 2], Vec<Texel>);
 
 /// The image and its mip levels.
-fn mip_chain(texture: &Texture) -> Vec<Level<Texel>> {
+fn mip_chain(texture: &Texture, is_normals: bool) -> Vec<Level<Texel>> {
     let size = [texture.width as usize, texture.height as usize];
     let mut images: Vec<Image> = vec![(size, texture.rgba.clone())];
     while let Some(last) = images.last().filter(|(size, _)| is_halved(*size)) {
-        images.push(halved(last));
+        images.push(halved(last, is_normals));
     }
     let level =
         |(size, texels): &Image| Level::of_rows(*size, size.map(|side| side as f32), texture.wrap, texels);
     images.iter().map(level).collect()
 }
 
-/// Means of 2×2 texels in linear light; an odd last row or column is dropped.
-fn halved((fine_size, fine): &Image) -> Image {
+/// Means of 2×2 texels, of colours in linear light; an odd last row or column is dropped.
+fn halved((fine_size, fine): &Image, is_normals: bool) -> Image {
     let [fine_width, fine_height] = *fine_size;
     let (width, height) = ((fine_width / 2).max(1), (fine_height / 2).max(1));
     let linear: Vec<f32> = (0..=u8::MAX)
@@ -378,7 +423,7 @@ fn halved((fine_size, fine): &Image) -> Image {
         ];
         std::array::from_fn(|channel| {
             let codes = four.map(|texel| texel[channel]);
-            if channel == 3 {
+            if channel == 3 || is_normals {
                 return (codes.iter().map(|code| u32::from(*code)).sum::<u32>() / 4) as u8;
             }
             let light = codes.iter().map(|code| linear[usize::from(*code)]).sum::<f32>() / 4.0;

@@ -194,7 +194,7 @@ impl Appearance {
         Self {
             surface: material.surface,
             double_sided: material.has_back(),
-            has_bumps: material.has_bumps(),
+            has_bumps: material.has_bumps() || material.relief().is_some(),
             bounds: object.bounds(),
             record: ObjectRecord {
                 base_colour: rgb(material.base_colour),

@@ -148,8 +148,7 @@ impl PipelineKey {
                 has_texture: flags.has_texture && looks_up,
                 is_scaled: flags.is_scaled && writes == RenderTarget::Composed,
                 traces_lights: flags.traces_lights && writes == RenderTarget::Traced,
-                has_bumps: flags.has_bumps
-                    && (writes == RenderTarget::Traced || (shows_itself && surface == SurfaceKind::Coated)),
+                has_bumps: flags.has_bumps && looks_up,
                 has_sky: flags.has_sky && writes == RenderTarget::Traced,
                 is_dispersive: flags.is_dispersive && writes == RenderTarget::Traced,
                 has_mask: flags.has_mask,

@@ -18,7 +18,7 @@ macro_rules! chains {
         program! { $name:
             "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
             "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-            "eye_pass/mixture" "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
+            "eye_pass/mixture" "eye_pass/light_record" "eye_pass/relief" "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
             $background "eye_pass/chain" "eye_pass/traced"
         }
     };
@@ -27,7 +27,8 @@ macro_rules! chains {
 /// Surfaces without reflections.
 pub(super) const SURFACE: Program = program! { "surface":
     "shared/srgb" "shared/refraction" "shared/fresnel" "eye_pass/frame" "eye_pass/objects" "eye_pass/images"
-    "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/surface" "eye_pass/own"
+    "eye_pass/bumps" "eye_pass/light_record" "eye_pass/relief" "eye_pass/place" "eye_pass/mask" "eye_pass/surface"
+    "eye_pass/own"
 };
 
 /// Surfaces that show a property instead of their radiance.
@@ -59,7 +60,7 @@ pub(super) const SKY: Program = program! { "sky":
 pub(super) const UNDER_LIGHTS: Program = program! { "under_lights":
     "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
     "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-    "eye_pass/mixture" "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
+    "eye_pass/mixture" "eye_pass/light_record" "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
 };
 
 /// The traced image, composed into the frame.

@@ -1,10 +1,13 @@
 //! Uniforms of the shaders; names and order are those of `shaders/eye_pass/`.
 
+use glam::DVec3;
+
 use crate::eye_pass::wavelengths::SeenWavelength;
 use crate::gpu::layout::shader_struct;
 use crate::optics::LinearSrgb;
 use crate::optics::glass::Dispersion;
 use crate::optics::spectrum::xyz::Matrix3;
+use crate::scene::emitter::{Emitter, EmitterKind};
 
 shader_struct! {
     /// Camera and output of one frame.
@@ -156,7 +159,7 @@ shader_struct! {
 shader_struct! {
     /// One light.
     LightRecord {
-        /// Position, local; for suns, the direction in which their light travels.
+        /// Position, local or [m]; for suns, the direction in which their light travels.
         place: [f32; 3],
         /// `LIGHT_*`.
         kind: u32,
@@ -245,6 +248,49 @@ shader_struct! {
         /// Local.
         distance: f32,
         padding: [u32; 2],
+    }
+}
+
+impl LightRecord {
+    /// A light in a vacuum, at its place in the shader's coordinates.
+    pub(super) fn of(emitter: &Emitter, placed: impl Fn(DVec3) -> [f32; 3]) -> Self {
+        let single = |direction: DVec3| direction.as_vec3().to_array();
+        let record = Self {
+            strength: rgb(emitter.strength),
+            ior: 1.0,
+            ..Self::default()
+        };
+        match emitter.kind {
+            EmitterKind::Point { position } => Self {
+                place: placed(position),
+                kind: 0,
+                ..record
+            },
+            EmitterKind::Spot {
+                position,
+                direction,
+                inner_cone_rad,
+                outer_cone_rad,
+            } => Self {
+                place: placed(position),
+                kind: 1,
+                cos_inner: inner_cone_rad.cos() as f32,
+                axis: single(direction),
+                cos_outer: outer_cone_rad.cos() as f32,
+                ..record
+            },
+            EmitterKind::Parallel { direction } => Self {
+                place: single(direction),
+                kind: 2,
+                ..record
+            },
+            EmitterKind::Facet { position, normal } => Self {
+                place: placed(position),
+                kind: 3,
+                axis: single(normal),
+                ..record
+            },
+        }
     }
 }
 

@@ -85,17 +85,6 @@ pub fn read_all(
         let mut reading = MaterialReader::new((document, index), folder, images, load);
         materials.push(reading.read(name)?);
     }
-    // What is matte needs no normals.
-    let of_shiny = sources
-        .iter()
-        .zip(&materials)
-        .filter(|(_, material)| material.surface.is_specular());
-    let normals = of_shiny.filter_map(|(source, _)| Some(source.normal_texture.as_ref()?.index));
-    images.decode_ahead(normals, load)?;
-    for (index, material) in materials.iter_mut().enumerate() {
-        let mut reading = MaterialReader::new((document, index), folder, images, load);
-        material.normal_map = reading.normal_map(material)?;
-    }
     Ok(materials)
 }
 
@@ -106,7 +95,8 @@ fn textures(source: &Source) -> impl Iterator<Item = Index<Texture>> {
     let emission = source.emissive_texture.as_ref().filter(|_| glows);
     let infos = [&pbr.base_color_texture, &pbr.metallic_roughness_texture];
     let infos = infos.into_iter().flatten().chain(emission);
-    infos.map(|info| info.index)
+    let normals = source.normal_texture.as_ref().map(|normals| normals.index);
+    infos.map(|info| info.index).chain(normals)
 }
 
 /// The colour of a texel, in linear light.
@@ -180,7 +170,7 @@ impl<'a> MaterialReader<'a, '_> {
             emission_texture: None,
             emission_spectrum: None,
             coat: 1.0,
-            normal_map: None,
+            normal_map: self.normal_map()?,
             waves: self
                 .stated(waves::KEY)
                 .and_then(|waves| waves::read(waves, &self.owner, self.load)),
@@ -426,7 +416,6 @@ impl<'a> MaterialReader<'a, '_> {
     }
 
     fn warn_of_ignored(&mut self, extensions: &extension::Material, material: &Material) {
-        let is_matte = !material.surface.is_specular();
         match self.source.alpha_mode {
             Checked::Valid(_) => {}
             Checked::Invalid => self.warn_damaged("its alpha mode is unknown and was read as opaque"),
@@ -450,12 +439,6 @@ impl<'a> MaterialReader<'a, '_> {
             ignored.push((
                 "thickness texture".to_owned(),
                 "expect it to be as thick as its mesh is",
-            ));
-        }
-        if is_matte && self.source.normal_texture.is_some() {
-            ignored.push((
-                "normal texture, as it is diffuse,".to_owned(),
-                "expect it to look and bake as if it were not there",
             ));
         }
         for (key, stated) in &extensions.others {

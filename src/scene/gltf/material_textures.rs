@@ -194,14 +194,8 @@ impl MaterialReader<'_, '_> {
         Some((uv_set, DMat3::IDENTITY))
     }
 
-    /// Normal map of a specular surface.
-    pub(super) fn normal_map(&mut self, material: &Material) -> Result<Option<NormalMap>> {
-        let source = self.source;
-        let Some(stated) = source
-            .normal_texture
-            .as_ref()
-            .filter(|_| material.surface.is_specular())
-        else {
+    pub(super) fn normal_map(&mut self) -> Result<Option<NormalMap>> {
+        let Some(stated) = &self.source.normal_texture else {
             return Ok(None);
         };
         let others = stated.extensions.as_ref().map(|extensions| &extensions.others);

@@ -11,14 +11,18 @@ use nephroid::illumination::tiles::{self, COARSEST, TileLayout};
 use nephroid::illumination::{Chart, IlluminationMap};
 use nephroid::optics::LinearSrgb;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{AlphaMask, Environment, LightKind, Material, Scene, SurfaceKind, Variation};
+use nephroid::scene::texture::Wrap;
+use nephroid::scene::{
+    AlphaMask, Environment, LightKind, Material, NormalMap, Scene, SurfaceKind, Variation,
+};
 use nephroid::settings::LayerKind;
 use nephroid::transport::Tracer;
+use nephroid::units::{Irradiance, RadiantIntensity};
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
 use support::chain_laws;
 use support::floors::{
-    diffuse, floor, floor_map, floor_scene, four_colours, from_above, lambert, texture_reference,
+    diffuse, floor, floor_map, floor_scene, four_colours, from_above, image, lambert, texture_reference,
 };
 use support::scenes::{bits, light, map_of, middles, seen, view};
 
@@ -248,6 +252,54 @@ fn mixtures() -> Vec<Case> {
     [(0.8, None), (0.0, Some(0.7))].into_iter().map(of).collect()
 }
 
+/// A bumpy floor under lamps and a sky, bare, coated and below a pane: lit, half in shadow, and with light to spare.
+fn reliefs() -> Vec<Case> {
+    let codes = [
+        [128, 128, 255, 255],
+        [200, 90, 220, 255],
+        [60, 140, 200, 255],
+        [120, 210, 160, 255],
+    ];
+    let image = image(2, codes.to_vec(), Wrap::MirroredRepeat);
+    let sky = Environment::new(
+        2,
+        2,
+        vec![[1.0, 2.0, 4.0], [2.0, 2.0, 2.0], [0.1, 0.2, 0.0], [0.0; 3]],
+    );
+    let lamps = [
+        LightKind::Environment { scale: 0.5 },
+        LightKind::Point {
+            position: DVec3::new(0.3, 0.4, 0.6),
+            intensity: RadiantIntensity(1.0),
+        },
+        LightKind::Sun {
+            direction: DVec3::new(0.8, -0.6, 0.0),
+            normal_irradiance: Irradiance(3.0),
+        },
+    ];
+    let of = |(surface, share): (SurfaceKind, f32)| {
+        let mut case = under("relief", SurfaceKind::ThinWall, ALBEDO, 0.5);
+        if surface == SurfaceKind::Coated {
+            case.scene.objects.pop();
+        }
+        let scene = &mut case.scene;
+        scene.textures.push(image.clone().into());
+        scene.environment = sky.clone().map(Arc::new);
+        scene.lights = lamps.map(light).to_vec();
+        let normals = NormalMap::new(texture_reference(), 0.7, &image);
+        (scene.materials[0].surface, scene.materials[0].normal_map) = (surface, Some(normals));
+        case.maps = even([6.0, 5.0, 7.0].map(|e| e * share));
+        (case.tolerance, case.of_peak, case.few) = (0.004, 0.2, 0.01);
+        case
+    };
+    let shares = [0.1, 0.6, 2.0];
+    let kinds = [SurfaceKind::Diffuse, SurfaceKind::Coated];
+    kinds
+        .into_iter()
+        .flat_map(|kind| shares.map(|share| of((kind, share))))
+        .collect()
+}
+
 /// A mirror ball and a glass ball over a dark floor, the sky ahead, and back over the seam of its image with the pole in
 /// view; channels that end at the balls' outlines, or go on over many surfaces, may differ.
 fn skies() -> Vec<Case> {
@@ -286,7 +338,13 @@ fn skies() -> Vec<Case> {
 #[test]
 fn device_shows_what_the_cpu_shows() {
     let mut faults = Vec::new();
-    for case in floors().iter().chain(&masks()).chain(&mixtures()).chain(&skies()) {
+    for case in floors()
+        .iter()
+        .chain(&masks())
+        .chain(&mixtures())
+        .chain(&reliefs())
+        .chain(&skies())
+    {
         let mut rig = or_skip!(Rig::at(AS_CPU, &case.scene, &case.maps));
         // Means of several places too, where the picture is small.
         let sides: &[u32] = if case.view.width < 100 { &[1, 3] } else { &[1] };
@@ -302,6 +360,16 @@ fn device_shows_what_the_cpu_shows() {
         }
     }
     assert!(faults.is_empty(), "{faults:#?}");
+}
+
+#[test]
+fn relief_is_seen_on_diffuse_surfaces() {
+    for mut case in reliefs() {
+        let bumpy = on_cpu(&case, 1);
+        case.scene.materials[0].normal_map = None;
+        let share = off(&case, &on_cpu(&case, 1), &bumpy);
+        assert!(share > 0.5, "{share}");
+    }
 }
 
 #[test]

@@ -431,14 +431,8 @@ fn normal_textures_of_what_is_specular_are_read() {
     for (normals, factors, image, why) in [
         (
             &plain,
-            factors(0.0, 1.0),
-            &image[..],
-            "material `m` | normal texture, as it is diffuse,",
-        ),
-        (
-            &plain,
             coat.clone(),
-            b"no image",
+            &b"no image"[..],
             "image `picture` | replaced by grey",
         ),
         (&fourth, coat.clone(), &image, "material `m` | TEXCOORD_3"),
@@ -447,6 +441,16 @@ fn normal_textures_of_what_is_specular_are_read() {
         assert!(scene.material_of(0).normal_map.is_none());
         warns(&scene, why);
     }
+    // That of a diffuse surface shades it and bends nothing.
+    let diffuse = embossed(&image, plain.clone(), factors(0.0, 1.0));
+    let material = diffuse.material_of(0);
+    assert!(material.relief().is_some() && material.bending_map().is_none());
+    assert!(
+        diffuse
+            .warnings
+            .iter()
+            .all(|warning| !warning.what.contains("normal texture"))
+    );
     // A flat one bends nothing, and there is nothing to say of it.
     let scene = embossed(&png(&[[128, 128, 255, 255]; 4], 2), plain.clone(), coat.clone());
     assert!(scene.material_of(0).normal_map.is_none());
