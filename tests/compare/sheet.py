@@ -28,7 +28,7 @@ COLUMNS = 2
 # Of the mark: mean FLIP, CPU seconds of a bake and of `inspect`.
 MARKS = {"flip": 0.02, "bake_s": 15.0, "inspect_s": 2.0}
 # CPU seconds after which a run is given up.
-LIMIT_S = 60
+LIMIT_S = 240
 
 
 class Failed(Exception):

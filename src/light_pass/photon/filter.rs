@@ -11,6 +11,7 @@
 use rayon::prelude::*;
 
 use super::cells::{Cells, Values};
+use crate::illumination::Receiver;
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::light_pass::accuracy::Noise;
 use crate::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
@@ -36,6 +37,10 @@ const DARK: f32 = 1.0 / 256.0;
 /// Floor of irradiance relative to the map's mean.
 const DARKEST: f32 = 1e-4;
 
+/// Maps of no more texels are filtered side by side, each taking some 150 bytes per texel; larger ones one after the
+/// other, by all threads.
+const SMALL_TEXELS: usize = 1 << 18;
+
 /// Filters the sum of two halves and returns the remaining squared error of each texel [W²/m⁴]. `is_signed`: channels
 /// may be negative. Adds counts that a map could not take to `left`.
 pub fn filter(
@@ -44,13 +49,18 @@ pub fn filter(
     (unit, is_signed): (FluxUnit, bool),
     left: &mut Sums,
 ) -> Noise {
-    let mut noise = Noise::new();
-    for (receiver, map) in sum.iter_mut() {
+    let of_map = |(receiver, map): (Receiver, &mut ReceiverMap)| {
         let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
         let kept = details.filtered();
-        noise.insert(receiver, details.squares(&kept, map));
-        add(left, details.put(&kept, map, unit));
-    }
+        let squares = details.squares(&kept, map);
+        ((receiver, squares), details.put(&kept, map, unit))
+    };
+    let is_small = |(_, map): &(Receiver, &mut ReceiverMap)| map.chart.texel_count() <= SMALL_TEXELS;
+    let (small, large): (Vec<_>, Vec<_>) = sum.iter_mut().partition(is_small);
+    let mut filtered: Vec<_> = small.into_par_iter().map(of_map).collect();
+    filtered.extend(large.into_iter().map(of_map));
+    let (noise, more): (Noise, Vec<Sums>) = filtered.into_iter().unzip();
+    more.into_iter().for_each(|more| add(left, more));
     noise
 }
 

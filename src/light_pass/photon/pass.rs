@@ -23,10 +23,10 @@ use crate::progress::{Control, Stage};
 
 /// Approximate number of photons in a block: a short stretch of the domain's curve, so that neighbours hit the same
 /// triangles.
-const BLOCK: u32 = 1 << 14;
+const BLOCK: u32 = 1 << 12;
 
 /// Blocks that are traced before their hits are deposited.
-const BLOCKS_AT_ONCE: usize = 16;
+const BLOCKS_AT_ONCE: usize = 64;
 
 /// Independent samples of the same strata; their difference is the noise.
 pub const HALVES: usize = 2;
