@@ -21,6 +21,9 @@ use crate::scene::{
     Adjacency, AlphaMask, Material, Mixture, NormalMap, Scene, SurfaceKind, TextureRef, Waves, instances,
 };
 
+/// Number of the largest opaque triangles.
+const MAX_HIDERS: usize = 1 << 16;
+
 /// A scene with its hierarchies and shape data. Edited copies share what the edits leave unchanged.
 #[derive(Clone, Debug)]
 pub struct Tracer {
@@ -36,6 +39,8 @@ pub struct Tracer {
     has_masks: bool,
     /// Whether any material has partial coverage.
     has_partial: bool,
+    /// See [`Self::largest_opaque`].
+    largest_opaque: Arc<OnceLock<Vec<(usize, usize)>>>,
     /// Wavelength of all light; `None` for RGB.
     wavelength: Option<Nanometres>,
     /// Where its rays go, if that is wanted.
@@ -145,6 +150,7 @@ impl Tracer {
             hierarchy,
             specular,
             has_bumps,
+            largest_opaque: Arc::default(),
             wavelength: None,
             traversed: None,
         }
@@ -252,6 +258,32 @@ impl Tracer {
     /// Wavelength of the traced light; `None` for RGB.
     pub fn wavelength(&self) -> Option<Nanometres> {
         self.wavelength
+    }
+
+    /// The largest triangles of opaque surfaces and their objects, (object, triangle), largest first: the best ones to
+    /// hide something behind. At most 2¹⁶.
+    pub fn largest_opaque(&self) -> &[(usize, usize)] {
+        self.largest_opaque.get_or_init(|| {
+            let mut all: Vec<(f64, usize, usize)> = Vec::new();
+            for (index, object) in self.scene.objects.iter().enumerate() {
+                if self.scene.material_of(index).is_opaque() {
+                    let mesh = object.in_scene();
+                    let area = |triangle| (mesh.triangle_area_m2(triangle), index, triangle);
+                    all.par_extend((0..mesh.triangle_count()).into_par_iter().map(area));
+                }
+            }
+            let order = |a: &(f64, usize, usize), b: &(f64, usize, usize)| {
+                b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2)))
+            };
+            if all.len() > MAX_HIDERS {
+                all.select_nth_unstable_by(MAX_HIDERS, order);
+                all.truncate(MAX_HIDERS);
+            }
+            all.par_sort_unstable_by(order);
+            all.into_iter()
+                .map(|(_, object, triangle)| (object, triangle))
+                .collect()
+        })
     }
 
     /// Whether anything perturbs the normals of an object.

@@ -1,6 +1,5 @@
 //! Marks the cells of an item buffer, and finds those whose casters are occluded.
 
-use std::cmp::Reverse;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rayon::prelude::*;
@@ -105,41 +104,28 @@ impl Builder<'_> {
         faces.par_iter().enumerate().map(find).collect()
     }
 
-    /// Opaque triangles, with their objects, that have part of a caster's box behind their plane as seen from the
+    /// Large opaque triangles, with their objects, that have part of a caster's box behind their plane as seen from the
     /// light: no others can hide a caster. Largest first, but those of casters last; empty if there are only those.
     fn hiders(&self) -> Vec<(usize, usize)> {
         let scene = self.tracer.scene();
-        let mut tests = 0;
-        let mut hiders = Vec::new();
-        for (object, item) in scene.objects.iter().enumerate() {
-            if !scene.material_of(object).is_opaque() || self.is_the_only_caster(object) {
-                continue;
-            }
-            let mesh = item.in_scene();
-            for triangle in 0..mesh.triangle_count() {
-                tests += 1;
-                let (corner, normal) = (mesh.corners(triangle)[0], mesh.face_normal(triangle));
-                let side = self.launch.side_of_light(corner, normal);
-                let has_behind = self.boxes.iter().any(|(low, high)| {
-                    let height = ((*low + *high) * 0.5 - corner).dot(normal);
-                    let reach = ((*high - *low) * 0.5).dot(normal.abs());
-                    side * height - reach < 0.0
-                });
-                if has_behind {
-                    hiders.push((object, triangle));
-                }
-            }
+        let large = self.tracer.largest_opaque();
+        self.count(large.len() as u64);
+        let may_hide = |&(object, triangle): &(usize, usize)| {
+            let mesh = scene.objects[object].in_scene();
+            let (corner, normal) = (mesh.corners(triangle)[0], mesh.face_normal(triangle));
+            let side = self.launch.side_of_light(corner, normal);
+            let has_behind = |(low, high): &Bounds| {
+                let height = ((*low + *high) * 0.5 - corner).dot(normal);
+                let reach = ((*high - *low) * 0.5).dot(normal.abs());
+                side * height - reach < 0.0
+            };
+            !self.is_the_only_caster(object) && self.boxes.iter().any(has_behind)
+        };
+        let hiders = large.iter().copied().filter(may_hide);
+        let (of_casters, mut hiders): (Vec<_>, Vec<_>) = hiders.partition(|(object, _)| self.wanted[*object]);
+        if !hiders.is_empty() {
+            hiders.extend(of_casters);
         }
-        self.count(tests);
-        if hiders.iter().all(|(object, _)| self.wanted[*object]) {
-            return Vec::new();
-        }
-        hiders.sort_by_cached_key(|&(object, triangle)| {
-            let [a, b, c] = scene.objects[object].in_scene().corners(triangle);
-            // Bits of positive floats are ordered like their values.
-            let area = (b - a).cross(c - a).length().to_bits();
-            (self.wanted[object], Reverse(area))
-        });
         hiders
     }
 

@@ -434,13 +434,6 @@ impl<'a> MaterialReader<'a, '_> {
                 "expect reflections of full strength",
             ));
         }
-        let volume = extensions.volume.as_ref().filter(|_| material.volume.is_some());
-        if volume.is_some_and(|volume| volume.thickness_texture.is_some()) {
-            ignored.push((
-                "thickness texture".to_owned(),
-                "expect it to be as thick as its mesh is",
-            ));
-        }
         for (key, stated) in &extensions.others {
             if ![coat::NAME, substance::NAME].contains(&key.as_str())
                 && let Some(loss) = extensions::loss(key, stated)
