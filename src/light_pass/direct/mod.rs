@@ -247,6 +247,7 @@ impl<'a> Baker<'a> {
             .map(|texel| texels[texel].is_uncertain || self.meets_other(texels, texel, |texel| texel.lit))
             .collect();
         let divided = smaller.map(|smaller| self.divide(smaller, &mut unclear, &mut seen, row_done, control));
+        self.smooth(&mut seen.texels, &mut unclear);
         seen.take(self.pass(row_done, control, SamplingDetail::FINE, |texel| unclear[texel]));
         let irradiance = seen.texels.into_iter().map(|texel| texel.irradiance);
         let mut irradiance: Vec<[f32; 3]> = irradiance.collect();
@@ -319,6 +320,27 @@ impl<'a> Baker<'a> {
             seen.texels[texel].irradiance = sum.map(|sum| sum / small.len() as f32);
         }
         divided
+    }
+
+    /// Averages noisy texels with those around them where the light is even enough; the others stay unclear.
+    fn smooth(&self, texels: &mut [Texel], unclear: &mut [bool]) {
+        let (width, height) = (self.chart.width, self.chart.height);
+        let around = |texel: usize| {
+            let (column, row) = (texel % width, texel / width);
+            let is_inside = (1..width.saturating_sub(1)).contains(&column)
+                && (1..height.saturating_sub(1)).contains(&row);
+            let square = |index: usize| texels[texel + index % 3 + width * (index / 3) - width - 1];
+            is_inside.then(|| std::array::from_fn(square))
+        };
+        let smoothed: Vec<(usize, [f32; 3])> = (0..texels.len())
+            .into_par_iter()
+            .filter(|&texel| unclear[texel] && texels[texel].is_uncertain)
+            .filter_map(|texel| Some((texel, Texel::smoothed(&around(texel)?)?)))
+            .collect();
+        for (texel, irradiance) in smoothed {
+            texels[texel].irradiance = irradiance;
+            unclear[texel] = false;
+        }
     }
 
     /// Whether a texel needs more samples.

@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use crate::geometry::sampling::{GOLDEN_64, mix64};
-use crate::optics::LinearSrgb;
+use crate::optics::{LinearSrgb, luminance};
 
 /// Numbers of samples per texel.
 #[derive(Clone, Copy, Debug)]
@@ -90,6 +90,17 @@ pub struct Spread {
     squares: f64,
 }
 
+/// Nine texels lie on a plane if their squared deviations from it sum to no more than this many variances of one: 95 %
+/// of χ² with the six degrees of freedom that a plane leaves.
+const MAX_DEVIATION: f64 = 12.6;
+
+/// Squared standard error of four samples at (±1/4, ±1/4) of a texel, without noise, over the square of the slope per
+/// texel.
+const SHARE_OF_SLOPE: f64 = 1.0 / 48.0;
+
+/// The largest of nine variances over their median, above which an edge runs through that texel.
+const MAX_UNEVENNESS: f64 = 8.0;
+
 /// Standard error relative to a texel's mean above which it is sampled again.
 const LARGEST_NOISE: f64 = 0.02;
 
@@ -106,9 +117,16 @@ impl Spread {
         if self.count < 2.0 {
             return self.sum > 0.0;
         }
+        self.variance().sqrt() > LARGEST_NOISE * whole
+    }
+
+    /// Squared standard error of the mean; 0 for fewer than two values.
+    fn variance(&self) -> f64 {
+        if self.count < 2.0 {
+            return 0.0;
+        }
         let mean = self.sum / self.count;
-        let variance = (self.squares / self.count - mean * mean).max(0.0) / (self.count - 1.0);
-        variance.sqrt() > LARGEST_NOISE * whole
+        (self.squares / self.count - mean * mean).max(0.0) / (self.count - 1.0)
     }
 }
 
@@ -152,6 +170,7 @@ impl TexelSum {
             lit: self.lit,
             soft_lit: self.soft_lit,
             is_uncertain: self.soft.is_uncertain((self.flux / self.area_m2).luminance()),
+            variance: self.soft.variance() as f32,
         }
     }
 }
@@ -177,6 +196,8 @@ pub struct Texel {
     pub soft_lit: LightsOfTexel,
     /// Whether extended lights need more samples.
     pub is_uncertain: bool,
+    /// Squared standard error of the luminance from extended lights [W²/m⁴].
+    pub variance: f32,
 }
 
 impl Texel {
@@ -186,7 +207,40 @@ impl Texel {
         lit: LightsOfTexel::EMPTY,
         soft_lit: LightsOfTexel::EMPTY,
         is_uncertain: false,
+        variance: 0.0,
     };
+
+    /// The mean of a texel and the eight around it, if their luminances differ from a plane by no more than their noise:
+    /// as good as eight times the samples. `None` as well where point lights or suns are partly occluded.
+    pub fn smoothed(square: &[Self; 9]) -> Option<[f32; 3]> {
+        let own = square[4].lit;
+        let is_alike = |texel: &Self| texel.lit == own && texel.lit != LightsOfTexel::EMPTY;
+        if own == LightsOfTexel::MIXED || !square.iter().all(is_alike) {
+            return None;
+        }
+        let values = square.map(|texel| luminance(&texel.irradiance));
+        let mean = values.iter().sum::<f64>() / 9.0;
+        let place = |index: usize| [index % 3, index / 3].map(|along| along as f64 - 1.0);
+        let slope = |axis: usize| {
+            let part = |(index, value): (usize, &f64)| place(index)[axis] * value;
+            values.iter().enumerate().map(part).sum::<f64>() / 6.0
+        };
+        let [across, down] = [slope(0), slope(1)];
+        let deviation = |(index, value): (usize, &f64)| {
+            let [x, y] = place(index);
+            (value - mean - across * x - down * y).powi(2)
+        };
+        let squares: f64 = values.iter().enumerate().map(deviation).sum();
+        let mut variances = square.map(|texel| f64::from(texel.variance));
+        variances.sort_unstable_by(f64::total_cmp);
+        let [.., median, _, _, _, largest] = variances;
+        // The samples of a texel differ by the plane's slope as well.
+        let variance = (median - SHARE_OF_SLOPE * (across * across + down * down)).max(0.0);
+        let colour =
+            [0, 1, 2].map(|channel| square.iter().map(|texel| texel.irradiance[channel]).sum::<f32>() / 9.0);
+        let has_edge = largest > MAX_UNEVENNESS * median;
+        (!has_edge && squares <= MAX_DEVIATION * variance).then_some(colour)
+    }
 
     /// Whether the texel needs more samples: visibility differs within it or from its neighbours, or it is too noisy.
     pub fn is_unclear<Around: Iterator<Item = Self>>(&self, around: impl Fn() -> Around) -> bool {
@@ -208,6 +262,36 @@ pub struct TexelRow {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Nine texels with these irradiances and a variance.
+    fn square(irradiance: impl Fn(f64, f64) -> f64, variance: f32) -> [Texel; 9] {
+        std::array::from_fn(|index| Texel {
+            irradiance: [irradiance((index % 3) as f64 - 1.0, (index / 3) as f64 - 1.0) as f32; 3],
+            lit: LightsOfTexel::EMPTY.and(0),
+            soft_lit: LightsOfTexel::MIXED,
+            is_uncertain: true,
+            variance,
+        })
+    }
+
+    #[test]
+    fn noise_is_smoothed_and_structure_is_not() {
+        let noise = |x: f64, y: f64| if (x + 3.0 * y) % 2.0 == 0.0 { 0.1 } else { -0.1 };
+        let plane = |x: f64, y: f64| 1.0 + 0.05 * x - 0.02 * y;
+        let found = Texel::smoothed(&square(|x, y| plane(x, y) + noise(x, y), 0.01)).expect("it is noise");
+        assert!((found[0] - 1.0).abs() < 0.02, "{found:?}");
+        let step = square(|x, _| if x > 0.0 { 2.0 } else { 1.0 }, 0.01);
+        assert!(Texel::smoothed(&step).is_none());
+        // Curved light without noise: the samples of a texel differ by its slope alone.
+        let steep = square(|x, _| (0.5 * x).exp(), 0.25 / 48.0);
+        assert!(Texel::smoothed(&steep).is_none());
+        let mut edge = square(plane, 0.01);
+        edge[2].variance = 0.1;
+        assert!(Texel::smoothed(&edge).is_none());
+        let mut shadow = square(plane, 0.01);
+        shadow[0].lit = LightsOfTexel::EMPTY.and(mark_of(1));
+        assert!(Texel::smoothed(&shadow).is_none());
+    }
 
     #[test]
     fn shadows_of_lights_64_apart_do_not_cancel() {
