@@ -15,7 +15,7 @@ use crate::scene::Scene;
 const ALIGNMENT: usize = 4;
 
 /// The file, which gzip packed: length of the description [u32], description as JSON, contents at the places that it
-/// names. A place is the first byte, counted from the description's end, the length and, where they are [`filtered`], that
+/// names. A place is the first byte, counted from the description's end, the length and, where they are filtered, that
 /// of a record. The light of the maps lies in other files. `None` where nothing in the scene is a mirror or clear.
 ///
 /// # Errors

@@ -3,7 +3,7 @@
 //! E = I cos θ/r² for points and spots and E⊥ cos θ for suns, with θ from the interpolated normal. Every surface casts
 //! shadows, clear glass included: what passes through it is caustic light (LS+D). A surface of partial coverage lets
 //! the rest of the light pass. The medium around a lamp absorbs on the way. Each side of a surface has its own map.
-//! Extended lights are averaged over samples.
+//! Extended lights are averaged over samples, and where these are noisy over neighbouring texels that they light evenly.
 
 pub mod border;
 pub(super) mod facet;
