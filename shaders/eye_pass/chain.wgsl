@@ -218,9 +218,8 @@ fn chain_radiance(first: Gaze) -> vec3f {
             let bumps = objects[point.object].bumps;
             if HAS_BUMPS && bumps != NO_IMAGE {
                 let side = select(-1.0, 1.0, is_front);
-                let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
                 let normals = array(side * point.interpolated_normal, side * point.shading_normal);
-                lit = in_relief(lit, bumps, place_m, normals);
+                lit = in_relief(lit, bumps, in_scene_m(point.place), normals);
             }
             if TRACES_LIGHTS {
                 lit += direct_irradiance(lit_point(point, is_front, gaze), objects[point.object]);

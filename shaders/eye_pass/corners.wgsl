@@ -30,6 +30,11 @@ struct SurfacePoint {
     map_density: f32,
 }
 
+// A local position in scene coordinates [m].
+fn in_scene_m(place: vec3f) -> vec3f {
+    return frame.camera_position + (place - start.eye) * start.unit_m;
+}
+
 fn corner_normal(corner: u32, object: ObjectRecord) -> vec3f {
     let normal = bitcast<vec3f>(vec3u(corners[6u * corner + 1u].y, corners[6u * corner + 2u]));
     return normal_in_scene(normal, object.row_x.xyz, object.row_y.xyz, object.row_z.xyz);
@@ -92,10 +97,9 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     if HAS_BUMPS {
         let record = object.bumps;
         if record != NO_IMAGE {
-            let place_m = frame.camera_position + (point.place - start.eye) * start.unit_m;
             let steps = array(triangle.b - triangle.a, triangle.c - triangle.a);
             let piece = Piece(steps, array(uv_b - uv_a, uv_c - uv_a), point.uvs, FINEST);
-            let bump = bump_at(record, place_m, piece, point.shading_normal);
+            let bump = bump_at(record, in_scene_m(point.place), piece, point.shading_normal);
             point.shading_normal = bent(point.shading_normal, bump.gradient);
             point.curvature -= 0.5 * bump.laplacian * start.unit_m;
         }

@@ -8,17 +8,17 @@ const WORDS_OF_LAMP: u32 = 16u;
 const MAX_GAIN: f32 = 4.0;
 const LUMINANCE: vec3f = vec3f(0.2126390, 0.7151687, 0.0721923);
 
-fn table_colour(at: u32) -> vec3f {
+fn table_vector(at: u32) -> vec3f {
     return vec3f(table_float(at), table_float(at + 1u), table_float(at + 2u));
 }
 
 fn lamp_at(at: u32) -> LightRecord {
     var lamp: LightRecord;
-    lamp.place = table_colour(at);
+    lamp.place = table_vector(at);
     lamp.kind = image_table[at + 3u];
-    lamp.strength = table_colour(at + 4u);
+    lamp.strength = table_vector(at + 4u);
     lamp.cos_inner = table_float(at + 7u);
-    lamp.axis = table_colour(at + 8u);
+    lamp.axis = table_vector(at + 8u);
     lamp.cos_outer = table_float(at + 11u);
     return lamp;
 }
@@ -26,8 +26,8 @@ fn lamp_at(at: u32) -> LightRecord {
 // Unoccluded irradiance of a surface [W/m²].
 fn sky_irradiance(record: u32, normal: vec3f) -> vec3f {
     let at = record + SKY_WORDS;
-    let change = mat3x3f(table_colour(at + 3u), table_colour(at + 6u), table_colour(at + 9u));
-    return max(table_colour(at) + change * normal, vec3f(0.0));
+    let change = mat3x3f(table_vector(at + 3u), table_vector(at + 6u), table_vector(at + 9u));
+    return max(table_vector(at) + change * normal, vec3f(0.0));
 }
 
 // The same from all lamps, for two normals.

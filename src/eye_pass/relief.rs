@@ -9,7 +9,7 @@
 use glam::DVec3;
 
 use crate::optics::LinearSrgb;
-use crate::scene::emitter::{Emitter, EmitterKind};
+use crate::scene::emitter::Emitter;
 use crate::scene::{Scene, SmoothIrradiance};
 
 /// Limit of the gain of lamp light. Where light grazes the surface bumps shadow each other, which is not known.
@@ -49,7 +49,7 @@ impl ReliefLights {
     /// E [W/m²] of a surface at a position [m] whose normal map bends its unit normal, given E of the smooth surface.
     pub fn shaded(&self, flat: LinearSrgb, position: DVec3, [normal, bent]: [DVec3; 2]) -> LinearSrgb {
         let [sky, bent_sky] = [normal, bent].map(|normal| self.sky.at(normal));
-        let [lamps, bent_lamps] = [normal, bent].map(|normal| self.of_lamps(position, normal));
+        let [lamps, bent_lamps] = self.of_lamps(position, [normal, bent]);
         let [luminance, of_sky, of_lamps] = [flat, sky, lamps].map(LinearSrgb::luminance);
         let share = |part: f64, whole: f64| {
             if whole > 0.0 {
@@ -65,31 +65,24 @@ impl ReliefLights {
         shaded.map(|channel| channel.max(0.0))
     }
 
-    /// E [W/m²] from all lamps without shadows.
-    fn of_lamps(&self, position: DVec3, normal: DVec3) -> LinearSrgb {
-        let mut sum = LinearSrgb::BLACK;
+    /// E [W/m²] from all lamps without shadows, for two normals.
+    fn of_lamps(&self, position: DVec3, normals: [DVec3; 2]) -> [LinearSrgb; 2] {
+        let mut sums = [LinearSrgb::BLACK; 2];
         for Emitter { kind, strength } in &self.emitters {
-            let (to_light, across_beam) = match (kind, kind.position()) {
-                (EmitterKind::Parallel { direction }, _) => (-*direction, 1.0),
-                (_, Some(place)) => {
-                    let offset = place - position;
-                    let to_light = offset.normalize_or_zero();
-                    (
-                        to_light,
-                        kind.falloff(-to_light) / offset.length_squared().max(1e-20),
-                    )
+            if let Some((to_light, _, across_beam)) = kind.seen_from(position, 0.0) {
+                for (sum, normal) in sums.iter_mut().zip(normals) {
+                    *sum += *strength * (across_beam * to_light.dot(normal).max(0.0));
                 }
-                (_, None) => continue,
-            };
-            sum += *strength * (across_beam * to_light.dot(normal).max(0.0));
+            }
         }
-        sum
+        sums
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::emitter::EmitterKind;
 
     const SUN: LinearSrgb = LinearSrgb::new(3.0, 2.0, 1.0);
 
@@ -139,7 +132,7 @@ mod tests {
     fn grazing_light_gains_little_and_light_from_nowhere_stays() {
         let lights = under_the_sun();
         let normal = DVec3::new(-0.79, 0.61, 0.08).normalize();
-        let lamps = lights.of_lamps(DVec3::ZERO, normal);
+        let [lamps, _] = lights.of_lamps(DVec3::ZERO, [normal, normal]);
         let flat = lamps + lights.sky.at(normal);
         let towards = DVec3::new(0.6, 0.8, 0.0);
         let gained = lights.shaded(flat, DVec3::ZERO, [normal, towards]) - lights.sky.at(towards);

@@ -64,6 +64,20 @@ impl EmitterKind {
         }
     }
 
+    /// Unit vector from a point [m] to the source, distance [m] (infinite for parallel light), and E at unit strength on
+    /// a surface there that faces the source; `None` at the source itself. A source that represents a patch of a surface
+    /// has the irradiance of a disc of its area [m²], which stays finite close by (Wallace, Elmquist and Haines, "A ray
+    /// tracing algorithm for progressive radiosity", SIGGRAPH 1989).
+    pub fn seen_from(&self, point: DVec3, patch_m2: f64) -> Option<(DVec3, f64, f64)> {
+        if let Self::Parallel { direction } = *self {
+            return Some((-direction, f64::INFINITY, 1.0));
+        }
+        let offset = self.position()? - point;
+        let to_light = offset.try_normalize()?;
+        let spread_m2 = offset.length_squared() + patch_m2 / std::f64::consts::PI;
+        Some((to_light, offset.length(), self.falloff(-to_light) / spread_m2))
+    }
+
     /// Axis and half-angle [rad] of the cone that contains all its light; `None` without such a cone.
     pub fn cone(&self) -> Option<(DVec3, f64)> {
         match *self {

@@ -73,22 +73,26 @@ impl Environment {
             total: 0.0,
             smooth: SmoothIrradiance::default(),
         };
+        let azimuth = |column: usize| ((column as f64 + 0.5) / width as f64 * TAU).sin_cos();
+        let azimuths: Vec<(f64, f64)> = (0..width).map(azimuth).collect();
         for row in 0..height {
             let solid_angle_sr = environment.pixel_solid_angle_sr(row);
             let mut sum = 0.0;
             let start = environment.columns.len();
             let (sine, cosine) = ((row as f64 + 0.5) / height as f64 * PI).sin_cos();
-            for column in 0..width {
+            let mut along = [LinearSrgb::BLACK; 3];
+            for (column, (across, ahead)) in azimuths.iter().enumerate() {
                 let pixel = environment.pixel(column, row);
                 sum += pixel.luminance();
                 environment.columns.push(sum);
-                let azimuth = (column as f64 + 0.5) / width as f64 * TAU;
-                let to_light = [sine * azimuth.sin(), cosine, -sine * azimuth.cos()];
-                let smooth = &mut environment.smooth;
-                smooth.mean += pixel * (0.25 * solid_angle_sr);
-                for (sum, share) in smooth.by_normal.iter_mut().zip(to_light) {
-                    *sum += pixel * (0.5 * solid_angle_sr * share);
-                }
+                along[0] += pixel * *across;
+                along[1] += pixel;
+                along[2] += pixel * -ahead;
+            }
+            let smooth = &mut environment.smooth;
+            smooth.mean += along[1] * (0.25 * solid_angle_sr);
+            for ((sum, along), share) in smooth.by_normal.iter_mut().zip(along).zip([sine, cosine, sine]) {
+                *sum += along * (0.5 * solid_angle_sr * share);
             }
             if sum > 0.0 {
                 environment.columns[start..]
@@ -277,6 +281,20 @@ mod tests {
         let ground = sky.radiance(DVec3::NEG_Y).luminance();
         let expected = 0.2 / PI * (6.0 * to_sun.y + 1.0);
         assert!((ground / expected - 1.0).abs() < 1e-6, "{ground} {expected}");
+    }
+
+    #[test]
+    fn half_a_sky_lights_surfaces_by_their_tilt() {
+        let pixels = (0..64 * 32).map(|index| [f32::from(u8::from(index < 64 * 16)); 3]);
+        let sky = Environment::new(64, 32, pixels.collect()).expect("a sound image");
+        for normal in [DVec3::Y, DVec3::NEG_Y, DVec3::X, DVec3::new(0.6, 0.8, 0.0)] {
+            let found = sky.smooth_irradiance().at(normal).luminance();
+            let expected = 0.5 * PI * (1.0 + normal.y);
+            assert!(
+                (found - expected).abs() < 2e-3 * PI,
+                "{normal}: {found} for {expected}"
+            );
+        }
     }
 
     #[test]

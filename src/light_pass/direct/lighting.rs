@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::facet::SurfacePoint;
 use super::surroundings::MediumAround;
 use crate::optics::LinearSrgb;
-use crate::scene::emitter::{Emitter, EmitterKind};
+use crate::scene::emitter::Emitter;
 use crate::transport::DiffuseResponse;
 
 /// Light that arrives at a point, whatever surface is there.
@@ -25,20 +25,9 @@ impl IncidentLight {
         Self::of_patch(emitter, point, 0.0)
     }
 
-    /// A source that represents a patch of a surface. Irradiance is that of a disc of its area [m²], which stays finite
-    /// close by (Wallace, Elmquist and Haines, "A ray tracing algorithm for progressive radiosity", SIGGRAPH 1989).
+    /// A source that represents a patch of a surface: see [`EmitterKind::seen_from`](crate::scene::emitter::EmitterKind::seen_from).
     pub fn of_patch(emitter: &Emitter, point: DVec3, patch_m2: f64) -> Option<Self> {
-        let (to_light, distance_m, across_beam) = match (emitter.kind, emitter.kind.position()) {
-            (EmitterKind::Parallel { direction }, _) => (-direction, f64::INFINITY, 1.0),
-            (kind, Some(position)) => {
-                let offset = position - point;
-                let to_light = offset.try_normalize()?;
-                let share = kind.falloff(-to_light);
-                let spread_m2 = offset.length_squared() + patch_m2 / std::f64::consts::PI;
-                (to_light, offset.length(), share / spread_m2)
-            }
-            (_, None) => return None,
-        };
+        let (to_light, distance_m, across_beam) = emitter.kind.seen_from(point, patch_m2)?;
         Some(Self {
             to_light,
             distance_m,
