@@ -124,8 +124,7 @@ impl CausticLayer<'_> {
     pub(super) fn carrier(&self, light: &VisibleLight) -> Carrier {
         match self.settings.estimator {
             Estimator::Photon => Carrier::Photons,
-            Estimator::Auto if self.settings.max_error.is_none() || self.is_soft(light) => Carrier::Photons,
-            Estimator::Auto => Carrier::Undecided,
+            Estimator::Auto => Carrier::Photons,
             Estimator::Wavefront => Carrier::Patches,
             Estimator::Splat => Carrier::Splats,
         }
@@ -253,7 +252,7 @@ fn are_photons_in_time(light: &LightProgress, context: &BakeContext) -> bool {
     let photons = light
         .rival
         .as_ref()
-        .and_then(|rival| rival.key.photons)
+        .and_then(|rival| rival.key.photons?.count())
         .unwrap_or(0);
     let (Some(&(0, of_photons)), Some(&(_, of_patches))) = (light.shares.first(), light.shares.last()) else {
         return false;
@@ -287,6 +286,6 @@ fn promised(light: &LightProgress, per_photon: f64, most_share: f64) -> Option<f
 fn photon_segments(level: &LightLevel) -> Option<(f64, f64)> {
     let rmse = level.error.as_ref()?.estimate.relative_rmse;
     let segments = level.work.0 as f64;
-    let photons = HALVES as f64 * f64::from(level.key.photons?);
+    let photons = HALVES as f64 * f64::from(level.key.photons?.count()?);
     (rmse > 0.0).then_some((segments, segments / photons))
 }

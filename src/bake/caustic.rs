@@ -507,7 +507,7 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> Result<()> {
         let predecessors = light.levels.len().min(ESTIMATED_LEVELS - 1);
-        let auditors = light.rival.as_ref().and_then(|rival| rival.key.photons);
+        let auditors = light.rival.as_ref().and_then(|rival| rival.key.photons?.count());
         let is_known = |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
         if !level.error.as_ref().is_some_and(is_known) && !context.control.is_cancelled() {
             let estimate = self.error_of(light, &level, context)?;
@@ -540,8 +540,7 @@ impl CausticLayer<'_> {
     pub(super) fn has_next_level(&self, light: &LightProgress) -> bool {
         match light.carrier {
             Carrier::Photons => {
-                let next = self.next_photons(light.visible, light.levels.last(), light.target_rmse);
-                next.is_some()
+                self.next_aim(light.visible, light.levels.last(), light.target_rmse).is_some()
             }
             _ => light.levels.len() < self.lattices(light.visible).len(),
         }

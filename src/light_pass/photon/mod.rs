@@ -4,12 +4,15 @@
 //! averaged over an extended light, a photon still costs one path. Point of the lamp, micro-normals and wavelength are
 //! dimensions of the path. Bundles carry coherent light, photons the difference.
 
-mod bundles;
+mod bundle;
 mod cells;
+mod edge;
 pub mod filter;
 pub mod launch;
 pub mod pass;
+mod paths;
+pub mod residual;
 pub mod spectrum;
 pub mod spheres;
-mod survey;
+mod squares;
 pub mod walk;
