@@ -23,7 +23,13 @@ const FIRST_GOAL: f64 = 0.2;
 const AIM: f64 = 0.92;
 
 /// Minimum and maximum of a goal relative to the one before.
-const STEPS: (f64, f64) = (0.15, 0.8);
+const STEPS: (f64, f64) = (0.08, 0.8);
+
+/// A goal so much larger than the target tells little about it.
+const FAR: f64 = 2.5;
+
+/// Largest goal relative to a target that is still far: filtered light has less noise than planned.
+const MAX_SLACK: f64 = 1.7;
 
 /// Noise below this fraction of the goal is low enough, whatever else the error contains.
 const MIN_NOISE: f64 = 0.7;
@@ -54,8 +60,14 @@ impl CausticLayer<'_> {
         let truncated = accuracy::truncated_share(&last.energy());
         let noise2 = error * error - truncated * truncated;
         let wanted2 = (target * target - truncated * truncated).max((MIN_NOISE * target).powi(2));
-        let ratio = AIM * (wanted2 / noise2).sqrt();
-        (noise2 > wanted2).then_some(before * ratio.clamp(STEPS.0, STEPS.1))
+        // What photons found is in the plan already. If it was not enough, the goal makes up for the rest.
+        let scaled = AIM * before * (wanted2 / noise2).sqrt();
+        let next = if before > FAR * target {
+            scaled.clamp(AIM * target, MAX_SLACK * target)
+        } else {
+            scaled
+        };
+        (noise2 > wanted2).then_some(next.clamp(STEPS.0 * before, STEPS.1 * before))
     }
 
     /// The level of a light with a goal; `None` if it was stopped.

@@ -11,6 +11,7 @@ pub mod filter;
 pub mod launch;
 pub mod pass;
 mod paths;
+mod receivers;
 pub mod residual;
 pub mod spectrum;
 pub mod spheres;

@@ -2,16 +2,15 @@
 //! bit.
 
 use std::ops::Range;
-use std::sync::{Arc, OnceLock};
 
-use glam::DVec2;
 use rayon::prelude::*;
 
 use super::launch::PhotonLaunch;
+use super::receivers::Receivers;
 use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk};
 use crate::geometry::sampling::GOLDEN_64;
 use crate::illumination::accumulator::FluxCount;
-use crate::illumination::{Chart, Receiver};
+use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
@@ -62,9 +61,6 @@ impl Block {
     }
 }
 
-/// Charts requested so far, by receiver.
-pub(super) type KnownCharts = Vec<OnceLock<Option<Arc<Chart>>>>;
-
 impl PhotonPass<'_> {
     /// Traces the photons of both halves with these indices, or a shard of their blocks. Each half has one set of maps,
     /// or one for each band.
@@ -83,8 +79,7 @@ impl PhotonPass<'_> {
             .filter(|(number, _)| share.is_none_or(|share| share.has(*number as u64)))
             .map(|(_, block)| block)
             .collect();
-        let objects = self.rules.tracer.scene().objects.len();
-        let charts: KnownCharts = Receiver::all(objects).map(|_| OnceLock::new()).collect();
+        let receivers = Receivers::new(self.rules.tracer.scene().objects.len(), self.chart_for);
         let mut report = PassReport::default();
         let mut waiting: Vec<Block> = Vec::new();
         for chunk in blocks.chunks(BLOCKS_AT_ONCE).chain([&[][..]]) {
@@ -94,7 +89,7 @@ impl PhotonPass<'_> {
                     let cancelled = listener.control.is_cancelled();
                     let own = (first..indices.end).step_by(stride as usize);
                     let own = own.filter(|index| *index >= indices.start);
-                    (!cancelled).then(|| self.block(half, own, &charts))
+                    (!cancelled).then(|| self.block(half, own, &receivers))
                 };
                 chunk.par_iter().filter_map(of).collect()
             };
@@ -122,7 +117,7 @@ impl PhotonPass<'_> {
         &self,
         half: usize,
         indices: impl Iterator<Item = u32>,
-        charts: &KnownCharts,
+        receivers: &Receivers,
     ) -> Block {
         let rules = PhotonRules {
             seed: half_seed(self.rules.seed, half),
@@ -143,7 +138,7 @@ impl PhotonPass<'_> {
             let start = self.launch.start(index, place, rules.seed);
             walk.follow(index, start, Followed::default(), |hit| {
                 let count = rules.unit.count(hit.flux_w);
-                match self.texel(&hit, charts) {
+                match texel(&hit, receivers) {
                     Some(texel) => {
                         placed.book(Account::Deposited, count);
                         block.deposits.push(Deposit {
@@ -162,27 +157,19 @@ impl PhotonPass<'_> {
         block.segments = walk.segments;
         block
     }
+}
 
-    /// The texel that a hit lies in; `None` without a map, or if the texel has no surface.
-    fn texel(&self, hit: &Hit, charts: &KnownCharts) -> Option<u32> {
-        let chart = self.chart(hit.receiver, charts)?;
-        let size = DVec2::new(chart.width as f64, chart.height as f64);
-        let place = match hit.place {
-            PhotonArrival::Surface {
-                triangle,
-                barycentric,
-            } => chart.uv(triangle, barycentric) * size,
-            PhotonArrival::Map { place, .. } => place,
-        };
-        let place = place.clamp(DVec2::ZERO, size - 0.5);
-        let texel = chart.texel_at(place.x as usize, place.y as usize);
-        (chart.texel_area_m2(texel) > 0.0).then_some(texel as u32)
-    }
-
-    fn chart<'c>(&self, receiver: Receiver, charts: &'c KnownCharts) -> Option<&'c Chart> {
-        let chart = charts[receiver.index()].get_or_init(|| (self.chart_for)(receiver));
-        chart.as_deref()
-    }
+/// The texel that a hit lies in; `None` without a map, or if the texel has no surface.
+fn texel(hit: &Hit, receivers: &Receivers) -> Option<u32> {
+    let chart = receivers.get(hit.receiver)?;
+    let place = match hit.place {
+        PhotonArrival::Surface {
+            triangle,
+            barycentric,
+        } => chart.place(triangle, barycentric),
+        PhotonArrival::Map { place, .. } => place,
+    };
+    chart.texel_at(place)
 }
 
 /// Adds what blocks deposit to the maps of their halves.

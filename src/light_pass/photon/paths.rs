@@ -3,10 +3,11 @@
 use glam::DVec2;
 
 use super::launch::{LAMP_MIDDLE, PhotonLaunch};
+use super::receivers::Receivers;
 use super::spectrum::PhotonSpectrum;
 use super::walk::PhotonRules;
 use crate::geometry::Ray;
-use crate::illumination::{Chart, Receiver, Side};
+use crate::illumination::{Receiver, Side};
 use crate::light_pass::path::PathSignature;
 use crate::optics::LinearSrgb;
 use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
@@ -129,7 +130,7 @@ struct QueuedLight {
 pub(super) struct PathFinder<'a> {
     pub(super) launch: &'a PhotonLaunch<'a>,
     pub(super) rules: PhotonRules<'a>,
-    pub(super) chart_of: &'a (dyn Fn(Receiver) -> Option<&'a Chart> + Sync),
+    pub(super) receivers: &'a Receivers<'a>,
 }
 
 impl PathFinder<'_> {
@@ -257,10 +258,9 @@ impl PathFinder<'_> {
     /// The end of a path at a hit; `None` on a surface without a map.
     fn end(&self, light: &QueuedLight, hit: &SurfaceHit) -> Option<PathEnd> {
         let receiver = Receiver::new(hit.object, Side::met(light.ray.direction, hit.geometric_normal));
-        let chart = (self.chart_of)(receiver)?;
-        let islands = chart.islands();
+        let chart = self.receivers.get(receiver)?;
+        let islands = chart.chart.islands();
         let island = islands.map_or(0, |islands| islands.of_triangle(hit.triangle));
-        let size = DVec2::new(chart.width as f64, chart.height as f64);
         Some(PathEnd {
             route: Route {
                 signature: light.signature.at(receiver.index(), island),
@@ -269,7 +269,7 @@ impl PathFinder<'_> {
                 island,
                 is_dispersed: light.is_dispersed,
             },
-            place: chart.uv(hit.triangle, hit.barycentric) * size,
+            place: chart.place(hit.triangle, hit.barycentric),
             flux_w: LinearSrgb::BLACK,
         })
     }

@@ -9,7 +9,7 @@
 //! A photon that arrives near its prediction changes both places by bilinear weights, so that the noise of the
 //! difference is proportional to its length. Bundles are deposited once; halves hold photons alone.
 
-use std::sync::OnceLock;
+use std::collections::BTreeMap;
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -17,13 +17,14 @@ use rayon::prelude::*;
 use super::bundle::{Bundle, Origin, flux_triangle};
 use super::edge;
 use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE, PhotonLaunch, Start};
-use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, KnownCharts, deposit_blocks, half_seed, set_of};
+use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed, set_of};
 use super::paths::PathFinder;
+use super::receivers::{MeasuredChart, Receivers};
 use super::spectrum::Hue;
 use super::squares::{Found, LitCells, Square, Squares, Surveyor};
 use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk, WAVELENGTH_DIMENSION};
 use crate::geometry::sampling::{GOLDEN_64, even_point, in_square, mix64};
-use crate::illumination::{Chart, Receiver};
+use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
@@ -34,8 +35,12 @@ use crate::progress::Stage;
 /// All flux is counted so many times, in bundles and in each half: enough that rounding to counts does not matter.
 pub const TIMES: u32 = 1 << 20;
 
-/// Part of the squared goal that the deposit of bundles may err: curves laid down as chords, slopes as steps.
-const DEPOSIT_PART: f64 = 0.15;
+/// Part of the squared goal that the deposit of bundles may err by its plan: curves laid down as chords, slopes as
+/// steps.
+const DEPOSIT_PART: f64 = 0.5;
+
+/// Squared error that deposits have over the planned one: at most, on the scenes with a reference.
+const MEASURED_OVER_PLANNED: f64 = 0.25;
 
 /// Photons in a block, at least.
 const BLOCK_PHOTONS: u64 = 1 << 12;
@@ -88,19 +93,14 @@ impl ResidualPass<'_> {
     ) -> ResidualReport {
         let squares = &mut squares.0;
         let mut report = ResidualReport::default();
-        let objects = self.rules.tracer.scene().objects.len();
-        let charts: KnownCharts = Receiver::all(objects).map(|_| OnceLock::new()).collect();
-        let chart_of = |receiver: Receiver| {
-            let chart = charts[receiver.index()].get_or_init(|| (self.chart_for)(receiver));
-            chart.as_deref()
-        };
+        let receivers = Receivers::new(self.rules.tracer.scene().objects.len(), self.chart_for);
 
         // Squares, finer where photons would cost more.
         let watch = Stopwatch::start();
         let finder = PathFinder {
             launch: self.launch,
             rules: self.rules,
-            chart_of: &chart_of,
+            receivers: &receivers,
         };
         let surveyor = Surveyor {
             finder,
@@ -111,7 +111,7 @@ impl ResidualPass<'_> {
         surveyor.refine(squares, goal);
         edge::finish(&finder, squares, &mut report.pass);
         report.pass.rays += (squares.points.len() - before) as u64;
-        report.deposit_square = plan_deposits(squares, goal, &|receiver| weight(chart_of(receiver)));
+        report.deposit_square = plan_deposits(squares, goal, &receivers);
         report.pass.trace_s.add(watch.elapsed());
 
         let watch = Stopwatch::start();
@@ -123,8 +123,7 @@ impl ResidualPass<'_> {
             pass: self,
             squares,
             goal,
-            chart_of: &chart_of,
-            weights: Receiver::all(objects).map(|receiver| weight(chart_of(receiver))).collect(),
+            receivers: &receivers,
         };
         let found = photons.run(&mut maps.halves, &mut report.pass, listener);
         for (square, found) in squares.squares.iter_mut().zip(found) {
@@ -139,21 +138,21 @@ impl ResidualPass<'_> {
     /// Deposits all bundles into their own maps.
     fn deposit_bundles(&self, squares: &Squares, maps: &mut [ReceiverMaps], report: &mut PassReport) {
         for squares in squares.squares.chunks(SQUARES_AT_ONCE) {
-            let made: Vec<Vec<(usize, Receiver, FluxTriangle)>> = squares
+            let made: Vec<TrianglesByMap> = squares
                 .par_chunks(64)
                 .map(|squares| {
-                    let mut triangles = Vec::new();
+                    let mut triangles = TrianglesByMap::new();
                     squares.iter().for_each(|square| self.triangles(square, maps.len(), &mut triangles));
                     triangles
                 })
                 .collect();
-            let mut made: Vec<(usize, Receiver, FluxTriangle)> = made.into_iter().flatten().collect();
-            made.sort_by_key(|(set, receiver, _)| (*set, *receiver));
-            for run in made.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-                let (set, receiver) = (run[0].0, run[0].1);
+            let mut by_map = TrianglesByMap::new();
+            for (map, mut triangles) in made.into_iter().flatten() {
+                by_map.entry(map).or_default().append(&mut triangles);
+            }
+            for ((set, receiver), triangles) in by_map {
                 maps[set].touch(receiver, self.chart_for);
                 if let Some(map) = maps[set].get_mut(receiver) {
-                    let triangles: Vec<FluxTriangle> = run.iter().map(|(.., triangle)| *triangle).collect();
                     // Photons of both halves remove it.
                     let placed = deposit_triangles(&triangles, map).deposited.map(|count| HALVES as i128 * count);
                     report.ledger.book_sum(Account::Deposited, placed);
@@ -164,12 +163,21 @@ impl ResidualPass<'_> {
         }
     }
 
-    /// Adds the triangles of a square with the sets of maps that they belong to.
-    fn triangles(&self, square: &Square, sets: usize, triangles: &mut Vec<(usize, Receiver, FluxTriangle)>) {
+    /// Adds the triangles of a square.
+    fn triangles(&self, square: &Square, sets: usize, triangles: &mut TrianglesByMap) {
         // Neighbouring triangles sample lamp and spectrum at different points.
         let place = square.place.corner;
         let mut drawn = (place.x >> 10).wrapping_mul(0x9e37_79b1) ^ (place.y >> 10).wrapping_mul(0x85eb_ca6b);
         for bundle in &square.bundles {
+            let is_plain = self.rules.spectrum.is_none() && self.launch.lamp_offsets().is_none();
+            if is_plain {
+                let triangles = triangles.entry((0, bundle.receiver())).or_default();
+                bundle.triangles(square.place.area(), |corners, flux_w| {
+                    let flux = self.rules.unit.count(flux_w * f64::from(TIMES));
+                    triangles.push(flux_triangle(bundle, corners, flux));
+                });
+                continue;
+            }
             bundle.triangles(square.place.area(), |corners, flux_w| {
                 drawn = drawn.wrapping_add(1);
                 for part in self.parts(bundle, drawn) {
@@ -177,7 +185,8 @@ impl ResidualPass<'_> {
                     let moved = bundle.shift.at(&part.origin);
                     let corners = corners.map(|corner| corner + moved);
                     let triangle = flux_triangle(bundle, corners, self.rules.unit.count(flux_w));
-                    triangles.push((set_of(part.hue.band, sets), bundle.receiver(), triangle));
+                    let map = (set_of(part.hue.band, sets), bundle.receiver());
+                    triangles.entry(map).or_default().push(triangle);
                 }
             });
         }
@@ -217,6 +226,9 @@ impl ResidualPass<'_> {
     }
 }
 
+/// Triangles by set of maps and receiver.
+type TrianglesByMap = BTreeMap<(usize, Receiver), Vec<FluxTriangle>>;
+
 /// A sample of lamp and wavelength.
 struct Part<'a> {
     origin: Origin,
@@ -225,13 +237,8 @@ struct Part<'a> {
     share: f64,
 }
 
-/// Weight of flux on a receiver [1/m]: errors of texels are relative to the root of their area.
-fn weight(chart: Option<&Chart>) -> f64 {
-    chart.map_or(0.0, |chart| (chart.texel_count() as f64 / chart.area_m2()).sqrt())
-}
-
 /// Chooses how finely each bundle is deposited. Returns the squared relative error that this leaves.
-fn plan_deposits(squares: &mut Squares, goal: f64, weight: &(dyn Fn(Receiver) -> f64 + Sync)) -> f64 {
+fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receivers) -> f64 {
     let relative = squares.plan.relative;
     let bundles: usize = squares.squares.iter().map(|square| square.bundles.len()).sum();
     if relative <= 0.0 {
@@ -241,12 +248,12 @@ fn plan_deposits(squares: &mut Squares, goal: f64, weight: &(dyn Fn(Receiver) ->
     let of_square = |square: &mut Square| -> f64 {
         let mut left = 0.0;
         for bundle in &mut square.bundles {
-            left += bundle.plan_deposit(weight(bundle.receiver()), allowed);
+            left += bundle.plan_deposit(receivers.weight(bundle.receiver()), allowed);
         }
         left
     };
     let left: Vec<f64> = squares.squares.par_iter_mut().map(of_square).collect();
-    left.iter().sum::<f64>() * relative
+    left.iter().sum::<f64>() * relative * MEASURED_OVER_PLANNED
 }
 
 /// Traces residual photons.
@@ -254,9 +261,7 @@ struct ResidualPhotons<'a> {
     pass: &'a ResidualPass<'a>,
     squares: &'a Squares,
     goal: f64,
-    chart_of: &'a (dyn Fn(Receiver) -> Option<&'a Chart> + Sync),
-    /// By receiver [1/m].
-    weights: Vec<f64>,
+    receivers: &'a Receivers<'a>,
 }
 
 /// Photons of one half of a square.
@@ -266,6 +271,8 @@ struct Draw {
     ledger: LedgerSum,
     segments: u64,
     found: Found,
+    /// Of the photon that is traced.
+    removals: Vec<Removal>,
 }
 
 /// Which photons are drawn.
@@ -454,7 +461,7 @@ impl ResidualPhotons<'_> {
                 ..Origin::default()
             },
         };
-        let mut removals: Vec<Removal> = Vec::new();
+        let mut removals = std::mem::take(&mut draw.removals);
         let mut maps = Changes {
             photons: self,
             draw,
@@ -475,9 +482,10 @@ impl ResidualPhotons<'_> {
                 barycentric,
             } => maps.arrive(&hit, (triangle, barycentric), &mut removals),
         });
-        for removal in removals {
+        for removal in removals.drain(..) {
             maps.remove(&removal);
         }
+        draw.removals = removals;
     }
 }
 
@@ -492,10 +500,10 @@ struct Changes<'a, 'p> {
 impl Changes<'_, '_> {
     /// A photon arrives on a surface, perhaps close to one of its predictions.
     fn arrive(&mut self, hit: &Hit, (triangle, barycentric): (usize, [f64; 3]), removals: &mut Vec<Removal>) {
-        let Some(chart) = (self.photons.chart_of)(hit.receiver) else {
+        let Some(chart) = self.photons.receivers.get(hit.receiver) else {
             return self.fail(hit.flux_w);
         };
-        let place = chart.uv(triangle, barycentric) * size(chart);
+        let place = chart.place(triangle, barycentric);
         let mut nearest: Option<(usize, f64)> = None;
         for (number, removal) in removals.iter().enumerate() {
             let distance = (removal.place - place).abs().max_element();
@@ -509,33 +517,33 @@ impl Changes<'_, '_> {
                 let removal = removals.swap_remove(number);
                 self.shift(chart, hit, place, &removal);
             }
-            Some((number, _)) if texel_at(chart, place) == texel_at(chart, removals[number].place) => {
+            Some((number, _)) if chart.texel_at(place) == chart.texel_at(removals[number].place) => {
                 let removal = removals.swap_remove(number);
                 self.book_removal(removal.hit.flux_w);
                 let both = Hit {
                     flux_w: hit.flux_w + removal.hit.flux_w,
                     ..*hit
                 };
-                self.put(&both, texel_at(chart, place));
+                self.put(&both, chart.texel_at(place));
             }
-            _ => self.put(hit, texel_at(chart, place)),
+            _ => self.put(hit, chart.texel_at(place)),
         }
     }
 
     /// Removes flux that did not arrive.
     fn remove(&mut self, removal: &Removal) {
         self.book_removal(removal.hit.flux_w);
-        match (self.photons.chart_of)(removal.hit.receiver) {
-            Some(chart) => self.put(&removal.hit, texel_at(chart, removal.place)),
+        match self.photons.receivers.get(removal.hit.receiver) {
+            Some(chart) => self.put(&removal.hit, chart.texel_at(removal.place)),
             None => self.fail(removal.hit.flux_w),
         }
     }
 
     /// Moves flux from a prediction to where it arrived, by bilinear weights.
-    fn shift(&mut self, chart: &Chart, hit: &Hit, place: DVec2, removal: &Removal) {
+    fn shift(&mut self, chart: &MeasuredChart, hit: &Hit, place: DVec2, removal: &Removal) {
         self.book_removal(removal.hit.flux_w);
-        let added = tent(chart, place, removal.island);
-        let removed = tent(chart, removal.place, removal.island);
+        let added = chart.tent(place, removal.island);
+        let removed = chart.tent(removal.place, removal.island);
         let mut changes: [(Option<u32>, LinearSrgb); 8] = [(None, LinearSrgb::BLACK); 8];
         let mut count = 0;
         for (tent, flux_w) in [(added, hit.flux_w), (removed, removal.hit.flux_w)] {
@@ -564,7 +572,7 @@ impl Changes<'_, '_> {
         let count = self.photons.pass.rules.unit.count(hit.flux_w);
         self.draw.ledger.book(Account::Deposited, count);
         let [r, g, b] = hit.flux_w.to_array().map(f64::abs);
-        let flux = r.max(g).max(b) * self.whole * self.photons.weights[hit.receiver.index()];
+        let flux = r.max(g).max(b) * self.whole * self.photons.receivers.weight(hit.receiver);
         self.draw.found.squares += flux * flux;
         self.draw.deposits.push(Deposit {
             receiver: hit.receiver,
@@ -584,39 +592,4 @@ impl Changes<'_, '_> {
         let count = self.photons.pass.rules.unit.count(flux_w);
         self.draw.ledger.book(Account::Unresolved, count);
     }
-}
-
-/// Texels across and down.
-fn size(chart: &Chart) -> DVec2 {
-    DVec2::new(chart.width as f64, chart.height as f64)
-}
-
-/// The texel of a place on a map; `None` if it has no surface.
-fn texel_at(chart: &Chart, place: DVec2) -> Option<u32> {
-    let place = place.clamp(DVec2::ZERO, size(chart) - 0.5);
-    let texel = chart.texel_at(place.x as usize, place.y as usize);
-    (chart.texel_area_m2(texel) > 0.0).then_some(texel as u32)
-}
-
-/// The four texels around a place with bilinear weights. Texels beyond the border or of other islands leave their weight
-/// to the one that holds the place.
-fn tent(chart: &Chart, place: DVec2, island: u32) -> [(Option<u32>, f64); 4] {
-    let own = texel_at(chart, place);
-    let low = (place - 0.5).floor();
-    let part = place - 0.5 - low;
-    let mut tent = [(own, 0.0); 4];
-    for (corner, (texel, weight)) in tent.iter_mut().enumerate() {
-        let (right, down) = ((corner % 2) as f64, (corner / 2) as f64);
-        let at = low + DVec2::new(right, down);
-        *weight = (1.0 - (right - part.x).abs()) * (1.0 - (down - part.y).abs());
-        let is_inside = at.cmpge(DVec2::ZERO).all() && at.cmplt(size(chart)).all();
-        let is_ours = || {
-            let islands = chart.islands();
-            islands.is_none_or(|islands| islands.covers(at.x as usize, at.y as usize, island))
-        };
-        if is_inside && is_ours() {
-            *texel = texel_at(chart, at).or(own);
-        }
-    }
-    tent
 }

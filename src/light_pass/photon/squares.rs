@@ -14,7 +14,6 @@ use super::bundle::{Bundle, Image, MEAN_WEIGHTS, Node, Shape, biquadratic};
 use super::launch::PhotonLaunch;
 use super::paths::{Chain, PathEnd, PathFinder, PointPaths, Route};
 use crate::geometry::sampling::{GOLDEN_64, mix64};
-use crate::illumination::Receiver;
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
 use crate::progress::Control;
 
@@ -454,14 +453,6 @@ impl Surveyor<'_> {
         points.extend(traced);
     }
 
-    /// Weight of flux on a receiver [1/m]: errors of texels are relative to the root of their area.
-    fn weight(&self, receiver: Receiver) -> f64 {
-        let Some(chart) = (self.finder.chart_of)(receiver) else {
-            return 0.0;
-        };
-        (chart.texel_count() as f64 / chart.area_m2()).sqrt()
-    }
-
     /// How many photons each square needs, as its bundles and the photons so far tell.
     fn plan(&self, squares: &Squares, goal: f64) -> Plan {
         let mut plan = Plan {
@@ -479,7 +470,7 @@ impl Surveyor<'_> {
             plan.arriving_w += square.arriving_w;
             for bundle in &square.bundles {
                 receivers.insert(bundle.receiver());
-                weighted_w += bundle.flux_w * self.weight(bundle.receiver());
+                weighted_w += bundle.flux_w * self.finder.receivers.weight(bundle.receiver());
             }
         }
         if plan.arriving_w <= 0.0 {
@@ -488,9 +479,9 @@ impl Surveyor<'_> {
         plan.lost_weight = weighted_w / plan.arriving_w;
         let mut area_m2 = 0.0;
         for receiver in receivers {
-            if let Some(chart) = (self.finder.chart_of)(receiver) {
-                area_m2 += chart.area_m2();
-                plan.texels += chart.texel_count() as f64;
+            if let Some(chart) = self.finder.receivers.get(receiver) {
+                area_m2 += chart.area_m2;
+                plan.texels += chart.chart.texel_count() as f64;
             }
         }
         plan.relative = area_m2 / (plan.arriving_w * plan.arriving_w);
@@ -570,7 +561,7 @@ impl Surveyor<'_> {
         }
         square.arriving_w += flux_w;
         let mut bundle = Bundle::new(route, flux_w);
-        let root = flux_w * self.weight(route.receiver);
+        let root = flux_w * self.finder.receivers.weight(route.receiver);
         let left: f64;
         if ends.iter().all(Option::is_some) {
             let nodes: [Node; 9] = std::array::from_fn(|node| Node::of(ends[node].expect("all are there")));
