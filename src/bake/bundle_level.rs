@@ -28,9 +28,6 @@ const STEPS: (f64, f64) = (0.08, 0.8);
 /// A goal so much larger than the target tells little about it.
 const FAR: f64 = 2.5;
 
-/// Largest goal relative to a target that is still far: filtered light has less noise than planned.
-const MAX_SLACK: f64 = 1.7;
-
 /// Noise below this fraction of the goal is low enough, whatever else the error contains.
 const MIN_NOISE: f64 = 0.7;
 
@@ -49,7 +46,8 @@ impl CausticLayer<'_> {
 
     /// Goal of the level after `last`, towards a relative RMSE; `None` if nothing is left to do.
     pub(super) fn next_goal(&self, last: Option<&LightLevel>, target: f64) -> Option<f64> {
-        let Some((last, PhotonAim::Goal(before))) = last.and_then(|last| Some((last, last.key.photons?))) else {
+        let Some((last, PhotonAim::Goal(before))) = last.and_then(|last| Some((last, last.key.photons?)))
+        else {
             return Some(FIRST_GOAL.max(AIM * target));
         };
         let error = last.error.as_ref().map(|error| error.estimate.relative_rmse);
@@ -60,10 +58,11 @@ impl CausticLayer<'_> {
         let truncated = accuracy::truncated_share(&last.energy());
         let noise2 = error * error - truncated * truncated;
         let wanted2 = (target * target - truncated * truncated).max((MIN_NOISE * target).powi(2));
-        // What photons found is in the plan already. If it was not enough, the goal makes up for the rest.
+        // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the target
+        // is near.
         let scaled = AIM * before * (wanted2 / noise2).sqrt();
         let next = if before > FAR * target {
-            scaled.clamp(AIM * target, MAX_SLACK * target)
+            scaled.max(AIM * target)
         } else {
             scaled
         };
@@ -168,7 +167,8 @@ impl CausticLayer<'_> {
 /// Limits a goal to what the remaining time allows, because an interrupted level is lost: time grows with the inverse
 /// square of the goal. The first level is not limited.
 fn in_time(goal: f64, before: Option<f64>, state: &LightState, context: &BakeContext) -> f64 {
-    let (Some(before), Some(left_s), Some(took_s)) = (before, context.control.time_left_s(), state.goal_s) else {
+    let (Some(before), Some(left_s), Some(took_s)) = (before, context.control.time_left_s(), state.goal_s)
+    else {
         return goal;
     };
     let own_s = PART_OF_TIME * left_s / context.open_lights as f64;

@@ -84,7 +84,12 @@ impl CausticLayer<'_> {
     }
 
     /// Everything that a level depends on.
-    pub(super) fn key(&self, light: &LightProgress, photons: Option<PhotonAim>, context: &BakeContext) -> LevelKey {
+    pub(super) fn key(
+        &self,
+        light: &LightProgress,
+        photons: Option<PhotonAim>,
+        context: &BakeContext,
+    ) -> LevelKey {
         let lattices = self.lattices(light.visible);
         // Photons are not refined.
         let (step, rounds, goal, is_underrated) = match photons {

@@ -120,8 +120,6 @@ pub(super) struct LightLevel {
     /// Work of the level if nothing were cached: cells of patches and receiver queries, or closest-hit queries of
     /// photons and 0.
     pub(super) work: (u64, u64),
-    /// Share of the patches' flux that concentrates a part of the spectrum in one place.
-    pub(super) lumped_share: f64,
     /// Paths that can be deposited again; `None` if they were too large to keep.
     pub(super) traced: Option<TracedLight>,
     /// Whether the maps include the light's colour.
@@ -150,8 +148,6 @@ impl PhotonSums {
 pub(super) struct KeptError {
     /// Number of coarser levels that it is based on.
     pub(super) predecessors: usize,
-    /// Photons in each half that audited the patches.
-    pub(super) auditors: Option<u32>,
     pub(super) estimate: LightError,
 }
 

@@ -10,7 +10,7 @@ use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::accuracy::{self, Images, LightError};
+use crate::light_pass::accuracy;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::ProgressScope;
 use crate::light_pass::photon::filter;
@@ -193,7 +193,10 @@ impl CausticLayer<'_> {
             PhotonAim::Goal(goal) => return self.next_bundles(light, last.as_deref(), goal, context),
             PhotonAim::Count(photons) => photons,
         };
-        let before = last.as_ref().and_then(|last| last.key.photons?.count()).unwrap_or(0);
+        let before = last
+            .as_ref()
+            .and_then(|last| last.key.photons?.count())
+            .unwrap_or(0);
         let photons = in_time(photons, before, &light.state, context);
         let key = self.key(light, Some(PhotonAim::Count(photons)), context);
         match light.state.take(&key) {
@@ -220,7 +223,10 @@ impl CausticLayer<'_> {
         let photons = key.photons.and_then(PhotonAim::count).unwrap_or(FIRST_PHOTONS);
         let alike = |level: &&mut LightLevel| level.key.trace == key.trace && level.key.sizes == key.sizes;
         let earlier = before.filter(|level| alike(level) && level.photons.is_some());
-        let first = earlier.as_ref().and_then(|level| level.key.photons?.count()).unwrap_or(0);
+        let first = earlier
+            .as_ref()
+            .and_then(|level| level.key.photons?.count())
+            .unwrap_or(0);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
         let spectrum = self.spectra.photons(light.light);
@@ -284,7 +290,15 @@ impl CausticLayer<'_> {
         raw: PhotonSums,
         is_shard: bool,
     ) -> LightLevel {
-        let level = self.level_of_layers(light, (key, unit), Layers { bundles: None, photons: &raw }, 0.0);
+        let level = self.level_of_layers(
+            light,
+            (key, unit),
+            Layers {
+                bundles: None,
+                photons: &raw,
+            },
+            0.0,
+        );
         LightLevel {
             error: level.error.filter(|_| !is_shard),
             photons: Some(raw),
@@ -316,7 +330,13 @@ impl CausticLayer<'_> {
         let mut left = [0; 3];
         let noise = if self.settings.filters() {
             let halves = [&first, &second].map(|half| &**half);
-            filter::filter(&mut maps, halves, bundles.as_deref(), (unit, is_signed), &mut left)
+            filter::filter(
+                &mut maps,
+                halves,
+                bundles.as_deref(),
+                (unit, is_signed),
+                &mut left,
+            )
         } else {
             accuracy::half_set_noise(&accuracy::images(&first, unit), &accuracy::images(&second, unit))
         };
@@ -327,7 +347,10 @@ impl CausticLayer<'_> {
         for (band, more) in bands.iter_mut().zip(layers.photons.halves[1].bands()) {
             band.add(more);
         }
-        for (band, more) in bands.iter_mut().zip(layers.bundles.map_or(&[][..], BandMaps::bands)) {
+        for (band, more) in bands
+            .iter_mut()
+            .zip(layers.bundles.map_or(&[][..], BandMaps::bands))
+        {
             (0..HALVES).for_each(|_| band.add(more));
         }
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
@@ -336,7 +359,6 @@ impl CausticLayer<'_> {
             estimate.raise_to(estimate.relative_rmse.powi(2) + bundle_square);
             KeptError {
                 predecessors: 0,
-                auditors: None,
                 estimate,
             }
         });
@@ -359,27 +381,6 @@ impl CausticLayer<'_> {
     /// Maps of both halves, not divided by the number of photons.
     fn half_maps<'a>(&self, light: &VisibleLight, raw: &'a PhotonSums) -> [Cow<'a, ReceiverMaps>; HALVES] {
         [0, 1].map(|half| self.srgb_sum(light, &raw.halves[half]))
-    }
-
-    /// Raises the estimated error of a level of patches to what photons of the same light reveal: no difference between
-    /// levels shows what patches miss at every level.
-    pub(super) fn audit(
-        &self,
-        light: &VisibleLight,
-        patches: &Images,
-        photons: &LightLevel,
-        estimate: &mut LightError,
-    ) {
-        let Some(raw) = &photons.photons else {
-            return;
-        };
-        let unit = photons.unit.times(HALVES as f64);
-        let [first, second] = self
-            .half_maps(light, raw)
-            .map(|maps| accuracy::images(&maps, unit));
-        if let Some(square) = accuracy::audited_square(patches, [&first, &second]) {
-            estimate.raise_to(square);
-        }
     }
 
     /// Unit of a single photon's flux, for sums over the maximum number of photons.

@@ -250,7 +250,9 @@ impl Bundle {
                 let point = |column: usize, row: usize| DVec2::new(column as f64, row as f64) * step;
                 let row_of = |row: usize| -> Vec<Predicted> {
                     let columns = 0..=divisions;
-                    columns.map(|column| biquadratic(nodes, point(column, row))).collect()
+                    columns
+                        .map(|column| biquadratic(nodes, point(column, row)))
+                        .collect()
                 };
                 let triangle_area = 0.5 * area * step * step;
                 let mut above = row_of(0);
@@ -369,7 +371,10 @@ impl Image {
             let diagonal = place(d) - place(a);
             let down = place(c) - place(a);
             let quarter = 0.5 * (across.perp_dot(diagonal).abs() + diagonal.perp_dot(down).abs());
-            let flux_w: f64 = [a, b, c, d].iter().map(|&node| nodes[node].flux_w().max_channel()).sum();
+            let flux_w: f64 = [a, b, c, d]
+                .iter()
+                .map(|&node| nodes[node].flux_w().max_channel())
+                .sum();
             let light = flux_w / quarter.max(1e-12);
             darkest = darkest.min(light);
             brightest = brightest.max(light);
@@ -396,7 +401,10 @@ impl Image {
     /// Squared error that a deposit in n² parts of this flux leaves, and the least n for which it is at most
     /// `allowed`: chords in the place of curves, and even light in each triangle.
     fn divisions(&self, flux: f64, allowed: f64) -> (usize, f64) {
-        let least = (self.bend / MAX_CHORD_TEXELS).sqrt().ceil().clamp(1.0, MAX_DIVISIONS as f64) as usize;
+        let least = (self.bend / MAX_CHORD_TEXELS)
+            .sqrt()
+            .ceil()
+            .clamp(1.0, MAX_DIVISIONS as f64) as usize;
         let error = |divisions: usize| {
             let parts = divisions as f64;
             let chord = self.bend / (parts * parts);
@@ -409,7 +417,9 @@ impl Image {
             };
             flux * flux / self.spread_texels() * (moved * moved + shade * shade)
         };
-        let divisions = (least..MAX_DIVISIONS).find(|&n| error(n) <= allowed).unwrap_or(MAX_DIVISIONS);
+        let divisions = (least..MAX_DIVISIONS)
+            .find(|&n| error(n) <= allowed)
+            .unwrap_or(MAX_DIVISIONS);
         (divisions, error(divisions))
     }
 }
@@ -420,5 +430,88 @@ pub(super) fn flux_triangle(bundle: &Bundle, corners: [DVec2; 3], flux: [i64; 3]
         corners,
         flux,
         island: bundle.route.island,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::even_point;
+    use crate::light_pass::path::PathSignature;
+    use crate::light_pass::photon::paths::Chain;
+
+    /// Nodes of a square whose place and flux are these functions.
+    fn nodes(place: impl Fn(DVec2) -> DVec2, flux_w: impl Fn(DVec2) -> f64) -> Box<[Node; 9]> {
+        Box::new(std::array::from_fn(|node| {
+            let within = DVec2::new((node % 3) as f64, (node / 3) as f64) * 0.5;
+            Node {
+                place: place(within).as_vec2(),
+                flux_w: [flux_w(within) as f32; 3],
+            }
+        }))
+    }
+
+    fn route() -> Route {
+        Route {
+            signature: PathSignature::default(),
+            chain: Chain::default(),
+            receiver: Receiver::front(0),
+            island: 0,
+            is_dispersed: false,
+        }
+    }
+
+    fn curved(within: DVec2) -> DVec2 {
+        let DVec2 { x, y } = within;
+        DVec2::new(
+            3.0 + 5.0 * x - 2.0 * x * x + x * y,
+            1.0 + 4.0 * y + y * y - 0.5 * x * y,
+        )
+    }
+
+    #[test]
+    fn parabolas_are_interpolated_exactly() {
+        let flux_w = |within: DVec2| 2.0 + within.x - within.x * within.x * within.y;
+        let nodes = nodes(curved, flux_w);
+        for index in 0..100 {
+            let within = even_point(index, 0, 1);
+            let predicted = biquadratic(&nodes, within);
+            assert!((predicted.place - curved(within)).length() < 1e-5, "{within}");
+            assert!((predicted.flux_w.g - flux_w(within)).abs() < 1e-5, "{within}");
+        }
+    }
+
+    /// The flux of all triangles is that of the square, and their area that of its image.
+    #[test]
+    fn triangles_carry_the_light_of_the_square() {
+        let flux_w = |within: DVec2| 2.0 + within.x + within.y;
+        let bundle = Bundle {
+            shape: Shape::Whole(nodes(|within| within * DVec2::new(3.0, 2.0), flux_w)),
+            divisions: 4,
+            ..Bundle::new(route(), 3.0)
+        };
+        let (mut flux, mut area) = (0.0, 0.0);
+        bundle.triangles(0.25, |[a, b, c], flux_w| {
+            flux += flux_w.g;
+            area += 0.5 * (b - a).perp_dot(c - a).abs();
+        });
+        assert!((flux - 0.25 * 3.0).abs() < 1e-6, "{flux} W");
+        assert!((area - 6.0).abs() < 1e-5, "{area} texels");
+    }
+
+    /// A finer deposit errs less, and no more than it is allowed.
+    #[test]
+    fn deposits_are_as_fine_as_asked() {
+        let mut bundle = Bundle {
+            shape: Shape::Whole(nodes(|within| curved(within) * 8.0, |within| 1.0 + within.x)),
+            ..Bundle::new(route(), 1.0)
+        };
+        let mut before = 0;
+        for allowed in [1e-3, 1e-5, 1e-6] {
+            let left = bundle.plan_deposit(1.0, allowed);
+            assert!(left <= allowed, "{left} of {allowed}");
+            assert!(bundle.divisions > before, "{} divisions", bundle.divisions);
+            before = bundle.divisions;
+        }
     }
 }

@@ -12,8 +12,9 @@ use rayon::prelude::*;
 use super::bundle::{Node, OriginShift, Piece, Shape};
 use super::paths::PathFinder;
 use super::squares::{DomainPoint, Plan, Points, Square, Squares};
-use crate::light_pass::path::PathSignature;
 use crate::light_pass::pass_report::PassReport;
+use crate::light_pass::path::PathSignature;
+use crate::progress::Control;
 
 /// Bisections of a side. Fewer leave a visible error on a mirror's rim; each further one halves what is left.
 const BISECTIONS: u32 = 7;
@@ -26,7 +27,7 @@ const CENTRE: usize = 4;
 const SQUARES_AT_ONCE: usize = 32;
 
 /// Cuts squares, and finds how their bundles move with lamp and wavelength.
-pub(super) fn finish(finder: &PathFinder, squares: &mut Squares, report: &mut PassReport) {
+pub(super) fn finish(finder: &PathFinder, squares: &mut Squares, control: &Control, report: &mut PassReport) {
     let Squares {
         squares,
         points,
@@ -42,6 +43,9 @@ pub(super) fn finish(finder: &PathFinder, squares: &mut Squares, report: &mut Pa
             };
             let mut more = (0, 0);
             for square in squares {
+                if control.is_cancelled() {
+                    break;
+                }
                 let (rays, segments) = cutter.finish(square, plan);
                 more = (more.0 + rays, more.1 + segments);
             }
@@ -101,16 +105,17 @@ impl Cutter<'_, '_> {
         let centre = Arc::clone(&square.points[CENTRE]);
         for bundle in 0..square.bundles.len() {
             let end = centre.end(square.bundles[bundle].route.signature);
-            let shift = end.and_then(|end| {
-                OriginShift::measured(end, lamp_sides.as_ref(), spectrum_ends.as_ref())
-            });
+            let shift =
+                end.and_then(|end| OriginShift::measured(end, lamp_sides.as_ref(), spectrum_ends.as_ref()));
             match shift {
                 Some(shift) => square.bundles[bundle].shift = shift,
                 None => square.give_up(bundle),
             }
         }
         let traced = lamp_sides.iter().chain(&spectrum_ends).flatten();
-        traced.fold((0, 0), |(rays, segments), paths| (rays + 1, segments + u64::from(paths.traced)))
+        traced.fold((0, 0), |(rays, segments), paths| {
+            (rays + 1, segments + u64::from(paths.traced))
+        })
     }
 
     /// The parts of a square that have a path.
@@ -133,11 +138,13 @@ impl Cutter<'_, '_> {
                     let has = nodes.map(|node| node.is_some());
                     let count = has.iter().filter(|has| **has).count();
                     // The corner that differs from both others, and these.
-                    let odd = has.iter().position(|has| *has == (count == 1)).expect("one corner differs");
+                    let odd = has
+                        .iter()
+                        .position(|has| *has == (count == 1))
+                        .expect("one corner differs");
                     let (next, last) = ((odd + 1) % 3, (odd + 2) % 3);
-                    let mut cut = |from: usize, to: usize| {
-                        self.cut(square, signature, [corners[from], corners[to]])
-                    };
+                    let mut cut =
+                        |from: usize, to: usize| self.cut(square, signature, [corners[from], corners[to]]);
                     if count == 1 {
                         let (second, third) = (cut(odd, next), cut(odd, last));
                         pieces.push(Piece {
@@ -165,7 +172,10 @@ impl Cutter<'_, '_> {
     /// Where the path ends between a node that has it and one that does not, with the last light on it.
     fn cut(&mut self, square: &Square, signature: PathSignature, nodes: [usize; 2]) -> (Vec2, Node) {
         let [mut inside, mut outside] = nodes.map(|node| square.place.node(node));
-        let mut light = square.points[nodes[0]].end(signature).map(Node::of).expect("it has the path");
+        let mut light = square.points[nodes[0]]
+            .end(signature)
+            .map(Node::of)
+            .expect("it has the path");
         for _ in 0..BISECTIONS {
             let Some(middle) = middle(inside, outside) else {
                 break;

@@ -52,7 +52,11 @@ pub fn filter(
     left: &mut Sums,
 ) -> Noise {
     let of_map = |(receiver, map): (Receiver, &mut ReceiverMap)| {
-        let layers = [halves[0].get(receiver), halves[1].get(receiver), bundles.and_then(|maps| maps.get(receiver))];
+        let layers = [
+            halves[0].get(receiver),
+            halves[1].get(receiver),
+            bundles.and_then(|maps| maps.get(receiver)),
+        ];
         let details = Details::new(map, layers, unit, is_signed);
         let kept = details.filtered();
         let squares = details.squares(&kept, map);
@@ -268,7 +272,12 @@ impl Details {
         drop(by_light);
         let pooled = self.cells.around(level, &power, &areas);
         drop(power);
-        let cells = refined.par_iter_mut().zip(&whole).zip(&details).zip(&pooled).zip(&areas);
+        let cells = refined
+            .par_iter_mut()
+            .zip(&whole)
+            .zip(&details)
+            .zip(&pooled)
+            .zip(&areas);
         cells.for_each(
             |((((kept, whole), detail), [signal, noise, tint_signal, tint_noise]), area)| {
                 let part = |signal: f32, noise: f32| {

@@ -9,8 +9,8 @@ use super::launch::PhotonLaunch;
 use super::receivers::Receivers;
 use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk};
 use crate::geometry::sampling::GOLDEN_64;
-use crate::illumination::accumulator::FluxCount;
 use crate::illumination::Receiver;
+use crate::illumination::accumulator::FluxCount;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
@@ -113,12 +113,7 @@ impl PhotonPass<'_> {
         report
     }
 
-    fn block(
-        &self,
-        half: usize,
-        indices: impl Iterator<Item = u32>,
-        receivers: &Receivers,
-    ) -> Block {
+    fn block(&self, half: usize, indices: impl Iterator<Item = u32>, receivers: &Receivers) -> Block {
         let rules = PhotonRules {
             seed: half_seed(self.rules.seed, half),
             ..self.rules
@@ -173,7 +168,11 @@ fn texel(hit: &Hit, receivers: &Receivers) -> Option<u32> {
 }
 
 /// Adds what blocks deposit to the maps of their halves.
-pub(super) fn deposit_blocks<M: AsMut<[ReceiverMaps]>>(blocks: &[Block], halves: &mut [M], chart_for: &ChartFor) {
+pub(super) fn deposit_blocks<M: AsMut<[ReceiverMaps]>>(
+    blocks: &[Block],
+    halves: &mut [M],
+    chart_for: &ChartFor,
+) {
     for block in blocks {
         for run in block
             .deposits

@@ -86,7 +86,8 @@ impl MeasuredChart {
             let at = low + DVec2::new(right, down);
             *weight = (1.0 - (right - part.x).abs()) * (1.0 - (down - part.y).abs());
             let is_inside = at.cmpge(DVec2::ZERO).all() && at.cmplt(self.size()).all();
-            let is_ours = || islands.is_none_or(|islands| islands.covers(at.x as usize, at.y as usize, island));
+            let is_ours =
+                || islands.is_none_or(|islands| islands.covers(at.x as usize, at.y as usize, island));
             if is_inside && is_ours() {
                 *texel = self.texel_at(at).or(own);
             }

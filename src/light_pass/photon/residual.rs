@@ -45,8 +45,9 @@ const MEASURED_OVER_PLANNED: f64 = 0.25;
 /// Photons in a block, at least.
 const BLOCK_PHOTONS: u64 = 1 << 12;
 
-/// Squares whose triangles are made before they are deposited.
-const SQUARES_AT_ONCE: usize = 1 << 12;
+/// Squares whose triangles are made before they are deposited: of light of one hue, and of a spectrum, which takes many
+/// times the triangles.
+const SQUARES_AT_ONCE: [usize; 2] = [1 << 12, 1 << 7];
 
 /// A half is sampled anew if the other half asks for so many times its photons, with at most as many times.
 const ANEW: (f64, f64) = (2.0, 64.0);
@@ -109,7 +110,7 @@ impl ResidualPass<'_> {
         };
         let before = squares.points.len();
         surveyor.refine(squares, goal);
-        edge::finish(&finder, squares, &mut report.pass);
+        edge::finish(&finder, squares, listener.control, &mut report.pass);
         report.pass.rays += (squares.points.len() - before) as u64;
         report.deposit_square = plan_deposits(squares, goal, &receivers);
         report.pass.trace_s.add(watch.elapsed());
@@ -137,12 +138,15 @@ impl ResidualPass<'_> {
 
     /// Deposits all bundles into their own maps.
     fn deposit_bundles(&self, squares: &Squares, maps: &mut [ReceiverMaps], report: &mut PassReport) {
-        for squares in squares.squares.chunks(SQUARES_AT_ONCE) {
+        let at_once = SQUARES_AT_ONCE[usize::from(self.rules.spectrum.is_some())];
+        for squares in squares.squares.chunks(at_once) {
             let made: Vec<TrianglesByMap> = squares
-                .par_chunks(64)
+                .par_chunks(at_once / 32)
                 .map(|squares| {
                     let mut triangles = TrianglesByMap::new();
-                    squares.iter().for_each(|square| self.triangles(square, maps.len(), &mut triangles));
+                    squares
+                        .iter()
+                        .for_each(|square| self.triangles(square, maps.len(), &mut triangles));
                     triangles
                 })
                 .collect();
@@ -154,10 +158,14 @@ impl ResidualPass<'_> {
                 maps[set].touch(receiver, self.chart_for);
                 if let Some(map) = maps[set].get_mut(receiver) {
                     // Photons of both halves remove it.
-                    let placed = deposit_triangles(&triangles, map).deposited.map(|count| HALVES as i128 * count);
+                    let placed = deposit_triangles(&triangles, map)
+                        .deposited
+                        .map(|count| HALVES as i128 * count);
                     report.ledger.book_sum(Account::Deposited, placed);
                     report.ledger.book_sum(Account::Bundled, placed);
-                    report.ledger.book_sum(Account::Sampling, placed.map(|count| -count));
+                    report
+                        .ledger
+                        .book_sum(Account::Sampling, placed.map(|count| -count));
                 }
             }
         }
@@ -367,7 +375,9 @@ impl ResidualPhotons<'_> {
         let mut all_found = Vec::with_capacity(squares.len());
         for (square, order) in squares.iter().zip(orders) {
             let order_of = |half| DrawOrder { half, ..*order };
-            let draws: Vec<Draw> = (0..HALVES).map(|half| self.draw(square, order_of(half))).collect();
+            let draws: Vec<Draw> = (0..HALVES)
+                .map(|half| self.draw(square, order_of(half)))
+                .collect();
             let founds: Vec<Found> = draws.iter().map(|draw| draw.found).collect();
             let mut found = Found::default();
             for (half, draw) in draws.into_iter().enumerate() {
@@ -414,7 +424,8 @@ impl ResidualPhotons<'_> {
         let mut draw = Draw::default();
         for number in 0..order.photons {
             let index = order.first.wrapping_add(number);
-            let jitter = (mix64(seed ^ u64::from(index).wrapping_mul(GOLDEN_64)) >> 11) as f64 * (-53_f64).exp2();
+            let jitter =
+                (mix64(seed ^ u64::from(index).wrapping_mul(GOLDEN_64)) >> 11) as f64 * (-53_f64).exp2();
             let along = (f64::from(number) + jitter) / f64::from(order.photons);
             let within = in_square((along * 64_f64.exp2()) as u64);
             self.photon(square, within, (index, order.photons), &mut walk, &mut draw);
@@ -442,10 +453,13 @@ impl ResidualPhotons<'_> {
         };
         let unit_squares = square.place.area() * f64::from(TIMES) / f64::from(photons);
         let root = square.place.corner.root as usize;
-        let start = pass.launch.start_at(root, square.place.at(within), lamp).map(|start| Start {
-            flux_w: start.flux_w * unit_squares,
-            ..start
-        });
+        let start = pass
+            .launch
+            .start_at(root, square.place.at(within), lamp)
+            .map(|start| Start {
+                flux_w: start.flux_w * unit_squares,
+                ..start
+            });
         let mut mask = 0;
         for (number, bundle) in square.bundles.iter().enumerate() {
             mask |= u64::from(bundle.has(within)) << number;
@@ -585,7 +599,9 @@ impl Changes<'_, '_> {
     /// Books removed flux, which is negative, as expected only.
     fn book_removal(&mut self, flux_w: LinearSrgb) {
         let count = self.photons.pass.rules.unit.count(flux_w);
-        self.draw.ledger.book(Account::Sampling, count.map(|count| -count));
+        self.draw
+            .ledger
+            .book(Account::Sampling, count.map(|count| -count));
     }
 
     fn fail(&mut self, flux_w: LinearSrgb) {

@@ -199,7 +199,11 @@ pub(super) struct Found {
 
 impl Found {
     fn variance(&self) -> f64 {
-        if self.photons > 0.0 { self.squares / self.photons } else { 0.0 }
+        if self.photons > 0.0 {
+            self.squares / self.photons
+        } else {
+            0.0
+        }
     }
 
     fn of_quarter(&self) -> Self {
@@ -263,7 +267,8 @@ impl Plan {
     /// a quarter of the goal to the error.
     pub(super) fn photons(&self, square: &Square, goal: f64) -> f64 {
         let audits = 4.0 * self.texels.sqrt() / goal;
-        self.photons_for(square.root(self), square) + audits * square.start_w / self.start_w.max(f64::MIN_POSITIVE)
+        self.photons_for(square.root(self), square)
+            + audits * square.start_w / self.start_w.max(f64::MIN_POSITIVE)
     }
 
     pub(super) fn is_worth_a_cut(&self, square: &Square) -> bool {
@@ -287,7 +292,11 @@ impl Square {
             uncut,
             lost_w,
         } = self.residual;
-        let edges = if self.is_cut || plan.is_worth_a_cut(self) { cut } else { uncut };
+        let edges = if self.is_cut || plan.is_worth_a_cut(self) {
+            cut
+        } else {
+            uncut
+        };
         displaced + edges + lost_w * plan.lost_weight
     }
 
@@ -379,7 +388,8 @@ impl LitCells {
         let mut places: Vec<SquarePlace> = match self {
             Self::All { roots } => (0..*roots).map(whole).collect(),
             Self::Marked(marked) => {
-                let mut roots: Vec<SquarePlace> = marked.iter().filter(|place| place.level == 0).copied().collect();
+                let mut roots: Vec<SquarePlace> =
+                    marked.iter().filter(|place| place.level == 0).copied().collect();
                 roots.sort_unstable();
                 roots
             }
@@ -400,9 +410,17 @@ impl Surveyor<'_> {
     pub(super) fn refine(&self, squares: &mut Squares, goal: f64) {
         if squares.squares.is_empty() {
             let places = self.lit.first();
-            self.trace_points(places.iter().flat_map(|place| (0..9).map(|node| place.node(node))), &mut squares.points);
+            self.trace_points(
+                places
+                    .iter()
+                    .flat_map(|place| (0..9).map(|node| place.node(node))),
+                &mut squares.points,
+            );
             let points = &squares.points;
-            squares.squares = places.par_iter().map(|&place| self.square(place, points, None)).collect();
+            squares.squares = places
+                .par_iter()
+                .map(|&place| self.square(place, points, None))
+                .collect();
         }
         for round in 0..=MAX_ROUNDS {
             squares.plan = self.plan(squares, goal);
@@ -421,34 +439,58 @@ impl Surveyor<'_> {
             if !divided.contains(&true) {
                 break;
             }
-            let new_points = squares.squares.iter().zip(&divided).filter(|(_, divided)| **divided).flat_map(|(square, _)| {
-                let place = square.place;
-                (0..25).filter(|n| n % 5 % 2 == 1 || n / 5 % 2 == 1).map(move |n| place.point(n % 5, n / 5, 4))
-            });
+            let new_points = squares
+                .squares
+                .iter()
+                .zip(&divided)
+                .filter(|(_, divided)| **divided)
+                .flat_map(|(square, _)| {
+                    let place = square.place;
+                    (0..25)
+                        .filter(|n| n % 5 % 2 == 1 || n / 5 % 2 == 1)
+                        .map(move |n| place.point(n % 5, n / 5, 4))
+                });
             self.trace_points(new_points, &mut squares.points);
 
             let points = &squares.points;
             let before = std::mem::take(&mut squares.squares);
-            let after = before.into_par_iter().zip(divided).flat_map_iter(|(square, is_divided)| {
-                if !is_divided {
-                    return vec![square];
-                }
-                let quarters = square.place.quarters().into_iter().filter(|place| self.lit.has(*place));
-                quarters.map(|place| self.square(place, points, Some(&square))).collect()
-            });
+            let after = before
+                .into_par_iter()
+                .zip(divided)
+                .flat_map_iter(|(square, is_divided)| {
+                    if !is_divided {
+                        return vec![square];
+                    }
+                    let quarters = square
+                        .place
+                        .quarters()
+                        .into_iter()
+                        .filter(|place| self.lit.has(*place));
+                    quarters
+                        .map(|place| self.square(place, points, Some(&square)))
+                        .collect()
+                });
             squares.squares = after.collect();
         }
     }
 
     /// Traces the points that are not known yet, neighbours one after the other.
     fn trace_points(&self, wanted: impl Iterator<Item = DomainPoint>, points: &mut Points) {
-        let new: HashSet<DomainPoint, PointHash> = wanted.filter(|point| !points.contains_key(point)).collect();
+        let new: HashSet<DomainPoint, PointHash> =
+            wanted.filter(|point| !points.contains_key(point)).collect();
         let mut new: Vec<DomainPoint> = new.into_iter().collect();
         new.sort_unstable_by_key(|point| (point.root, point.y >> 14, point.x >> 14, point.y, point.x));
         let traced: Vec<(DomainPoint, Arc<PointPaths>)> = new
             .into_par_iter()
             .with_min_len(16)
-            .map(|point| (point, Arc::new(self.finder.paths(point.root as usize, point.square()))))
+            .map(|point| {
+                // Whoever cancels drops the squares.
+                let paths = match self.control.is_cancelled() {
+                    true => PointPaths::default(),
+                    false => self.finder.paths(point.root as usize, point.square()),
+                };
+                (point, Arc::new(paths))
+            })
             .collect();
         points.extend(traced);
     }
@@ -485,7 +527,11 @@ impl Surveyor<'_> {
             }
         }
         plan.relative = area_m2 / (plan.arriving_w * plan.arriving_w);
-        let roots: f64 = squares.squares.iter().map(|square| square.root(&plan) * square.segments.sqrt()).sum();
+        let roots: f64 = squares
+            .squares
+            .iter()
+            .map(|square| square.root(&plan) * square.segments.sqrt())
+            .sum();
         plan.per_root = roots * plan.relative / (goal * goal);
         plan
     }
@@ -494,7 +540,11 @@ impl Surveyor<'_> {
     fn square(&self, place: SquarePlace, points: &Points, parent: Option<&Square>) -> Square {
         let points: [Arc<PointPaths>; 9] = std::array::from_fn(|node| Arc::clone(&points[&place.node(node)]));
         let mean = |value: &dyn Fn(&PointPaths) -> f64| -> f64 {
-            points.iter().zip(MEAN_WEIGHTS).map(|(point, weight)| weight * value(point)).sum()
+            points
+                .iter()
+                .zip(MEAN_WEIGHTS)
+                .map(|(point, weight)| weight * value(point))
+                .sum()
         };
         let area = place.area();
         let mut square = Square {
@@ -519,8 +569,12 @@ impl Surveyor<'_> {
                 routes.push(end.route);
             }
         }
-        let is_partial =
-            |route: &Route| square.points.iter().any(|point| point.end(route.signature).is_none());
+        let is_partial = |route: &Route| {
+            square
+                .points
+                .iter()
+                .any(|point| point.end(route.signature).is_none())
+        };
         let edges = routes.iter().filter(|route| is_partial(route)).count();
         for route in routes {
             self.add_bundle(&mut square, route, parent, edges);
@@ -554,7 +608,8 @@ impl Surveyor<'_> {
 
     /// Adds the bundle of a path, and what it leaves to photons. `edges`: paths that not all points have.
     fn add_bundle(&self, square: &mut Square, route: Route, parent: Option<&Square>, edges: usize) {
-        let ends: [Option<&PathEnd>; 9] = std::array::from_fn(|node| square.points[node].end(route.signature));
+        let ends: [Option<&PathEnd>; 9] =
+            std::array::from_fn(|node| square.points[node].end(route.signature));
         let mut flux_w = 0.0;
         for (end, weight) in ends.iter().zip(MEAN_WEIGHTS) {
             flux_w += end.map_or(0.0, |end| end.flux_w.max_channel()) * weight * square.place.area();
@@ -625,7 +680,10 @@ fn inherited(parent: &Square) -> Found {
 /// Largest deviation of the nodes that are new in a square from its parent's interpolation [texels]; `None` if the
 /// parent does not have the whole path.
 fn deviation_texels(parent: &Square, route: Route, place: SquarePlace, nodes: &[Node; 9]) -> Option<f64> {
-    let bundle = parent.bundles.iter().find(|bundle| bundle.route.signature == route.signature)?;
+    let bundle = parent
+        .bundles
+        .iter()
+        .find(|bundle| bundle.route.signature == route.signature)?;
     let Shape::Whole(old) = &bundle.shape else {
         return None;
     };

@@ -387,7 +387,10 @@ impl Photon<'_, '_> {
             }
             self.followed.mask &= !bit;
             // Light that no surface disperses stays whole.
-            let hue = self.own_hue.filter(|_| bundle.route.is_dispersed).unwrap_or(self.whole_hue);
+            let hue = self
+                .own_hue
+                .filter(|_| bundle.route.is_dispersed)
+                .unwrap_or(self.whole_hue);
             let origin = Origin {
                 ends: hue.ends,
                 ..followed.origin
@@ -402,7 +405,11 @@ impl Photon<'_, '_> {
                     place: predicted.place,
                     bundle: number,
                 },
-                flux_w: if self.own_hue.is_some() { hue.channels.apply(flux_w) } else { flux_w },
+                flux_w: if self.own_hue.is_some() {
+                    hue.channels.apply(flux_w)
+                } else {
+                    flux_w
+                },
                 band: hue.band,
             });
         }
