@@ -1,16 +1,16 @@
 // Maps of many moments, shown in turn: a button plays and pauses, a slider chooses the moment.
 
 export class Motion {
-  /** `frames`: {count, fps}; `show(moment, seconds)` makes a moment ready, `changed` draws it, `rested` follows a stop. */
-  constructor(bar, frames, { show, changed, rested }) {
-    Object.assign(this, { ...frames, show, changed, rested, moment: 0, shown: 0, isBusy: false, isPlaying: false });
+  /** `count` moments at `fps`; `show(moment)` makes one ready, `changed` draws it. */
+  constructor(bar, count, fps, { show, changed }) {
+    Object.assign(this, { count, fps, show, changed, moment: 0, shown: 0, isBusy: false, isPlaying: false });
     [this.button, this.slider, this.clock] = bar.children;
     bar.hidden = false;
     this.slider.max = this.count - 1;
     this.button.onclick = () => this.toggle();
     this.slider.oninput = () => {
       this.isPlaying = false;
-      this.seek(Number(this.slider.value)).then(rested);
+      this.seek(Number(this.slider.value));
     };
     this.tell();
   }
@@ -31,7 +31,7 @@ export class Motion {
     try {
       while (this.shown !== this.moment) {
         const next = this.moment;
-        await this.show(next, next / this.fps);
+        await this.show(next);
         this.shown = next;
         this.changed();
       }
@@ -60,6 +60,6 @@ export class Motion {
       const now = await new Promise((resolve) => requestAnimationFrame(resolve));
       if (this.isPlaying) await this.seek(Math.floor((Math.max(now - began, 0) * this.fps) / 1000) % this.count);
     }
-    this.rested();
+    this.changed();
   }
 }

@@ -1,6 +1,6 @@
 // A camera that flies, walks or orbits, by keys, mouse and touch: the keys of the program's window.
 
-import * as THREE from "three";
+import { along, dot, length, scaled } from "geometry";
 
 // As in the window: time in which the velocity has closed 1 − 1/e of its gap [s], speeds in scene radii per second and
 // [m/s], height of the eyes [m], turn of a look [rad per pixel].
@@ -11,159 +11,136 @@ const WALL_M = 0.25, NEAREST = 1e-3;
 const MODES = ["fly", "walk", "orbit"];
 const AXES = { KeyD: [0, 1], KeyA: [0, -1], KeyE: [1, 1], KeyQ: [1, -1], KeyW: [2, 1], KeyS: [2, -1],
   ArrowRight: [0, 1], ArrowLeft: [0, -1], ArrowUp: [2, 1], ArrowDown: [2, -1] };
+const unit = (vector) => scaled(vector, 1 / (length(vector) || 1));
 
 export class Navigation {
-  constructor(stage, element, changed) {
-    Object.assign(this, { stage, element, changed, mode: "fly", held: new Set(), yaw: 0, pitch: 0, fov: 0.8 });
-    this.position = new THREE.Vector3();
-    this.velocity = new THREE.Vector3();
-    this.fingers = new Map();
-    this.ray = new THREE.Raycaster();
-    this.cameras = [];
-    stage.gltf.scene.traverse((node) => { if (node.isPerspectiveCamera) this.cameras.push(node); });
+  /** `geometry()` gives that of the present moment, `changed` follows every change. */
+  constructor({ bounds_m: [low, high], cameras }, geometry, element, changed) {
+    Object.assign(this, { geometry, element, changed, cameras, mode: "fly", held: new Set(), fingers: new Map(), next: 0 });
+    this.centre = scaled(along(low, high, 1), 0.5);
+    this.radius = Math.max(length(along(high, low, -1)) / 2, 1e-6);
     // What single keys do.
     this.keys = {
-      KeyC: () => this.nextCamera(),
+      KeyC: () => this.show(this.next),
       KeyF: () => this.frame(),
       KeyV: () => this.setMode(MODES[(MODES.indexOf(this.mode) + 1) % MODES.length]),
     };
-    this.next = 0;
-    if (this.cameras.length) this.nextCamera();
-    else this.frame();
+    this.show(0);
     this.listen();
   }
 
-  forward() {
+  get forward() {
     const level = Math.cos(this.pitch);
-    return new THREE.Vector3(Math.sin(this.yaw) * level, Math.sin(this.pitch), -Math.cos(this.yaw) * level);
+    return [Math.sin(this.yaw) * level, Math.sin(this.pitch), -Math.cos(this.yaw) * level];
   }
 
-  right() {
-    return new THREE.Vector3(Math.cos(this.yaw), 0, Math.sin(this.yaw));
+  get right() {
+    return [Math.cos(this.yaw), 0, Math.sin(this.yaw)];
   }
 
   stand(position, forward, fov) {
-    this.position.copy(position);
-    this.pitch = Math.asin(Math.max(-1, Math.min(1, forward.y)));
-    if (Math.hypot(forward.x, forward.z) > 1e-6) this.yaw = Math.atan2(forward.x, -forward.z);
-    this.fov = fov;
-    this.velocity.set(0, 0, 0);
-    this.measureOrbit();
-    this.changed();
+    const [x, y, z] = forward;
+    this.pitch = Math.asin(Math.max(-1, Math.min(1, y)));
+    if (Math.hypot(x, z) > 1e-6) this.yaw = Math.atan2(x, -z);
+    Object.assign(this, { position, fov, yaw: this.yaw ?? 0 });
+    this.setMode(this.mode);
   }
 
   show(index) {
     this.next = (index + 1) % this.cameras.length;
     this.shown = index;
-    const camera = this.cameras[index];
-    const forward = new THREE.Vector3(0, 0, -1).transformDirection(camera.matrixWorld);
-    this.stand(new THREE.Vector3().setFromMatrixPosition(camera.matrixWorld), forward, (camera.fov * Math.PI) / 180);
-  }
-
-  nextCamera() {
-    if (this.cameras.length) this.show(this.next);
+    const { position_m: position, forward, fov_rad: fov } = this.cameras[index];
+    this.stand(position, forward, fov);
   }
 
   /** So that the scene fills the picture. */
   frame() {
-    const { bounds, radius } = this.stage;
-    const backward = new THREE.Vector3(-0.5, 0.55, 0.67).normalize();
-    const centre = bounds.getCenter(new THREE.Vector3());
+    const backward = unit([-0.5, 0.55, 0.67]);
     const aspect = this.element.clientWidth / Math.max(this.element.clientHeight, 1);
     const half = Math.min(0.4, Math.atan(Math.tan(0.4) * aspect));
-    this.stand(centre.addScaledVector(backward, radius / Math.sin(half)), backward.negate(), 0.8);
+    this.stand(along(this.centre, backward, this.radius / Math.sin(half)), scaled(backward, -1), 0.8);
   }
 
   setMode(mode) {
-    this.mode = mode;
-    this.velocity.set(0, 0, 0);
-    this.measureOrbit();
+    Object.assign(this, { mode, velocity: [0, 0, 0], orbit: null });
     this.changed();
   }
 
-  meets(from, direction, most = Infinity) {
-    this.ray.set(from, direction);
-    this.ray.far = most;
-    this.ray.layers.enableAll();
-    return this.ray.intersectObjects(this.stage.meshes, false)[0]?.distance;
-  }
-
+  // The point that is orbited lies where the gaze meets something.
   measureOrbit() {
-    const along = this.stage.bounds.getCenter(new THREE.Vector3()).sub(this.position).dot(this.forward());
-    this.orbit = this.meets(this.position, this.forward()) ?? (along > 0 ? along : this.stage.radius);
+    const ahead = dot(along(this.centre, this.position, -1), this.forward);
+    this.orbit ??= this.geometry().meets(this.position, this.forward) ?? (ahead > 0 ? ahead : this.radius);
   }
 
   turn(across, down) {
-    const pivot = this.position.clone().addScaledVector(this.forward(), this.orbit);
+    const isOrbit = this.mode === "orbit";
+    if (isOrbit) this.measureOrbit();
+    const pivot = isOrbit && along(this.position, this.forward, this.orbit);
     this.yaw += LOOK_RAD * across;
     this.pitch = Math.max(-Math.PI / 2, Math.min(Math.PI / 2, this.pitch - LOOK_RAD * down));
-    if (this.mode === "orbit") this.position.copy(pivot).addScaledVector(this.forward(), -this.orbit);
+    if (isOrbit) this.position = along(pivot, this.forward, -this.orbit);
     this.changed();
   }
 
   /** Nearer by a factor where it orbits, else a step ahead. */
   approach(steps) {
     if (this.mode === "orbit") {
-      const nearer = Math.max(this.orbit * 0.9 ** steps, NEAREST * this.stage.radius);
-      this.position.addScaledVector(this.forward(), this.orbit - nearer);
+      this.measureOrbit();
+      const nearer = Math.max(this.orbit * 0.9 ** steps, NEAREST * this.radius);
+      this.position = along(this.position, this.forward, this.orbit - nearer);
       this.orbit = nearer;
     } else {
-      this.go(this.forward().multiplyScalar(0.08 * steps * (this.mode === "walk" ? WALKING_M_PER_S : this.stage.radius)));
+      this.go(scaled(this.forward, 0.08 * steps * (this.mode === "walk" ? WALKING_M_PER_S : this.radius)));
     }
     this.changed();
   }
 
   go(way) {
     if (this.mode === "walk") {
-      way.y = 0;
-      const length = way.length();
-      if (length > 0) {
-        const ahead = this.meets(this.position, way.clone().normalize(), length + WALL_M);
-        if (ahead !== undefined) way.setLength(Math.max(Math.min(ahead - WALL_M, length), 0));
-      }
+      way[1] = 0;
+      const far = length(way);
+      const ahead = far > 0 ? this.geometry().meets(this.position, unit(way), far + WALL_M) : undefined;
+      if (ahead !== undefined) way = scaled(unit(way), Math.max(Math.min(ahead - WALL_M, far), 0));
     }
-    this.position.add(way);
+    this.position = along(this.position, way, 1);
+    if (this.mode !== "orbit") this.orbit = null;
   }
 
   get isMoving() {
-    return this.velocity.lengthSq() > 0 || [...this.held].some((key) => AXES[key]) || Boolean(this.falls);
+    return length(this.velocity) > 0 || [...this.held].some((key) => AXES[key]) || Boolean(this.falls);
   }
 
   /** Lets time pass [s]. */
   advance(seconds) {
-    const asked = [0, 0, 0];
+    const asked = [0, 0, 0], isWalking = this.mode === "walk", { forward } = this;
     for (const key of this.held) if (AXES[key]) asked[AXES[key][0]] += AXES[key][1];
     const run = this.held.has("ShiftLeft") || this.held.has("ShiftRight") ? RUN : 1;
-    const speed = run * (this.mode === "walk" ? WALKING_M_PER_S : FLYING * this.stage.radius);
-    const ahead = this.mode === "walk" ? this.forward().setY(0).normalize() : this.forward();
-    const goal = this.right().multiplyScalar(Math.sign(asked[0])).addScaledVector(ahead, Math.sign(asked[2]));
-    if (this.mode !== "walk") goal.y += Math.sign(asked[1]);
-    if (goal.lengthSq() > 0) goal.setLength(speed);
-    const left = Math.exp(-seconds / SETTLING_S);
-    this.go(goal.clone().multiplyScalar(seconds).addScaledVector(this.velocity.clone().sub(goal), SETTLING_S * (1 - left)));
-    this.velocity.sub(goal).multiplyScalar(left).add(goal);
-    if (goal.lengthSq() === 0 && this.velocity.length() < 1e-3 * speed) this.velocity.set(0, 0, 0);
-    if (this.mode === "walk") this.keepToGround(seconds);
+    const speed = run * (isWalking ? WALKING_M_PER_S : FLYING * this.radius);
+    const ahead = isWalking ? unit([forward[0], 0, forward[2]]) : forward;
+    let goal = along(scaled(this.right, Math.sign(asked[0])), ahead, Math.sign(asked[2]));
+    if (!isWalking) goal[1] += Math.sign(asked[1]);
+    goal = scaled(unit(goal), length(goal) > 0 ? speed : 0);
+    const left = Math.exp(-seconds / SETTLING_S), gap = along(this.velocity, goal, -1);
+    this.go(along(scaled(goal, seconds), gap, SETTLING_S * (1 - left)));
+    this.velocity = along(goal, gap, left);
+    if (length(goal) === 0 && length(this.velocity) < 1e-3 * speed) this.velocity = [0, 0, 0];
+    this.falls = isWalking && this.keepToGround(seconds);
   }
 
   keepToGround(seconds) {
-    const below = this.meets(this.position, new THREE.Vector3(0, -1, 0));
+    const below = this.geometry().meets(this.position, [0, -1, 0]);
     const gap = below === undefined ? 0 : EYES_M - below;
-    this.falls = Math.abs(gap) > 1e-3;
-    this.position.y += gap * (1 - Math.exp(-seconds / (2 * SETTLING_S)));
+    this.position[1] += gap * (1 - Math.exp(-seconds / (2 * SETTLING_S)));
+    return Math.abs(gap) > 1e-3;
   }
 
   /** The camera for a picture of that aspect (width/height): a narrow picture is widened as in the window. */
-  place(camera, aspect) {
-    const widened = 16 / 9 / Math.max(aspect, 1);
-    camera.fov = (360 / Math.PI) * Math.atan(Math.tan(this.fov / 2) * Math.max(widened, 1));
-    camera.aspect = aspect;
-    camera.near = 1e-3 * this.stage.radius;
-    camera.far = 1e3 * this.stage.radius;
-    camera.position.copy(this.position);
-    camera.rotation.set(this.pitch, -this.yaw, 0, "YXZ");
-    camera.updateProjectionMatrix();
-    camera.updateMatrixWorld();
+  camera(aspect) {
+    const widened = Math.max(16 / 9 / Math.max(aspect, 1), 1);
+    const { position, forward, right } = this;
+    const [x, y, z] = forward;
+    const up = [-right[2] * y, right[2] * x - right[0] * z, right[0] * y];
+    return { position, forward, right, up, fov: 2 * Math.atan(Math.tan(this.fov / 2) * widened), near: 1e-3 * this.radius };
   }
 
   listen() {
@@ -185,7 +162,7 @@ export class Navigation {
       this.fingers.set(event.pointerId, [event.clientX, event.clientY]);
     });
     for (const end of ["pointerup", "pointercancel"]) {
-      element.addEventListener(end, (event) => this.fingers.delete(event.pointerId));
+      element.addEventListener(end, (event) => { this.fingers.delete(event.pointerId); this.changed(); });
     }
     element.addEventListener("pointermove", (event) => this.drag(event));
     element.addEventListener("wheel", (event) => {
@@ -204,10 +181,9 @@ export class Navigation {
     // A mouse turns the gaze, a finger takes the picture along.
     const sign = event.pointerType === "touch" ? -1 : 1;
     if (this.fingers.size < 2) return this.turn(sign * across, sign * down);
-    const pinched = this.spread() - before;
-    this.approach(pinched / 20);
-    const step = (this.mode === "walk" ? 1 : this.stage.radius) * 2e-3;
-    this.go(this.right().multiplyScalar(-across * step / 2).add(new THREE.Vector3(0, (down * step) / 2, 0)));
+    this.approach((this.spread() - before) / 20);
+    const step = (this.mode === "walk" ? 1 : this.radius) * 1e-3;
+    this.go(along(scaled(this.right, -across * step), [0, down * step, 0], 1));
     this.changed();
   }
 

@@ -18,10 +18,22 @@ struct MapTile {
 
 const STORED: u32 = 65u;
 
-// E [W/m²] of a layer, whose size is its own, where a level of the map has a texel.
+// Most lookups across and down: enough for all of a layer in 128 times as coarse a level.
+const LOOKUPS: f32 = 64.0;
+
+// E [W/m²] of a layer, whose size is its own, over a texel of a level of the map. Each lookup is the mean of 2 x 2 texels
+// of a finer layer.
 fn irradiance(layer: texture_2d<f32>, uv: vec2f, extent: vec2f) -> vec3f {
-    let level = log2(f32(textureDimensions(layer).x) / extent.x);
-    return textureSampleLevel(layer, bilinear, uv, max(level, 0.0)).rgb;
+    let texels = vec2f(textureDimensions(layer)) / extent;
+    let lookups = clamp(ceil(0.5 * texels), vec2f(1.0), vec2f(LOOKUPS));
+    var sum = vec3f(0.0);
+    for (var row = 0.5; row < lookups.y; row += 1.0) {
+        for (var column = 0.5; column < lookups.x; column += 1.0) {
+            let within = vec2f(column, row) / lookups - 0.5;
+            sum += textureSampleLevel(layer, bilinear, uv + within / extent, 0.0).rgb;
+        }
+    }
+    return sum / (lookups.x * lookups.y);
 }
 
 @compute @workgroup_size(8, 8)

@@ -1,17 +1,26 @@
 //! `export`: baked maps for other programs, as a glTF scene or as textures.
 
+#[cfg(feature = "gpu")]
+use std::cell::Cell;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+#[cfg(feature = "gpu")]
+use std::sync::Arc;
 
 use clap::Args;
+#[cfg(feature = "gpu")]
+use nephroid::effect::EffectSwitches;
 use nephroid::error::{Error, Result};
 use nephroid::export::glb::{self, Bits, Carrier, GlbOptions, GlbReport, SceneLights};
 use nephroid::export::map_set::MapSet;
 use nephroid::export::textures::{
     self, Content, Encoding, Exposure, Packing, TextureFolder, TextureOptions, TextureReport, Transfer,
 };
+#[cfg(feature = "gpu")]
 use nephroid::export::web::Site;
 use nephroid::export::{DEFAULT_CUT, Quantity};
+#[cfg(feature = "gpu")]
+use nephroid::eye_pass::View;
 use nephroid::files;
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::{LoadOptions, Scene};
@@ -21,6 +30,8 @@ use serde::Serialize;
 
 use super::console::Console;
 use super::options::RunOptions;
+#[cfg(feature = "gpu")]
+use super::picture::{self, Backend};
 use super::values::{self, Named};
 
 /// Share of lit texels that are white in an unlit picture, if no exposure is given.
@@ -277,8 +288,9 @@ impl ExportArguments {
         console.print_result(&glb_text(file, &report), &written)
     }
 
+    #[cfg(feature = "gpu")]
     fn write_web(&self, console: &Console) -> Result<()> {
-        let scene = self.load()?;
+        let scene = Arc::new(self.load()?);
         let default = if self.single_file { "site.html" } else { "site" };
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(default));
         if self.single_file {
@@ -286,8 +298,19 @@ impl ExportArguments {
         }
         let frames = self.frames(&scene)?;
         let moments = self.moments(&scene, &frames)?;
-        let exposure_stops = exposure_of(&scene, &moments[0].read_all()?);
-        let site = Site::new(&scene, &moments, exposure_stops, console.control())?;
+        let shown = frames
+            .first()
+            .map_or(Arc::clone(&scene), |first| Arc::new(first.clone()));
+        let maps = moments[0].read_all()?;
+        // A machine without a graphics card is told so once.
+        let backend = Cell::new(None);
+        let eye = |view: &View| {
+            let effects = EffectSwitches::default();
+            let (picture, made_by) = picture::drawn(&shown, &maps, view, &effects, backend.get(), console)?;
+            backend.set((made_by == "cpu").then_some(Backend::Cpu));
+            Ok(picture)
+        };
+        let site = Site::new(&scene, &moments, &eye, console.control())?;
         let report = if self.single_file {
             site.write_file(&output)?
         } else {
@@ -295,12 +318,14 @@ impl ExportArguments {
         };
         console.warn(&report.warnings);
         let file = &output.display().to_string();
-        let (files, textures, bytes) = (report.files, report.textures, report.bytes);
         let what = match self.single_file {
             true => "open it in a browser",
             false => "let any server serve it, such as python3 -m http.server -d",
         };
-        let text = format!("{file}: {files} files with {textures} textures, {bytes} bytes\n{what} {file}");
+        let text = format!(
+            "{file}: {} files, {} bytes\n{what} {file}",
+            report.files, report.bytes
+        );
         console.print_result(
             &text,
             &WrittenFile {
@@ -308,6 +333,15 @@ impl ExportArguments {
                 report: &report,
             },
         )
+    }
+
+    #[cfg(not(feature = "gpu"))]
+    fn write_web(&self, _: &Console) -> Result<()> {
+        Err(Error::usage(
+            "--format web",
+            "this program was built without the gpu feature, whose shaders the page runs",
+            "choose another format",
+        ))
     }
 
     fn glb_options(&self, scene: &Scene, maps: &[IlluminationMap]) -> GlbOptions {
@@ -435,7 +469,7 @@ fn glb_text(file: &str, report: &GlbReport) -> String {
             map.tex_coord,
             map.intensity,
             match report.options.carrier {
-                Carrier::LightMap | Carrier::Beside => report.unit,
+                Carrier::LightMap => report.unit,
                 Carrier::Emissive | Carrier::Unlit => "of what is shown",
             },
             100.0 * map.cut_share,

@@ -107,19 +107,7 @@ pub fn make(
     console: &Console,
 ) -> Result<MadePicture> {
     let mut view = view(scene, options, eye)?;
-    console.check("picture")?;
-    let (picture, made_by) = match eye.backend {
-        Some(Backend::Cpu) => by_cpu(scene, maps, &view, effects, console)?,
-        Some(Backend::Gpu) => by_gpu(scene, maps, &view, effects)?,
-        None => match by_gpu(scene, maps, &view, effects) {
-            Ok(made) => made,
-            Err(error) => {
-                console.note(&format!("{error}: the CPU makes the picture"));
-                by_cpu(scene, maps, &view, effects, console)?
-            }
-        },
-    };
-    console.check("picture")?;
+    let (picture, made_by) = drawn(scene, maps, &view, effects, eye.backend, console)?;
     view.exposure_stops = match options.exposure {
         Some(Exposure::Stops(stops)) => stops,
         _ => picture.auto_exposure_stops(),
@@ -127,6 +115,34 @@ pub fn make(
     let white = eye.white_balance.unwrap_or_default().matrix(scene);
     picture.white_balanced(&white).save(path, &view)?;
     Ok(MadePicture { view, made_by })
+}
+
+/// Radiance of a view, and the graphics card's name or `cpu`.
+///
+/// # Errors
+/// No graphics card although one is requested; a signal.
+pub fn drawn(
+    scene: &Arc<Scene>,
+    maps: &[IlluminationMap],
+    view: &View,
+    effects: &EffectSwitches,
+    backend: Option<Backend>,
+    console: &Console,
+) -> Result<(Picture, String)> {
+    console.check("picture")?;
+    let made = match backend {
+        Some(Backend::Cpu) => by_cpu(scene, maps, view, effects, console)?,
+        Some(Backend::Gpu) => by_gpu(scene, maps, view, effects)?,
+        None => match by_gpu(scene, maps, view, effects) {
+            Ok(made) => made,
+            Err(error) => {
+                console.note(&format!("{error}: the CPU makes the picture"));
+                by_cpu(scene, maps, view, effects, console)?
+            }
+        },
+    };
+    console.check("picture")?;
+    Ok(made)
 }
 
 fn by_cpu(

@@ -139,6 +139,11 @@ impl<'a> MapSet<'a> {
         })
     }
 
+    /// The scene that the maps light.
+    pub fn scene(&self) -> &'a Scene {
+        self.scene
+    }
+
     /// Frame of the sequence, counted from 0.
     pub fn frame(&self) -> Option<usize> {
         self.frame

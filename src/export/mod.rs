@@ -1,7 +1,5 @@
 //! Files for other programs: maps with their manifest, pictures, glTF, textures; and how maps are read back.
 
-#[cfg(feature = "gpu")]
-pub mod chains;
 pub mod exr;
 pub mod float_image;
 pub mod frame_folder;
@@ -15,6 +13,7 @@ mod quantity;
 pub mod sequence;
 pub mod shards;
 pub mod textures;
+#[cfg(feature = "gpu")]
 pub mod web;
 
 pub use crate::illumination::uv_file;

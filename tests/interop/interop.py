@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy
 import OpenEXR
 
-import chains_pixels
 import page
 import textures
 from three_pixels import pixels as three_pixels
@@ -178,7 +177,7 @@ def check_sequence(nephroid, browser, folder):
     found = numpy.load(out)
     for frame, (light, _, _) in enumerate(maps):
         compare(f"{version}, pool, frame {frame + 1} of {frames}", found[frame], interpolated(light))
-    page.check_motion(nephroid, browser, folder, folder.with_name("sequence_page"), run, faults)
+    page.check(nephroid, browser, "builtin:pool", folder, folder.with_name("sequence_page"), run, faults)
     moved = numpy.abs(blocks(found[1]) / blocks(found[0]) - 1.0).max()
     print(f"pool: blocks change by up to {100 * moved:.0f} % from frame to frame")
     if moved < 5 * BOUND:
@@ -197,11 +196,13 @@ def main():
             check_bevy(name, nephroid, bevy, folder)
             page.check(nephroid, browser, f"builtin:{name}", folder / f"{name}_direct", folder / f"{name}_page", run, faults)
             textures.check(nephroid, modules, folder / name, folder / f"{name}_textures", run, faults)
-        for name in chains_pixels.SCENES:
-            chains_pixels.check(name, nephroid, browser, folder, run, faults)
         gallery = folder / "gallery"
         run(nephroid, "bake", "builtin:gallery", "-o", gallery, "--layers", "caustic,direct,indirect", "--quiet")
         page.check(nephroid, browser, "builtin:gallery", gallery, folder / "gallery_page", run, faults)
+        water = folder / "water-room"
+        run(nephroid, "bake", "builtin:water-room", "-o", water, "--frames", 3, "--fps", 8, "--map-resolution", 2 * SIDE,
+            "--layers", "caustic,direct", "--preset", "preview", "--quiet")
+        page.check(nephroid, browser, "builtin:water-room", water, folder / "water_page", run, faults)
         check_sequence(nephroid, browser, folder / "sequence")
         for number, scene in enumerate(others):
             maps = folder / f"other{number}"

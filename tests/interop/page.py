@@ -1,7 +1,7 @@
 """The page of `export --format web` in Chromium: as a folder behind a server and as one file from the disk; beside
-`nephroid render` of the same camera; by keys, mouse and touch; on a phone.
+`nephroid render` of the same camera; moment by moment; by keys, mouse and touch; on a phone; without WebGPU.
 
-check(nephroid, browser, maps, folder, run, faults): maps is a bake with all layers.
+check(nephroid, browser, scene, maps, folder, run, faults): maps is a bake of the scene, or a sequence.
 """
 
 import base64
@@ -18,24 +18,30 @@ from urllib.request import urlopen
 
 import cv2
 import flip_evaluator
+import numpy
 import websocket
 
-PATIENCE_S = 300
+PATIENCE_S = 3600
 SIZE = (960, 540)
 PHONE = (390, 844)
-# Mean FLIP of matt surfaces with maps beside `nephroid render` [1]: what is seen in mirrors, glass and coat is
-# approximated in the page.
+# Mean FLIP beside `nephroid render` [1].
 FLIP = 0.03
-# In false colours, coated surfaces are as grey as mirrors and glass.
-MATT = """nephroid.stage.meshes.forEach(({ material }) => {
-  if (material.uniforms.coat.value > 0) { delete material.defines.LIT; material.needsUpdate = true; }
-})"""
-# What has no map, in false colours: 1 % in linear light.
-NO_MAP = 25
-# Scripts of the page with three.js, gzipped [bytes].
-CODE = 1 << 20
 # The gallery's folder [bytes].
 GALLERY = 12e6
+# The flags by which Chromium without a graphics card gives a canvas to WebGPU.
+WEBGPU = ["--enable-unsafe-webgpu", "--use-webgpu-adapter=swiftshader", "--enable-features=Vulkan", "--use-vulkan=swiftshader",
+          "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--disable-gpu-watchdog"]
+# Without a graphics card, pictures of the window show no WebGPU: a canvas is read in the task that draws it.
+READING = """{
+  const { getCurrentTexture } = GPUCanvasContext.prototype, { submit } = GPUQueue.prototype;
+  let isDrawn = false;
+  GPUCanvasContext.prototype.getCurrentTexture = function () { isDrawn = true; return getCurrentTexture.call(this); };
+  GPUQueue.prototype.submit = function (commands) {
+    submit.call(this, commands);
+    if (isDrawn) globalThis.drawn = document.getElementById("picture").toDataURL();
+    isDrawn = false;
+  };
+}"""
 
 
 class Quiet(SimpleHTTPRequestHandler):
@@ -46,12 +52,11 @@ class Quiet(SimpleHTTPRequestHandler):
 class Browser:
     """One tab, driven by the DevTools protocol."""
 
-    def __init__(self, program):
+    def __init__(self, program, flags=WEBGPU):
         self.profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self.process = subprocess.Popen(
-            [program, "--headless=new", "--no-sandbox", "--enable-unsafe-swiftshader", "--use-angle=swiftshader",
-             "--remote-debugging-port=0", "--remote-allow-origins=*", "--no-first-run", "--hide-scrollbars",
-             f"--user-data-dir={self.profile.name}", "about:blank"],
+            [program, "--headless=new", "--no-sandbox", "--remote-debugging-port=0", "--remote-allow-origins=*",
+             "--no-first-run", "--hide-scrollbars", f"--user-data-dir={self.profile.name}", *flags, "about:blank"],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         told = Path(self.profile.name) / "DevToolsActivePort"
         end = time.time() + PATIENCE_S
@@ -67,6 +72,8 @@ class Browser:
         self.events = []
         for domain in ["Page", "Network", "Runtime"]:
             self.call(f"{domain}.enable")
+        if flags:
+            self.call("Page.addScriptToEvaluateOnNewDocument", source=f"if (globalThis.GPUQueue) {READING}")
 
     def call(self, method, **parameters):
         self.number += 1
@@ -86,24 +93,29 @@ class Browser:
         return told["result"].get("value")
 
     def open(self, url, size, is_phone=False):
-        """Waits until the page has drawn its last picture; the time of the first [s] and the addresses asked for."""
+        """Waits for the last picture of the first view, or the still one; the addresses asked for."""
         self.events.clear()
         self.call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=is_phone)
         self.call("Emulation.setTouchEmulationEnabled", enabled=is_phone)
         self.call("Page.navigate", url=url)
-        end = time.time() + PATIENCE_S
-        while (state := self.value("globalThis.nephroid?.state")) != "done":
-            if state == "failed" or time.time() > end:
-                raise RuntimeError(f"{url}: {self.value('globalThis.nephroid?.error')}")
-            time.sleep(0.2)
-        asked = [event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"]
-        return self.value("nephroid.firstPicture_ms") / 1000, asked
+        self.wait()
+        return [event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"]
 
-    def picture(self, file):
-        """Without the panel."""
-        self.value("document.querySelectorAll('#panel, #menu, #scale').forEach((one) => { one.style.visibility = 'hidden'; })")
-        shot = self.call("Page.captureScreenshot", format="png")["data"]
-        file.write_bytes(base64.b64decode(shot))
+    def wait(self):
+        """Until nothing more is drawn."""
+        end = time.time() + PATIENCE_S
+        while (state := self.value("globalThis.nephroid?.state")) not in {"done", "still"}:
+            if time.time() > end:
+                raise RuntimeError(f"the page is still {state}")
+            time.sleep(0.2)
+
+    def picture(self):
+        """What was drawn last, without the panel."""
+        return decoded(self.value("drawn").split(",")[1])
+
+    def window(self):
+        """All that the browser shows, but for what WebGPU draws."""
+        return decoded(self.call("Page.captureScreenshot", format="png")["data"])
 
     def close(self):
         self.socket.close()
@@ -111,18 +123,19 @@ class Browser:
         self.process.wait()
 
 
-def flip(wanted, found, coloured):
-    """Mean FLIP over the picture, and over the matt surfaces with maps alone: false colours leave others grey."""
-    wanted, found, coloured = (cv2.imread(str(file))[:, :, ::-1] for file in (wanted, found, coloured))
-    pictures = [picture.astype("float32") / 255 for picture in (wanted, found)]
-    error = flip_evaluator.evaluate(*pictures, "LDR", applyMagma=False)[0].squeeze()
-    has_map = (coloured != NO_MAP).any(axis=2)
-    return float(error.mean()), float(error[has_map].mean())
+def decoded(png):
+    bytes = numpy.frombuffer(base64.b64decode(png), numpy.uint8)
+    return cv2.imdecode(bytes, cv2.IMREAD_COLOR)[:, :, ::-1].astype("float32") / 255
+
+
+def flip(wanted, found):
+    """Mean over the picture."""
+    return float(flip_evaluator.evaluate(wanted, found, "LDR", applyMagma=False)[0].mean())
 
 
 def steer(browser, faults):
     """Every way to move changes the camera."""
-    place = "JSON.stringify([...nephroid.navigation.position, nephroid.navigation.yaw, nephroid.navigation.mode])"
+    place = "JSON.stringify([nephroid.navigation.position, nephroid.navigation.yaw, nephroid.navigation.mode])"
 
     def moves(what, *calls):
         before = browser.value(place)
@@ -160,29 +173,16 @@ def served(folder):
     server.shutdown()
 
 
-def check_motion(nephroid, browser, maps, folder, run, faults):
-    """A sequence plays by T, and its slider shows each moment."""
-    run(nephroid, "export", maps, "--format", "web", "-o", folder)
-    tab = Browser(browser)
-    with served(folder) as own:
-        tab.open(own, SIZE)
-        count = tab.value("nephroid.motion.count")
-        tab.call("Input.dispatchKeyEvent", type="keyDown", code="KeyT", key="t")
-        end = time.time() + PATIENCE_S
-        seen = set()
-        while len(seen) < 2 and time.time() < end:
-            seen.add(tab.value("nephroid.motion.shown"))
-        tab.value("nephroid.motion.toggle()")
-        shots = [folder / f"{moment}.png" for moment in (0, count - 1)]
-        for moment, shot in zip((0, count - 1), shots):
-            tab.value(f"nephroid.motion.seek({moment}).then(() => new Promise(requestAnimationFrame))")
-            tab.picture(shot)
+def check_still(browser, url, faults):
+    """Without WebGPU, the page shows its picture and says why."""
+    tab = Browser(browser, [])
+    tab.open(url, SIZE)
+    told, is_there = tab.value("document.getElementById('told').innerText"), tab.value("still.naturalWidth > 0")
+    spread = float(tab.window().std())
+    print(f"without WebGPU: {told}")
+    if "WebGPU" not in told or not is_there or spread < 0.02:
+        faults.append("the page without WebGPU")
     tab.close()
-    first, last = (cv2.imread(str(shot)).astype("float32") / 255 for shot in shots)
-    changed = float(flip_evaluator.evaluate(first, last, "LDR", applyMagma=False)[0].mean())
-    print(f"{maps.name}, web: {count} moments, mean FLIP {changed:.4f} between the first and the last")
-    if len(seen) < 2 or not changed > 0:
-        faults.append("the page of a sequence stands still")
 
 
 def check(nephroid, browser, scene, maps, folder, run, faults):
@@ -190,36 +190,48 @@ def check(nephroid, browser, scene, maps, folder, run, faults):
     site, file, picture = folder / "site", folder / "site.html", folder / "render.png"
     for path, options in [(site, []), (file, ["--single-file"])]:
         run(nephroid, "export", maps, "--format", "web", "-o", path, *options)
-    told = json.loads(run(nephroid, "render", scene, "--maps", maps, "--size", "{}x{}".format(*SIZE), "-o", picture, "--json"))
-    query = f"?exposure={told['exposure_stops']}"
+    sequence = json.loads((maps / "manifest.json").read_text()).get("sequence")
+    size = ["--maps", maps, "--size", "{}x{}".format(*SIZE)]
+    page = (site / "index.html").read_text().split('id="about">')[1]
+    stops = json.loads(page.split("</script>")[0])["cameras"][0]["exposure_stops"]
+    if sequence:
+        times = ["--frames", len(sequence["frames"]), "--fps", sequence["fps"]]
+        run(nephroid, "render", scene, *size, *times, "-o", folder / "frames", "--exposure", stops)
+        wanted = [cv2.imread(str(frame)) for frame in sorted((folder / "frames").glob("*.png"))]
+    else:
+        run(nephroid, "render", scene, *size, "-o", picture, "--exposure", stops)
+        wanted = [cv2.imread(str(picture))]
+    wanted = [picture[:, :, ::-1].astype("float32") / 255 for picture in wanted]
     tab = Browser(browser)
     with served(site) as own:
         for what, url, allowed in [("folder", own, own), ("one file", file.as_uri(), file.as_uri())]:
-            seconds, asked = tab.open(url + query, SIZE)
-            shot = folder / f"{what.replace(' ', '_')}.png"
-            tab.picture(shot)
+            asked = tab.open(url, SIZE)
             away = [url for url in asked if not url.startswith((allowed, "data:", "blob:"))]
-            tab.value(MATT)
+            for moment, picture in enumerate(wanted):
+                if moment:
+                    tab.value(f"nephroid.motion.seek({moment})")
+                    tab.wait()
+                error = flip(picture, tab.picture())
+                print(f"{scene}, web as {what}, moment {moment}: mean FLIP {error:.4f} beside render; "
+                      f"{len(asked)} requests, {len(away)} elsewhere")
+                if not error <= FLIP:
+                    faults.append(f"{scene} as {what}: FLIP")
+            if away:
+                faults.append(f"{scene} as {what}: {away}")
+            lit = tab.picture()
             tab.value("document.querySelector('[name=colours]').click()")
-            time.sleep(3)
-            tab.picture(folder / "colours.png")
-            whole, maps_alone = flip(picture, shot, folder / "colours.png")
-            print(f"{scene}, web as {what}: mean FLIP {whole:.4f} beside render, {maps_alone:.4f} of matt surfaces; "
-                  f"first picture after {seconds:.2f} s, {len(asked)} requests, {len(away)} elsewhere")
-            if away or maps_alone > FLIP:
-                faults.append(f"{scene} as {what}: {away or 'FLIP'}")
+            tab.wait()
+            if not flip(lit, tab.picture()) > FLIP:
+                faults.append(f"{scene} as {what}: false colours")
         steer(tab, faults)
         tab.open(own, PHONE, is_phone=True)
-        tab.picture(folder / "phone.png")
         wide = tab.value("document.scrollingElement.scrollWidth - innerWidth")
         if wide > 0:
             faults.append(f"{scene}: wider than a phone by {wide} pixels")
+        check_still(browser, own, faults)
     tab.close()
-    code = [entry for entry in site.rglob("*") if entry.suffix in {".js", ".html"}]
-    packed = sum(len(subprocess.run(["gzip", "-9c", entry], capture_output=True, check=True).stdout) for entry in code)
-    whole = sum(entry.stat().st_size for entry in site.rglob("*") if entry.is_file())
-    print(f"{scene}: folder {whole / 1e6:.2f} MB, code {packed / 1e3:.0f} kB gzipped, one file {file.stat().st_size / 1e6:.2f} MB")
-    if packed > CODE:
-        faults.append(f"{scene}: the page's code is {packed} bytes")
+    code = sum(entry.stat().st_size for entry in site.iterdir() if entry.suffix in {".js", ".html"})
+    whole = sum(entry.stat().st_size for entry in site.iterdir())
+    print(f"{scene}: folder {whole / 1e6:.2f} MB, {code / 1e3:.0f} kB of it code; one file {file.stat().st_size / 1e6:.2f} MB")
     if scene == "builtin:gallery" and whole > GALLERY:
         faults.append(f"{scene}: the folder is {whole} bytes")

@@ -29,7 +29,7 @@ pub fn light_of(
         }
     }
     let factor = match options.carrier {
-        Carrier::LightMap | Carrier::Beside => options.quantity.factor(),
+        Carrier::LightMap => options.quantity.factor(),
         Carrier::Emissive => match options.quantity {
             Quantity::Irradiance | Quantity::IrradianceByPi => std::f64::consts::FRAC_1_PI,
             Quantity::Illuminance | Quantity::IlluminanceByPi => {
@@ -38,7 +38,7 @@ pub fn light_of(
         },
         Carrier::Unlit => options.exposure_stops.exp2() * std::f64::consts::FRAC_1_PI,
     };
-    if matches!(options.carrier, Carrier::LightMap | Carrier::Beside) {
+    if options.carrier == Carrier::LightMap {
         return light.into_iter().map(|light| light * factor).collect();
     }
     let albedo = albedo(scene, &map.chart);
@@ -135,7 +135,7 @@ pub fn encode(
 ) -> Result<Vec<u8>> {
     let white = match options.carrier {
         Carrier::Unlit => 1.0,
-        Carrier::LightMap | Carrier::Emissive | Carrier::Beside => {
+        Carrier::LightMap | Carrier::Emissive => {
             let values = light.iter().flat_map(|light| light.to_array());
             white(values, options.cut).unwrap_or(1.0)
         }

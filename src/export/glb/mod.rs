@@ -28,9 +28,6 @@ pub enum Carrier {
     Emissive,
     /// Light that the surface reflects, as the colour of a KHR_materials_unlit material.
     Unlit,
-    /// Nothing: the maps lie beside the file, which has their coordinates alone. Of a surface with light on both sides, both
-    /// maps follow the same ones.
-    Beside,
 }
 
 /// What becomes of the scene's own lights. With lights in the file and their direct light in the maps, it would be lit
@@ -166,11 +163,7 @@ pub fn encode(
     };
     let objects = maps.iter().map(|map| &scene.objects[map.chart.object()]);
     glb.push_own_meshes(objects.map(|object| object.node).collect());
-    let written = match options.carrier {
-        Carrier::Beside => one_of_each(maps),
-        _ => front_maps(maps, scene, &mut report.warnings),
-    };
-    for map in written {
+    for map in front_maps(maps, scene, &mut report.warnings) {
         let object = &scene.objects[map.chart.object()];
         let dense = map.dense();
         let world_from_node = world_from_node.get(&object.node);
@@ -242,13 +235,6 @@ fn front_maps<'a>(
     front
 }
 
-/// One map of each object.
-fn one_of_each(maps: &[IlluminationMap]) -> Vec<&IlluminationMap> {
-    let mut objects = BTreeSet::new();
-    let maps = maps.iter();
-    maps.filter(|map| objects.insert(map.chart.object())).collect()
-}
-
 fn add_map(
     glb: &mut Glb,
     scene: &Scene,
@@ -268,9 +254,6 @@ fn add_map(
         cut_share: 0.0,
         negative_texels: 0,
     };
-    if options.carrier == Carrier::Beside {
-        return Ok(exported);
-    }
     let light = images::light_of(map, layers, scene, options);
     let png = images::encode(&light, (map.width(), map.height()), options, &mut exported)?;
     let image_index = glb.push_png(&format!("{} light", object.name), &png);
@@ -362,7 +345,6 @@ fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64
     }
     let black = json!([0.0, 0.0, 0.0, 1.0]);
     match options.carrier {
-        Carrier::Beside => {}
         Carrier::LightMap => {
             texture["intensity"] = json!(intensity);
             material["extensions"][LIGHT_MAP] = texture;

@@ -197,7 +197,7 @@ impl ChainScene {
     }
 
     /// What nodes and triangles hold, by name, and lamps, of which there are none. Triangles of the scene come without their
-    /// corners, which their indices tell.
+    /// corners, which their indices tell, and nodes of meshes without boxes, which their triangles tell.
     pub(super) fn contents_without_corners(&self) -> [(&'static str, Content); 3] {
         let mut triangles: Vec<Triangle> = bytemuck::pod_collect_to_vec(self.triangles.bytes());
         for triangle in triangles
@@ -209,13 +209,21 @@ impl ChainScene {
             // Numbers that mostly follow from each other.
             triangle.order = triangle.order.wrapping_mul(3).wrapping_sub(triangle.first_index);
         }
-        let nodes: Vec<Node> = bytemuck::pod_collect_to_vec(self.nodes.bytes());
+        let mut nodes: Vec<Node> = bytemuck::pod_collect_to_vec(self.nodes.bytes());
+        for node in &mut nodes[self.first_mesh_node()..] {
+            (node.low, node.high) = ([0.0; 3], [0.0; 3]);
+        }
         let lights: Vec<LightRecord> = bytemuck::pod_collect_to_vec(self.lights.bytes());
         [
             ("nodes", Content::records(&nodes)),
             ("triangles", Content::records(&triangles)),
             ("lights", Content::records(&lights)),
         ]
+    }
+
+    /// The first node of a mesh: all from there on are of meshes.
+    pub(super) fn first_mesh_node(&self) -> usize {
+        self.starts[0].0
     }
 
     /// Local coordinates.

@@ -7,22 +7,26 @@ use strum::VariantArray;
 
 use super::accumulation;
 use super::bindings::Binding;
-use super::draws::{Draw, DrawList};
+use super::draws::{Draw, DrawList, DrawState};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
 use super::maps::DeviceMap;
 use super::pipelines::{
-    COMPOSED_BINDINGS, DEPTH_FORMAT, FRAME_BINDINGS, HDR_FORMAT, PipelineKey, RenderTarget, TRACED_BINDINGS,
+    COMPOSED_BINDINGS, DEPTH_FORMAT, FRAME_BINDINGS, HDR_FORMAT, PipelineFlags, PipelineKey, RenderTarget,
+    TRACED_BINDINGS,
 };
 use super::shaders::{ACCUMULATED, SKY, SUMMED, TONE_MAPPING};
-use super::uniforms::{ChainStart, DisplayWhite, Frame, MapTile, ObjectRecord, SeenWavelengths, Triangle};
-use super::{EyeQuality, Renderer, sky, tone_mapping};
-use crate::error::Result;
+use super::uniforms::{
+    ChainStart, DisplayWhite, Frame, MapTile, Node, ObjectRecord, SeenWavelengths, Triangle,
+};
+use super::{EyeQuality, Inspected, MapStyle, Renderer, sky, tone_mapping};
+use crate::error::{Error, Result};
 use crate::eye_pass::reference::ChainLimits;
 use crate::eye_pass::{ToneMap, View, wavelengths};
 use crate::gpu::layout::StructLayout;
 use crate::gpu::shader::Program;
 use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
+use crate::illumination::false_colours::ColourScale;
 use crate::optics::spectrum::xyz::IDENTITY;
 use crate::scene::{Camera, Scene};
 
@@ -43,14 +47,17 @@ const PICTURES: u32 = 17;
 pub struct WebScene {
     /// Shader modules, layouts, pipelines, draws and structs.
     pub description: Value,
-    /// What buffers and textures hold, by their names in the description. Triangles lack what their indices tell.
+    /// What buffers and textures hold, by their names in the description. Triangles lack what their indices tell, and nodes
+    /// what their triangles tell.
     pub contents: Vec<(&'static str, Content)>,
     /// Where each map's tiles lie, as `summed.wgsl` reads them.
     pub map_tiles: Vec<Content>,
+    /// Why mirrors and glass are drawn without reflections and refractions, if they are.
+    pub refusal: Option<Error>,
 }
 
 /// What a buffer or a texture holds.
-#[derive(Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Content {
     pub bytes: Vec<u8>,
     /// Length of each of its records [bytes], if it has any that resemble each other.
@@ -74,29 +81,41 @@ impl Content {
 }
 
 impl WebScene {
-    /// Gathers a scene with maps of some sizes; `None` where nothing in it is specular. Of their light, only the largest
-    /// value counts: the host fills the tiles.
+    /// Gathers a scene with maps of some sizes. Of their light, only the largest value counts: the host fills the tiles,
+    /// and a texture of the environment.
     ///
     /// # Errors
     /// A scene beyond what every browser's device holds; maps that do not belong to the scene.
-    pub fn new(scene: &Scene, maps: &[IlluminationMap]) -> Result<Option<Self>> {
+    pub fn new(scene: &Scene, maps: &[IlluminationMap]) -> Result<Self> {
         let gpu = Gpu::idle()?;
         let mut renderer = Renderer::new(&gpu, scene, wgpu::TextureFormat::Rgba8Unorm, SAMPLES)?;
+        // The host traces at any resolution.
+        renderer.set_quality(EyeQuality {
+            traced_scale: 0.5,
+            ..EyeQuality::STILL
+        });
         // Coarse first: tiles then fill the pool without gaps.
         renderer.set_map_budget(0);
         renderer.set_maps(&gpu, scene, maps)?;
         renderer.set_map_budget(MAP_BUDGET_BYTES);
         renderer.fit_maps(&gpu);
+        if renderer.geometry.pages.len() > 1 {
+            return Err(Error::failure(
+                &scene.source,
+                format!(
+                    "has {} triangles, more than every browser holds in one buffer",
+                    scene.triangle_count()
+                ),
+                "export a scene of fewer triangles",
+            ));
+        }
         let mut looks = renderer.objects.list.iter();
-        if !looks.any(|look| renderer.draw_state().is_specular(look)) {
-            return Ok(None);
+        if looks.any(|look| renderer.draw_state().is_specular(look)) {
+            renderer.make_chain_scene(&gpu);
         }
-        renderer.make_chain_scene(&gpu);
-        if let Some(refusal) = renderer.refusal.take() {
-            return Err(refusal);
-        }
-        let made = renderer.web_scene(&gpu, maps)?;
-        gpu.take_error().map_or(Ok(Some(made)), Err)
+        let mut made = renderer.web_scene(&gpu, maps)?;
+        made.refusal = renderer.refusal.take();
+        gpu.take_error().map_or(Ok(made), Err)
     }
 }
 
@@ -127,22 +146,17 @@ impl Renderer {
         });
         let map_tiles = tiles.collect();
         let [map_pool, texture_pool] = images.pool_sizes();
-        let mut textures = json!({
+        let textures = json!({
             "map_tiles": {"size": map_pool, "format": word(HDR_FORMAT)},
             "texture_tiles": {"size": texture_pool, "format": "rgba8unorm-srgb"},
         });
         let mut contents = self.web_buffers(gpu)?;
         contents.push(("texture_tiles", Content::plain(&images.texture_tiles())));
-        if let Some(environment) = self.scene.environment.as_ref().filter(|_| self.shows_sky()) {
-            let limit = gpu.limits().max_texture_dimension_2d as usize;
-            let (width, height, pixels) = sky::fitted(environment, limit);
-            textures["sky"] = json!({"size": [width, height, 1], "format": word(sky::FORMAT)});
-            contents.push(("sky", Content::plain(&pixels)));
-        }
         Ok(WebScene {
             description: self.web_description(textures),
             contents,
             map_tiles,
+            refusal: None,
         })
     }
 
@@ -184,20 +198,46 @@ impl Renderer {
         Ok(buffers)
     }
 
-    fn web_description(&self, textures: Value) -> Value {
+    /// Draws of all objects: with chains, without them, and in false colours of the light.
+    fn web_draws(&self) -> Vec<(&'static str, Vec<Draw>)> {
         let all: Vec<usize> = (0..self.objects.list.len()).collect();
-        let list = DrawList::new(&self.objects, &all, self.draw_state());
-        let is_composed = |draw: &&Draw| draw.key.writes == RenderTarget::Composed;
-        let (composed, own): (Vec<Draw>, Vec<Draw>) = list.surfaces.iter().partition(is_composed);
+        let lit = self.draw_state();
+        let list = DrawList::new(&self.objects, &all, lit);
+        let plain = DrawState {
+            has_chains: false,
+            ..lit
+        };
+        let scale = ColourScale {
+            is_logarithmic: true,
+            ..ColourScale::default()
+        };
+        let what = Inspected::Irradiance;
+        let colours = DrawState {
+            style: MapStyle::Inspected { what, scale },
+            flags: PipelineFlags {
+                is_logarithmic: true,
+                ..lit.flags
+            },
+            ..lit
+        };
+        let surfaces = |state| DrawList::new(&self.objects, &all, state).surfaces;
+        let is_composed = |draw: &Draw| draw.key.writes == RenderTarget::Composed;
+        let (composed, own) = list.surfaces.into_iter().partition(is_composed);
+        vec![
+            ("depths", list.depths),
+            ("traced", list.traced),
+            ("composed", composed),
+            ("own", own),
+            ("plain", surfaces(plain)),
+            ("colours", surfaces(colours)),
+        ]
+    }
+
+    fn web_description(&self, textures: Value) -> Value {
         let mut keys: Vec<PipelineKey> = Vec::new();
         let mut draws = Map::new();
-        for (name, of) in [
-            ("depths", &list.depths),
-            ("traced", &list.traced),
-            ("composed", &composed),
-            ("own", &own),
-        ] {
-            let runs = self.runs(of).into_iter().map(|(key, segment, objects)| {
+        for (name, of) in self.web_draws() {
+            let runs = self.runs(&of).into_iter().map(|(key, segment, objects)| {
                 let place = keys.iter().position(|known| *known == key).unwrap_or(keys.len());
                 if place == keys.len() {
                     keys.push(key);
@@ -214,7 +254,11 @@ impl Renderer {
         }
         let local = self.chain_scene.as_ref().map(|scene| {
             let frame = scene.frame();
-            json!({"centre_m": frame.centre.to_array(), "per_m": frame.scale})
+            json!({
+                "centre_m": frame.centre.to_array(),
+                "per_m": frame.scale,
+                "first_mesh_node": scene.first_mesh_node(),
+            })
         });
         let buffers = [CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT].map(|layout| vertices(&layout));
         let surfaces: Vec<Value> = keys.iter().map(|key| surface(*key)).collect();
@@ -255,6 +299,7 @@ impl Renderer {
             "ChainStart": offsets(&ChainStart::layout()),
             "ObjectRecord": offsets(&ObjectRecord::layout()),
             "MapTile": offsets(&MapTile::layout()),
+            "Node": offsets(&Node::layout()),
             "Triangle": offsets(&Triangle::layout()),
             "local": local,
             "background": background,

@@ -3,6 +3,7 @@
 mod glb;
 mod maps;
 mod textures;
+#[cfg(feature = "gpu")]
 mod web;
 
 use std::path::PathBuf;

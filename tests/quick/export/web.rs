@@ -1,19 +1,24 @@
 //! A page to walk through: its folder and its single file, taken apart.
 
+use std::collections::HashMap;
 use std::io::Read as _;
 use std::path::Path;
 
 use nephroid::export::map_set::MapSet;
+use nephroid::export::sequence::FrameTimes;
 use nephroid::export::web::{Site, WebReport};
+use nephroid::eye_pass::renderer::WebScene;
+use nephroid::eye_pass::{Picture, View};
 
 use super::Baked;
 use crate::prelude::*;
-use support::glb::load_path;
 use support::program::Sandbox;
 
 const LAYERS: [LayerKind; 2] = [LayerKind::Caustic, LayerKind::Direct];
 /// Step of nine bits that share an exponent, and what fewer texels may differ by [1].
 const TOLERANCE: f64 = 1.0 / 256.0 + 0.02;
+/// Radiance of every still picture, all over: two stops below white [W/(m² sr)].
+const GREY: f32 = 0.25;
 
 fn baked() -> Baked {
     Baked::quick(builtin::build("ring").expect("it is built in"), &LAYERS)
@@ -21,7 +26,14 @@ fn baked() -> Baked {
 
 fn site(baked: &Baked) -> Site {
     let set = MapSet::open(baked.path("out"), &baked.scene).expect("it was baked");
-    Site::new(&baked.scene, &[set], 0.0, &Control::default()).expect("it fits")
+    let eye = |view: &View| {
+        Ok(Picture {
+            width: view.width,
+            height: view.height,
+            radiance: vec![[GREY; 3]; (view.width * view.height) as usize],
+        })
+    };
+    Site::new(&baked.scene, &[set], &eye, &Control::default()).expect("it fits")
 }
 
 fn written(baked: &Baked) -> (WebReport, Value, String) {
@@ -30,6 +42,53 @@ fn written(baked: &Baked) -> (WebReport, Value, String) {
         .expect("it is empty");
     let page = text(&baked.path("site/index.html"));
     (report, about(&page), page)
+}
+
+/// The file of a moment: its description, and what it names.
+struct Moment {
+    description: Value,
+    contents: HashMap<String, Vec<u8>>,
+}
+
+impl Moment {
+    fn read(path: &Path, first: Option<&Self>) -> Self {
+        let (packed, mut file) = (std::fs::read(path).expect("it was written"), Vec::new());
+        let read = flate2::read::GzDecoder::new(&packed[..]).read_to_end(&mut file);
+        read.expect("gzip");
+        let (length, rest) = file.split_at(4);
+        let length = u32::from_le_bytes(length.try_into().expect("four bytes")) as usize;
+        let (description, stored) = rest.split_at(length);
+        let description: Value = serde_json::from_slice(description).expect("JSON");
+        let mut contents = first.map_or_else(HashMap::new, |first| first.contents.clone());
+        for (name, place) in description["contents"].as_object().expect("places") {
+            let [first, length] = [0, 1].map(|which| place[which].as_u64().expect("a number") as usize);
+            let stored = &stored[first..first + length];
+            let bytes = match place[2].as_u64() {
+                Some(record) => unfiltered(stored, record as usize, contents.get(name)),
+                None => stored.to_vec(),
+            };
+            contents.insert(name.clone(), bytes);
+        }
+        Self {
+            description,
+            contents,
+        }
+    }
+}
+
+/// Bytes lie by their place in a record; words are differences from the first moment, and these from the record before.
+fn unfiltered(stored: &[u8], record: usize, first: Option<&Vec<u8>>) -> Vec<u8> {
+    let byte = |at: usize| stored[at % record * (stored.len() / record) + at / record];
+    let first: Vec<u32> = bytemuck::pod_collect_to_vec(first.map_or(&[][..], |first| first));
+    let mut moved: Vec<u32> = Vec::new();
+    for word in 0..stored.len() / 4 {
+        let change = u32::from_le_bytes([0, 1, 2, 3].map(|part| byte(4 * word + part)));
+        let before = word.checked_sub(record / 4).map_or(0, |before| moved[before]);
+        moved.push(change.wrapping_add(before));
+    }
+    let words = moved.iter().enumerate();
+    let words = words.map(|(word, moved)| moved.wrapping_add(first.get(word).copied().unwrap_or(0)));
+    words.flat_map(u32::to_le_bytes).collect()
 }
 
 /// What scripts read in a page.
@@ -53,9 +112,8 @@ fn a_folder_holds_all_that_its_page_names() {
     let baked = baked();
     let (report, about, page) = written(&baked);
     assert_eq!(about["layers"], json!(["caustic", "direct"]));
-    let maps = files(&about).into_iter().filter(|file| file.starts_with("maps/"));
-    assert_eq!(maps.count(), report.textures);
-    for file in files(&about).into_iter().chain(["page.js", "three/LICENSE"]) {
+    assert_eq!(files(&about), ["moment0.gz", "still.jpg"]);
+    for file in files(&about).into_iter().chain(["page.js"]) {
         assert!(baked.path("site").join(file).is_file(), "{file}");
     }
     let imports = page.split_once("importmap\">").expect("it imports").1;
@@ -67,27 +125,22 @@ fn a_folder_holds_all_that_its_page_names() {
             "{file}"
         );
     }
-    let packed = std::fs::read(baked.path("site/scene.glb.gz")).expect("it was written");
-    let mut glb = Vec::new();
-    flate2::read::GzDecoder::new(&packed[..])
-        .read_to_end(&mut glb)
-        .expect("gzip");
-    std::fs::write(baked.path("scene.glb"), glb).expect("it can be written");
-    let read = load_path(&baked.path("scene.glb"), &LoadOptions::default()).expect("we read it ourselves");
-    assert_eq!(
-        (read.objects.len(), read.lights.len()),
-        (baked.scene.objects.len(), 0)
-    );
-    let kinds: Vec<&Value> = about["objects"]
-        .as_array()
-        .expect("a list")
-        .iter()
-        .map(|look| &look["kind"])
-        .collect();
+    let still = image::open(baked.path("site/still.jpg"))
+        .expect("a picture")
+        .to_rgb8();
+    // Exposed to middle grey, which stays as it is: the sRGB code of 0.18.
+    assert_eq!(still.dimensions(), (1280, 720));
     assert!(
-        kinds.contains(&&json!("mirror")) && kinds.contains(&&json!("diffuse")),
-        "{kinds:?}"
+        still
+            .pixels()
+            .all(|pixel| pixel.0.iter().all(|code| code.abs_diff(118) <= 2))
     );
+    let cameras = about["cameras"].as_array().expect("a list");
+    assert_eq!(cameras.len(), baked.scene.cameras.len().max(1));
+    for camera in cameras {
+        let stops = camera["exposure_stops"].as_f64().expect("a number");
+        assert_close(stops, (0.18 / f64::from(GREY)).log2(), 1e-6, "exposure");
+    }
     let again = site(&baked)
         .write_folder(&baked.path("site"), false)
         .expect("it is ours");
@@ -100,22 +153,20 @@ fn maps_hold_the_light_that_was_baked() {
     let (_, about, _) = written(&baked);
     let wanted = baked.light("direct");
     let mean = wanted.iter().map(|texel| f64::from(texel[1])).sum::<f64>() / wanted.len() as f64;
-    let file = about["maps"][0]["layers"]["direct"][0]
-        .as_str()
-        .expect("it was baked");
-    let bytes = std::fs::read(baked.path("site").join(file)).expect("it was written");
-    let number = |at: usize| u64::from_le_bytes(bytes[at..at + 8].try_into().expect("eight bytes")) as usize;
-    let side = u32::from_le_bytes(bytes[20..24].try_into().expect("four bytes")) as usize;
-    let mut level = Vec::new();
-    let mut decoder =
-        ruzstd::decoding::StreamingDecoder::new(&bytes[number(80)..number(80) + number(88)]).expect("zstd");
-    decoder.read_to_end(&mut level).expect("zstd");
-    assert_eq!(level.len(), 4 * side * side);
+    let moment = Moment::read(&baked.path("site").join(files(&about)[0]), None);
+    let side = moment.description["maps"][0]["direct"][0]
+        .as_u64()
+        .expect("a size") as usize;
+    // Words are differences from the row before.
+    let mut words: Vec<u32> = bytemuck::pod_collect_to_vec(&moment.contents["direct0"]);
+    for texel in side..words.len() {
+        words[texel] = words[texel].wrapping_add(words[texel - side]);
+    }
+    assert_eq!(words.len(), side * side);
     // Means over what one of its texels covers.
     let fold = 64 / side;
     let mut squares = 0.0;
-    for (texel, word) in level.chunks_exact(4).enumerate() {
-        let word = u32::from_le_bytes(word.try_into().expect("four bytes"));
+    for (texel, word) in words.into_iter().enumerate() {
         let found = f64::from((word >> 9) & 511) * f64::from((word >> 27) as i32 - 24).exp2();
         let (row, column) = (texel / side, texel % side);
         let covered = (0..fold * fold)
@@ -133,46 +184,54 @@ fn one_file_needs_no_other() {
     let path = baked.path("site.html");
     site(&baked).write_file(&path).expect("it can be written");
     let page = text(&path);
-    for (start, _) in page.match_indices("src=").chain(page.match_indices("href=")) {
-        assert!(
-            page[start..].starts_with("href=\"data:,\""),
-            "{}",
-            &page[start..start + 40]
-        );
+    for (start, _) in page.match_indices("src=\"").chain(page.match_indices("href=\"")) {
+        let value = page[start..].split_once('"').expect("a value").1;
+        assert!(value.starts_with("data:"), "{}", &value[..40]);
     }
-    // Texts of three.js name its homepage, packed.
     assert!(!page.contains("http:") && !page.contains("https:"));
-    assert!(page.contains("data-file=\"scene.glb.gz\"") && page.contains("data-file=\"module:page\""));
+    assert!(page.contains("data-file=\"moment0.gz\"") && page.contains("data-file=\"module:page\""));
 }
 
-/// Each moment has a file where its light differs; those of an export that is replaced go.
+/// Each moment has a file of what differs from the first; those of an export that is replaced go.
 #[test]
-fn a_sequence_has_maps_of_each_moment() {
+fn a_sequence_has_what_differs_at_each_moment() {
     let sandbox = Sandbox::new();
     let quick = "--density 1e3 --map-resolution 32 --layers caustic,direct";
     sandbox.succeed(&format!("bake builtin:pool -o maps --frames 3 --fps 8 {quick}"));
     sandbox.succeed("export maps --format web -o site");
     let moving = about(&text(&sandbox.path("site/index.html")));
-    assert_eq!(moving["frames"], json!({ "count": 3, "fps": 8.0 }));
-    let layers = &moving["maps"][0]["layers"];
-    let caustics = layers["caustic"].as_array().expect("files");
-    assert!(caustics.len() == 3 && caustics[0] != caustics[1], "{layers}");
-    // Clear water alone moves: direct light stands still.
-    assert_eq!(layers["direct"].as_array().expect("files").len(), 1, "{layers}");
-    let is_there = |name: &&str| sandbox.path("site").join(name).is_file();
-    assert!(files(&moving).iter().all(is_there));
-    std::fs::write(sandbox.path("site/maps/mine.txt"), "mine").expect("it can be written");
+    let names = ["moment0.gz", "moment1.gz", "moment2.gz"];
+    assert_eq!((&moving["moments"], &moving["fps"]), (&json!(names), &json!(8.0)));
+    let moments = names.map(|name| sandbox.path("site").join(name));
+    let first = Moment::read(&moments[0], None);
+    let last = Moment::read(&moments[2], Some(&first));
+    // Clear water alone moves: direct light, and what surfaces look like, stand still.
+    let stored = last.description["contents"].as_object().expect("places");
+    assert!(stored.contains_key("caustic0") && stored.contains_key("corners"));
+    assert!(!stored.contains_key("direct0") && !stored.contains_key("map_uvs"));
+    assert!(last.description["programs"].is_null() && first.description["programs"].is_object());
+    let times = FrameTimes {
+        frames: 3,
+        fps: 8.0,
+        is_loop: false,
+    };
+    let rest = built_in("pool");
+    let water = times.scene(&rest).at(times.time_s(2));
+    for (name, content) in WebScene::new(&water, &[]).expect("it is small").contents {
+        if ["corners", "nodes", "triangles", "indices"].contains(&name) {
+            assert!(last.contents[name] == content.bytes, "{name}");
+        }
+    }
+    std::fs::write(sandbox.path("site/mine.txt"), "mine").expect("it can be written");
     sandbox.succeed(&format!("bake builtin:pool -o maps {quick}"));
     sandbox.succeed("export maps --format web -o site");
     let still = about(&text(&sandbox.path("site/index.html")));
-    assert!(still["frames"].is_null() && files(&still).iter().all(is_there));
-    for gone in files(&moving)
-        .iter()
-        .filter(|name| !files(&still).contains(*name))
-    {
-        assert!(!is_there(gone), "{gone}");
-    }
-    assert_eq!(text(&sandbox.path("site/maps/mine.txt")), "mine");
+    assert_eq!(
+        (&still["moments"], &still["fps"]),
+        (&json!(["moment0.gz"]), &Value::Null)
+    );
+    assert!(moments[0].is_file() && !moments[1].exists() && !moments[2].exists());
+    assert_eq!(text(&sandbox.path("site/mine.txt")), "mine");
 }
 
 #[test]

@@ -1,10 +1,9 @@
-//! What a browser gets of a scene: draws within their buffers, modules that hold, and the light of the maps layer by
-//! layer. Pictures are compared by `tests/run --interop`.
+//! What a browser gets of a scene: draws within their buffers, modules that hold, and tiles for the light of the maps.
+//! Pictures are compared by `tests/run --interop`.
 
-use std::collections::HashMap;
-use std::io::Read as _;
+use std::collections::BTreeMap;
 
-use nephroid::export::chains::encode;
+use nephroid::eye_pass::renderer::WebScene;
 use nephroid::illumination::{IlluminationMap, Layer};
 
 use crate::prelude::*;
@@ -27,97 +26,100 @@ fn scene(has_ball: bool) -> (Scene, Vec<IlluminationMap>) {
     (scene, vec![map])
 }
 
-/// The description, and the bytes that it names.
-struct Unpacked {
-    description: Value,
-    contents: Vec<u8>,
-}
-
-impl Unpacked {
-    fn of(packed: &[u8]) -> Self {
-        let mut file = Vec::new();
-        let read = flate2::read::GzDecoder::new(packed).read_to_end(&mut file);
-        read.expect("gzip");
-        let (length, rest) = file.split_at(4);
-        let length = u32::from_le_bytes(length.try_into().expect("four bytes")) as usize;
-        Self {
-            description: serde_json::from_slice(&rest[..length]).expect("JSON"),
-            contents: rest[length..].to_vec(),
-        }
-    }
-
-    /// Bytes at a place; those of records lie by their place in a record, and their words are differences.
-    fn part(&self, place: &Value) -> Vec<u8> {
-        let [first, length] = [0, 1].map(|which| place[which].as_u64().expect("a number") as usize);
-        let stored = &self.contents[first..first + length];
-        let Some(record) = place[2].as_u64().map(|record| record as usize) else {
-            return stored.to_vec();
-        };
-        let byte = |at: usize| stored[at % record * (length / record) + at / record];
-        let mut words: Vec<u32> = Vec::new();
-        for word in 0..length / 4 {
-            let change = u32::from_le_bytes([0, 1, 2, 3].map(|part| byte(4 * word + part)));
-            let before = word.checked_sub(record / 4).map_or(0, |before| words[before]);
-            words.push(change.wrapping_add(before));
-        }
-        bytemuck::cast_slice(&words).to_vec()
-    }
-
-    fn buffer(&self, name: &str) -> Vec<u8> {
-        self.part(&self.description["contents"][name])
-    }
-}
-
-fn packed(has_ball: bool) -> Option<Unpacked> {
+fn gathered(has_ball: bool) -> WebScene {
     let (scene, maps) = scene(has_ball);
-    encode(&scene, &maps)
-        .expect("it is small")
-        .map(|bytes| Unpacked::of(&bytes))
+    let made = WebScene::new(&scene, &maps).expect("it is small");
+    assert_eq!(made.refusal, None);
+    made
 }
 
-#[test]
-fn draws_lie_within_their_buffers() {
-    let packed = packed(true).expect("glass");
-    let about = &packed.description;
+fn buffer<'a>(made: &'a WebScene, wanted: &str) -> Option<&'a [u8]> {
+    let found = made.contents.iter().find(|(name, _)| *name == wanted);
+    found.map(|(_, content)| &*content.bytes)
+}
+
+/// Objects by list of draws, each of which lies within its buffers and has a pipeline.
+fn drawn(made: &WebScene) -> BTreeMap<&str, usize> {
+    let about = &made.description;
     let number = |value: &Value| value.as_u64().expect("a number") as usize;
-    let record = about["vertices"][2]["arrayStride"].as_u64().expect("a stride") as usize;
-    let (indices, objects) = (
-        packed.buffer("indices").len() / 4,
-        packed.buffer("objects").len() / record,
-    );
-    let mut drawn = HashMap::new();
+    let record = number(&about["vertices"][2]["arrayStride"]);
+    let indices = buffer(made, "indices").expect("triangles").len() / 4;
+    let objects = buffer(made, "objects").expect("objects").len() / record;
+    let mut drawn = BTreeMap::new();
     for (list, draws) in about["draws"].as_object().expect("lists") {
+        drawn.insert(list.as_str(), 0);
         for draw in draws.as_array().expect("draws") {
             let [pipeline, index_count, object_count, first_index, first_object] =
                 std::array::from_fn(|which: usize| number(&draw[which]));
             let surface = &about["surfaces"][pipeline];
             assert!(about["programs"][surface["program"].as_str().expect("a name")].is_string());
             assert!(first_index + index_count <= indices && first_object + object_count <= objects);
-            *drawn.entry(list.as_str()).or_insert(0) += object_count;
+            *drawn.entry(list).or_default() += object_count;
         }
     }
-    // The floor and the ball: both hide, the ball is traced and composed, the floor shows itself.
+    drawn
+}
+
+#[test]
+fn draws_lie_within_their_buffers() {
+    let made = gathered(true);
+    // The floor and the ball: both hide, the ball is traced and composed, the floor shows itself. Without chains, and in
+    // false colours, clear bodies are left out.
+    let wanted = [
+        ("depths", 2),
+        ("traced", 1),
+        ("composed", 1),
+        ("own", 1),
+        ("plain", 1),
+        ("colours", 1),
+    ];
+    assert_eq!(drawn(&made), BTreeMap::from(wanted));
+    let corner = made.description["vertices"][0]["arrayStride"]
+        .as_u64()
+        .expect("a stride");
+    let corners = buffer(&made, "corners").expect("corners").len() / corner as usize;
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(buffer(&made, "indices").expect("triangles"));
+    assert_eq!(*words.iter().max().expect("triangles") as usize + 1, corners);
+    let triangles = buffer(&made, "triangles").expect("what chains are traced through");
+    let size = made.description["Triangle"]["size"].as_u64().expect("a size") as usize;
+    assert_eq!(triangles.len() / size, words.len() / 3);
+}
+
+/// The host makes the boxes of a mesh's nodes from those of their children.
+#[test]
+fn nodes_of_meshes_are_a_tree_over_all_triangles() {
+    let made = gathered(true);
+    let first = made.description["local"]["first_mesh_node"]
+        .as_u64()
+        .expect("a number") as usize;
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(buffer(&made, "nodes").expect("a hierarchy"));
+    let nodes: Vec<&[u32]> = words.chunks_exact(8).collect();
+    let mut seen = vec![0; nodes.len()];
+    let mut triangles = 0;
+    for node in &nodes[first..] {
+        let (child, count) = (node[3] as usize, node[7] as usize);
+        triangles += count;
+        if count == 0 {
+            seen[child..child + 2].iter_mut().for_each(|seen| *seen += 1);
+        }
+        assert!([0, 1, 2, 4, 5, 6].iter().all(|word| node[*word] == 0), "no box");
+    }
+    // One mesh of all that is not instanced, and its root is nobody's child.
+    assert_eq!(seen[first..].iter().filter(|seen| **seen != 1).count(), 1);
+    let size = made.description["Triangle"]["size"].as_u64().expect("a size") as usize;
     assert_eq!(
-        drawn,
-        HashMap::from([("depths", 2), ("traced", 1), ("composed", 1), ("own", 1)])
+        triangles,
+        buffer(&made, "triangles").expect("triangles").len() / size
     );
-    let corners = packed.buffer("corners").len() / number(&about["vertices"][0]["arrayStride"]);
-    let words = packed.buffer("indices");
-    let largest = words
-        .chunks_exact(4)
-        .map(|word| u32::from_le_bytes(word.try_into().expect("four bytes")))
-        .max();
-    assert_eq!(largest.expect("triangles") as usize + 1, corners);
 }
 
 /// The host fills tiles of each level, which lie beside each other in the pool, from textures of any size.
 #[test]
 fn tiles_hold_the_whole_map() {
-    let packed = packed(true).expect("glass");
-    let about = &packed.description;
-    let size = &about["textures"]["map_tiles"]["size"];
+    let made = gathered(true);
+    let size = &made.description["textures"]["map_tiles"]["size"];
     let [across, down] = [0, 1].map(|axis| size[axis].as_u64().expect("a size") as usize);
-    let words: Vec<u32> = bytemuck::pod_collect_to_vec(&packed.part(&about["maps"][0]));
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(&made.map_tiles[0].bytes);
     let tiles: Vec<&[u32]> = words.chunks_exact(8).collect();
     let mut texels = 0;
     let mut corners = Vec::new();
@@ -138,6 +140,16 @@ fn tiles_hold_the_whole_map() {
 }
 
 #[test]
-fn a_scene_without_mirrors_and_glass_has_none() {
-    assert!(packed(false).is_none());
+fn a_scene_without_mirrors_and_glass_traces_nothing() {
+    let made = gathered(false);
+    let wanted = [
+        ("depths", 0),
+        ("traced", 0),
+        ("composed", 0),
+        ("own", 1),
+        ("plain", 1),
+        ("colours", 1),
+    ];
+    assert_eq!(drawn(&made), BTreeMap::from(wanted));
+    assert!(made.description["local"].is_null() && buffer(&made, "nodes").is_none());
 }
