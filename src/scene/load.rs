@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Light, LightKind, Opened, Scene, builtin, contacts, environment, gltf};
+use super::{Light, LightKind, Opened, Scene, builtin, contacts, dark, environment, gltf};
 use crate::error::{Error, Result, Warning};
 use crate::units::Irradiance;
 
@@ -50,6 +50,8 @@ impl Scene {
         }
         let covering = contacts::set_apart(&mut scene);
         scene.warnings.extend(covering);
+        let dark = dark::warnings(&scene);
+        scene.warnings.extend(dark);
         if options.default_light && scene.lights.is_empty() {
             add_default_light(&mut scene);
         }

@@ -18,6 +18,7 @@ pub mod camera;
 pub mod camera_path;
 pub mod changes;
 pub mod contacts;
+mod dark;
 pub mod edit;
 pub mod emitter;
 pub mod environment;
