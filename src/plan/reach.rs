@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::sealed_regions::Compartments;
 use crate::geometry::enclosure::Bounds;
-use crate::scene::{Material, InScene, Light, LightKind, Scene, SurfaceKind};
+use crate::scene::{InScene, Light, LightKind, Material, Scene, SurfaceKind};
 
 /// With more specular objects than this, all that share a compartment are assumed to send light to each other.
 const MAX_RELAYS: usize = 512;

@@ -101,14 +101,18 @@ pub fn set_apart(scene: &mut Scene) -> Vec<Warning> {
 
 /// All triangles within the bounding box of another object.
 fn faces(scene: &Scene) -> Vec<Face> {
-    let boxes = scene.objects.iter().map(|object| object.bounds().unwrap_or_default());
+    let boxes = scene
+        .objects
+        .iter()
+        .map(|object| object.bounds().unwrap_or_default());
     let boxes: Vec<Bounds> = boxes.collect();
     let corners: Vec<[DVec3; 3]> = boxes.iter().map(|&(low, high)| [low, high, high]).collect();
     let near = TriangleBvh::build(&corners);
     let of_object = |object: usize| {
         let is_near = |&(low, high): &Bounds| {
             !all_within(&near, (low, high), |slot| {
-                near.triangle(slot) as usize == object || !overlap(boxes[near.triangle(slot) as usize], (low, high))
+                near.triangle(slot) as usize == object
+                    || !overlap(boxes[near.triangle(slot) as usize], (low, high))
             })
         };
         let mut faces = Vec::new();
@@ -130,7 +134,10 @@ fn faces(scene: &Scene) -> Vec<Face> {
         }
         faces
     };
-    (0..boxes.len()).into_par_iter().flat_map_iter(of_object).collect()
+    (0..boxes.len())
+        .into_par_iter()
+        .flat_map_iter(of_object)
+        .collect()
 }
 
 fn bounds([a, b, c]: &[DVec3; 3]) -> Bounds {
@@ -187,7 +194,11 @@ fn contact(faces: &[Face], pair: [usize; 2]) -> Option<Contact> {
     if cosine.abs() < PARALLEL {
         return None;
     }
-    let largest = |face: &Face| face.corners.iter().fold(DVec3::ZERO, |most, corner| most.max(corner.abs()));
+    let largest = |face: &Face| {
+        face.corners
+            .iter()
+            .fold(DVec3::ZERO, |most, corner| most.max(corner.abs()))
+    };
     let [of_a, of_b] = [a, b].map(largest);
     let (size_a, size_b) = (of_a.max_element(), of_b.max_element());
     let around = size_a.max(size_b).min(MAX_RATIO * size_a.min(size_b));
@@ -259,7 +270,9 @@ impl Movements {
                 (false, true) => second,
                 (true, true) => smaller,
                 // Where closed bodies stand on something, nobody sees either face.
-                (false, false) if !contact.is_same_side && (is_closed(first) || is_closed(second)) => continue,
+                (false, false) if !contact.is_same_side && (is_closed(first) || is_closed(second)) => {
+                    continue;
+                }
                 (false, false) => smaller,
             };
             let object = faces[mover].object;
@@ -269,7 +282,10 @@ impl Movements {
             let known = all.of_faces.entry(mover).or_default();
             *known = if is_within { -step_m } else { known.max(step_m) };
             if contact.is_same_side && !is_solid(mover) {
-                all.covered.entry(object).or_default().insert(faces[larger].object);
+                all.covered
+                    .entry(object)
+                    .or_default()
+                    .insert(faces[larger].object);
             }
         }
         all
@@ -279,7 +295,12 @@ impl Movements {
     fn steps(&self, scene: &Scene, faces: &[Face]) -> Steps {
         let mut steps = Steps::new();
         for (&face, &distance_m) in &self.of_faces {
-            let Face { object, triangle, normal, .. } = faces[face];
+            let Face {
+                object,
+                triangle,
+                normal,
+                ..
+            } = faces[face];
             // Above everything that it covers.
             let layers = self.covered.get(&object).map_or(1, BTreeSet::len);
             let step = normal * (distance_m * layers as f64);

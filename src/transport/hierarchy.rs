@@ -176,7 +176,8 @@ impl Hierarchy {
             };
             let (object, triangle) = self.triangle(found);
             let is_first = |(hit, known): &(RayHit, Found)| {
-                let is_before = || (distance_m, object, triangle) < (hit.distance_m, hit.object, hit.triangle);
+                let is_before =
+                    || (distance_m, object, triangle) < (hit.distance_m, hit.object, hit.triangle);
                 let is_near = (distance_m - hit.distance_m).abs() <= self.same_m(distance_m);
                 let known = (is_near && hit.object == object).then(|| self.corners(*known));
                 let facing = known.and_then(|known| which_faces(ray.direction, corners, &known));

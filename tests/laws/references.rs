@@ -301,10 +301,7 @@ fn read_map(scene: &Scene, surface: &str, file: &str) -> IlluminationMap {
     let object = names
         .position(|name| name == surface)
         .expect("a surface of the scene");
-    let chart = parametrise(
-        object,
-        scene.objects[object].mesh_in_scene())
-    .expect("an area");
+    let chart = parametrise(object, scene.objects[object].mesh_in_scene()).expect("an area");
     IlluminationMap {
         chart: Arc::new(chart.chart(grid.width, grid.height)),
         layers: vec![Layer {

@@ -43,7 +43,11 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
             if !material(object).double_sided && is_against_normals(object.mesh()) {
                 turned.turn(&mut objects[index]);
                 let what = "was wound against its normals; its front is now where these point";
-                load.warn(node(&objects[index]), what, "turn its faces, or recompute its normals");
+                load.warn(
+                    node(&objects[index]),
+                    what,
+                    "turn its faces, or recompute its normals",
+                );
             }
             continue;
         }
@@ -62,10 +66,13 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
         return bounds_body;
     }
     let is_near = |object: &Object| {
-        let overlaps = |(a, b): (DVec3, DVec3), (low, high): (DVec3, DVec3)| a.cmple(high).all() && b.cmpge(low).all();
+        let overlaps =
+            |(a, b): (DVec3, DVec3), (low, high): (DVec3, DVec3)| a.cmple(high).all() && b.cmpge(low).all();
         let own = object.bounds();
-        open.iter()
-            .any(|&open| own.zip(objects[open].bounds()).is_some_and(|(a, b)| overlaps(a, b)))
+        open.iter().any(|&open| {
+            own.zip(objects[open].bounds())
+                .is_some_and(|(a, b)| overlaps(a, b))
+        })
     };
     let opaque = |index: &usize| {
         let object = &objects[*index];
@@ -120,7 +127,9 @@ fn warn_of_turn(object: &Object, load: &mut LoadContext) {
 fn agreement(mesh: &Mesh) -> (f64, f64) {
     (0..mesh.triangles.len()).fold((0.0, 0.0), |(sum, all), triangle| {
         let [a, b, c] = mesh.corners(triangle);
-        let normals = mesh.corner_normals(triangle).map(|normal| normal.normalize_or_zero());
+        let normals = mesh
+            .corner_normals(triangle)
+            .map(|normal| normal.normalize_or_zero());
         let agreed = (b - a).cross(c - a).dot(normals.iter().sum());
         (sum + agreed, all + agreed.abs())
     })
@@ -144,7 +153,10 @@ impl Turned {
         let (_, turned) = self.known.entry(Arc::as_ptr(&mesh)).or_insert_with(|| {
             let mut turned = Mesh::clone(&mesh);
             let points_along = agreement(&mesh).0 > 0.0;
-            turned.triangles.iter_mut().for_each(|[_, b, c]| std::mem::swap(b, c));
+            turned
+                .triangles
+                .iter_mut()
+                .for_each(|[_, b, c]| std::mem::swap(b, c));
             if points_along {
                 turned.normals.iter_mut().for_each(|normal| *normal = -*normal);
             }
@@ -176,9 +188,13 @@ impl Pieces {
             let mesh = objects[object].in_scene();
             let ids: Vec<u32> = mesh.positions().map(|place| weld.id(place)).collect();
             let mut border = Border::new();
-            for [a, b, c] in mesh.triangles().map(|vertices| vertices.map(|vertex| ids[vertex as usize])) {
+            for [a, b, c] in mesh
+                .triangles()
+                .map(|vertices| vertices.map(|vertex| ids[vertex as usize]))
+            {
                 for (from, to) in [(a, b), (b, c), (c, a)] {
-                    *border.entry((from.min(to), from.max(to))).or_default() += (to > from) as i32 - (to < from) as i32;
+                    *border.entry((from.min(to), from.max(to))).or_default() +=
+                        (to > from) as i32 - (to < from) as i32;
                 }
             }
             border.retain(|_, net| *net != 0);
@@ -204,9 +220,10 @@ impl Pieces {
             let Some(mut body) = closed else {
                 continue;
             };
-            let volumes = body.signs.iter().map(|(&object, &sign)| {
-                f64::from(sign) * volume_m3(objects[object].in_scene())
-            });
+            let volumes = body
+                .signs
+                .iter()
+                .map(|(&object, &sign)| f64::from(sign) * volume_m3(objects[object].in_scene()));
             if volumes.sum::<f64>() < 0.0 {
                 body.signs.values_mut().for_each(|sign| *sign = -*sign);
             }
@@ -267,7 +284,10 @@ impl Weld {
             return id;
         }
         self.count += 1;
-        self.known.entry(cell(place)).or_default().push((place, self.count));
+        self.known
+            .entry(cell(place))
+            .or_default()
+            .push((place, self.count));
         self.count
     }
 }

@@ -326,7 +326,9 @@ impl Vertices<'_> {
                 colour: mean.truncate().to_array().into(),
                 alpha: mean.w,
             },
-            has_alphas: colours.iter().any(|colour| (colour.w - mean.w).abs() > SAME_COLOUR),
+            has_alphas: colours
+                .iter()
+                .any(|colour| (colour.w - mean.w).abs() > SAME_COLOUR),
             of_vertices: varies.then(|| colours.iter().map(linear).collect()),
         }))
     }

@@ -79,7 +79,8 @@ pub fn add_objects(
         }
     }
     let bounds_body = bodies::find(&mut scene.objects, &materials.all, load);
-    for (object, (bounds_body, factors)) in scene.objects.iter_mut().zip(bounds_body.into_iter().zip(factors)) {
+    for (object, (bounds_body, factors)) in scene.objects.iter_mut().zip(bounds_body.into_iter().zip(factors))
+    {
         let source = root.materials.get(object.material);
         let blends = source.is_some_and(|source| source.alpha_mode == Checked::Valid(AlphaMode::Blend));
         let material = materials.thin_or_solid(object.material, bounds_body, solid_glass);
