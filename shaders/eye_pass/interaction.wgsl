@@ -87,13 +87,14 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe
     let incident = gaze.direction;
     let media = gaze.media;
     let ior = ior_of(point.object, gaze.wavelength);
-    var beyond = left(media, point.object);
+    let body = objects[point.object].solid - 1u;
+    var beyond = left(media, body);
     // Where bodies overlap, the one entered last is the medium until the ray leaves it. An open sheet was never
     // entered.
     var ior_near = select(medium_ior(media, gaze.wavelength), ior, all(beyond == media));
     var ior_far = medium_ior(beyond, gaze.wavelength);
     if facing.front {
-        beyond = entered(media, point.object);
+        beyond = entered(media, body);
         ior_near = medium_ior(media, gaze.wavelength);
         ior_far = ior;
     }

@@ -217,10 +217,19 @@ fn enter(ray: Slabs, index: u32, limit: f32) -> f32 {
     return select(FAR_AWAY, begin, begin <= end);
 }
 
+// Whether the first of two triangles faces a ray where they lie back to back; `otherwise` where they do not.
+fn faces_first(first: Triangle, second: Triangle, direction: vec3f, otherwise: bool) -> bool {
+    let normal = cross(first.b - first.a, first.c - first.a);
+    let other = cross(second.b - second.a, second.c - second.a);
+    let is_back_to_back = dot(normal, other) < -0.9999 * length(normal) * length(other);
+    return select(otherwise, dot(normal, direction) < 0.0, is_back_to_back);
+}
+
 // State of a search for the nearest triangle.
 struct Search {
     best: Hit,
     best_order: u32,
+    best_object: u32,
     // The node to visit next, if there is one.
     index: u32,
     is_over: bool,
@@ -238,7 +247,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
     let outside = slabs(origin, direction, 0.0);
     var boxes = outside;
     var waiting: array<vec2f, STACK>;
-    var search = Search(Hit(NO_TRIANGLE, limit, vec3f(0.0), LOCAL), 0u, 0u, false, 0u, LOCAL, 0u);
+    var search = Search(Hit(NO_TRIANGLE, limit, vec3f(0.0), LOCAL), 0u, NO_OBJECT, 0u, false, 0u, LOCAL, 0u);
     loop {
         var first = 0u;
         var end = 0u;
@@ -284,11 +293,16 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             let triangle = in_instance(triangles[slot], search.instance);
             let found = meet_triangle(ray, slot, triangle, search.instance);
             // Of triangles at the same distance, the one of lowest order wins.
-            let is_nearer = found.distance < search.best.distance
+            var is_nearer = found.distance < search.best.distance
                 || (found.distance == search.best.distance && triangle.order < search.best_order);
+            let is_near = abs(found.distance - search.best.distance) <= BOX_MARGIN;
+            if found.triangle != NO_TRIANGLE && triangle.object == search.best_object && is_near {
+                is_nearer = faces_first(triangle, met(search.best), direction, is_nearer);
+            }
             if found.triangle != NO_TRIANGLE && is_nearer && triangle.object != NO_OBJECT {
                 search.best = found;
                 search.best_order = triangle.order;
+                search.best_object = triangle.object;
             }
         }
         if search.is_over {

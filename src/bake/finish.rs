@@ -15,6 +15,7 @@ use super::map_plan::MEMORY;
 use super::map_size::{self, SizeRequest};
 use super::sizes::{ChartCache, MapMemory};
 use super::{Bake, LightLayer, StopReason, Timings, map_plan};
+use crate::effect::EffectSwitch;
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
@@ -104,6 +105,7 @@ impl MapAssembler<'_> {
         };
         let mut warnings = outcome.warnings.clone();
         warnings.extend(beyond_single(&maps));
+        warnings.extend(self.empty_layer());
         Bake {
             estimated_relative_rmse,
             estimated_visible,
@@ -129,6 +131,20 @@ impl MapAssembler<'_> {
             partial: stop_reason == StopReason::Cancelled,
             warnings,
         }
+    }
+
+    /// The warning that the caustic layer is empty, where other layers fill the maps.
+    fn empty_layer(&self) -> Option<Warning> {
+        let mut effects = self.plan.effects.iter();
+        let pass = effects.find(|line| line.effect == Effect::LightPass)?;
+        let is_wanted = self.settings.layers.len() > 1 && self.settings.layers.contains(&LayerKind::Caustic);
+        (is_wanted && !pass.on && pass.switch == EffectSwitch::Auto).then(|| {
+            Warning::new(
+                "caustic layer",
+                format!("is empty: {}", pass.reason),
+                "leave it out of --layers, or make a lit surface clear or smooth",
+            )
+        })
     }
 
     /// Caustic and direct layers of all maps, with all lights at their strengths and the error of the caustic layer;

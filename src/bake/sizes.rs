@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use glam::DVec3;
 
 use super::map_size::{self, Borders, MapSize, SizeRequest, TileDemand};
-use crate::illumination::parametrisation::{DEFAULT_NOMINAL_SIDE, Parametrisation, parametrise};
+use crate::illumination::parametrisation::{Parametrisation, parametrise};
 use crate::illumination::tiles::{TileLayout, tile_counts};
 use crate::illumination::{Chart, Receiver, Side, UvSet};
 use crate::light_pass::direct::find_borders;
@@ -78,8 +78,6 @@ impl MapMemory {
 pub struct ChartCache {
     scene: Arc<Scene>,
     parametrisations: Vec<OnceLock<Option<Arc<Parametrisation>>>>,
-    /// Generated parametrisations for sides other than the default, by object and side.
-    laid_out: Mutex<BTreeMap<(usize, usize), Arc<Parametrisation>>>,
     /// Whether each object's mesh is closed.
     closed: Vec<OnceLock<bool>>,
     /// Charts by receiver, those used last at the end.
@@ -99,7 +97,6 @@ impl ChartCache {
             scene,
             parametrisations,
             closed,
-            laid_out: Mutex::default(),
             charts: Mutex::default(),
             borders: Mutex::default(),
         }
@@ -112,8 +109,6 @@ impl ChartCache {
             sizes.parametrisations[object] = OnceLock::new();
             sizes.closed[object] = OnceLock::new();
         }
-        let laid_out = sizes.laid_out.get_mut().unwrap_or_else(PoisonError::into_inner);
-        laid_out.retain(|(object, _), _| !changed.contains(object));
         let charts = sizes.charts.get_mut().unwrap_or_else(PoisonError::into_inner);
         charts.retain(|receiver, _| !changed.contains(&receiver.object()));
         sizes
@@ -130,34 +125,9 @@ impl ChartCache {
         self.parametrisations[object]
             .get_or_init(|| {
                 let mesh = self.scene.objects[object].mesh_in_scene();
-                parametrise(object, mesh, DEFAULT_NOMINAL_SIDE).map(Arc::new)
+                parametrise(object, mesh).map(Arc::new)
             })
             .as_ref()
-    }
-
-    /// The parametrisation of an object for maps of a given side, on which the gutters of generated charts depend.
-    fn laid_out(&self, object: usize, side: usize) -> Option<Arc<Parametrisation>> {
-        let usual = &self.parametrisations[object];
-        let is_for_all = |usual: &Arc<Parametrisation>| usual.uv_set != UvSet::Generated;
-        match usual.get() {
-            Some(usual) if usual.as_ref().is_none_or(is_for_all) => return usual.clone(),
-            _ if side == DEFAULT_NOMINAL_SIDE => return self.parametrisation(object).cloned(),
-            _ => {}
-        }
-        let known = || self.laid_out.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = known().get(&(object, side)) {
-            return Some(Arc::clone(known));
-        }
-        let made = Arc::new(parametrise(
-            object,
-            self.scene.objects[object].mesh_in_scene(),
-            side,
-        )?);
-        if is_for_all(&made) {
-            return usual.get_or_init(|| Some(made)).clone();
-        }
-        known().insert((object, side), Arc::clone(&made));
-        Some(made)
     }
 
     /// Whether direct light can reach a receiver that is visible: the front of a surface, or the back of a double-sided
@@ -195,8 +165,7 @@ impl ChartCache {
         let is_it =
             |chart: &Arc<Chart>| chart.layout.is_none() && (chart.width, chart.height) == (width, height);
         self.cached(receiver, is_it, || {
-            let laid_out = self.laid_out(receiver.object(), width.min(height))?;
-            Some(laid_out.chart(width, height))
+            Some(self.parametrisation(receiver.object())?.chart(width, height))
         })
     }
 

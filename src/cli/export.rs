@@ -247,7 +247,17 @@ impl ExportArguments {
         let options = LoadOptions::default();
         match &self.scene {
             Some(scene) => Scene::load(scene, &options),
-            None => Scene::load(&MapSet::source_of(&self.maps)?, &options),
+            None => {
+                let source = MapSet::source_of(&self.maps)?;
+                let is_gone = !source.starts_with("builtin:") && !Path::new(&source).exists();
+                Scene::load(&source, &options).map_err(|error| Error {
+                    remedy: match is_gone {
+                        true => "name the file with --scene, or run in the folder of the bake".into(),
+                        false => error.remedy,
+                    },
+                    ..error
+                })
+            }
         }
     }
 

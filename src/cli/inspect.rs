@@ -12,6 +12,7 @@ use nephroid::optics::spectrum::temperature::correlated_temperature;
 use nephroid::optics::wavelength::VISIBLE;
 use nephroid::optics::{Glass, Metal};
 use nephroid::plan::{self, EffectPlan};
+use nephroid::scene::watertight;
 use nephroid::scene::{Light, LightKind, LightSize, Material, Scene, SurfaceKind};
 use nephroid::settings::LayerKind;
 use serde_json::{Value, json};
@@ -78,6 +79,10 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
     let objects: Vec<Value> = (0..scene.objects.len())
         .map(|object| object_report(scene, object, &mut lines))
         .collect();
+    let bodies: Vec<Value> = (0..scene.objects.len())
+        .filter(|&object| scene.body_of(object) == object && scene.material_of(object).is_solid())
+        .map(|object| body_report(scene, object, &mut lines))
+        .collect();
     let in_use = |index: usize| {
         scene
             .objects
@@ -136,6 +141,7 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
         "bounds_m": bounds.map(|(low, high)| [low.to_array(), high.to_array()]),
         "triangles": scene.triangle_count(),
         "objects": objects,
+        "bodies": bodies,
         "materials": materials,
         "lights": lights,
         "cameras": cameras,
@@ -176,6 +182,26 @@ fn object_report(scene: &Scene, index: usize, lines: &mut Lines) -> Value {
         "area_m2": area_m2,
         "material": material.name,
         "surface": surface,
+    })
+}
+
+/// A body of glass: the objects that bound it and, if a single closed mesh does, its volume.
+fn body_report(scene: &Scene, body: usize, lines: &mut Lines) -> Value {
+    let parts: Vec<usize> = (0..scene.objects.len())
+        .filter(|&object| scene.body_of(object) == body)
+        .collect();
+    let object = &scene.objects[body];
+    let is_closed = parts.len() > 1 || watertight::is_closed(object.mesh());
+    let volume_m3 = (parts.len() == 1 && is_closed).then(|| watertight::volume_m3(object.in_scene()));
+    let shape = if is_closed { "closed" } else { "open" };
+    let volume = volume_m3.map_or(String::new(), |volume_m3| format!(", {volume_m3:.3e} m^3"));
+    let line = format!("{}: {shape}, of {} objects{volume}", object.name, parts.len());
+    lines.push(("body", line));
+    json!({
+        "object": body,
+        "objects": parts,
+        "closed": is_closed,
+        "volume_m3": volume_m3,
     })
 }
 

@@ -10,7 +10,6 @@ use super::map_folder::is_map_file;
 use super::{FloatImage, float_image, uv_file};
 use crate::error::{Error, Result, Warning};
 use crate::files;
-use crate::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use crate::illumination::{Chart, IlluminationMap, Layer, Parametrisation, UvSet, parametrise};
 use crate::optics::LinearSrgb;
 use crate::scene::{Object, Scene};
@@ -315,7 +314,7 @@ impl<'a> MapSet<'a> {
             }
             (UvSet::Generated, None) => None,
             // The scene's own UV sets are processed as in the bake.
-            (set, _) => parametrise(index, mesh, DEFAULT_NOMINAL_SIDE).filter(|own| own.uv_set == set),
+            (set, _) => parametrise(index, mesh).filter(|own| own.uv_set == set),
         };
         let missing = || format!("the texture coordinates of {} are not there", entry.surface);
         let parametrisation = parametrisation.ok_or_else(|| unusable(&self.location, missing()))?;

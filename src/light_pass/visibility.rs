@@ -12,7 +12,7 @@ use crate::light_pass::item_buffer::{HiddenCellPolicy, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::light_pass::photon::spheres::Spheres;
 use crate::plan::{LightReach, SceneReach};
-use crate::scene::{Light, LightKind, Scene, SurfaceKind};
+use crate::scene::{Light, LightKind, Material, Scene};
 use crate::settings::ItemBufferKind;
 use crate::transport::{Tracer, media_at};
 
@@ -133,11 +133,11 @@ impl LightVisibility {
     /// `sizes`: whether lights have their extent, or shine from their middles.
     pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, aiming: CullMode, sizes: bool) -> Self {
         let scene = tracer.scene();
-        let has = |wanted: fn(SurfaceKind) -> bool| {
-            (0..scene.objects.len()).any(|object| wanted(scene.material_of(object).surface))
+        let has = |wanted: fn(&Material) -> bool| {
+            (0..scene.objects.len()).any(|object| wanted(scene.material_of(object)))
         };
         let mut aim = Self::default();
-        if !has(SurfaceKind::is_specular) || !has(SurfaceKind::is_receiver) {
+        if !has(Material::is_specular) || !has(|material| material.surface.is_receiver()) {
             aim.sights = vec![LightReach::default(); scene.lights.len()];
             aim.looks = vec![ItemBufferStats::default(); scene.lights.len()];
             return aim;
@@ -261,7 +261,7 @@ impl EmissionCuller<'_> {
 
 fn specular_objects(scene: &Scene) -> Vec<usize> {
     (0..scene.objects.len())
-        .filter(|&object| scene.material_of(object).surface.is_specular())
+        .filter(|&object| scene.material_of(object).is_specular())
         .collect()
 }
 

@@ -46,7 +46,7 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> 
         decision.dispersion(pass.on),
         on_paths(
             Effect::Reflection,
-            &|material| material.surface.is_specular(),
+            &Material::is_specular,
             "no lit surface is specular",
         ),
         on_paths(
@@ -137,9 +137,9 @@ impl Decision<'_> {
         }
     }
 
-    /// Whether any object has a kind of surface that `wanted` accepts.
-    fn has(&self, wanted: impl Fn(SurfaceKind) -> bool) -> bool {
-        (0..self.scene.objects.len()).any(|object| wanted(self.scene.material_of(object).surface))
+    /// Whether any object has a material that `wanted` accepts.
+    fn has(&self, wanted: impl Fn(&Material) -> bool) -> bool {
+        (0..self.scene.objects.len()).any(|object| wanted(self.scene.material_of(object)))
     }
 
     fn light_pass(&self) -> EffectLine {
@@ -154,10 +154,10 @@ impl Decision<'_> {
         if self.scene.lights.is_empty() {
             return line(false, "the scene has no light");
         }
-        if !self.has(SurfaceKind::is_specular) {
+        if !self.has(Material::is_specular) {
             return line(false, "nothing in the scene is specular");
         }
-        if !self.has(SurfaceKind::is_receiver) {
+        if !self.has(|material| material.surface.is_receiver()) {
             return line(false, "nothing in the scene can receive light diffusely");
         }
         let lit = self.lit_objects().find(|(_, _, way)| way.is_none());
@@ -300,7 +300,7 @@ impl Decision<'_> {
     fn why_dark(&self) -> Option<&'static str> {
         if self.scene.lights.is_empty() {
             Some("the scene has no light")
-        } else if !self.has(SurfaceKind::is_receiver) {
+        } else if !self.has(|material| material.surface.is_receiver()) {
             Some("nothing in the scene can receive light diffusely")
         } else {
             None
@@ -330,7 +330,7 @@ impl Decision<'_> {
         if !shines {
             return "it does not shine".into();
         }
-        if !self.has(SurfaceKind::is_specular) {
+        if !self.has(Material::is_specular) {
             return "nothing in the scene is specular".into();
         }
         if sight.unsealed == 0 {

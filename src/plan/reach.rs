@@ -5,7 +5,7 @@ use glam::DVec3;
 
 use super::sealed_regions::Compartments;
 use crate::geometry::enclosure::Bounds;
-use crate::scene::{InScene, Light, LightKind, Scene, SurfaceKind};
+use crate::scene::{InScene, Light, LightKind, Material, Scene, SurfaceKind};
 
 /// With more specular objects than this, all that share a compartment are assumed to send light to each other.
 const MAX_RELAYS: usize = 512;
@@ -31,9 +31,9 @@ pub struct SceneReach<'a> {
 
 impl<'a> SceneReach<'a> {
     pub fn of(scene: &'a Scene) -> Self {
-        let of_kind = |wanted: fn(SurfaceKind) -> bool| -> Vec<usize> {
+        let of_kind = |wanted: fn(&Material) -> bool| -> Vec<usize> {
             (0..scene.objects.len())
-                .filter(|&object| wanted(scene.material_of(object).surface))
+                .filter(|&object| wanted(scene.material_of(object)))
                 .collect()
         };
         let size_m = scene.bounds().map_or(0.0, |(low, high)| {
@@ -43,8 +43,8 @@ impl<'a> SceneReach<'a> {
             scene,
             compartments: Compartments::of(scene),
             bounds: scene.objects.iter().map(|object| object.bounds()).collect(),
-            specular: of_kind(SurfaceKind::is_specular),
-            receivers: of_kind(SurfaceKind::is_receiver),
+            specular: of_kind(Material::is_specular),
+            receivers: of_kind(|material| material.surface.is_receiver()),
             tolerance_m: TOLERANCE * size_m,
             is_useful: vec![false; scene.objects.len()],
         };

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::{Light, LightKind, Opened, Scene, builtin, coincident_faces, environment, gltf};
+use super::{Light, LightKind, Opened, Scene, builtin, contacts, dark, environment, gltf};
 use crate::error::{Error, Result, Warning};
 use crate::units::Irradiance;
 
@@ -48,8 +48,10 @@ impl Scene {
         if let Some(path) = &options.environment {
             add_environment(&mut scene, path, options.memory_limit_bytes)?;
         }
-        let touching = coincident_faces::warnings(&scene);
-        scene.warnings.extend(touching);
+        let covering = contacts::set_apart(&mut scene);
+        scene.warnings.extend(covering);
+        let dark = dark::warnings(&scene);
+        scene.warnings.extend(dark);
         if options.default_light && scene.lights.is_empty() {
             add_default_light(&mut scene);
         }

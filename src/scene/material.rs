@@ -21,6 +21,9 @@ pub const METAL_ROUGHNESS_LIMIT: f64 = 0.6;
 /// Largest roughness treated as smooth: the lobe is some hundredths of a degree wide.
 pub const SMOOTH_ROUGHNESS: f64 = 0.01;
 
+/// Smallest difference of a factor that counts: two steps of an 8-bit image.
+pub const EVEN: f64 = 2.0 / 255.0;
+
 /// Interior of a solid dielectric (KHR_materials_volume).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Volume {
@@ -188,6 +191,7 @@ impl Material {
     pub fn classified(&self) -> SurfaceKind {
         let surface = match &self.variation {
             _ if self.coverage.is_some() => SurfaceKind::Varied,
+            None if self.is_partly_clear() => SurfaceKind::Varied,
             Some(variation) => variation.surface,
             None => Self::class_of(self.metallic, self.roughness, self.transmission),
         };
@@ -196,6 +200,19 @@ impl Material {
             (true, None) => SurfaceKind::ThinWall,
             (false, _) => surface,
         }
+    }
+
+    /// Whether the same share of it is clear everywhere, and the rest diffuse.
+    fn is_partly_clear(&self) -> bool {
+        self.metallic < 0.5 && self.transmission >= EVEN && self.transmission <= 1.0 - EVEN
+    }
+
+    /// Whether light may leave it in a direction or a lobe. Light only passes straight through the holes of a matte
+    /// surface.
+    pub fn is_specular(&self) -> bool {
+        let whole = self.mixture(LinearSrgb::WHITE, 1.0);
+        let is_matte = self.variation.is_none() && whole.metal + whole.clear + whole.coat == 0.0;
+        self.surface.is_specular() && !(self.surface == SurfaceKind::Varied && is_matte)
     }
 
     /// Surface class for factors that do not vary; transparent surfaces count as thin.

@@ -17,7 +17,8 @@ pub mod builtin;
 pub mod camera;
 pub mod camera_path;
 pub mod changes;
-pub mod coincident_faces;
+pub mod contacts;
+mod dark;
 pub mod edit;
 pub mod emitter;
 pub mod environment;
@@ -91,6 +92,11 @@ impl Scene {
     /// Material of an object.
     pub fn material_of(&self, object: usize) -> &Material {
         &self.materials[self.objects[object].material]
+    }
+
+    /// The object that stands for the body of glass that an object bounds: itself, unless several objects bound it.
+    pub fn body_of(&self, object: usize) -> usize {
+        self.objects[object].body.unwrap_or(object)
     }
 
     /// Index of a light in the scene as loaded; `None` if it was added since.
@@ -209,10 +215,11 @@ impl Scene {
                 node,
                 primitive,
                 material,
+                body,
                 ..
             } = object;
             let mesh = object.copy_in_scene();
-            let _ = writeln!(text, "{name:?} {node} {primitive} {material} {mesh:?}");
+            let _ = writeln!(text, "{name:?} {node} {primitive} {material} {body:?} {mesh:?}");
         }
         let _ = write!(
             text,

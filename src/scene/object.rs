@@ -20,6 +20,8 @@ pub struct Object {
     pub primitive: usize,
     /// Index into [`Scene::materials`].
     pub material: usize,
+    /// Index of the object that stands for the body of glass that several objects bound together.
+    pub body: Option<usize>,
     shape: Shape,
 }
 
@@ -121,6 +123,7 @@ impl Object {
             node,
             primitive,
             material,
+            body: None,
             shape: Shape {
                 mesh: mesh.into(),
                 at_rest: DAffine3::IDENTITY,

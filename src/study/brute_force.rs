@@ -393,8 +393,7 @@ fn targets(scene: &Scene, (width, height): (usize, usize)) -> Vec<Option<Target>
             if !scene.material_of(object).surface.is_receiver() {
                 return None;
             }
-            let parametrisation =
-                parametrise(object, scene.objects[object].mesh_in_scene(), width.min(height))?;
+            let parametrisation = parametrise(object, scene.objects[object].mesh_in_scene())?;
             let empty = || (0..width * height).map(|_| Default::default()).collect();
             Some(Target {
                 chart: Arc::new(parametrisation.chart(width, height).of_side(receiver.side())),

@@ -23,6 +23,12 @@ use crate::scene::{Mesh, Object, Scene, instances};
 /// object space, which keeps their precision.
 const FAR_RADII: f64 = 4.0;
 
+/// Rounding of a hit's distance, relative to it and the scene's size.
+const SAME: f64 = 1.0 / (1_u64 << 44) as f64;
+
+/// Largest cosine between the normals of triangles that lie back to back.
+const BACK_TO_BACK: f64 = -1.0 + 1e-9;
+
 #[derive(Debug)]
 pub(super) struct Hierarchy {
     pub(super) copied: Arc<Copied>,
@@ -153,6 +159,7 @@ impl Hierarchy {
     }
 
     /// Closest hit for which `is_there` holds; among hits at the same distance, that of the lowest object and triangle.
+    /// Of two faces of an object that lie back to back, the one that faces the ray.
     #[inline]
     pub(super) fn closest(
         &self,
@@ -161,16 +168,20 @@ impl Hierarchy {
     ) -> Option<(RayHit, Found<'_>)> {
         let sheared = ShearedRay::new(ray);
         let mut best: Option<(RayHit, Found)> = None;
-        let mut nearest_m = f64::INFINITY;
-        self.search(ray, nearest_m, |corners, found| {
+        let mut limit_m = f64::INFINITY;
+        self.search(ray, limit_m, |corners, found| {
             let hit = sheared.intersect(corners);
-            let Some((distance_m, barycentric)) = hit.filter(|(distance_m, _)| *distance_m <= nearest_m)
-            else {
+            let Some((distance_m, barycentric)) = hit.filter(|(distance_m, _)| *distance_m <= limit_m) else {
                 return Some(f64::INFINITY);
             };
             let (object, triangle) = self.triangle(found);
-            let is_first = |(hit, _): &(RayHit, Found)| {
-                (distance_m, object, triangle) < (hit.distance_m, hit.object, hit.triangle)
+            let is_first = |(hit, known): &(RayHit, Found)| {
+                let is_before =
+                    || (distance_m, object, triangle) < (hit.distance_m, hit.object, hit.triangle);
+                let is_near = (distance_m - hit.distance_m).abs() <= self.same_m(distance_m);
+                let known = (is_near && hit.object == object).then(|| self.corners(*known));
+                let facing = known.and_then(|known| which_faces(ray.direction, corners, &known));
+                facing.unwrap_or_else(is_before)
             };
             let is_nearer = best.as_ref().is_none_or(is_first);
             let is_there = || is_there(object as usize, triangle as usize, barycentric);
@@ -184,10 +195,15 @@ impl Hierarchy {
                 distance_m,
             };
             best = Some((hit, found));
-            nearest_m = distance_m;
-            Some(distance_m)
+            limit_m = distance_m + self.same_m(distance_m);
+            Some(limit_m)
         });
         best
+    }
+
+    /// Bound on the rounding of a distance [m].
+    fn same_m(&self, distance_m: f64) -> f64 {
+        SAME * (distance_m + 1.0 / self.frame.scale)
     }
 
     /// Whether anything lies on a ray before `distance_m` (exclusive).
@@ -294,6 +310,12 @@ impl Hierarchy {
         });
         roots.collect()
     }
+}
+
+/// Whether the first of two triangles that lie back to back faces a ray; `None` where they do not.
+fn which_faces(direction: DVec3, first: &[DVec3; 3], second: &[DVec3; 3]) -> Option<bool> {
+    let [first, second] = [first, second].map(|[a, b, c]| (*b - *a).cross(*c - *a).normalize_or_zero());
+    (first.dot(second) < BACK_TO_BACK).then(|| first.dot(direction) < 0.0)
 }
 
 impl Copied {

@@ -477,10 +477,11 @@ impl Tracer {
             hit, incident, media, ..
         } = meeting;
         let is_front = meeting.frame.front;
+        let body = self.scene().body_of(hit.object);
         let beyond = if is_front {
-            media.entered(hit.object)
+            media.entered(body)
         } else {
-            media.left(hit.object)
+            media.left(body)
         };
         let (ior_near, ior_far) = if is_front {
             (media.ior(self.scene()), material.ior)

@@ -9,8 +9,8 @@ use glam::DVec3;
 /// Most nested bodies that a path keeps track of.
 const CAPACITY: usize = 8;
 
-/// Objects that the path is inside of, innermost last. Entering an object pushes it, leaving it removes its topmost
-/// entry. The medium is the one on top, or vacuum when empty. Where bodies overlap, the medium is thus the one entered
+/// Bodies that the path is inside of, each by the object that stands for it, innermost last. Entering a body pushes it,
+/// leaving it removes its topmost entry. The medium is the one on top, or vacuum when empty. Where bodies overlap, the medium is thus the one entered
 /// last, and leaving the other one within it does not refract. A body beyond the capacity is not recorded: the path
 /// then leaves it into the medium on top.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,14 +30,14 @@ impl MediumStack {
         &self.objects[..usize::from(self.depth)]
     }
 
-    /// The innermost object.
+    /// The object of the innermost body.
     pub fn top(&self) -> Option<usize> {
         self.depth
             .checked_sub(1)
             .map(|top| self.objects[usize::from(top)] as usize)
     }
 
-    /// The media after entering an object.
+    /// The media after entering a body.
     #[must_use]
     pub fn entered(mut self, object: usize) -> Self {
         if usize::from(self.depth) < CAPACITY {
@@ -47,7 +47,7 @@ impl MediumStack {
         self
     }
 
-    /// The media after leaving an object; unchanged where the path was not inside it (an open sheet, or a start
+    /// The media after leaving a body; unchanged where the path was not inside it (an open sheet, or a start
     /// inside).
     #[must_use]
     pub fn left(mut self, object: usize) -> Self {
@@ -105,13 +105,14 @@ pub fn media_at(tracer: &Tracer, point: DVec3) -> MediumStack {
         let Some(hit) = tracer.closest_hit(&ray) else {
             break;
         };
+        let body = scene.body_of(hit.object);
         if scene.material_of(hit.object).is_solid() {
             if hit.geometric_normal.dot(ray.direction) < 0.0 {
-                entered[hit.object] += 1;
-            } else if entered[hit.object] > 0 {
-                entered[hit.object] -= 1;
+                entered[body] += 1;
+            } else if entered[body] > 0 {
+                entered[body] -= 1;
             } else {
-                left_from_inside.push(hit.object);
+                left_from_inside.push(body);
             }
         }
         ray = hit.spawn(ray.direction);

@@ -5,7 +5,7 @@ use nephroid::optics::LinearSrgb;
 use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::optics::refraction::{cos_transmitted, refract};
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Mesh, Scene, Volume, coincident_faces};
+use nephroid::scene::{Material, Mesh, Scene, Volume};
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::Flux;
 
@@ -102,14 +102,6 @@ fn bodies(t: &mut Table) {
         .watts_as_first("watts as without it", 2e-3)
         .as_first_within_errors();
     let bright_branches = || set(at(1e3, 16), |s| s.branch_threshold = Some(1e-4));
-    t.case("touching-glass")
-        .check(
-            "the common face is found, a gap of a micrometre is none",
-            common_face,
-        )
-        .bake_with(slabs(&[[0.3, 0.7]]), bright_branches())
-        .bake_with(slabs(&[[0.3, 0.5], [0.5, 0.7]]), bright_branches())
-        .as_first("map as of one slab, a limit of the method", 0.2, 1.0);
     t.case("overlapping-glass")
         .bake_with(slabs(&[[0.3, 0.7]]), bright_branches())
         .bake_with(slabs(&[[0.3, 0.55], [0.45, 0.7]]), bright_branches())
@@ -296,12 +288,6 @@ fn slabs(borders: &[[f64; 2]]) -> Scene {
     borders
         .iter()
         .fold(scene, |scene, [low, high]| scene.glass(1.5, slab(*low, *high)))
-}
-
-fn common_face() {
-    let found = coincident_faces::touching(&slabs(&[[0.3, 0.5], [0.5, 0.7]]));
-    assert!(found.get(&(1, 2)).is_some_and(|faces| *faces > 0));
-    assert!(coincident_faces::touching(&slabs(&[[0.3, 0.5], [0.5 + 1e-6, 0.7]])).is_empty());
 }
 
 /// Glass that lets a share of each channel through a distance.

@@ -1,5 +1,7 @@
 //! Hard cases: each row of the table is a scene with a law that must hold. `NEPHROID_LONG=1` tries more.
 
+mod charts;
+mod contacts;
 mod files;
 mod glass;
 mod invariance;
@@ -25,4 +27,4 @@ macro_rules! groups {
     };
 }
 
-groups! { files glass invariance item_buffer lights meshes mirrors numbers openings random rays references }
+groups! { charts contacts files glass invariance item_buffer lights meshes mirrors numbers openings random rays references }

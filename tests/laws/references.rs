@@ -7,7 +7,6 @@ use std::sync::Arc;
 use nephroid::export::manifest::SceneSummary;
 use nephroid::export::pfm;
 use nephroid::illumination::compare::{Agreement, relative_rmse};
-use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::{IlluminationMap, Layer, parametrise};
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
@@ -302,12 +301,7 @@ fn read_map(scene: &Scene, surface: &str, file: &str) -> IlluminationMap {
     let object = names
         .position(|name| name == surface)
         .expect("a surface of the scene");
-    let chart = parametrise(
-        object,
-        scene.objects[object].mesh_in_scene(),
-        DEFAULT_NOMINAL_SIDE,
-    )
-    .expect("an area");
+    let chart = parametrise(object, scene.objects[object].mesh_in_scene()).expect("an area");
     IlluminationMap {
         chart: Arc::new(chart.chart(grid.width, grid.height)),
         layers: vec![Layer {

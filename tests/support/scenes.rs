@@ -5,7 +5,6 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use nephroid::eye_pass::reference::{EyeRays, ReferenceSettings, render_counted};
 use nephroid::eye_pass::{Picture, ToneMap, View};
-use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::{Chart, IlluminationMap, Layer, parametrise};
 use nephroid::light_pass::direct::{DirectLayer, bake_direct};
 use nephroid::optics::LinearSrgb;
@@ -89,7 +88,7 @@ pub fn wave(amplitude_m: f64, wavelength_m: f64, direction: DVec3, phase_rad: f6
 
 /// The chart of an object in a tracer's scene.
 pub fn chart(tracer: &Tracer, object: usize, width: usize, height: usize) -> Chart {
-    parametrise(object, tracer.scene().objects[object].mesh_in_scene(), DEFAULT_NOMINAL_SIDE)
+    parametrise(object, tracer.scene().objects[object].mesh_in_scene())
         .expect("the object has area")
         .chart(width, height)
 }

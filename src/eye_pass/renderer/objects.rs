@@ -209,7 +209,11 @@ impl Appearance {
                 metallic: material.metallic as f32,
                 transmission: material.transmission as f32,
                 coverage: material.coverage.map_or(-1.0, |factor| factor as f32),
-                solid: u32::from(material.is_solid()),
+                solid: if material.is_solid() {
+                    scene.body_of(index) as u32 + 1
+                } else {
+                    0
+                },
                 row_x,
                 row_y,
                 row_z,

@@ -143,7 +143,7 @@ shader_struct! {
         transmission: f32,
         /// Coverage [0, 1], to be multiplied by the texture's alpha; negative if all of the surface is there.
         coverage: f32,
-        /// Whether it bounds a body.
+        /// Number of the body that it bounds: index + 1 of the object that stands for it; 0 for none.
         solid: u32,
         /// Texture reference of its emission.
         glow: u32,

@@ -19,8 +19,12 @@ use crate::scene::Mesh;
 use coverage::twice_signed_area;
 use plane::{common_normal, smallest_rectangle};
 
-/// Default map side for which generated coordinates reserve gutters [texels].
-pub const DEFAULT_NOMINAL_SIDE: usize = 512;
+/// Map sides for which generated coordinates may reserve gutters [texels]: those of the smallest of which charts fill
+/// enough.
+const NOMINAL_SIDES: [usize; 4] = [64, 128, 256, 512];
+
+/// Smallest filled share of a map with gutters, unless its side is the largest: wider gutters cost texels at all sizes.
+const MIN_FILLED: f64 = 0.6;
 
 /// Map coordinates of one object, independent of the map size.
 #[derive(Clone, Debug)]
@@ -46,14 +50,14 @@ pub struct Parametrisation {
 /// TEXCOORD_0, if it is an injective map into the unit square (finite, inside, no overlap beyond borders, every
 /// triangle has its share of area, at least a twentieth of the map is covered); otherwise generated coordinates. A
 /// planar mesh is then projected onto its smallest enclosing rectangle; any other is unwrapped into charts with gutters
-/// of two texels at a map of `nominal_side` texels. Deterministic.
-pub fn parametrise(object: usize, mesh: &Mesh, nominal_side: usize) -> Option<Parametrisation> {
+/// for small maps, the same for maps of all sizes. Deterministic.
+pub fn parametrise(object: usize, mesh: &Mesh) -> Option<Parametrisation> {
     let has_area = mesh.area_m2() > 0.0;
-    let (uv_set, corner_uvs) = has_area.then(|| choose(mesh, nominal_side))??;
+    let (uv_set, corner_uvs) = has_area.then(|| choose(mesh))??;
     Some(Parametrisation::new(object, mesh, uv_set, corner_uvs))
 }
 
-fn choose(mesh: &Mesh, nominal_side: usize) -> Option<(UvSet, Vec<[DVec2; 3]>)> {
+fn choose(mesh: &Mesh) -> Option<(UvSet, Vec<[DVec2; 3]>)> {
     let normal = common_normal(mesh);
     let usable = |uvs: Option<&Vec<DVec2>>| given::light_map_set(mesh, uvs?).ok();
     let first = usable(mesh.uv0.as_ref());
@@ -73,9 +77,22 @@ fn choose(mesh: &Mesh, nominal_side: usize) -> Option<(UvSet, Vec<[DVec2; 3]>)> 
     let flat = normal.map(|normal| project_flat(mesh, normal));
     let generated = match flat {
         Some(set) if !given::overlaps(&set, 256) => set,
-        _ => unwrap::unwrap(mesh, nominal_side)?,
+        _ => unwrapped(mesh)?,
     };
     Some((UvSet::Generated, generated))
+}
+
+/// Charts with gutters for the smallest of the nominal sides that they fill well.
+fn unwrapped(mesh: &Mesh) -> Option<Vec<[DVec2; 3]>> {
+    let mut found = None;
+    for side in NOMINAL_SIDES {
+        found = unwrap::unwrap(mesh, side);
+        let filled = found.as_deref().map_or(0.0, given::covered_share);
+        if filled >= MIN_FILLED {
+            break;
+        }
+    }
+    found
 }
 
 /// Coordinate sets of a mesh that cannot be used for its map, and why.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::grid::Grid;
@@ -43,6 +44,8 @@ pub struct Network {
     places: SurfaceGrids,
     stances: Vec<ElementPoints>,
     closed: Vec<bool>,
+    /// Whether the inside of each object is drawn and holds another object.
+    rooms: Vec<bool>,
     batches: Vec<Vec<Link>>,
     /// By pass, then by element: the number of its batch, and its links there.
     rows: Vec<Vec<Option<(u32, LinkRange)>>>,
@@ -69,8 +72,26 @@ impl Network {
             let mesh = scene.objects[object].copy_in_scene();
             enclosure::is_closed(&mesh.positions, &mesh.triangles)
         };
+        let bounds: Vec<_> = scene.objects.iter().map(|object| object.bounds()).collect();
+        // The middle of another object is within it, and not only an edge, as where walls overlap.
+        let is_room = |object: usize| {
+            let material = scene.material_of(object);
+            let holds = |(low, high): (DVec3, DVec3), other: (DVec3, DVec3)| {
+                let middle = 0.5 * (other.0 + other.1);
+                middle.cmpgt(low).all() && middle.cmplt(high).all()
+            };
+            let mut others = (0..scene.objects.len()).filter(|&other| other != object);
+            material.double_sided
+                && material.is_opaque()
+                && others.any(|other| {
+                    bounds[object]
+                        .zip(bounds[other])
+                        .is_some_and(|(own, other)| holds(own, other))
+                })
+        };
         Self {
             grids,
+            rooms: (0..scene.objects.len()).into_par_iter().map(is_room).collect(),
             places: SurfaceGrids { by_receiver },
             stances: vec![ElementPoints::Unknown; first],
             closed: (0..scene.objects.len()).into_par_iter().map(is_closed).collect(),
@@ -159,6 +180,7 @@ impl Network {
                 places: &self.places,
                 stances: &self.stances,
                 closed: &self.closed,
+                rooms: &self.rooms,
                 seed,
                 rays: (rays, Self::rays_after(pass + 1)),
             };

@@ -24,8 +24,8 @@ pub struct PathEnd {
     pub segments: u64,
     /// Share of the radiance that was truncated.
     pub truncated: f64,
-    /// Present if the first surface was the back of an opaque one: (object, whether its back is drawn).
-    pub first_back: Option<(usize, bool)>,
+    /// Object of which the back was the first surface, if it is opaque.
+    pub first_back: Option<usize>,
 }
 
 /// Traces rays through a scene.
@@ -58,7 +58,7 @@ impl Follower<'_> {
             let side = Side::met(ray.direction, hit.geometric_normal);
             let is_back = side == Side::Back;
             if depth == 0 && is_back && material.is_opaque() {
-                found.first_back = Some((hit.object, material.double_sided));
+                found.first_back = Some(hit.object);
             }
             weight = weight * media.transmittance(scene, hit.distance_m);
             let micro = material.is_rough().then(|| choice(2 * depth + 1));

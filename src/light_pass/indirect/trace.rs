@@ -91,6 +91,8 @@ pub struct GatherPass<'a> {
     pub stances: &'a [ElementPoints],
     /// Whether each object's mesh is closed.
     pub closed: &'a [bool],
+    /// Whether the inside of each object is drawn and holds another object.
+    pub rooms: &'a [bool],
     pub seed: u64,
     /// Range of a typical element's ray indices; both ends are powers of two or 0.
     pub rays: (u32, u32),
@@ -99,7 +101,7 @@ pub struct GatherPass<'a> {
 /// A ray with its links.
 struct RayEnd {
     links: std::ops::Range<usize>,
-    /// Present if it started inside a solid: whether the inside of that is drawn.
+    /// Present if it started inside a solid: whether that is a room.
     within: Option<bool>,
 }
 
@@ -236,10 +238,10 @@ impl GatherPass<'_> {
         counts.truncated += found.truncated;
         let within = found
             .first_back
-            .filter(|&(object, _)| object != own && self.closed[object]);
+            .filter(|&object| object != own && self.closed[object]);
         Some(RayEnd {
             links: first..part.links.len(),
-            within: within.map(|(_, is_drawn)| is_drawn),
+            within: within.map(|object| self.rooms[object]),
         })
     }
 
@@ -260,11 +262,11 @@ impl GatherPass<'_> {
     }
 }
 
-/// Outside, unless all points lie inside a solid, or most do and its inside is drawn.
+/// Outside, unless all points lie inside a solid, or most do and it is a room.
 fn stance(ends: &[RayEnd]) -> ElementPoints {
     let within = ends.iter().filter(|end| end.within.is_some()).count();
-    let is_drawn = ends.iter().any(|end| end.within == Some(true));
-    if within > 0 && (within == ends.len() || is_drawn && 2 * within > ends.len()) {
+    let is_room = ends.iter().any(|end| end.within == Some(true));
+    if within > 0 && (within == ends.len() || is_room && 2 * within > ends.len()) {
         ElementPoints::Inside
     } else {
         ElementPoints::Outside

@@ -6,14 +6,12 @@ use glam::DMat3;
 use image::RgbaImage;
 
 use crate::optics::LinearSrgb;
+use crate::scene::material::EVEN;
 use crate::scene::texture::Wrap;
 use crate::scene::{Material, SurfaceKind, Texture};
 
 /// Largest share of other classes on a surface that still counts as one class.
 const MOST_OF_OTHERS: f64 = 0.01;
-
-/// Smallest difference that counts as variation of a factor: two steps of an 8-bit image.
-const EVEN: f64 = 2.0 / 255.0;
 
 /// What [`Material::class_of`] knows.
 const CLASSES: [SurfaceKind; 4] = [

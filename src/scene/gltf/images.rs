@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use super::buffers::Buffers;
 use super::context::LoadContext;
 use super::{extras, guard, uri};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::scene::Texture;
 use crate::scene::texture::Wrap;
@@ -233,8 +233,11 @@ impl<'a> Images<'a> {
             Err(why) => {
                 load.warn(
                     owner.clone(),
-                    format!("{why}; it was replaced by grey"),
-                    "repair the image",
+                    match why.location == owner {
+                        true => format!("{}; it was replaced by grey", why.what),
+                        false => format!("{}: {}; it was replaced by grey", why.location, why.what),
+                    },
+                    why.remedy,
                 );
                 RgbaImage::from_pixel(1, 1, image::Rgba([GREY, GREY, GREY, 255]))
             }
@@ -245,19 +248,25 @@ impl<'a> Images<'a> {
         Ok(pixels)
     }
 
-    fn read(&self, image: usize, owner: &str, most_bytes: u64) -> std::result::Result<RgbaImage, String> {
+    fn read(&self, image: usize, owner: &str, most_bytes: u64) -> Result<RgbaImage> {
         let image = &self.root.images[image];
         let loaded;
         let bytes = match (image.buffer_view, &image.uri) {
-            (Some(view), _) => self.buffers.view(view, owner).map_err(|error| error.what)?.data,
+            (Some(view), _) => self.buffers.view(view, owner)?.data,
             (None, Some(uri)) => {
-                loaded = uri::read(uri, self.folder, most_bytes, owner).map_err(|error| error.what)?;
+                loaded = uri::read(uri, self.folder, most_bytes, owner)?;
                 &loaded
             }
-            (None, None) => return Err("has no data".into()),
+            (None, None) => return Err(unreadable(owner, "has no data")),
         };
-        guard::without_panic(|| decode(bytes, most_bytes)).unwrap_or_else(|| Err("is damaged".into()))
+        let decoded = guard::without_panic(|| decode(bytes, most_bytes));
+        let decoded = decoded.unwrap_or_else(|| Err("is damaged".into()));
+        decoded.map_err(|why| unreadable(owner, why))
     }
+}
+
+fn unreadable(owner: &str, why: impl Into<String>) -> Error {
+    Error::failure(owner, why, "repair the image")
 }
 
 fn decode(bytes: &[u8], most_bytes: u64) -> std::result::Result<RgbaImage, String> {

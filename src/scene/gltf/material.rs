@@ -31,32 +31,15 @@ pub fn default() -> Material {
     }
 }
 
-/// Whether it transmits light without bounding a solid body.
-pub fn is_thin(material: &Material) -> bool {
-    material.transmits() && material.volume.is_none()
+/// Makes a transmissive material solid, by its mesh or by the file, or thin.
+pub fn set_interior(material: &mut Material, interior: Option<Volume>, is_by_shape: bool) {
+    material.volume = interior;
+    material.is_solid_by_shape = interior.is_some() && is_by_shape;
+    material.surface = material.classified();
 }
 
-/// Makes a thin wall clear solid glass.
-pub fn make_solid(thin: &mut Material) {
-    thin.volume = Some(CLEAR);
-    thin.surface = thin.classified();
-    thin.is_solid_by_shape = true;
-}
-
-/// A thin wall as clear solid glass, or the thin wall of which such glass was made.
-pub fn twin(own: &Material, is_solid: bool) -> Material {
-    let kind = if is_solid { "solid" } else { "thin" };
-    let mut twin = Material {
-        name: format!("{} ({kind})", own.name),
-        volume: is_solid.then_some(CLEAR),
-        is_solid_by_shape: is_solid,
-        ..own.clone()
-    };
-    twin.surface = twin.classified();
-    twin
-}
-
-const CLEAR: Volume = Volume {
+/// Interior of glass of which the file states none.
+pub const CLEAR: Volume = Volume {
     attenuation_distance_m: f64::INFINITY,
     attenuation_colour: LinearSrgb::WHITE,
 };
@@ -165,7 +148,11 @@ impl<'a> MaterialReader<'a, '_> {
             glass: None,
             metal: None,
             volume: self.volume(extensions),
-            is_solid_by_shape: false,
+            // Without a thickness, the mesh decides.
+            is_solid_by_shape: extensions
+                .volume
+                .as_ref()
+                .is_some_and(|volume| volume.thickness_factor.0 == 0.0),
             emitted_radiance: self.emission(extensions),
             emission_texture: None,
             emission_spectrum: None,
@@ -193,6 +180,7 @@ impl<'a> MaterialReader<'a, '_> {
         if !material.transmits() {
             material.volume = None;
         }
+        material.is_solid_by_shape &= material.volume.is_some();
         let is_coat = matches!(material.surface, SurfaceKind::Coated | SurfaceKind::Varied);
         if let (true, Some(specular)) = (is_coat, &extensions.specular) {
             material.coat = self.specular_weight(specular)?;
@@ -289,9 +277,6 @@ impl<'a> MaterialReader<'a, '_> {
                 format!("its thickness of {thickness} was read as 0"),
                 "use a positive thickness",
             );
-            return None;
-        }
-        if thickness == 0.0 {
             return None;
         }
         let mut distance = widen(stated.attenuation_distance.0);

@@ -77,6 +77,8 @@ impl MaterialReader<'_, '_> {
     ) -> Result<()> {
         let source = self.source;
         let stated = source.pbr_metallic_roughness.metallic_roughness_texture.as_ref();
+        // Factors of 0 drop what they multiply.
+        let stated = stated.filter(|_| material.metallic > 0.0 || material.roughness > 0.0);
         let metallic_roughness = self.factor_image("metallic-roughness texture", stated)?;
         let stated = transmission.and_then(|transmission| transmission.transmission_texture.as_ref());
         let stated = stated.filter(|_| material.transmission > 0.0);

@@ -20,6 +20,7 @@ use crate::units::Radiance;
 mod accessor;
 mod animation;
 mod area_light;
+mod bodies;
 mod buffers;
 mod coat;
 mod container;

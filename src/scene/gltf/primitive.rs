@@ -62,8 +62,16 @@ struct Local {
     has_normals: bool,
     /// Whether its positions are stored in single precision.
     is_rounded: bool,
-    /// Uniform vertex colour or area-weighted mean; `None` without colours, or if the mesh has them per vertex.
-    colour: Option<LinearSrgb>,
+    factors: VertexFactors,
+}
+
+/// What the vertex colours of a whole primitive multiply.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VertexFactors {
+    /// Uniform colour or area-weighted mean; white without colours, or if the mesh has them per vertex.
+    pub colour: LinearSrgb,
+    /// Area-weighted mean of the alpha, [0, 1].
+    pub alpha: f64,
 }
 
 /// Source data of primitives.
@@ -103,8 +111,8 @@ impl Variant {
 }
 
 impl Primitives {
-    /// Triangles of a primitive, in coordinates that `world_from_node` maps to the world, and their vertex colour, if
-    /// any. Colours that vary are kept in the mesh if it `has_colours`, and averaged otherwise. `None`, with a warning,
+    /// Triangles of a primitive, in coordinates that `world_from_node` maps to the world, and the factors of their vertex
+    /// colours. Colours that vary are kept in the mesh if it `has_colours`, and averaged otherwise. `None`, with a warning,
     /// if no triangle has an area there.
     ///
     /// # Errors
@@ -116,7 +124,7 @@ impl Primitives {
         world_from_node: &DAffine3,
         owner: &str,
         load: &mut LoadContext,
-    ) -> Result<Option<(Arc<Mesh>, Option<LinearSrgb>)>> {
+    ) -> Result<Option<(Arc<Mesh>, VertexFactors)>> {
         let deformed_by = source.poses.is_own(place.node).then_some(place.node);
         let known = match self.known.entry((place.mesh, place.primitive, deformed_by)) {
             Entry::Occupied(known) => known.into_mut(),
@@ -151,7 +159,7 @@ impl Primitives {
             has_area,
         };
         if let Some((_, made)) = known.made.iter().find(|(made, _)| *made == variant) {
-            return Ok(Some((Arc::clone(made), local.colour)));
+            return Ok(Some((Arc::clone(made), local.factors)));
         }
         if !known.made.is_empty() {
             take_copy(source, owner, load)?;
@@ -162,7 +170,7 @@ impl Primitives {
         }
         let mesh = Arc::new(mesh);
         known.made.push((variant, Arc::clone(&mesh)));
-        Ok(Some((mesh, local.colour)))
+        Ok(Some((mesh, local.factors)))
     }
 
     /// Drops a mesh that no further node has.
@@ -281,22 +289,22 @@ impl Vertices<'_> {
         );
         let (which, formats) = ((Semantic::Colors(0), "colours"), Formats::FloatOrShare);
         let count = mesh.positions.len();
-        let colours: Option<Vec<DVec3>> = if has_alpha {
-            let colours = self.one_each::<4, DVec4>(which, formats, count, load)?;
-            colours.map(|colours| colours.into_iter().map(DVec4::truncate).collect())
+        let colours: Option<Vec<DVec4>> = if has_alpha {
+            self.one_each::<4, DVec4>(which, formats, count, load)?
         } else {
-            self.one_each(which, formats, count, load)?
+            let colours = self.one_each::<3, DVec3>(which, formats, count, load)?;
+            colours.map(|colours| colours.into_iter().map(|colour| colour.extend(1.0)).collect())
         };
         let Some(colours) = colours else {
             return Ok(None);
         };
-        let (mut sum, mut area) = (DVec3::ZERO, 0.0);
+        let (mut sum, mut area) = (DVec4::ZERO, 0.0);
         for (triangle, corners) in mesh.triangles.iter().enumerate() {
             let weight = mesh.triangle_area_m2(triangle);
             let of_triangle = corners
                 .iter()
                 .map(|vertex| colours[*vertex as usize])
-                .sum::<DVec3>();
+                .sum::<DVec4>();
             sum += of_triangle / 3.0 * weight;
             area += weight;
         }
@@ -304,20 +312,32 @@ impl Vertices<'_> {
         if !mean.is_finite() {
             return Ok(None);
         }
-        let mean = mean.clamp(DVec3::ZERO, DVec3::ONE);
+        let mean = mean.clamp(DVec4::ZERO, DVec4::ONE);
         // Rounded, so that a uniform colour is independent of the averaging and white stays white.
         let mean = (mean / COLOUR_STEP).round() * COLOUR_STEP;
-        let varies = colours.iter().any(|colour| colour.distance(mean) > SAME_COLOUR);
-        let linear = |colour: &DVec3| colour.clamp(DVec3::ZERO, DVec3::ONE).as_vec3().to_array();
+        let differs = |colour: &DVec4| colour.truncate().distance(mean.truncate()) > SAME_COLOUR;
+        let varies = colours.iter().any(differs);
+        let linear = |colour: &DVec4| {
+            let colour = colour.truncate().clamp(DVec3::ZERO, DVec3::ONE);
+            colour.as_vec3().to_array()
+        };
         Ok(Some(Colours {
-            mean: mean.to_array().into(),
+            mean: VertexFactors {
+                colour: mean.truncate().to_array().into(),
+                alpha: mean.w,
+            },
+            has_alphas: colours
+                .iter()
+                .any(|colour| (colour.w - mean.w).abs() > SAME_COLOUR),
             of_vertices: varies.then(|| colours.iter().map(linear).collect()),
         }))
     }
 }
 
 struct Colours {
-    mean: LinearSrgb,
+    mean: VertexFactors,
+    /// Whether the alpha varies.
+    has_alphas: bool,
     /// `None` if they are uniform.
     of_vertices: Option<Vec<[f32; 3]>>,
 }
@@ -389,10 +409,21 @@ fn read_local(
         );
         None
     });
-    let mut colour = colours.as_ref().map(|colours| colours.mean);
+    let none = VertexFactors {
+        colour: LinearSrgb::WHITE,
+        alpha: 1.0,
+    };
+    let mut factors = colours.as_ref().map_or(none, |colours| colours.mean);
+    if colours.as_ref().is_some_and(|colours| colours.has_alphas) {
+        load.warn(
+            owner,
+            "the alpha of its vertex colours was read as its mean",
+            "use the alpha of a base colour texture",
+        );
+    }
     if let Some(of_vertices) = colours.and_then(|colours| colours.of_vertices) {
         if has_colours {
-            (colour, mesh.colours) = (None, Some(of_vertices));
+            (factors.colour, mesh.colours) = (LinearSrgb::WHITE, Some(of_vertices));
         } else {
             load.warn(
                 owner,
@@ -416,7 +447,7 @@ fn read_local(
         mesh,
         has_normals,
         is_rounded: positions.is_some_and(|index| reader.has_floats(index)),
-        colour,
+        factors,
     }))
 }
 

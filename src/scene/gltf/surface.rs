@@ -4,17 +4,18 @@ use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::DAffine3;
+use gltf::json::material::AlphaMode;
 use gltf::json::mesh;
+use gltf::json::validation::Checked;
 
 use super::context::{LoadContext, damaged};
 use super::nodes::PlacedNode;
 use super::pose::PrimitiveInstance;
-use super::primitive::{self, Primitives};
-use super::{extras, material};
+use super::primitive::{self, Primitives, VertexFactors};
+use super::{bodies, extras, material};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::watertight::{has_volume, is_closed};
-use crate::scene::{Material, Mesh, Object, Scene, instances};
+use crate::scene::{Material, Mesh, Object, Scene, Volume, instances};
 
 /// Adds all objects, and to `materials`, which has those of the file, any that the file only implies. `solid_glass`
 /// reads thin walls as solid glass if their mesh encloses space.
@@ -31,7 +32,7 @@ pub fn add_objects(
 ) -> Result<()> {
     let root = source.reader.root;
     let mut primitives = Primitives::default();
-    let mut closed = HashMap::new();
+    let mut factors = Vec::new();
     let mut uses = vec![0; root.meshes.len()];
     let meshes = placed.iter().filter_map(|placed| root.nodes[placed.node].mesh);
     for mesh in meshes {
@@ -64,26 +65,27 @@ pub fn add_objects(
             let material = materials.of_primitive(part, &owner, load);
             let part = (place, part, materials.is_opaque_body(material));
             let read = primitives.read(source, part, &world_from_node, &owner, load)?;
-            let Some((mesh, colour)) = read else {
+            let Some((mesh, of_vertices)) = read else {
                 continue;
             };
-            let mut object = Object::new(placed.name.as_str(), (placed.node, index), 0, mesh);
+            let mut object = Object::new(placed.name.as_str(), (placed.node, index), material, mesh);
             object.place(world_from_node);
-            let is_solid = || {
-                let mesh = object.mesh();
-                let mut is_closed = || *closed.entry(Arc::as_ptr(mesh)).or_insert_with(|| is_closed(mesh));
-                solid_glass && has_volume(object.in_scene()) && is_closed()
-            };
-            let material = materials.thin_or_solid(material, is_solid);
-            let material = materials.tinted(material, colour);
-            materials.check_coordinates(material, object.mesh(), &placed.name, load);
-            object.material = material;
             scene.objects.push(object);
+            factors.push(of_vertices);
         }
         uses[mesh_index.value()] -= 1;
         if uses[mesh_index.value()] == 0 {
             primitives.forget(mesh_index.value());
         }
+    }
+    let bounds_body = bodies::find(&mut scene.objects, &materials.all, load);
+    for (object, (bounds_body, factors)) in scene.objects.iter_mut().zip(bounds_body.into_iter().zip(factors))
+    {
+        let source = root.materials.get(object.material);
+        let blends = source.is_some_and(|source| source.alpha_mode == Checked::Valid(AlphaMode::Blend));
+        let material = materials.thin_or_solid(object.material, bounds_body, solid_glass);
+        object.material = materials.tinted(material, factors, blends);
+        materials.check_coordinates(object.material, object.mesh(), &object.name, load);
     }
     take_copies(&scene.objects, load)?;
     let degenerate = primitives.degenerate;
@@ -122,16 +124,33 @@ fn owner(mesh: &mesh::Mesh, mesh_index: usize, primitive: usize) -> String {
     )
 }
 
+/// Interior of a body, as the file states it.
+#[derive(Clone, Copy, Debug)]
+struct Interior {
+    volume: Volume,
+    /// Whether it has a thickness; the mesh decides otherwise.
+    has_thickness: bool,
+}
+
 /// Materials of the file, followed by those that it only implies.
 #[derive(Debug)]
 pub struct Materials {
     all: Vec<Material>,
     in_file: usize,
     default: Option<usize>,
-    /// For each thin wall of the file: whether it became solid, and its variant of the other kind.
-    thin: HashMap<usize, (bool, Option<usize>)>,
-    /// Tinted variants: original material, tint, variant.
-    tinted: Vec<(usize, LinearSrgb, usize)>,
+    /// Interior that the file states for each material.
+    stated: Vec<Option<Interior>>,
+    /// For each transmissive material of the file in use: whether it became solid, and its variant of the other kind.
+    transmissive: HashMap<usize, (bool, Option<usize>)>,
+    /// Tinted variants: original material, factors, variant.
+    tinted: Vec<(usize, VertexFactors, usize)>,
+}
+
+fn interior(material: &Material) -> Option<Interior> {
+    material.volume.map(|volume| Interior {
+        volume,
+        has_thickness: !material.is_solid_by_shape,
+    })
 }
 
 impl Materials {
@@ -140,7 +159,8 @@ impl Materials {
         Self {
             in_file: in_file.len(),
             default: None,
-            thin: HashMap::new(),
+            stated: in_file.iter().map(interior).collect(),
+            transmissive: HashMap::new(),
             tinted: Vec::new(),
             all: in_file,
         }
@@ -162,10 +182,18 @@ impl Materials {
                 "give it a material",
             );
         }
-        *self.default.get_or_insert_with(|| {
-            self.all.push(material::default());
-            self.all.len() - 1
-        })
+        if let Some(known) = self.default {
+            return known;
+        }
+        let added = self.add(material::default(), None);
+        self.default = Some(added);
+        added
+    }
+
+    fn add(&mut self, material: Material, stated: Option<Interior>) -> usize {
+        self.all.push(material);
+        self.stated.push(stated);
+        self.all.len() - 1
     }
 
     /// Whether a material is diffuse, with or without a coat.
@@ -174,35 +202,51 @@ impl Materials {
         surface.is_receiver() && surface.is_opaque()
     }
 
-    /// Variant of a thin-walled material for a solid or an open mesh; other materials stay the same. The first mesh
-    /// decides what the material itself becomes; meshes of the other kind get a variant.
-    fn thin_or_solid(&mut self, material: usize, is_solid: impl FnOnce() -> bool) -> usize {
-        let is_known = self.thin.contains_key(&material);
-        if !is_known && !material::is_thin(&self.all[material]) {
+    /// Variant of a transmissive material for an object that bounds a body or does not; other materials stay the same.
+    /// The first object decides what the material itself becomes; objects of the other kind get a variant.
+    fn thin_or_solid(&mut self, material: usize, bounds_body: bool, solid_glass: bool) -> usize {
+        let own = &self.all[material];
+        if !own.transmits() {
             return material;
         }
-        let is_solid = is_solid();
-        let (own, twin) = self.thin.entry(material).or_insert((is_solid, None));
-        if *own == is_solid {
-            if !is_known && is_solid {
-                material::make_solid(&mut self.all[material]);
+        let stated = self.stated[material];
+        let has_thickness = stated.is_some_and(|interior| interior.has_thickness);
+        let is_solid = bounds_body && (solid_glass || has_thickness);
+        let set = |material: &mut Material| {
+            let volume = stated.map_or(material::CLEAR, |interior| interior.volume);
+            material::set_interior(material, is_solid.then_some(volume), !has_thickness);
+        };
+        match self.transmissive.get(&material).copied() {
+            None => {
+                set(&mut self.all[material]);
+                self.transmissive.insert(material, (is_solid, None));
+                material
             }
-            return material;
+            Some((first, _)) if first == is_solid => material,
+            Some((_, Some(twin))) => twin,
+            Some((first, None)) => {
+                let mut twin = self.all[material].clone();
+                twin.name += if is_solid { " (solid)" } else { " (thin)" };
+                set(&mut twin);
+                let twin = self.add(twin, stated);
+                self.transmissive.insert(material, (first, Some(twin)));
+                twin
+            }
         }
-        *twin.get_or_insert_with(|| {
-            self.all.push(material::twin(&self.all[material], is_solid));
-            self.all.len() - 1
-        })
     }
 
-    /// Warns of the remaining thin walls.
+    /// Warns of the thin walls of which the file states no interior.
     pub fn warn_of_thin_walls(&self, solid_glass: bool, load: &mut LoadContext) {
-        for material in self.all.iter().filter(|material| material::is_thin(material)) {
+        let all = self.all.iter().zip(&self.stated);
+        let is_thin = |material: &Material| material.transmits() && material.volume.is_none();
+        let thin = all.filter(|(material, _)| is_thin(material));
+        let bare = thin.filter(|(_, stated)| stated.is_none_or(|interior| !interior.has_thickness));
+        for (material, _) in bare {
             load.warn(
                 format!("material `{}`", material.name),
                 "transmits light but has no thickness, so it is a thin pane and does not refract",
                 if solid_glass {
-                    "give it a volume, or close its mesh, to make it solid glass"
+                    "give it a volume and close its mesh to make it solid glass"
                 } else {
                     "give it a volume, or leave --solid-glass on"
                 },
@@ -210,23 +254,34 @@ impl Materials {
         }
     }
 
-    /// Variant of a material with its base colour multiplied by `colour`.
-    fn tinted(&mut self, material: usize, colour: Option<LinearSrgb>) -> usize {
-        let Some(colour) = colour.filter(|colour| *colour != LinearSrgb::WHITE) else {
+    /// Variant of a material with its base colour multiplied by the factors of vertices and, if it is cut out or `blends`,
+    /// its alpha.
+    fn tinted(&mut self, material: usize, mut factors: VertexFactors, blends: bool) -> usize {
+        let own = &self.all[material];
+        let has_alpha = own.alpha_mask.is_some() || (blends && !own.transmits());
+        if !has_alpha {
+            factors.alpha = 1.0;
+        }
+        if factors.colour == LinearSrgb::WHITE && factors.alpha == 1.0 {
             return material;
-        };
-        let same = |known: &&(usize, LinearSrgb, usize)| (known.0, known.1) == (material, colour);
+        }
+        let same = |known: &&(usize, VertexFactors, usize)| (known.0, known.1) == (material, factors);
         if let Some((.., twin)) = self.tinted.iter().find(same) {
             return *twin;
         }
-        let twin = self.all.len();
-        let own = &self.all[material];
-        self.all.push(Material {
+        let mut tinted = Material {
             name: format!("{} (tinted)", own.name),
-            base_colour: own.base_colour * colour,
+            base_colour: own.base_colour * factors.colour,
             ..own.clone()
-        });
-        self.tinted.push((material, colour, twin));
+        };
+        if let Some(mask) = &mut tinted.alpha_mask {
+            mask.factor *= factors.alpha;
+        } else if factors.alpha < 1.0 {
+            tinted.coverage = Some(own.coverage.unwrap_or(1.0) * factors.alpha);
+            tinted.surface = tinted.classified();
+        }
+        let twin = self.add(tinted, self.stated[material]);
+        self.tinted.push((material, factors, twin));
         twin
     }
 

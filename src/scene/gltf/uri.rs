@@ -87,11 +87,12 @@ fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
     let Some(relative) = decoded.filter(|path| !path.is_empty() && !path.contains('\0')) else {
         return Err(refused("its URI is not valid"));
     };
-    // Backslashes and drives are path syntax on Windows only; refused everywhere, so that a scene reads the same on all
-    // systems.
+    // Backslashes separate folders on Windows only, where some writers leave them; read everywhere, so that a scene
+    // reads the same on all systems. Drives are refused everywhere.
+    let relative = relative.replace('\\', "/");
     let mut components = Path::new(&relative).components();
     let stays = components.all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-    if !stays || relative.contains('\\') || relative.contains(':') {
+    if !stays || relative.contains(':') {
         return Err(refused(
             "its URI is not a relative path within the scene's folder",
         ));

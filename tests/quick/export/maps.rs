@@ -11,7 +11,6 @@ use nephroid::export::map_folder::MapFolder;
 use nephroid::export::map_set::MapSet;
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest, ShardSet};
 use nephroid::export::textures::TextureFolder;
-use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::tiles::TileLayout;
 use nephroid::illumination::{Chart, IlluminationMap, Layer, Parametrisation, parametrise};
 use nephroid::light_pass::shard_index::ShardIndex;
@@ -162,7 +161,7 @@ fn stored_maps_are_not_trusted() {
 
 fn plane() -> Parametrisation {
     let mesh = shapes::rectangle(DVec3::ZERO, DVec3::X * 2.0, DVec3::Z);
-    parametrise(0, &mesh, DEFAULT_NOMINAL_SIDE).expect("a chart")
+    parametrise(0, &mesh).expect("a chart")
 }
 
 /// A value of its own for each texel of each channel of a part; its sums are exact.

@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 
 use nephroid::illumination::gutter::fill_gutter;
 use nephroid::illumination::lookup::bilinear;
-use nephroid::illumination::parametrisation::DEFAULT_NOMINAL_SIDE;
 use nephroid::illumination::parametrisation::coverage::{for_each_texel_in_row, rows};
 use nephroid::illumination::{Parametrisation, UvSet, parametrise};
 
@@ -12,7 +11,7 @@ use crate::prelude::*;
 use support::meshes::{cuboid, floor, grid, joined, moved, quad, sphere};
 
 fn of(mesh: &Mesh) -> Parametrisation {
-    parametrise(3, mesh, DEFAULT_NOMINAL_SIDE).expect("the mesh has area")
+    parametrise(3, mesh).expect("the mesh has area")
 }
 
 fn without_uv(mut mesh: Mesh) -> Mesh {
@@ -215,7 +214,7 @@ fn texels_are_alike_all_over_a_surface() {
 #[test]
 fn pieces_keep_their_gutter() {
     let mesh = cuboid(DVec3::ZERO, dvec3(1.0, 2.0, 3.0));
-    let map = parametrise(0, &mesh, 128).expect("the box has area");
+    let map = parametrise(0, &mesh).expect("the box has area");
     let bounds = |face: &[[DVec2; 3]]| {
         let corners = || face.iter().flatten().copied();
         let low = corners().fold(DVec2::INFINITY, DVec2::min);
@@ -238,8 +237,8 @@ fn no_area_no_map_and_always_the_same() {
         triangles: vec![[0, 1, 2]],
         ..Mesh::default()
     };
-    assert!(parametrise(0, &point, 64).is_none());
-    assert!(parametrise(0, &Mesh::default(), 64).is_none());
+    assert!(parametrise(0, &point).is_none());
+    assert!(parametrise(0, &Mesh::default()).is_none());
     assert_eq!(of(&torus()).corner_uvs, of(&torus()).corner_uvs);
 }
 
@@ -306,7 +305,7 @@ fn l_shape() -> Mesh {
 }
 
 fn areas(mesh: &Mesh, width: usize, height: usize) -> Vec<f64> {
-    let map = parametrise(0, mesh, 256).expect("the mesh has area");
+    let map = parametrise(0, mesh).expect("the mesh has area");
     assert_close(map.area_m2(), mesh.area_m2(), 1e-12, "the map's area");
     let chart = map.chart(width, height);
     (0..width * height)

@@ -9,7 +9,7 @@ use nephroid::scene::{Environment, Volume};
 use crate::prelude::*;
 use support::chain_laws::direction;
 use support::floors::{diffuse, image, texture_reference};
-use support::meshes::{cuboid, floor, quad, sphere};
+use support::meshes::{cuboid, floor, joined, quad, sphere};
 use support::scenes::{chart, light, map_of, scene, seen, surface, tracer, view};
 
 const WATER: f64 = 1.333;
@@ -120,6 +120,26 @@ fn coloured(
 
 fn layer(low: f64, high: f64) -> Mesh {
     cuboid(dvec3(-90.0, low, -90.0), dvec3(90.0, high, 90.0))
+}
+
+/// Faces back to back are seen from the side that faces the eye.
+#[test]
+fn a_floor_back_to_back_has_no_holes() {
+    let front = floor(100.0, 0.0);
+    let mut back = front.clone();
+    back.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    back.normals.fill(-DVec3::Y);
+    let doubled = scene(vec![(joined(front, back), floor_material())], vec![]);
+    let lit = Lit::with_map(doubled, 2, vec![E; 4]);
+    let slanting = view(dvec3(0.3, 2.0, 0.1), dvec3(0.0, 0.0, 1.7), 0.9, [32, 32]);
+    for radiance in lit.picture(&slanting, 1).radiance {
+        near(
+            DVec3::from(radiance.map(f64::from)),
+            floor_sends(),
+            1e-5,
+            "radiance",
+        );
+    }
 }
 
 /// Water as an open sheet and as a closed body.

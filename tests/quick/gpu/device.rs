@@ -159,7 +159,7 @@ fn meshes_beyond_a_buffer_are_drawn_whole() {
     let mut scene = Scene::default();
     parts::add(&mut scene, "floor", sheet(0.0), diffuse(LinearSrgb::WHITE));
     parts::add(&mut scene, "pane", sheet(0.5), pane);
-    let chart = parametrise(0, &sheet(0.0), 8).expect("it has area").chart(8, 8);
+    let chart = parametrise(0, &sheet(0.0)).expect("it has area").chart(8, 8);
     let texels = (0..64).map(|index| [index as f32; 3]).collect();
     let lit = (scene, vec![map_of(Arc::new(chart), texels)]);
     let words = "holds at most 64 KiB, and 16384 triangles take more";

@@ -8,7 +8,11 @@ use crate::prelude::*;
 use support::floors::image;
 
 fn material(json: Value) -> (Material, Scene) {
-    let scene = Glb::triangle().with_material(json).scene();
+    let by_file = options(|options| options.solid_glass = false);
+    let scene = Glb::tetrahedron()
+        .with_material(json)
+        .load_with(&by_file)
+        .expect("loads");
     (scene.material_of(0).clone(), scene)
 }
 

@@ -1,5 +1,6 @@
 //! Scenes: the built-in ones and those from files.
 
+mod bodies;
 mod builtins;
 mod camera_paths;
 mod collections;

@@ -1,0 +1,107 @@
+//! Surfaces that meet, and bodies of several parts, as files bring them.
+
+use glam::DVec3;
+use nephroid::illumination::Side;
+use nephroid::optics::fresnel::dielectric_reflectance;
+use nephroid::scene::builtin::shapes;
+use nephroid::scene::{Mesh, Scene, contacts};
+
+use support::laws::law::*;
+use support::laws::scenes::*;
+use support::laws::{Baked, Table};
+use support::tools::{at, set};
+
+/// Gaps of a rounding error to single precision, one way and the other.
+const GAPS_M: [f64; 3] = [0.0, 6e-8, -6e-8];
+
+pub fn fill(t: &mut Table) {
+    let down = DVec3::new(0.3, -1.0, 0.0).normalize();
+    let cosine = -down.y;
+    let through_one = (1.0 - dielectric_reflectance(cosine, 1.5)) * cosine;
+    let bright_branches = || set(at(1e3, 16), |s| s.branch_threshold = Some(1e-4));
+    for gap_m in GAPS_M {
+        // Either order of the objects.
+        let slab = || slab(gap_m, 0.2 + gap_m);
+        let mut turned = Scene::default().glass(1.5, slab());
+        let floor_first = floor(0.5).glass(1.5, slab()).sun(down);
+        for part in floor(0.5).objects {
+            let mesh = Mesh::clone(part.mesh());
+            turned = turned.diffuse("floor", mesh);
+        }
+        for scene in [floor_first, turned.sun(down)] {
+            t.case("glass-on-the-table").bake(apart(scene), 1e3, 32).e(
+                "that behind a single face of glass",
+                1e-3,
+                move |_| through_one,
+            );
+        }
+        t.case("touching-glass")
+            .bake_with(slabs(&[[0.3, 0.7]], 1.5), bright_branches())
+            .bake_with(slabs(&[[0.3, 0.5], [0.5 + gap_m, 0.7]], 1.5), bright_branches())
+            .as_first("map as of one slab", 1e-6, 1.0);
+        t.case("liquid-in-its-glass")
+            .bake_with(slabs(&[[0.5, 0.7], [0.3, 0.501]], 1.33), bright_branches())
+            .bake_with(slabs(&[[0.5, 0.7], [0.3, 0.5 + gap_m]], 1.33), bright_branches())
+            .as_first("map as where they overlap", 1e-2, 1.0);
+        let rug = shapes::floor([-0.2, 0.2], [-0.2, 0.2], gap_m);
+        t.case("rug-on-the-floor")
+            .bake(before(upright()), 1e3, 32)
+            .bake(apart(before(upright()).diffuse("rug", rug)), 1e3, 32)
+            .watts_as_first("watts as without it", 1e-3)
+            .measure("the rug holds what falls on its place", 1e-2, on_the_rug);
+        let mut back = shapes::floor([-0.5, 0.5], [-0.5, 0.5], gap_m);
+        turn(&mut back);
+        t.case("floor-of-two-nodes-back-to-back")
+            .bake(before(upright()), 1e3, 32)
+            .bake(apart(before(upright()).diffuse("back", back)), 1e3, 32)
+            .as_first("map as of a single floor", 1e-3, 1.0);
+    }
+    t.case("floor-doubled-back-to-back")
+        .bake(before(upright()), 1e3, 32)
+        .bake(before(upright()).reshaped(0, back_to_back), 1e3, 32)
+        .watts_as_first("watts as of a single floor", 1e-3)
+        .must("only the side that is met is lit", |bake| {
+            let mut maps = bake.result.maps.iter();
+            maps.all(|map| map.chart.receiver.side() == Side::Front)
+        });
+}
+
+fn apart(mut scene: Scene) -> Scene {
+    let warnings = contacts::set_apart(&mut scene);
+    scene.warnings.extend(warnings);
+    scene
+}
+
+/// Slabs above each other, the first of glass and the others of an index, under a slanting sun.
+fn slabs(borders: &[[f64; 2]], ior: f64) -> Scene {
+    let scene = floor(0.5).sun(DVec3::new(0.1, -1.0, 0.05));
+    let all = borders.iter().enumerate();
+    apart(all.fold(scene, |scene, (index, [low, high])| {
+        scene.glass(if index == 0 { 1.5 } else { ior }, slab(*low, *high))
+    }))
+}
+
+fn turn(mesh: &mut Mesh) {
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+}
+
+fn back_to_back(mesh: &mut Mesh) {
+    let mut back = mesh.clone();
+    turn(&mut back);
+    shapes::append(mesh, &back);
+}
+
+/// How far the rug's mean E is off that of the lamp.
+fn on_the_rug(bake: &Baked) -> f64 {
+    let Some(map) = map_of(bake, "rug") else {
+        return f64::INFINITY;
+    };
+    let held_w = map.flux_w(nephroid::settings::LayerKind::Caustic).luminance();
+    let middles = (0..64).flat_map(|x| (0..64).map(move |z| [x, z]));
+    let mean = middles.map(|place| {
+        let [x, z] = place.map(|index| (f64::from(index) + 0.5) / 64.0 * 0.4 - 0.2);
+        from_lamp(DVec3::new(x, 0.0, z), MIRRORED_LAMP) / 4096.0
+    });
+    off(held_w, mean.sum::<f64>() * 0.16)
+}
