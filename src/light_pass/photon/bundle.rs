@@ -136,6 +136,13 @@ impl OriginShift {
         (shift.lamp_step_texels() < MAX_STEP_TEXELS).then_some(shift)
     }
 
+    /// Whether lamp and wavelengths spread the light over several texels.
+    pub(super) fn is_smooth(&self) -> bool {
+        let [x, y] = self.lamp.map(|moved| 2.0 * moved.abs().max_element());
+        let hues = (self.hues[0] - self.hues[1]).abs().max_element();
+        f64::from(hues.max(x.min(y))) >= SMOOTH_TEXELS
+    }
+
     pub(super) fn at(&self, origin: &Origin) -> DVec2 {
         let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
         let [first, last] = self.hues.map(|moved| moved.as_dvec2());

@@ -108,7 +108,10 @@ impl Cutter<'_, '_> {
             let shift =
                 end.and_then(|end| OriginShift::measured(end, lamp_sides.as_ref(), spectrum_ends.as_ref()));
             match shift {
-                Some(shift) => square.bundles[bundle].shift = shift,
+                Some(shift) => {
+                    square.bundles[bundle].shift = shift;
+                    square.bundles[bundle].is_smooth |= shift.is_smooth();
+                }
                 None => square.give_up(bundle),
             }
         }
