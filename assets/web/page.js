@@ -18,7 +18,7 @@ const about = JSON.parse(by("about").textContent);
 const query = new URLSearchParams(location.search);
 const panel = by("panel"), fields = panel.elements, canvas = by("picture");
 const shown = { layers: {}, line: 2, exposureStops: 0, toneMap: about.tone_map, colours: null };
-const state = (globalThis.nephroid = { state: "loading", shown, pictures: 0, level: 0 });
+const state = (globalThis.nephroid = { state: "loading", shown, drawn: 0, level: 0 });
 // Files of moments, by name, and the first of them, which others differ from.
 const files = new Map();
 let eye, navigation, first, range, exposureBase;
@@ -28,7 +28,7 @@ let isDue = true, wake = () => {}, turn = Promise.resolve();
 const nextFrame = () => new Promise((resolve) => requestAnimationFrame(resolve));
 const asset = (name) => files.get(name) ?? files.set(name, read(name)).get(name);
 
-const request = () => { isDue = true; wake(); };
+const request = () => { isDue = true; state.drawn = 0; wake(); };
 
 /** Runs one thing after the other that uses the device. */
 const inTurn = (task) => (turn = turn.then(task, task));
@@ -54,11 +54,10 @@ async function drawAll() {
     } else if (!navigation.fingers.size && !state.motion?.isPlaying && eye.count < (isRefined ? MOST_PICTURES : Infinity)) {
       isRefined = await inTurn(() => eye.draw(view(1, 1, BRANCHING.resting), isRefined, () => isDue)) || isRefined;
     } else {
-      state.state = "done";
       await new Promise((resolve) => { wake = resolve; });
     }
-    state.pictures += 1;
-    state.state = isRefined && eye.count >= MOST_PICTURES ? "done" : "drawing";
+    // Pictures in the mean of the view at rest.
+    state.drawn = isRefined && !isDue ? eye.count : 0;
   }
 }
 
@@ -186,7 +185,7 @@ async function start() {
   }
   document.body.className = "ready";
   await nextFrame();
-  state.firstPicture_ms = performance.now();
+  Object.assign(state, { state: "drawing", firstPicture_ms: performance.now() });
   addEventListener("resize", request);
   if (about.moments.length > 1) {
     state.motion = new Motion(by("motion"), about.moments.length, about.fps, { show, changed: request });
