@@ -110,8 +110,7 @@ export class EyePass {
     if (!this.pipelines.has(key)) {
       const module = this.modules[program];
       const made = this.device.createRenderPipelineAsync({
-        ...rest,
-        label: fragment?.entryPoint ?? "depth",
+        ...rest, label: fragment?.entryPoint ?? "depth",
         layout: this.device.createPipelineLayout({ bindGroupLayouts: groups.map((name) => this.layouts[name]) }),
         vertex: { module, entryPoint: vertex, buffers: vertex === "place" ? this.scene.vertices : [] },
         ...(fragment && { fragment: { ...fragment, module, ...changes } }),
@@ -169,13 +168,10 @@ export class EyePass {
       return this.device.createTexture({ label, size, format, sampleCount, usage });
     };
     const textures = {
-      radiance: made("radiance", formats.radiance, size),
-      samples: made("samples", formats.radiance, size, samples),
-      depth: made("depth", formats.depth, size, samples),
-      traced: made("traced picture", formats.radiance, tracedSize),
+      radiance: made("radiance", formats.radiance, size), samples: made("samples", formats.radiance, size, samples),
+      depth: made("depth", formats.depth, size, samples), means: made("mean", formats.mean, size),
+      otherMean: made("mean", formats.mean, size), traced: made("traced picture", formats.radiance, tracedSize),
       tracedDepth: made("traced depth", formats.depth, tracedSize),
-      means: made("mean", formats.mean, size),
-      otherMean: made("mean", formats.mean, size),
     };
     Object.values(this.targets?.textures ?? {}).forEach((texture) => texture.destroy());
     const views = Object.entries(textures).map(([name, texture]) => [name, texture.createView()]);
@@ -222,23 +218,13 @@ export class EyePass {
     const jitter = ([right, down]) => [(2 * right) / width, (-2 * down) / height];
     const exposure = 2 ** exposureStops, [low, high] = (colours ?? [1, 2]).map(Math.log2);
     const frame = {
-      clip_from_camera: [...columns.flat(), 0, 0, camera.near, 0],
-      camera_position: camera.position,
-      radiance_scale: [exposure],
-      background: scaled(scene.background, scene.textures.sky?.scale ?? 1),
-      level_bias: [count === 0 ? 0 : -1],
-      forward: camera.forward,
-      traced_width: [tracedWidth],
-      right: scaled(camera.right, halfHeight * aspect),
-      traced_height: [tracedHeight],
-      up: scaled(camera.up, halfHeight),
-      pixel_rad: [(2 * halfHeight) / tracedHeight],
-      jitter: jitter(offset),
-      traced_per_pixel: perPixel,
+      clip_from_camera: [...columns.flat(), 0, 0, camera.near, 0], camera_position: camera.position, forward: camera.forward,
+      right: scaled(camera.right, halfHeight * aspect), up: scaled(camera.up, halfHeight),
+      background: scaled(scene.background, scene.textures.sky?.scale ?? 1), radiance_scale: [exposure],
+      level_bias: [count === 0 ? 0 : -1], pixel_rad: [(2 * halfHeight) / tracedHeight], jitter: jitter(offset),
+      traced_width: [tracedWidth], traced_height: [tracedHeight], traced_per_pixel: perPixel,
       traced_offset: offset.map((place, axis) => (place - tracedOffset[axis]) * perPixel[axis]),
-      colour_scale: [low, 1 / (high - low)],
-      fault: [1],
-      stand_in: [STAND_IN / exposure],
+      colour_scale: [low, 1 / (high - low)], fault: [1], stand_in: [STAND_IN / exposure],
     };
     write(device, uniforms.frame, scene.Frame, frame);
     write(device, uniforms.tracedFrame, scene.Frame, { ...frame, jitter: jitter(tracedOffset) });
@@ -246,10 +232,8 @@ export class EyePass {
     const { centre_m: centre, per_m: perM } = scene.local;
     device.queue.writeBuffer(uniforms.start, 0, scene.contents.start);
     write(device, uniforms.start, scene.ChainStart, {
-      eye: camera.position.map((coordinate, axis) => (coordinate - centre[axis]) * perM),
-      near: [camera.near * perM],
-      media: this.geometry.media(camera.position),
-      branching_depth: new Uint32Array([branching]),
+      eye: camera.position.map((coordinate, axis) => (coordinate - centre[axis]) * perM), near: [camera.near * perM],
+      media: this.geometry.media(camera.position), branching_depth: new Uint32Array([branching]),
     });
     const sets = scene.contents.wavelengths, bytes = sets.length / scene.pictures;
     device.queue.writeBuffer(uniforms.wavelengths, 0, sets.subarray((count % scene.pictures) * bytes, (count % scene.pictures + 1) * bytes));
@@ -342,9 +326,7 @@ export class EyePass {
   }
 }
 
-function cleared(view) {
-  return { view, loadOp: "clear", storeOp: "store", clearValue: [0, 0, 0, 0] };
-}
+const cleared = (view) => ({ view, loadOp: "clear", storeOp: "store", clearValue: [0, 0, 0, 0] });
 
 // Fields of a struct, as the shaders lay it out.
 function write(device, buffer, { fields }, values) {

@@ -27,9 +27,7 @@ export class Geometry {
   }
 
   /** Each object: number, whether it is a body, corners of its triangles in the scene [m] and the box around them. */
-  get shapes() {
-    return (this.made ??= this.makeShapes());
-  }
+  get shapes() { return (this.made ??= this.makeShapes()); }
 
   makeShapes() {
     const { contents: { objects }, draws, ObjectRecord: { size, fields } } = this.scene;
@@ -137,13 +135,11 @@ export class Geometry {
         let least = Infinity, most = -Infinity;
         for (let part = begin + axis; part < end; part += step) {
           for (const field of fields) {
-            const value = from[part + field];
-            if (value < least) least = value;
-            if (value > most) most = value;
+            least = Math.min(least, from[part + field]);
+            most = Math.max(most, from[part + field]);
           }
         }
-        boxes[at + low + axis] = least;
-        boxes[at + high + axis] = most;
+        [boxes[at + low + axis], boxes[at + high + axis]] = [least, most];
       }
     }
     return { triangles, nodes };

@@ -42,10 +42,7 @@ export class Motion {
     this.isBusy = false;
   }
 
-  toggle() {
-    if (this.isPlaying) this.pause();
-    else this.play();
-  }
+  toggle() { return this.isPlaying ? this.pause() : this.play(); }
 
   pause() {
     this.isPlaying = false;

@@ -34,12 +34,9 @@ export class Navigation {
     return [Math.sin(this.yaw) * level, Math.sin(this.pitch), -Math.cos(this.yaw) * level];
   }
 
-  get right() {
-    return [Math.cos(this.yaw), 0, Math.sin(this.yaw)];
-  }
+  get right() { return [Math.cos(this.yaw), 0, Math.sin(this.yaw)]; }
 
-  stand(position, forward, fov) {
-    const [x, y, z] = forward;
+  stand(position, [x, y, z], fov) {
     this.pitch = Math.asin(Math.max(-1, Math.min(1, y)));
     if (Math.hypot(x, z) > 1e-6) this.yaw = Math.atan2(x, -z);
     Object.assign(this, { position, fov, yaw: this.yaw ?? 0 });
@@ -47,8 +44,7 @@ export class Navigation {
   }
 
   show(index) {
-    this.next = (index + 1) % this.cameras.length;
-    this.shown = index;
+    Object.assign(this, { next: (index + 1) % this.cameras.length, shown: index });
     const { position_m: position, forward, fov_rad: fov } = this.cameras[index];
     this.stand(position, forward, fov);
   }
@@ -137,8 +133,7 @@ export class Navigation {
   /** The camera for a picture of that aspect (width/height): a narrow picture is widened as in the window. */
   camera(aspect) {
     const widened = Math.max(16 / 9 / Math.max(aspect, 1), 1);
-    const { position, forward, right } = this;
-    const [x, y, z] = forward;
+    const { position, forward, forward: [x, y, z], right } = this;
     const up = [-right[2] * y, right[2] * x - right[0] * z, right[0] * y];
     return { position, forward, right, up, fov: 2 * Math.atan(Math.tan(this.fov / 2) * widened), near: 1e-3 * this.radius };
   }

@@ -9,8 +9,7 @@ const LUMENS_PER_WATT = 683;
 // How a moving picture is drawn, from fine to coarse: pixels per pixel of the screen, and of what is traced per pixel,
 // along a side; last, without what is traced.
 const LEVELS = [[1, 1], [1, 0.5], [1, 0.25], [0.5, 0.25], [0.5, 0.125], [0.5, 0]];
-// A moving picture that takes longer is drawn coarser, a faster one finer; without what is traced, where all else takes
-// longer than the last [ms].
+// A moving picture that takes longer is drawn coarser, a faster one finer; above the last, without what is traced [ms].
 const LATE_MS = 50, EARLY_MS = 14, HOPELESS_MS = 400;
 // Pictures of a view at rest, each through other places of its pixels; surfaces at which both ways on are followed.
 const MOST_PICTURES = 16, BRANCHING = { moving: 2, resting: 4 };
@@ -19,7 +18,7 @@ const about = JSON.parse(by("about").textContent);
 const query = new URLSearchParams(location.search);
 const panel = by("panel"), fields = panel.elements, canvas = by("picture");
 const shown = { layers: {}, line: 2, exposureStops: 0, toneMap: about.tone_map, colours: null };
-const state = (globalThis.nephroid = { state: "loading", shown, pictures: 0, level: 0 });
+const state = (globalThis.nephroid = { state: "loading", shown, drawn: 0, level: 0 });
 // Files of moments, by name, and the first of them, which others differ from.
 const files = new Map();
 let eye, navigation, first, range, exposureBase;
@@ -27,15 +26,9 @@ let eye, navigation, first, range, exposureBase;
 let isDue = true, wake = () => {}, turn = Promise.resolve();
 
 const nextFrame = () => new Promise((resolve) => requestAnimationFrame(resolve));
-const asset = (name) => {
-  if (!files.has(name)) files.set(name, read(name));
-  return files.get(name);
-};
+const asset = (name) => files.get(name) ?? files.set(name, read(name)).get(name);
 
-function request() {
-  isDue = true;
-  wake();
-}
+const request = () => { isDue = true; state.drawn = 0; wake(); };
 
 /** Runs one thing after the other that uses the device. */
 const inTurn = (task) => (turn = turn.then(task, task));
@@ -61,11 +54,10 @@ async function drawAll() {
     } else if (!navigation.fingers.size && !state.motion?.isPlaying && eye.count < (isRefined ? MOST_PICTURES : Infinity)) {
       isRefined = await inTurn(() => eye.draw(view(1, 1, BRANCHING.resting), isRefined, () => isDue)) || isRefined;
     } else {
-      state.state = "done";
       await new Promise((resolve) => { wake = resolve; });
     }
-    state.pictures += 1;
-    state.state = isRefined && eye.count >= MOST_PICTURES ? "done" : "drawing";
+    // Pictures in the mean of the view at rest.
+    state.drawn = isRefined && !isDue ? eye.count : 0;
   }
 }
 
@@ -73,8 +65,7 @@ async function drawMoving() {
   const [scale, traced] = LEVELS[state.level];
   const began = performance.now();
   await eye.draw(view(scale, traced, BRANCHING.moving));
-  const took = performance.now() - began;
-  const isLast = state.level >= LEVELS.length - 2;
+  const took = performance.now() - began, isLast = state.level >= LEVELS.length - 2;
   if (eye.isFresh) return request();
   if (took > (isLast ? HOPELESS_MS : LATE_MS)) state.level = Math.min(state.level + 1, LEVELS.length - 1);
   else if (took < EARLY_MS) state.level = Math.max(state.level - 1, 0);
@@ -96,10 +87,8 @@ function expose(stops) {
 
 function divide(share) {
   shown.line = share;
-  const divider = by("divider");
-  divider.style.display = share <= 1 ? "block" : "none";
-  divider.style.left = `${100 * share}%`;
-  divider.ariaValueNow = Math.round(100 * share);
+  Object.assign(by("divider").style, { display: share <= 1 ? "block" : "none", left: `${100 * share}%` });
+  by("divider").ariaValueNow = Math.round(100 * share);
   request();
 }
 
@@ -110,8 +99,7 @@ function fillPanel() {
     const label = document.createElement("label");
     label.innerHTML = '<input type="checkbox">';
     label.append(layer[0].toUpperCase() + layer.slice(1));
-    label.firstChild.name = layer;
-    label.firstChild.checked = shown.layers[layer];
+    Object.assign(label.firstChild, { name: layer, checked: shown.layers[layer] });
     label.onchange = () => { shown.layers[layer] = label.firstChild.checked; request(); };
     by("layers").append(label);
   }
@@ -134,7 +122,7 @@ function fillPanel() {
     const step = { ArrowLeft: -0.02, ArrowRight: 0.02 }[event.key];
     if (step) { event.stopPropagation(); within(shown.line + step); }
   };
-  const open = (is) => { panel.classList.toggle("open", is); by("menu").setAttribute("aria-expanded", is); };
+  const open = (is) => by("menu").setAttribute("aria-expanded", panel.classList.toggle("open", is));
   by("menu").onclick = () => open(!panel.classList.contains("open"));
   open(innerWidth > 600);
 }
@@ -175,8 +163,7 @@ function stayStill(error) {
 }
 
 async function start() {
-  const progress = by("loading").querySelector("progress");
-  const file = read(about.moments[0], (share) => { progress.value = share; });
+  const file = read(about.moments[0], (share) => { by("loading").lastChild.value = share; });
   file.catch(() => {});
   const { device, isSoftware } = await openDevice();
   device.lost.then(({ message, reason }) => stayStill(new Error(`the graphics device is lost (${message || reason})`)));
@@ -190,8 +177,7 @@ async function start() {
     fields.camera.value = navigation.shown;
     request();
   });
-  if (isSoftware) state.level = LEVELS.length - 2;
-  Object.assign(state, { eye, navigation });
+  Object.assign(state, { eye, navigation, level: isSoftware ? LEVELS.length - 2 : 0 });
   obey();
   await drawMoving();
   for (const error of [await device.popErrorScope(), await device.popErrorScope()]) {
@@ -199,7 +185,7 @@ async function start() {
   }
   document.body.className = "ready";
   await nextFrame();
-  state.firstPicture_ms = performance.now();
+  Object.assign(state, { state: "drawing", firstPicture_ms: performance.now() });
   addEventListener("resize", request);
   if (about.moments.length > 1) {
     state.motion = new Motion(by("motion"), about.moments.length, about.fps, { show, changed: request });

@@ -22,7 +22,9 @@ import numpy
 import websocket
 
 PATIENCE_S = 3600
+# Software draws them.
 SIZE = (960, 540)
+PICTURES = 4
 PHONE = (390, 844)
 # Mean FLIP beside `nephroid render` [1].
 FLIP = 0.03
@@ -93,7 +95,7 @@ class Browser:
         return told["result"].get("value")
 
     def open(self, url, size, is_phone=False):
-        """Waits for the last picture of the first view, or the still one; the addresses asked for."""
+        """Waits for the first view, or the still picture; the addresses asked for."""
         self.events.clear()
         self.call("Emulation.setDeviceMetricsOverride", width=size[0], height=size[1], deviceScaleFactor=1, mobile=is_phone)
         self.call("Emulation.setTouchEmulationEnabled", enabled=is_phone)
@@ -102,15 +104,15 @@ class Browser:
         return [event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"]
 
     def wait(self):
-        """Until nothing more is drawn."""
+        """Until the view is the mean of enough pictures."""
         end = time.time() + PATIENCE_S
-        while (state := self.value("globalThis.nephroid?.state")) not in {"done", "still"}:
+        while self.value(f"!(globalThis.nephroid?.drawn >= {PICTURES} || globalThis.nephroid?.state === 'still')"):
             if time.time() > end:
-                raise RuntimeError(f"the page is still {state}")
+                raise RuntimeError(f"the page has no picture: {self.value('globalThis.nephroid?.error')}")
             time.sleep(0.2)
 
     def picture(self):
-        """What was drawn last, without the panel."""
+        """What WebGPU drew last."""
         return decoded(self.value("drawn").split(",")[1])
 
     def window(self):
@@ -150,17 +152,17 @@ def steer(browser, faults):
         return ("Input.dispatchKeyEvent", {"type": kind, "code": code, "key": code[-1].lower()})
 
     def mouse(kind, x, **more):
-        return ("Input.dispatchMouseEvent", {"type": kind, "x": x, "y": 300, "button": "left", "buttons": 1} | more)
+        return ("Input.dispatchMouseEvent", {"type": kind, "x": x, "y": 100, "button": "left", "buttons": 1} | more)
 
     def touch(kind, *places):
         return ("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [{"x": x, "y": y} for x, y in places]})
 
     moves("W", key("KeyW", "keyDown"), key("KeyW", "keyUp"))
-    moves("the mouse", mouse("mousePressed", 300, clickCount=1), mouse("mouseMoved", 400), mouse("mouseReleased", 400, clickCount=1))
+    moves("the mouse", mouse("mousePressed", 100, clickCount=1), mouse("mouseMoved", 200), mouse("mouseReleased", 200, clickCount=1))
     moves("V", key("KeyV", "keyDown"), key("KeyV", "keyUp"))
     browser.call("Emulation.setTouchEmulationEnabled", enabled=True)
-    moves("a finger", touch("touchStart", (200, 300)), touch("touchMove", (260, 300)), touch("touchEnd"))
-    moves("two fingers", touch("touchStart", (200, 300), (300, 300)), touch("touchMove", (150, 300), (350, 300)), touch("touchEnd"))
+    moves("a finger", touch("touchStart", (200, 100)), touch("touchMove", (260, 100)), touch("touchEnd"))
+    moves("two fingers", touch("touchStart", (100, 100), (200, 100)), touch("touchMove", (50, 100), (250, 100)), touch("touchEnd"))
     browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
 
 
