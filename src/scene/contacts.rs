@@ -39,8 +39,8 @@ const PARALLEL: f64 = 0.9999;
 /// Most factors by which a vertex of several faces moves farther than each face does.
 const MAX_REACH: f64 = 4.0;
 
-/// Largest number of warnings.
-const MAX_WARNINGS: usize = 8;
+/// Most objects that a warning names.
+const MAX_NAMED: usize = 4;
 
 /// A triangle in the scene.
 #[derive(Clone, Copy, Debug)]
@@ -65,38 +65,23 @@ struct Contact {
 /// Movements of vertices [m], by body and place.
 type Steps = HashMap<(usize, [u64; 3]), Vec<DVec3>>;
 
-/// Sets apart all surfaces that meet. Returns a warning for each of the first few pairs of which one covers the other.
-pub fn set_apart(scene: &mut Scene) -> Vec<Warning> {
+/// Sets apart all surfaces that meet. Returns a warning of those that cover others.
+pub fn set_apart(scene: &mut Scene) -> Option<Warning> {
     let faces = faces(scene);
     let contacts = contacts(&faces);
     if contacts.is_empty() {
-        return Vec::new();
+        return None;
     }
     let movements = Movements::of(scene, &faces, &contacts);
     let steps = movements.steps(scene, &faces);
     let moved: Vec<(usize, Mesh)> = (0..scene.objects.len())
         .filter_map(|object| Some((object, moved(scene, object, &steps)?)))
         .collect();
-    let name = |object: usize| &scene.objects[object].name;
-    let covering = movements
-        .covered
-        .iter()
-        .flat_map(|(&above, all)| all.iter().map(move |&below| (above, below)));
-    let warning = |(above, below): (usize, usize)| {
-        Warning::new(
-            format!("nodes `{}` and `{}`", name(below), name(above)),
-            format!(
-                "lie in one plane and face the same way; `{}`, the smaller, covers the other",
-                name(above)
-            ),
-            "raise the one that is to be seen a little",
-        )
-    };
-    let warnings = covering.take(MAX_WARNINGS).map(warning).collect();
+    let warning = movements.warning(scene);
     for (object, mesh) in moved {
         scene.objects[object].reshape(Arc::new(mesh));
     }
-    warnings
+    warning
 }
 
 /// All triangles within the bounding box of another object.
@@ -289,6 +274,24 @@ impl Movements {
             }
         }
         all
+    }
+
+    fn warning(&self, scene: &Scene) -> Option<Warning> {
+        let name = |object: &usize| format!("`{}`", scene.objects[*object].name);
+        let (_, below) = self.covered.first_key_value()?;
+        let mut names: Vec<String> = self.covered.keys().take(MAX_NAMED).map(name).collect();
+        if self.covered.len() > MAX_NAMED {
+            names.push(format!("{} more", self.covered.len() - MAX_NAMED));
+        }
+        let under: Vec<String> = below.first().iter().map(|object| name(object)).collect();
+        Some(Warning::new(
+            format!("nodes {}", names.join(", ")),
+            format!(
+                "cover larger surfaces that lie in the same plane and face the same way, the first one {}",
+                under.concat()
+            ),
+            "raise what is to be seen a little",
+        ))
     }
 
     /// Steps of all vertices at the corners of the faces.

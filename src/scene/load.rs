@@ -43,13 +43,11 @@ impl Scene {
     pub fn load(source: &str, options: &LoadOptions) -> Result<Self> {
         let mut scene = match source.strip_prefix("builtin:") {
             Some(name) => builtin::build(name).ok_or_else(|| unknown_builtin(source))?,
-            None => gltf::load(Path::new(source), options)?,
+            None => load_file(source, options)?,
         };
         if let Some(path) = &options.environment {
             add_environment(&mut scene, path, options.memory_limit_bytes)?;
         }
-        let covering = contacts::set_apart(&mut scene);
-        scene.warnings.extend(covering);
         let dark = dark::warnings(&scene);
         scene.warnings.extend(dark);
         if options.default_light && scene.lights.is_empty() {
@@ -114,6 +112,14 @@ pub fn share(before: &Scene, now: &mut Scene) -> bool {
         }
     }
     is_same
+}
+
+/// Reads a file. Only there do surfaces meet without an order: those of built-in scenes are placed to have one.
+fn load_file(source: &str, options: &LoadOptions) -> Result<Scene> {
+    let mut scene = gltf::load(Path::new(source), options)?;
+    let covering = contacts::set_apart(&mut scene);
+    scene.warnings.extend(covering);
+    Ok(scene)
 }
 
 fn unknown_builtin(source: &str) -> Error {

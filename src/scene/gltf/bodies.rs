@@ -295,11 +295,12 @@ impl Weld {
 /// Tells water, which something holds, from panes.
 #[derive(Default)]
 struct Held {
-    opaque: Option<TriangleBvh>,
+    /// All triangles.
+    all: Option<TriangleBvh>,
 }
 
 impl Held {
-    /// Whether an open mesh is level and opaque surfaces are below it all around.
+    /// Whether an open mesh is level and other surfaces are below it all around.
     fn is_water(&mut self, index: usize, objects: &[Object], materials: &[Material]) -> bool {
         let (mesh, material) = (objects[index].in_scene(), &materials[objects[index].material]);
         let count = mesh.triangle_count();
@@ -309,21 +310,17 @@ impl Held {
         if is_window || up.y < LEVEL * mesh.area_m2() {
             return false;
         }
-        let opaque = self.opaque.get_or_insert_with(|| {
-            let of_object = |object: &Object| {
-                let mesh = object.in_scene();
-                let is_opaque = materials[object.material].is_opaque();
-                let corners = (0..mesh.triangle_count()).map(|triangle| mesh.corners(triangle));
-                if is_opaque { corners.collect() } else { Vec::new() }
-            };
-            let corners: Vec<[DVec3; 3]> = objects.iter().flat_map(of_object).collect();
-            TriangleBvh::build(&corners)
+        let all = self.all.get_or_insert_with(|| {
+            let meshes = objects.iter().map(|object| object.in_scene());
+            let corners = meshes
+                .flat_map(|mesh| (0..mesh.triangle_count()).map(move |triangle| mesh.corners(triangle)));
+            TriangleBvh::build(&corners.collect::<Vec<_>>())
         });
         let is_stopped = |ray: &Ray| {
             let sheared = ShearedRay::new(ray);
             let mut is_stopped = false;
-            opaque.search(ray, f64::INFINITY, |slot| {
-                is_stopped = sheared.intersect(opaque.corners(slot)).is_some();
+            all.search(ray, f64::INFINITY, |slot| {
+                is_stopped = sheared.intersect(all.corners(slot)).is_some();
                 (!is_stopped).then_some(f64::INFINITY)
             });
             is_stopped
