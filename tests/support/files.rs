@@ -41,7 +41,7 @@ pub fn lamps_with_extent() -> Vec<u8> {
 /// 5 cm radius.
 pub fn mirror_under_lamps() -> Vec<u8> {
     let mirror = json!({ "pbrMetallicRoughness": { "metallicFactor": 1.0, "roughnessFactor": 0.0 } });
-    let plaster = json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0 } });
+    let plaster = json!({ "doubleSided": true, "pbrMetallicRoughness": { "metallicFactor": 0.0 } });
     let ceiling = json!({ "name": "ceiling", "translation": [-1.0, 1.5, -1.0], "scale": [4.0, 4.0, 4.0] });
     let file = with_triangle(Glb::empty(), json!({ "name": "ground" }), mirror);
     let file = with_triangle(file, ceiling, plaster);

@@ -22,7 +22,7 @@ const SAMPLES: u32 = 16;
 /// Smallest vertical component of the mean normal of a level sheet.
 const LEVEL: f64 = 0.7;
 
-/// Index above which a double-sided sheet is a window and not water.
+/// Highest index of water and other liquids that stand in the open; window glass has a higher one.
 const MOST_LIQUID_IOR: f64 = 1.4;
 
 /// Turns meshes that are wound inwards, and gives each object of a body that several bound its [`Object::body`].
@@ -300,15 +300,18 @@ struct Held {
 }
 
 impl Held {
-    /// Whether an open mesh is level and other surfaces are below it all around.
+    /// Whether an open mesh is level and has one side of a liquid, or other surfaces are below it all around.
     fn is_water(&mut self, index: usize, objects: &[Object], materials: &[Material]) -> bool {
         let (mesh, material) = (objects[index].in_scene(), &materials[objects[index].material]);
         let count = mesh.triangle_count();
         let area = |triangle: usize| mesh.face_normal(triangle) * mesh.triangle_area_m2(triangle);
         let up: DVec3 = (0..count).map(area).sum();
-        let is_window = material.double_sided && material.ior > MOST_LIQUID_IOR;
-        if is_window || up.y < LEVEL * mesh.area_m2() {
+        let is_liquid = material.ior <= MOST_LIQUID_IOR;
+        if (material.double_sided && !is_liquid) || up.y < LEVEL * mesh.area_m2() {
             return false;
+        }
+        if is_liquid && !material.double_sided {
+            return true;
         }
         let all = self.all.get_or_insert_with(|| {
             let meshes = objects.iter().map(|object| object.in_scene());
@@ -320,7 +323,7 @@ impl Held {
             let sheared = ShearedRay::new(ray);
             let mut is_stopped = false;
             all.search(ray, f64::INFINITY, |slot| {
-                is_stopped = sheared.intersect(all.corners(slot)).is_some();
+                is_stopped |= sheared.intersect(all.corners(slot)).is_some();
                 (!is_stopped).then_some(f64::INFINITY)
             });
             is_stopped

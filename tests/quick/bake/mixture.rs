@@ -100,7 +100,6 @@ fn boards_are_half_of_each_kind() {
             [255; 4],
             [0, 255, 255, 255],
         ),
-        ("there and not", covered(1.0), [255; 4], [255, 255, 255, 0]),
     ] {
         let scene = |of: &dyn Fn(bool) -> [u8; 4]| lit(material.clone(), board(of));
         let mixed = fluxes(&scene(&|is_light| if is_light { light } else { dark }));

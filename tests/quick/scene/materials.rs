@@ -603,7 +603,8 @@ fn textures_of_factors_make_surfaces_vary() {
             false,
         ),
         ([0, 0, 0], [255, 0, 0], &clear, by_image.clone(), Varied, true),
-        ([200, 0, 0], [255, 9, 9], &clear, by_image, ThinWall, false),
+        // Nearly even: the mean of 0.89 is clear in part.
+        ([200, 0, 0], [255, 9, 9], &clear, by_image, Varied, false),
     ] {
         let opaque = |[r, g, b]: [u8; 3]| [r, g, b, 255];
         let json = stated(factors.clone(), transmission);
