@@ -80,10 +80,7 @@ impl CausticLayer<'_> {
         goal: f64,
         context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
-        let before = match last.and_then(|last| last.key.photons) {
-            Some(PhotonAim::Goal(before)) => Some(before),
-            _ => None,
-        };
+        let before = last.map(|last| last.goal).filter(|goal| *goal > 0.0);
         let goal = in_time(goal, before, &light.state, context);
         let key = self.key(light, Some(PhotonAim::Goal(goal)), context);
         if let Some(level) = light.state.take(&key) {
@@ -159,6 +156,7 @@ impl CausticLayer<'_> {
         );
         Ok(Some(LightLevel {
             work: (report.pass.segments, 0),
+            goal: report.goal,
             ..level
         }))
     }

@@ -113,6 +113,8 @@ pub(super) struct LightLevel {
     pub(super) overshoots: Vec<PatchOvershoot>,
     /// Squared difference between the half sets of splats, by receiver.
     pub(super) noise: Option<Noise>,
+    /// Relative RMSE that bundles and residual photons aimed at; 0 for other carriers.
+    pub(super) goal: f64,
     /// `None` if there are too few levels before it, or no light arrived.
     pub(super) error: Option<KeptError>,
     /// Sums that the next level adds to; only the last level of a light by photons has them.

@@ -127,6 +127,7 @@ impl CausticLayer<'_> {
             strays: Vec::new(),
             overshoots: Vec::new(),
             noise: None,
+            goal: 0.0,
             error: None,
             photons: None,
             work: (0, 0),

@@ -32,6 +32,7 @@ pub(super) fn finish(finder: &PathFinder, squares: &mut Squares, control: &Contr
         squares,
         points,
         plan,
+        ..
     } = squares;
     let chunks = squares.par_chunks_mut(SQUARES_AT_ONCE);
     let traced: Vec<(u64, u64)> = chunks

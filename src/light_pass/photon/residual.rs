@@ -50,7 +50,7 @@ const BLOCK_PHOTONS: u64 = 1 << 12;
 const SQUARES_AT_ONCE: [usize; 2] = [1 << 12, 1 << 7];
 
 /// A half is sampled anew if the other half asks for so many times its photons, with at most as many times.
-const ANEW: (f64, f64) = (2.0, 64.0);
+const ANEW: (f64, f64) = (2.0, 8.0);
 
 /// A photon changes the map by bilinear weights if it arrives nearer than this to its prediction [texels].
 const TENT_REACH: f64 = 1.0;
@@ -81,6 +81,8 @@ pub struct ResidualReport {
     pub pass: PassReport,
     /// Squared relative error that the deposit of bundles leaves, as planned.
     pub deposit_square: f64,
+    /// The goal that was aimed at: larger than the one asked for if that would take too many photons at once.
+    pub goal: f64,
 }
 
 impl ResidualPass<'_> {
@@ -123,7 +125,6 @@ impl ResidualPass<'_> {
         let photons = ResidualPhotons {
             pass: self,
             squares,
-            goal,
             receivers: &receivers,
         };
         let found = photons.run(&mut maps.halves, &mut report.pass, listener);
@@ -133,6 +134,18 @@ impl ResidualPass<'_> {
         }
         report.pass.trace_s.add(watch.elapsed());
         report.pass.cancelled = listener.control.is_cancelled();
+        report.goal = squares.plan.goal;
+
+        // What the next level needs to know.
+        squares.photons = squares
+            .squares
+            .iter()
+            .map(|square| squares.plan.photons(square))
+            .sum();
+        let counted = f64::from(TIMES) * HALVES as f64;
+        let deposited = self.rules.unit.per(counted as u64);
+        let arrived_w = report.pass.ledger.watts_of_largest(Account::Deposited, deposited);
+        squares.arrived_w = Some(arrived_w).filter(|watts| *watts > 0.0);
         report
     }
 
@@ -268,7 +281,6 @@ fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receivers) -> f64
 struct ResidualPhotons<'a> {
     pass: &'a ResidualPass<'a>,
     squares: &'a Squares,
-    goal: f64,
     receivers: &'a Receivers<'a>,
 }
 
@@ -315,7 +327,7 @@ impl ResidualPhotons<'_> {
         let mut blocks = vec![0..0];
         let (mut first, mut in_block) = (0_u32, 0_u64);
         for (number, square) in squares.iter().enumerate() {
-            let wanted = 0.5 * self.squares.plan.photons(square, self.goal);
+            let wanted = 0.5 * self.squares.plan.photons(square);
             let photons = wanted.ceil().clamp(1.0, f64::from(u32::MAX >> 8)) as u32;
             orders.push(DrawOrder {
                 half: 0,

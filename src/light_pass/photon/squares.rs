@@ -49,6 +49,10 @@ const CUT_COST: f64 = 30.0;
 /// deviation from the child's new points over this; audits by photons show 0.1 to 3 times as much.
 const GAIN_OF_DIVISION: f64 = 6.0;
 
+/// Maximum number of photons of the first level, and that of a later one relative to the level before.
+const FIRST_PHOTONS: f64 = 1e5;
+const GROWTH: f64 = 8.0;
+
 /// Number of photons that a square's plan counts for against photons that were traced.
 const PLAN_PHOTONS: f64 = 4.0;
 
@@ -247,10 +251,13 @@ pub(super) struct Plan {
     texels: f64,
     /// All emitted flux [W].
     start_w: f64,
-    /// All flux that arrives at the end of bundles [W].
-    pub(super) arriving_w: f64,
+    /// Flux that arrives on maps [W, largest channel]: as photons found or, before any were traced, all that bundles
+    /// carry or leave.
+    arriving_w: f64,
     /// Factor from squared errors [W²/m²] to squared relative errors of all maps.
     pub(super) relative: f64,
+    /// Goal that the photons of this plan reach: the one asked for, or a larger one if that would take too many.
+    pub(super) goal: f64,
 }
 
 impl Plan {
@@ -265,8 +272,8 @@ impl Plan {
 
     /// Photons of a square. Audits look everywhere: as many that a single one that contradicts its bundle adds at most
     /// a quarter of the goal to the error.
-    pub(super) fn photons(&self, square: &Square, goal: f64) -> f64 {
-        let audits = 4.0 * self.texels.sqrt() / goal;
+    pub(super) fn photons(&self, square: &Square) -> f64 {
+        let audits = 4.0 * self.texels.sqrt() / self.goal;
         self.photons_for(square.root(self), square)
             + audits * square.start_w / self.start_w.max(f64::MIN_POSITIVE)
     }
@@ -320,6 +327,10 @@ pub(super) struct Squares {
     pub(super) squares: Vec<Square>,
     pub(super) points: Points,
     pub(super) plan: Plan,
+    /// Photons of the last level.
+    pub(super) photons: f64,
+    /// Flux that arrived in the last level [W, largest channel].
+    pub(super) arrived_w: Option<f64>,
 }
 
 /// Builds squares.
@@ -426,7 +437,7 @@ impl Surveyor<'_> {
             squares.plan = self.plan(squares, goal);
             let plan = squares.plan;
             let is_last = round == MAX_ROUNDS || squares.squares.len() > MAX_SQUARES;
-            if is_last || plan.arriving_w <= 0.0 || self.control.is_cancelled() {
+            if is_last || plan.per_root.is_infinite() || self.control.is_cancelled() {
                 break;
             }
 
@@ -506,19 +517,22 @@ impl Surveyor<'_> {
             ..Plan::default()
         };
         let mut receivers = BTreeSet::new();
-        let mut weighted_w = 0.0;
+        let (mut weighted_w, mut bundled_w, mut lost_w) = (0.0, 0.0, 0.0);
         for square in &squares.squares {
             plan.start_w += square.start_w;
-            plan.arriving_w += square.arriving_w;
+            bundled_w += square.arriving_w;
+            lost_w += square.residual.lost_w;
             for bundle in &square.bundles {
                 receivers.insert(bundle.receiver());
                 weighted_w += bundle.flux_w * self.finder.receivers.weight(bundle.receiver());
             }
         }
-        if plan.arriving_w <= 0.0 {
+        plan.goal = goal;
+        plan.arriving_w = squares.arrived_w.unwrap_or(bundled_w + lost_w);
+        if bundled_w <= 0.0 || plan.arriving_w <= 0.0 {
             return plan;
         }
-        plan.lost_weight = weighted_w / plan.arriving_w;
+        plan.lost_weight = weighted_w / bundled_w;
         let mut area_m2 = 0.0;
         for receiver in receivers {
             if let Some(chart) = self.finder.receivers.get(receiver) {
@@ -527,12 +541,17 @@ impl Surveyor<'_> {
             }
         }
         plan.relative = area_m2 / (plan.arriving_w * plan.arriving_w);
-        let roots: f64 = squares
-            .squares
-            .iter()
-            .map(|square| square.root(&plan) * square.segments.sqrt())
-            .sum();
+        let sum = |of: &dyn Fn(&Square) -> f64| squares.squares.iter().map(of).sum::<f64>();
+        let roots = sum(&|square| square.root(&plan) * square.segments.sqrt());
         plan.per_root = roots * plan.relative / (goal * goal);
+
+        // A level that would take very many photons stops half-way: the next one knows more.
+        let photons = sum(&|square| plan.photons_for(square.root(&plan), square));
+        let most = (GROWTH * squares.photons).max(FIRST_PHOTONS);
+        if photons > most {
+            plan.per_root *= most / photons;
+            plan.goal *= (photons / most).sqrt();
+        }
         plan
     }
 
