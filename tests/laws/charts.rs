@@ -8,7 +8,7 @@ use nephroid::settings::LayerKind::{Direct, Indirect};
 
 use support::laws::law::*;
 use support::laws::scenes::*;
-use support::laws::{Baked, Table};
+use support::laws::Table;
 use support::tools::{at, set};
 
 pub fn fill(t: &mut Table) {
@@ -21,12 +21,7 @@ pub fn fill(t: &mut Table) {
             .without_books()
             .measure("lit texels without indirect light", 0.0, |bake| {
                 bake.result.maps.iter().map(without_indirect).fold(0.0, f64::max)
-            })
-            .measure(
-                "indirect light of each wall is ρ/(1 − ρ) of the lamp's sixth",
-                0.03,
-                by_wall,
-            );
+            });
     }
 }
 
@@ -54,20 +49,4 @@ fn without_indirect(map: &IlluminationMap) -> f64 {
         (all + 1.0, dark + no(*indirect > 0.0))
     });
     dark / f64::max(all, 1.0)
-}
-
-fn by_wall(bake: &Baked) -> f64 {
-    // Half of the 4π W are reflected, again and again.
-    let expected_w = 4.0 * std::f64::consts::PI / 6.0;
-    let held = bake
-        .result
-        .maps
-        .iter()
-        .map(|map| map.flux_w(Indirect).luminance());
-    let held: Vec<f64> = held.filter(|held_w| *held_w > 0.0).collect();
-    let worst = held
-        .iter()
-        .map(|held_w| off(*held_w, expected_w))
-        .fold(0.0, f64::max);
-    if held.len() == 6 { worst } else { f64::INFINITY }
 }

@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 use nephroid::illumination::Side;
-use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::scene::builtin::shapes;
 use nephroid::scene::{Mesh, Scene, contacts};
 
@@ -15,26 +14,8 @@ use support::tools::{at, set};
 const GAPS_M: [f64; 3] = [0.0, 6e-8, -6e-8];
 
 pub fn fill(t: &mut Table) {
-    let down = DVec3::new(0.3, -1.0, 0.0).normalize();
-    let cosine = -down.y;
-    let through_one = (1.0 - dielectric_reflectance(cosine, 1.5)) * cosine;
     let bright_branches = || set(at(1e3, 16), |s| s.branch_threshold = Some(1e-4));
     for gap_m in GAPS_M {
-        // Either order of the objects.
-        let slab = || slab(gap_m, 0.2 + gap_m);
-        let mut turned = Scene::default().glass(1.5, slab());
-        let floor_first = floor(0.5).glass(1.5, slab()).sun(down);
-        for part in floor(0.5).objects {
-            let mesh = Mesh::clone(part.mesh());
-            turned = turned.diffuse("floor", mesh);
-        }
-        for scene in [floor_first, turned.sun(down)] {
-            t.case("glass-on-the-table").bake(apart(scene), 1e3, 32).e(
-                "that behind a single face of glass",
-                1e-3,
-                move |_| through_one,
-            );
-        }
         t.case("touching-glass")
             .bake_with(slabs(&[[0.3, 0.7]], 1.5), bright_branches())
             .bake_with(slabs(&[[0.3, 0.5], [0.5 + gap_m, 0.7]], 1.5), bright_branches())
@@ -54,7 +35,7 @@ pub fn fill(t: &mut Table) {
         t.case("floor-of-two-nodes-back-to-back")
             .bake(before(upright()), 1e3, 32)
             .bake(apart(before(upright()).diffuse("back", back)), 1e3, 32)
-            .as_first("map as of a single floor", 1e-3, 1.0);
+            .watts_as_first("watts as of a single floor", 1e-3);
     }
     t.case("floor-doubled-back-to-back")
         .bake(before(upright()), 1e3, 32)

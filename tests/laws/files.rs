@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
+use glam::Vec3;
 use nephroid::scene::LightKind;
 use serde_json::{Value, json};
 
@@ -153,13 +154,21 @@ fn with_glass(mut extensions: Value, thickness: f64) -> Glb {
     file
 }
 
-/// Glass that lets nothing through within a nanometre, with a channel of 0, and a back face behind its front.
+/// A closed block of glass that lets nothing through within a nanometre, with a channel of 0.
 fn black_block() -> Glb {
     let volume = json!({ "attenuationDistance": 1e-9, "attenuationColor": [0.5, 0.0, 0.9] });
     let mut file = with_glass(json!({ "KHR_materials_volume": volume }), 0.1);
     let back = [MIRROR[0], MIRROR[3], MIRROR[2], MIRROR[1]].map(|[_, y, z]| [0.8, y, z]);
     let mesh = rectangle(&mut file, back, [1.0, 0.0, 0.0], 1);
     file.push_root(json!({ "name": "back", "mesh": mesh }));
+    for (index, from) in MIRROR.into_iter().enumerate() {
+        let to = MIRROR[(index + 1) % MIRROR.len()];
+        let behind = |[_, y, z]: [f32; 3]| [0.8, y, z];
+        let along = Vec3::from(from) - Vec3::from(to);
+        let normal = along.cross(Vec3::X).normalize().to_array();
+        let mesh = rectangle(&mut file, [to, from, behind(from), behind(to)], normal, 1);
+        file.push_root(json!({ "name": "side", "mesh": mesh }));
+    }
     file
 }
 
