@@ -14,6 +14,7 @@ use crate::light_pass::photon::pass::HALVES;
 use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, TIMES};
 use crate::light_pass::photon::walk::PhotonRules;
 use crate::light_pass::visibility::VisibleLight;
+use crate::settings::Estimator;
 use crate::transport::EffectSet;
 
 /// Goal of the first level, which gives the first picture.
@@ -35,12 +36,11 @@ const MIN_NOISE: f64 = 0.7;
 const LEAST_WITHOUT_ERROR: f64 = 0.005;
 
 impl CausticLayer<'_> {
-    /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way.
+    /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way, and is not
+    /// traced by wavelength, where the few hues of a deposit leave an error that no half shows.
     pub(super) fn has_bundles(&self, light: &VisibleLight) -> bool {
-        let spectrum = self.spectra.photons(light.light);
-        let is_smooth = spectrum.is_none_or(|spectrum| spectrum.tracers().is_some());
-        is_smooth
-            && self.settings.estimator != crate::settings::Estimator::Photon
+        self.settings.estimator != Estimator::Photon
+            && !self.spectra.has(light.light)
             && (!self.has_places(light) || self.with_launch(light, |launch| launch.has_offsets()))
     }
 

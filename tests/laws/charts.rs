@@ -6,9 +6,9 @@ use nephroid::scene::Scene;
 use nephroid::scene::builtin::shapes;
 use nephroid::settings::LayerKind::{Direct, Indirect};
 
+use support::laws::Table;
 use support::laws::law::*;
 use support::laws::scenes::*;
-use support::laws::Table;
 use support::tools::{at, set};
 
 pub fn fill(t: &mut Table) {
