@@ -150,7 +150,7 @@ fn an_open_mesh_bounds_nothing_unless_water_is_held() {
             "materials",
             json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0 } }),
         );
-        let level = quad(dvec3(0.0, 0.5, 0.0), DVec3::Z, DVec3::X);
+        let level = quad(dvec3(0.0, 0.5, 0.0), DVec3::X, DVec3::Z);
         let part = primitive(&mut file, &level, &level.triangles, material);
         let mesh = file.push_mesh(part);
         file.push_root(json!({ "name": "sheet", "mesh": mesh }));
