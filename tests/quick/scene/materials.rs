@@ -551,7 +551,7 @@ fn with_image(pixels: [[u8; 4]; 2], stated: Value) -> (Material, Scene) {
 
 #[test]
 fn textures_of_factors_make_surfaces_vary() {
-    use SurfaceKind::{Coated, Diffuse, Mirror, ThinWall, Varied};
+    use SurfaceKind::{Coated, Diffuse, Mirror, Varied};
     let stated = |factors: Value, transmission: Value| {
         let extensions = json!({ "KHR_materials_transmission": transmission });
         json!({ "name": "m", "pbrMetallicRoughness": factors, "extensions": extensions })
