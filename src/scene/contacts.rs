@@ -6,14 +6,14 @@
 //! - Of surfaces that face the same way, the smaller one covers the other, as a rug covers a floor.
 //! - Sheets back to back are met each on its own side.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::watertight::is_closed;
-use super::{Mesh, Scene};
+use super::{Mesh, Object, Scene};
 use crate::error::Warning;
 use crate::geometry::enclosure::Bounds;
 use crate::geometry::{TriangleBvh, bits, bvh};
@@ -91,6 +91,12 @@ fn faces(scene: &Scene) -> Vec<Face> {
         .iter()
         .map(|object| object.bounds().unwrap_or_default());
     let boxes: Vec<Bounds> = boxes.collect();
+    // Instances at one place are as one: thousands of them would meet in millions of pairs.
+    let mut seen = HashSet::new();
+    let is_first = |(object, (low, high)): (&Object, &Bounds)| {
+        seen.insert((Arc::as_ptr(object.mesh()), bits(*low), bits(*high)))
+    };
+    let is_first: Vec<bool> = scene.objects.iter().zip(&boxes).map(is_first).collect();
     let corners: Vec<[DVec3; 3]> = boxes.iter().map(|&(low, high)| [low, high, high]).collect();
     let near = TriangleBvh::build(&corners);
     let of_object = |object: usize| {
@@ -101,7 +107,7 @@ fn faces(scene: &Scene) -> Vec<Face> {
             })
         };
         let mut faces = Vec::new();
-        if !is_near(&widened(boxes[object])) {
+        if !is_first[object] || !is_near(&widened(boxes[object])) {
             return faces;
         }
         let mesh = scene.objects[object].in_scene();
