@@ -94,7 +94,9 @@ fn faces(scene: &Scene) -> Vec<Face> {
     // Instances at one place are as one: thousands of them would meet in millions of pairs.
     let mut seen = HashSet::new();
     let is_first = |(object, (low, high)): (&Object, &Bounds)| {
-        seen.insert((Arc::as_ptr(object.mesh()), bits(*low), bits(*high)))
+        let mesh = object.in_scene();
+        let first = (mesh.triangle_count() > 0).then(|| mesh.corners(0).map(bits));
+        seen.insert((mesh.triangle_count(), first, bits(*low), bits(*high)))
     };
     let is_first: Vec<bool> = scene.objects.iter().zip(&boxes).map(is_first).collect();
     let corners: Vec<[DVec3; 3]> = boxes.iter().map(|&(low, high)| [low, high, high]).collect();
