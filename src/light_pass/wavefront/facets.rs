@@ -115,6 +115,10 @@ impl Facets<'_> {
             }
         }
         let whole: f64 = found.iter().map(|piece| piece.share).sum();
+        // Rays that land on a line cover no area to take shares of.
+        if !whole.is_finite() {
+            return (Vec::new(), false);
+        }
         found.iter_mut().for_each(|piece| piece.share /= whole);
         // Between facets with an angle, a second-order part of the light is counted twice or not at all.
         (found, (whole - 1.0).abs() <= MAX_AMISS)
