@@ -3,6 +3,8 @@
 
 use std::time::Instant;
 
+use glam::DVec2;
+
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums};
 use super::photon_level::{Layers, PART_OF_TIME};
@@ -12,8 +14,11 @@ use crate::light_pass::accuracy;
 use crate::light_pass::pass_report::ProgressScope;
 use crate::light_pass::photon::pass::HALVES;
 use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, TIMES};
+use crate::light_pass::photon::squares::FIRST_LEVEL;
 use crate::light_pass::photon::walk::PhotonRules;
 use crate::light_pass::visibility::VisibleLight;
+use crate::light_pass::wavefront::edge_search::EdgeSearch;
+use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
 use crate::settings::Estimator;
 use crate::transport::EffectSet;
 
@@ -29,11 +34,22 @@ const STEPS: (f64, f64) = (0.08, 0.8);
 /// A goal so much larger than the target tells little about it.
 const FAR: f64 = 2.5;
 
+/// An error so much larger than its goal comes from light that the plan did not know, and knows now.
+const SURPRISE: f64 = 2.0;
+
 /// Noise below this fraction of the goal is low enough, whatever else the error contains.
 const MIN_NOISE: f64 = 0.7;
 
 /// A light whose error is still unknown at this goal is given up.
-const LEAST_WITHOUT_ERROR: f64 = 0.005;
+const LEAST_WITHOUT_ERROR: f64 = 0.05;
+
+/// What became of a level of bundles.
+pub(super) enum BundleLevel {
+    Made(Box<LightLevel>),
+    Stopped,
+    /// Bundles can carry next to nothing of the light.
+    LeftToPhotons,
+}
 
 impl CausticLayer<'_> {
     /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way, and is not
@@ -46,10 +62,10 @@ impl CausticLayer<'_> {
 
     /// Goal of the level after `last`, towards a relative RMSE; `None` if nothing is left to do.
     pub(super) fn next_goal(&self, last: Option<&LightLevel>, target: f64) -> Option<f64> {
-        let Some((last, PhotonAim::Goal(before))) = last.and_then(|last| Some((last, last.key.photons?)))
-        else {
+        let Some(last) = last else {
             return Some(FIRST_GOAL.max(AIM * target));
         };
+        let before = last.goal;
         let error = last.error.as_ref().map(|error| error.estimate.relative_rmse);
         let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
             return (before > LEAST_WITHOUT_ERROR).then_some(STEPS.0 * before);
@@ -61,15 +77,17 @@ impl CausticLayer<'_> {
         // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the target
         // is near.
         let scaled = AIM * before * (wanted2 / noise2).sqrt();
-        let next = if before > FAR * target {
-            scaled.max(AIM * target)
+        let next = if error > SURPRISE * before {
+            AIM * target
+        } else if before > FAR * target {
+            scaled.max(AIM * target).clamp(STEPS.0 * before, STEPS.1 * before)
         } else {
-            scaled
+            scaled.clamp(STEPS.0 * before, STEPS.1 * before)
         };
-        (noise2 > wanted2).then_some(next.clamp(STEPS.0 * before, STEPS.1 * before))
+        (noise2 > wanted2).then_some(next)
     }
 
-    /// The level of a light with a goal; `None` if it was stopped.
+    /// The level of a light with a goal.
     ///
     /// # Errors
     /// A power that is not finite.
@@ -79,16 +97,17 @@ impl CausticLayer<'_> {
         last: Option<&LightLevel>,
         goal: f64,
         context: &mut BakeContext,
-    ) -> Result<Option<LightLevel>> {
+    ) -> Result<BundleLevel> {
         let before = last.map(|last| last.goal).filter(|goal| *goal > 0.0);
         let goal = in_time(goal, before, &light.state, context);
         let key = self.key(light, Some(PhotonAim::Goal(goal)), context);
         if let Some(level) = light.state.take(&key) {
-            return Ok(Some(level));
+            return Ok(BundleLevel::Made(Box::new(level)));
         }
         let began = Instant::now();
         let made = self.make_bundles(light, key, goal, context)?;
-        light.state.goal_s = made.as_ref().map(|_| began.elapsed().as_secs_f64());
+        let is_made = matches!(made, BundleLevel::Made(_));
+        light.state.goal_s = is_made.then(|| began.elapsed().as_secs_f64());
         Ok(made)
     }
 
@@ -98,7 +117,7 @@ impl CausticLayer<'_> {
         key: LevelKey,
         goal: f64,
         context: &mut BakeContext,
-    ) -> Result<Option<LightLevel>> {
+    ) -> Result<BundleLevel> {
         let unit = self.photon_unit(light.visible)?;
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let mut squares = match light.state.squares.take() {
@@ -128,19 +147,36 @@ impl CausticLayer<'_> {
             bundles: bundles.sets_mut(),
             halves: [first.sets_mut(), second.sets_mut()],
         };
+        let is_of_faces = !self.has_places(light.visible);
+        let sought = (squares.is_empty() && is_of_faces).then(|| {
+            let cell = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
+            let visible = light.visible;
+            SubcellFeatures::find(
+                self.tracer,
+                &visible.launch,
+                visible.visible(),
+                cell,
+                EdgeSearch::ROUGH,
+            )
+        });
         let report = self.with_launch(light.visible, |launch| {
             let pass = ResidualPass {
                 launch,
                 rules,
                 chart_for: &chart_for,
+                sought: sought.as_ref(),
+                is_rough: self.rough_object(light.visible).is_some(),
             };
             pass.run(goal, &mut squares, &mut maps, &listener)
         });
         context.outcome.count(&report.pass, context.clock);
         if report.pass.cancelled {
-            return Ok(None);
+            return Ok(BundleLevel::Stopped);
         }
         light.state.squares = Some((key.trace.clone(), key.sizes.clone(), squares));
+        if report.is_left_to_photons {
+            return Ok(BundleLevel::LeftToPhotons);
+        }
         let photons = PhotonSums {
             ledger: report.pass.ledger,
             halves,
@@ -154,11 +190,11 @@ impl CausticLayer<'_> {
             |clock| &mut clock.deposit,
             || self.level_of_layers(light.visible, (key, unit), layers, report.deposit_square),
         );
-        Ok(Some(LightLevel {
+        Ok(BundleLevel::Made(Box::new(LightLevel {
             work: (report.pass.segments, 0),
             goal: report.goal,
             ..level
-        }))
+        })))
     }
 }
 

@@ -4,6 +4,7 @@ use std::borrow::Cow;
 use std::time::Instant;
 
 use super::band_maps::BandMaps;
+use super::bundle_level::BundleLevel;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
 use super::shards::PassSums;
@@ -131,8 +132,9 @@ impl CausticLayer<'_> {
         last: Option<&LightLevel>,
         target_rmse: Option<f64>,
     ) -> Option<PhotonAim> {
+        let is_left_to_photons = matches!(last.and_then(|last| last.key.photons), Some(PhotonAim::Count(_)));
         match self.settings.max_error {
-            Some(target) if self.has_bundles(light) => {
+            Some(target) if !is_left_to_photons && self.has_bundles(light) => {
                 let goal = self.next_goal(last, target_rmse.unwrap_or(target));
                 goal.map(PhotonAim::Goal)
             }
@@ -190,7 +192,11 @@ impl CausticLayer<'_> {
             return Ok(None);
         };
         let photons = match aim {
-            PhotonAim::Goal(goal) => return self.next_bundles(light, last.as_deref(), goal, context),
+            PhotonAim::Goal(goal) => match self.next_bundles(light, last.as_deref(), goal, context)? {
+                BundleLevel::Made(level) => return Ok(Some(*level)),
+                BundleLevel::Stopped => return Ok(None),
+                BundleLevel::LeftToPhotons => FIRST_PHOTONS,
+            },
             PhotonAim::Count(photons) => photons,
         };
         let before = last

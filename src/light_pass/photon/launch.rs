@@ -205,6 +205,14 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
+    /// The launch of a light without extent, whose roots are its faces.
+    pub(super) fn of_faces(&self) -> Option<&'a Launch> {
+        match &self.domain {
+            Domain::Cells { launch, .. } => Some(launch),
+            Domain::Spheres(_) => None,
+        }
+    }
+
     /// The light that starts at a point of a root and a point of its lamp's unit square, with its flux per unit square;
     /// `None` if none does.
     pub(super) fn start_at(&self, root: usize, square: DVec2, lamp: DVec2) -> Option<Start> {

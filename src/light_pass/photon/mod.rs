@@ -19,5 +19,5 @@ mod receivers;
 pub mod residual;
 pub mod spectrum;
 pub mod spheres;
-mod squares;
+pub mod squares;
 pub mod walk;

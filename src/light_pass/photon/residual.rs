@@ -29,6 +29,7 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::coverage::{FluxTriangle, deposit_triangles};
+use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
 use crate::optics::LinearSrgb;
 use crate::progress::Stage;
 
@@ -44,6 +45,9 @@ const MEASURED_OVER_PLANNED: f64 = 0.25;
 
 /// Photons in a block, at least.
 const BLOCK_PHOTONS: u64 = 1 << 12;
+
+/// Where surfaces are rough, bundles have to carry this part of the light, or photons are better off without them.
+const MIN_BUNDLED: f64 = 0.1;
 
 /// Squares whose triangles are made before they are deposited: of light of one hue, and of a spectrum, which takes many
 /// times the triangles.
@@ -61,11 +65,21 @@ pub struct ResidualPass<'a> {
     /// Both halves derive their seeds from the one here.
     pub rules: PhotonRules<'a>,
     pub chart_for: &'a ChartFor<'a>,
+    /// What new squares might miss.
+    pub sought: Option<&'a SubcellFeatures>,
+    /// Whether the light meets rough surfaces.
+    pub is_rough: bool,
 }
 
 /// The squares of a light, to be refined from one goal to the next.
 #[derive(Debug, Default)]
 pub struct LightSquares(Squares);
+
+impl LightSquares {
+    pub fn is_empty(&self) -> bool {
+        self.0.squares.is_empty()
+    }
+}
 
 /// Maps that a pass fills; one set, or one for each band.
 pub struct ResidualMaps<'a> {
@@ -81,12 +95,15 @@ pub struct ResidualReport {
     pub pass: PassReport,
     /// Squared relative error that the deposit of bundles leaves, as planned.
     pub deposit_square: f64,
+    /// Whether rough surfaces scatter nearly all of the light.
+    pub is_left_to_photons: bool,
     /// The goal that was aimed at: larger than the one asked for if that would take too many photons at once.
     pub goal: f64,
 }
 
 impl ResidualPass<'_> {
-    /// Carries the light towards a goal, the relative root mean square error of all maps together.
+    /// Carries the light towards a goal, the relative root mean square error of all maps together. Leaves the maps as
+    /// they are if rough surfaces scatter nearly all of it.
     pub fn run(
         &self,
         goal: f64,
@@ -109,9 +126,17 @@ impl ResidualPass<'_> {
             finder,
             control: listener.control,
             lit: LitCells::of(self.launch),
+            sought: self.sought,
         };
         let before = squares.points.len();
         surveyor.refine(squares, goal);
+        if self.is_rough && squares.plan.bundled_part < MIN_BUNDLED {
+            report.is_left_to_photons = true;
+            report.pass.rays = squares.points.len() as u64;
+            report.pass.trace_s.add(watch.elapsed());
+            report.pass.cancelled = listener.control.is_cancelled();
+            return report;
+        }
         edge::finish(&finder, squares, listener.control, &mut report.pass);
         report.pass.rays += (squares.points.len() - before) as u64;
         report.deposit_square = plan_deposits(squares, goal, &receivers);
@@ -128,7 +153,9 @@ impl ResidualPass<'_> {
             receivers: &receivers,
         };
         let found = photons.run(&mut maps.halves, &mut report.pass, listener);
+        let mut traced = 0.0;
         for (square, found) in squares.squares.iter_mut().zip(found) {
+            traced += found.photons;
             square.found.photons += found.photons;
             square.found.squares += found.squares;
         }
@@ -137,11 +164,7 @@ impl ResidualPass<'_> {
         report.goal = squares.plan.goal;
 
         // What the next level needs to know.
-        squares.photons = squares
-            .squares
-            .iter()
-            .map(|square| squares.plan.photons(square))
-            .sum();
+        squares.photons = traced;
         let counted = f64::from(TIMES) * HALVES as f64;
         let deposited = self.rules.unit.per(counted as u64);
         let arrived_w = report.pass.ledger.watts_of_largest(Account::Deposited, deposited);

@@ -15,6 +15,7 @@ use super::launch::PhotonLaunch;
 use super::paths::{Chain, PathEnd, PathFinder, PointPaths, Route};
 use crate::geometry::sampling::{GOLDEN_64, mix64};
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
+use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
 use crate::progress::Control;
 
 /// Coordinates of points are multiples of 2⁻²⁴ of a root's side.
@@ -25,10 +26,15 @@ const WHOLE: u32 = 1 << POINT_BITS;
 const CELL_LEVEL: u32 = CELLS_PER_SIDE.ilog2();
 
 /// The first squares are of the coarsest level from this one on ...
-const FIRST_LEVEL: u32 = 4;
+pub const FIRST_LEVEL: u32 = 4;
 
 /// ... that has so many of them. A quarter of them leaves light on small casters unseen.
 const FIRST_SQUARES: usize = 160;
+
+/// The finest level of squares around small casters and openings, and how many squares there are at most until these
+/// are found.
+const FINEST_SOUGHT: u32 = 20;
+const MAX_SOUGHT: usize = 1 << 16;
 
 /// The finest level.
 const LAST_LEVEL: u32 = 14;
@@ -49,9 +55,9 @@ const CUT_COST: f64 = 30.0;
 /// deviation from the child's new points over this; audits by photons show 0.1 to 3 times as much.
 const GAIN_OF_DIVISION: f64 = 6.0;
 
-/// Maximum number of photons of the first level, and that of a later one relative to the level before.
+/// Maximum number of photons of the first level, and the least and most of a later one relative to the level before.
 const FIRST_PHOTONS: f64 = 1e5;
-const GROWTH: f64 = 8.0;
+const GROWTH: (f64, f64) = (1.25, 8.0);
 
 /// Number of photons that a square's plan counts for against photons that were traced.
 const PLAN_PHOTONS: f64 = 4.0;
@@ -256,6 +262,8 @@ pub(super) struct Plan {
     arriving_w: f64,
     /// Factor from squared errors [W²/m²] to squared relative errors of all maps.
     pub(super) relative: f64,
+    /// Part of the light that bundles follow to its end.
+    pub(super) bundled_part: f64,
     /// Goal that the photons of this plan reach: the one asked for, or a larger one if that would take too many.
     pub(super) goal: f64,
 }
@@ -338,6 +346,8 @@ pub(super) struct Surveyor<'a> {
     pub(super) finder: PathFinder<'a>,
     pub(super) control: &'a Control,
     pub(super) lit: LitCells,
+    /// What the first squares might miss.
+    pub(super) sought: Option<&'a SubcellFeatures>,
 }
 
 /// Which squares light may start in.
@@ -420,7 +430,7 @@ impl Surveyor<'_> {
     /// Divides squares for a goal, the relative root mean square error of all maps together.
     pub(super) fn refine(&self, squares: &mut Squares, goal: f64) {
         if squares.squares.is_empty() {
-            let places = self.lit.first();
+            let places = self.with_small_casters(self.lit.first());
             self.trace_points(
                 places
                     .iter()
@@ -485,6 +495,37 @@ impl Surveyor<'_> {
         }
     }
 
+    /// Divides the first squares until small casters and openings are as large as the squares around them.
+    fn with_small_casters(&self, mut places: Vec<SquarePlace>) -> Vec<SquarePlace> {
+        let (Some(sought), Some(launch)) = (self.sought, self.finder.launch.of_faces()) else {
+            return places;
+        };
+        let Some(first) = places.first().map(|place| place.level) else {
+            return places;
+        };
+        for level in first..FINEST_SOUGHT {
+            let is_divided = |place: &SquarePlace| {
+                let square = (place.at(DVec2::ZERO), place.at(DVec2::ONE));
+                let root = place.corner.root as usize;
+                place.level == level
+                    && sought.ask_for_finer(launch, root, square, level - first, f64::INFINITY)
+            };
+            let before = places.len();
+            let of_place = |place: SquarePlace| -> Vec<SquarePlace> {
+                if !is_divided(&place) {
+                    return vec![place];
+                }
+                let quarters = place.quarters().into_iter();
+                quarters.filter(|quarter| self.lit.has(*quarter)).collect()
+            };
+            places = places.into_par_iter().flat_map_iter(of_place).collect();
+            if places.len() == before || places.len() > MAX_SOUGHT {
+                break;
+            }
+        }
+        places
+    }
+
     /// Traces the points that are not known yet, neighbours one after the other.
     fn trace_points(&self, wanted: impl Iterator<Item = DomainPoint>, points: &mut Points) {
         let new: HashSet<DomainPoint, PointHash> =
@@ -528,6 +569,11 @@ impl Surveyor<'_> {
             }
         }
         plan.goal = goal;
+        plan.bundled_part = if lost_w > 0.0 {
+            bundled_w / (bundled_w + lost_w)
+        } else {
+            1.0
+        };
         plan.arriving_w = squares.arrived_w.unwrap_or(bundled_w + lost_w);
         if bundled_w <= 0.0 || plan.arriving_w <= 0.0 {
             return plan;
@@ -546,11 +592,14 @@ impl Surveyor<'_> {
         plan.per_root = roots * plan.relative / (goal * goal);
 
         // A level that would take very many photons stops half-way: the next one knows more.
+        // One that would take hardly more than the last one tells no more than that.
         let photons = sum(&|square| plan.photons_for(square.root(&plan), square));
-        let most = (GROWTH * squares.photons).max(FIRST_PHOTONS);
-        if photons > most {
-            plan.per_root *= most / photons;
-            plan.goal *= (photons / most).sqrt();
+        let least = GROWTH.0 * squares.photons;
+        let most = (GROWTH.1 * squares.photons).max(FIRST_PHOTONS);
+        let allowed = photons.clamp(least, most);
+        if photons > 0.0 && allowed != photons {
+            plan.per_root *= allowed / photons;
+            plan.goal *= (photons / allowed).sqrt();
         }
         plan
     }
