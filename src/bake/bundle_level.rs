@@ -43,6 +43,9 @@ const MIN_NOISE: f64 = 0.7;
 /// A light whose error is still unknown at this goal is given up.
 const LEAST_WITHOUT_ERROR: f64 = 0.05;
 
+/// A light of which less than this fraction arrives is not followed any further.
+const LEAST_ARRIVING: f64 = 1e-6;
+
 /// What became of a level of bundles.
 pub(super) enum BundleLevel {
     Made(Box<LightLevel>),
@@ -70,8 +73,12 @@ impl CausticLayer<'_> {
         let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
             return (before > LEAST_WITHOUT_ERROR).then_some(STEPS.0 * before);
         };
+        let energy = last.energy();
+        if energy.deposited < LEAST_ARRIVING * energy.emitted {
+            return None;
+        }
         // Finer squares do not recover truncated light.
-        let truncated = accuracy::truncated_share(&last.energy());
+        let truncated = accuracy::truncated_share(&energy);
         let noise2 = error * error - truncated * truncated;
         let wanted2 = (target * target - truncated * truncated).max((MIN_NOISE * target).powi(2));
         // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the target

@@ -329,10 +329,34 @@ impl Details {
     /// the square of their area, and distributed among them by their irradiance.
     fn squares(&self, of_texels: &[FilteredCell], map: &ReceiverMap) -> Vec<f64> {
         let expected = |[.., a, b, _]: &FilteredCell| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
-        let square = |[.., a, b, missed]: &FilteredCell| missed + 0.25 * (a - b) * (a - b);
         let shares = self.cells.shares();
+        let area_of = |texel: usize| shares[texel] * map.chart.texel_area_m2(texel) as f32;
+
+        // What the filter took from both halves alike is its bias, of whatever levels it is made. Levels by themselves
+        // tell of less, as those details are dropped that happen to disagree.
+        let raw = self.cells.texels(&self.raw);
+        let bundled = self.cells.texels(&self.bundled);
+        let (mut taken, mut known, mut light) = (0.0, 0.0, 0.0);
+        for (texel, kept) in of_texels.iter().enumerate() {
+            let [.., a, b, missed] = *kept;
+            let [first, second] = luminances(&raw[texel]);
+            let bundled = luminance(&bundled[texel]) as f32;
+            let area = f64::from(area_of(texel));
+            taken += area * f64::from((a - bundled - first) * (b - bundled - second));
+            known += area * f64::from(missed);
+            light += area * f64::from(expected(kept));
+        }
+        let unknown = if light > 0.0 {
+            (taken - known).max(0.0) / light
+        } else {
+            0.0
+        } as f32;
+        let square = |kept: &FilteredCell| {
+            let [.., a, b, missed] = *kept;
+            missed + unknown * expected(kept) + 0.25 * (a - b) * (a - b)
+        };
         let mut ratios = self.cells.densities(|texel| {
-            let weight = shares[texel] * map.chart.texel_area_m2(texel) as f32;
+            let weight = area_of(texel);
             [square(&of_texels[texel]), expected(&of_texels[texel])].map(|value| value * weight)
         });
         let pool = self.cells.pool();
