@@ -49,8 +49,8 @@ impl LayerKind {
 choices! {
     /// How the light pass turns rays into irradiance.
     pub enum Estimator {
-        /// Photons for extended lights, for rough surfaces, and without a target. Otherwise patches; for a single light,
-        /// whichever of the two a pilot of both measures to be cheaper for the target.
+        /// Bundles, with photons for what these cannot carry. Photons alone without a target, on rough surfaces, for light
+        /// traced by wavelength, and for lamps that shine in all directions from a sphere or an environment.
         Auto,
         /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
         Wavefront,

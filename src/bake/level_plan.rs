@@ -3,7 +3,7 @@
 use glam::DVec2;
 
 use super::caustic::{BakeContext, CausticLayer, ESTIMATED_LEVELS, LightProgress};
-use super::light_level::{LevelKey, StatisticsKey, TraceKey};
+use super::light_level::{LevelKey, PhotonAim, StatisticsKey, TraceKey};
 use super::splat_level::LEVEL_STRIDES;
 use crate::error::{Error, Result};
 use crate::illumination::accumulator::FluxUnit;
@@ -84,7 +84,12 @@ impl CausticLayer<'_> {
     }
 
     /// Everything that a level depends on.
-    pub(super) fn key(&self, light: &LightProgress, photons: Option<u32>, context: &BakeContext) -> LevelKey {
+    pub(super) fn key(
+        &self,
+        light: &LightProgress,
+        photons: Option<PhotonAim>,
+        context: &BakeContext,
+    ) -> LevelKey {
         let lattices = self.lattices(light.visible);
         // Photons are not refined.
         let (step, rounds, goal, is_underrated) = match photons {

@@ -14,6 +14,7 @@ use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::light_pass::photon::residual::LightSquares;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::splat::arrival_cache::ArrivalCache;
 use crate::light_pass::visibility::VisibleLight;
@@ -65,8 +66,27 @@ pub(super) struct LevelKey {
     pub(super) kernels: BakeSettings,
     /// Only every `stride`-th ray across and down is traced (splats).
     pub(super) stride: usize,
-    /// Photons in each half; `None` for other carriers.
-    pub(super) photons: Option<u32>,
+    /// What photons aim at; `None` for other carriers.
+    pub(super) photons: Option<PhotonAim>,
+}
+
+/// What a level of photons aims at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum PhotonAim {
+    /// So many photons in each half, and no bundles.
+    Count(u32),
+    /// A relative RMSE, by bundles and residual photons.
+    Goal(f64),
+}
+
+impl PhotonAim {
+    /// Photons in each half, if that is the aim.
+    pub(super) fn count(self) -> Option<u32> {
+        match self {
+            Self::Count(photons) => Some(photons),
+            Self::Goal(_) => None,
+        }
+    }
 }
 
 /// Levels that are kept whatever their size, because an error estimate needs them.
@@ -93,6 +113,8 @@ pub(super) struct LightLevel {
     pub(super) overshoots: Vec<PatchOvershoot>,
     /// Squared difference between the half sets of splats, by receiver.
     pub(super) noise: Option<Noise>,
+    /// Relative RMSE that bundles and residual photons aimed at; 0 for other carriers.
+    pub(super) goal: f64,
     /// `None` if there are too few levels before it, or no light arrived.
     pub(super) error: Option<KeptError>,
     /// Sums that the next level adds to; only the last level of a light by photons has them.
@@ -100,8 +122,6 @@ pub(super) struct LightLevel {
     /// Work of the level if nothing were cached: cells of patches and receiver queries, or closest-hit queries of
     /// photons and 0.
     pub(super) work: (u64, u64),
-    /// Share of the patches' flux that concentrates a part of the spectrum in one place.
-    pub(super) lumped_share: f64,
     /// Paths that can be deposited again; `None` if they were too large to keep.
     pub(super) traced: Option<TracedLight>,
     /// Whether the maps include the light's colour.
@@ -130,8 +150,6 @@ impl PhotonSums {
 pub(super) struct KeptError {
     /// Number of coarser levels that it is based on.
     pub(super) predecessors: usize,
-    /// Photons in each half that audited the patches.
-    pub(super) auditors: Option<u32>,
     pub(super) estimate: LightError,
 }
 
@@ -194,6 +212,10 @@ pub(super) struct LightState {
     pub(super) levels: Vec<LightLevel>,
     /// Wall-clock time per photon of each half in the last level of photons [s].
     pub(super) photon_s: Option<f64>,
+    /// Squares of its launch domain, and what they depend on.
+    pub(super) squares: Option<(TraceKey, Sizes, LightSquares)>,
+    /// Wall-clock time of the last level with a goal [s].
+    pub(super) goal_s: Option<f64>,
     /// Arrivals that splats were made of.
     pub(super) arrivals: Option<(TraceKey, ArrivalCache)>,
 }
@@ -316,6 +338,7 @@ impl LightState {
     /// Drops maps whose paths changed. Rays stay, as their cache knows which of them are valid.
     pub(super) fn forget_maps(&mut self) {
         self.levels.clear();
+        self.squares = None;
         self.arrivals = None;
     }
 

@@ -2,6 +2,7 @@
 
 mod band_layers;
 mod band_maps;
+mod bundle_level;
 mod carrier;
 mod caustic;
 mod clock;

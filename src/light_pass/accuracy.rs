@@ -8,7 +8,7 @@
 //! A difference does not show what all levels miss: truncated light (threshold, depth, unresolved) is added by its
 //! watts.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -72,18 +72,15 @@ pub struct LightError {
     pub relative_rmse: f64,
     /// Error of the level before over that of the last level.
     pub ratio: f64,
-    /// Whether an audit found a larger error than the differences between levels show.
-    pub is_raised: bool,
 }
 
 impl LightError {
-    /// Scales all errors up if the relative squared error is found to be larger.
+    /// Scales all errors up to a larger relative squared error.
     pub fn raise_to(&mut self, relative_square: f64) {
         let factor = relative_square.sqrt() / self.relative_rmse;
         if !(factor > 1.0 && factor.is_finite()) {
             return;
         }
-        self.is_raised = true;
         self.relative_rmse *= factor;
         for map in self.maps.values_mut() {
             map.texels.iter_mut().for_each(|error| *error *= factor);
@@ -462,33 +459,6 @@ pub fn truncated_share(ledger: &EnergyLedger) -> f64 {
     } else {
         0.0
     }
-}
-
-/// Standard deviations by which a mean square has to exceed zero to be significant.
-const SIGNIFICANT: f64 = 4.0;
-
-/// Relative mean square error of `maps`, from the product of their differences to two independent noisy maps of the
-/// same light, whose noise cancels in the mean. `None` if it is not significant.
-pub fn audited_square(maps: &Images, halves: [&Images; 2]) -> Option<f64> {
-    let noise = half_set_noise(halves[0], halves[1]);
-    let (mut sum, mut variance, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0, 0.0);
-    let receivers: BTreeSet<&Receiver> = maps.keys().chain(noise.keys()).collect();
-    for &receiver in &receivers {
-        let [own, first, second] = [maps, halves[0], halves[1]].map(|images| images.get(receiver));
-        let image = own.or(first).or(second)?;
-        let value = |image: Option<&Image>, texel: usize| image.map_or(0.0, |image| image.luminance[texel]);
-        let noise = noise.get(receiver);
-        for texel in 0..image.luminance.len() {
-            let (own, texel_m2) = (value(own, texel), image.area_m2(texel));
-            sum += (own - value(first, texel)) * (own - value(second, texel)) * texel_m2;
-            // Each half has half the variance of their difference.
-            variance += (0.5 * noise.map_or(0.0, |noise| noise[texel]) * texel_m2).powi(2);
-            flux_w += own * texel_m2;
-            area_m2 += texel_m2;
-        }
-    }
-    let is_bias = sum > SIGNIFICANT * variance.sqrt();
-    is_bias.then(|| sum * area_m2 / (flux_w * flux_w))
 }
 
 /// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`, if refinement divides their error
