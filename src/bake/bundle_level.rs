@@ -12,9 +12,9 @@ use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::light_pass::accuracy;
 use crate::light_pass::pass_report::ProgressScope;
+use crate::light_pass::photon::domain::FIRST_LEVEL;
 use crate::light_pass::photon::pass::HALVES;
 use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, TIMES};
-use crate::light_pass::photon::squares::FIRST_LEVEL;
 use crate::light_pass::photon::walk::PhotonRules;
 use crate::light_pass::visibility::VisibleLight;
 use crate::light_pass::wavefront::edge_search::EdgeSearch;
@@ -131,7 +131,7 @@ impl CausticLayer<'_> {
             Some((trace, sizes, squares)) if trace == key.trace && sizes == key.sizes => squares,
             _ => LightSquares::default(),
         };
-        let mut bundles = self.part_maps();
+        let mut bundles = self.no_maps();
         let mut halves = vec![self.part_maps(), self.part_maps()];
         let listener = ProgressScope {
             progress: self.progress,
@@ -151,7 +151,7 @@ impl CausticLayer<'_> {
             unreachable!("there are two halves");
         };
         let mut maps = ResidualMaps {
-            bundles: bundles.sets_mut(),
+            bundles: &mut bundles,
             halves: [first.sets_mut(), second.sets_mut()],
         };
         let is_of_faces = !self.has_places(light.visible);

@@ -66,7 +66,7 @@ fn in_time(photons: u32, before: u32, state: &LightState, context: &BakeContext)
 #[derive(Clone, Copy)]
 pub(super) struct Layers<'a> {
     /// Light that bundles carry.
-    pub(super) bundles: Option<&'a BandMaps>,
+    pub(super) bundles: Option<&'a ReceiverMaps>,
     pub(super) photons: &'a PhotonSums,
 }
 
@@ -325,24 +325,18 @@ impl CausticLayer<'_> {
         self.spectra
             .to_linear_srgb(light.light, &mut self.no_maps(), &mut ledger);
         let [first, second] = self.half_maps(light, layers.photons);
-        let bundles = layers.bundles.map(|bundles| self.srgb_sum(light, bundles));
+        let bundles = layers.bundles;
         let is_signed = self.spectra.has(light.light);
         let mut maps = first.clone().into_owned();
         maps.add(&second);
         // Bundles belong to either half.
         for _ in 0..HALVES {
-            bundles.iter().for_each(|bundles| maps.add(bundles));
+            bundles.into_iter().for_each(|bundles| maps.add(bundles));
         }
         let mut left = [0; 3];
         let noise = if self.settings.filters() {
             let halves = [&first, &second].map(|half| &**half);
-            filter::filter(
-                &mut maps,
-                halves,
-                bundles.as_deref(),
-                (unit, is_signed),
-                &mut left,
-            )
+            filter::filter(&mut maps, halves, bundles, (unit, is_signed), &mut left)
         } else {
             accuracy::half_set_noise(&accuracy::images(&first, unit), &accuracy::images(&second, unit))
         };
@@ -352,12 +346,6 @@ impl CausticLayer<'_> {
         let mut bands = layers.photons.halves[0].bands().to_vec();
         for (band, more) in bands.iter_mut().zip(layers.photons.halves[1].bands()) {
             band.add(more);
-        }
-        for (band, more) in bands
-            .iter_mut()
-            .zip(layers.bundles.map_or(&[][..], BandMaps::bands))
-        {
-            (0..HALVES).for_each(|_| band.add(more));
         }
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
         let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);

@@ -385,9 +385,12 @@ pub fn estimate_splats(
     })
 }
 
-/// The error of photons: half sets give the noise. `None` if no light arrived.
+/// The error of photons: half sets give the noise. Maps that no photon changed have none. `None` if no light arrived.
 pub fn by_noise(fine: &Images, mut noise: Noise, ledger: &EnergyLedger) -> Option<LightError> {
-    by_squares(fine, ledger, |receiver, _| noise.remove(&receiver))
+    by_squares(fine, ledger, |receiver, image| {
+        let quiet = || vec![0.0; image.luminance.len()];
+        Some(noise.remove(&receiver).unwrap_or_else(quiet))
+    })
 }
 
 /// The error of `fine`, whose square is a share of the squared difference from `other`. `None` if no light arrived.

@@ -336,30 +336,20 @@ impl Details {
         // tell of less, as those details are dropped that happen to disagree.
         let raw = self.cells.texels(&self.raw);
         let bundled = self.cells.texels(&self.bundled);
-        let (mut taken, mut known, mut light) = (0.0, 0.0, 0.0);
-        for (texel, kept) in of_texels.iter().enumerate() {
-            let [.., a, b, missed] = *kept;
+        let untold = |texel: usize| {
+            let [.., a, b, missed] = of_texels[texel];
             let [first, second] = luminances(&raw[texel]);
             let bundled = luminance(&bundled[texel]) as f32;
-            let area = f64::from(area_of(texel));
-            taken += area * f64::from((a - bundled - first) * (b - bundled - second));
-            known += area * f64::from(missed);
-            light += area * f64::from(expected(kept));
-        }
-        let unknown = if light > 0.0 {
-            (taken - known).max(0.0) / light
-        } else {
-            0.0
-        } as f32;
-        let square = |kept: &FilteredCell| {
-            let [.., a, b, missed] = *kept;
-            missed + unknown * expected(kept) + 0.25 * (a - b) * (a - b)
+            (a - bundled - first) * (b - bundled - second) - missed
         };
         let mut ratios = self.cells.densities(|texel| {
-            let weight = area_of(texel);
-            [square(&of_texels[texel]), expected(&of_texels[texel])].map(|value| value * weight)
+            let kept = &of_texels[texel];
+            let [.., a, b, missed] = *kept;
+            let square = missed + 0.25 * (a - b) * (a - b);
+            [square, expected(kept), untold(texel)].map(|value| value * area_of(texel))
         });
         let pool = self.cells.pool();
+        add_untold(&mut ratios[pool], self.cells.areas_m2(pool));
         for level in (0..pool).rev() {
             ratios[level] = self.cells.between(level, &ratios);
         }
@@ -367,7 +357,7 @@ impl Details {
         let squares = of_texels
             .iter()
             .zip(&ratios)
-            .map(|(kept, [square, expected_there])| {
+            .map(|(kept, [square, expected_there, _])| {
                 let ratio = if *expected_there > 0.0 {
                     (square / expected_there).max(0.0)
                 } else {
@@ -387,6 +377,21 @@ impl Details {
             [0, 1, 2].map(|channel| f64::from(of_texels[texel][channel]) * counts)
         };
         put(map, flux, self.is_signed)
+    }
+}
+
+/// Adds the bias that levels do not tell of to the squared errors of cells. Over the whole map,
+/// noise cancels from its products; they tell where it lies as far as they are positive.
+fn add_untold(cells: &mut [[f32; 3]], areas_m2: &[f32]) {
+    let (mut sum, mut positive) = (0.0, 0.0);
+    for ([_, _, untold], area_m2) in cells.iter().zip(areas_m2) {
+        sum += f64::from(untold * area_m2);
+        positive += f64::from(untold.max(0.0) * area_m2);
+    }
+    if sum > 0.0 {
+        for [square, _, untold] in cells {
+            *square += (sum / positive) as f32 * untold.max(0.0);
+        }
     }
 }
 

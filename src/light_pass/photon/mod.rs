@@ -10,6 +10,7 @@
 
 mod bundle;
 mod cells;
+pub mod domain;
 mod edge;
 pub mod filter;
 pub mod launch;
@@ -19,5 +20,5 @@ mod receivers;
 pub mod residual;
 pub mod spectrum;
 pub mod spheres;
-pub mod squares;
+mod squares;
 pub mod walk;

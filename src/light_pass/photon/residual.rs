@@ -14,15 +14,15 @@ use std::collections::BTreeMap;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::bundle::{Bundle, Origin, flux_triangle};
+use super::bundle::{Bundle, flux_triangle};
+use super::domain::LitCells;
 use super::edge;
 use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE, PhotonLaunch, Start};
-use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed, set_of};
+use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed};
 use super::paths::PathFinder;
 use super::receivers::{MeasuredChart, Receivers};
-use super::spectrum::Hue;
-use super::squares::{Found, LitCells, Square, Squares, Surveyor};
-use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk, WAVELENGTH_DIMENSION};
+use super::squares::{Found, Square, Squares, Surveyor};
+use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk};
 use crate::geometry::sampling::{GOLDEN_64, even_point, in_square, mix64};
 use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -49,9 +49,8 @@ const BLOCK_PHOTONS: u64 = 1 << 12;
 /// Where surfaces are rough, bundles have to carry this part of the light, or photons are better off without them.
 const MIN_BUNDLED: f64 = 0.1;
 
-/// Squares whose triangles are made before they are deposited: of light of one hue, and of a spectrum, which takes many
-/// times the triangles.
-const SQUARES_AT_ONCE: [usize; 2] = [1 << 12, 1 << 7];
+/// Squares whose triangles are made before they are deposited.
+const SQUARES_AT_ONCE: usize = 1 << 12;
 
 /// A half is sampled anew if the other half asks for so many times its photons, with at most as many times.
 const ANEW: (f64, f64) = (2.0, 8.0);
@@ -81,10 +80,10 @@ impl LightSquares {
     }
 }
 
-/// Maps that a pass fills; one set, or one for each band.
+/// Maps that a pass fills.
 pub struct ResidualMaps<'a> {
     /// Light of all bundles.
-    pub bundles: &'a mut [ReceiverMaps],
+    pub bundles: &'a mut ReceiverMaps,
     /// What photons add to it.
     pub halves: [&'a mut [ReceiverMaps]; HALVES],
 }
@@ -173,26 +172,25 @@ impl ResidualPass<'_> {
     }
 
     /// Deposits all bundles into their own maps.
-    fn deposit_bundles(&self, squares: &Squares, maps: &mut [ReceiverMaps], report: &mut PassReport) {
-        let at_once = SQUARES_AT_ONCE[usize::from(self.rules.spectrum.is_some())];
-        for squares in squares.squares.chunks(at_once) {
-            let made: Vec<TrianglesByMap> = squares
-                .par_chunks(at_once / 32)
+    fn deposit_bundles(&self, squares: &Squares, maps: &mut ReceiverMaps, report: &mut PassReport) {
+        for squares in squares.squares.chunks(SQUARES_AT_ONCE) {
+            let made: Vec<TrianglesByReceiver> = squares
+                .par_chunks(SQUARES_AT_ONCE / 32)
                 .map(|squares| {
-                    let mut triangles = TrianglesByMap::new();
+                    let mut triangles = TrianglesByReceiver::new();
                     squares
                         .iter()
-                        .for_each(|square| self.triangles(square, maps.len(), &mut triangles));
+                        .for_each(|square| self.triangles(square, &mut triangles));
                     triangles
                 })
                 .collect();
-            let mut by_map = TrianglesByMap::new();
-            for (map, mut triangles) in made.into_iter().flatten() {
-                by_map.entry(map).or_default().append(&mut triangles);
+            let mut by_receiver = TrianglesByReceiver::new();
+            for (receiver, mut triangles) in made.into_iter().flatten() {
+                by_receiver.entry(receiver).or_default().append(&mut triangles);
             }
-            for ((set, receiver), triangles) in by_map {
-                maps[set].touch(receiver, self.chart_for);
-                if let Some(map) = maps[set].get_mut(receiver) {
+            for (receiver, triangles) in by_receiver {
+                maps.touch(receiver, self.chart_for);
+                if let Some(map) = maps.get_mut(receiver) {
                     // Photons of both halves remove it.
                     let placed = deposit_triangles(&triangles, map)
                         .deposited
@@ -208,78 +206,44 @@ impl ResidualPass<'_> {
     }
 
     /// Adds the triangles of a square.
-    fn triangles(&self, square: &Square, sets: usize, triangles: &mut TrianglesByMap) {
-        // Neighbouring triangles sample lamp and spectrum at different points.
+    fn triangles(&self, square: &Square, triangles: &mut TrianglesByReceiver) {
+        // Neighbouring triangles sample the lamp at different points.
         let place = square.place.corner;
         let mut drawn = (place.x >> 10).wrapping_mul(0x9e37_79b1) ^ (place.y >> 10).wrapping_mul(0x85eb_ca6b);
         for bundle in &square.bundles {
-            let is_plain = self.rules.spectrum.is_none() && self.launch.lamp_offsets().is_none();
-            if is_plain {
-                let triangles = triangles.entry((0, bundle.receiver())).or_default();
-                bundle.triangles(square.place.area(), |corners, flux_w| {
-                    let flux = self.rules.unit.count(flux_w * f64::from(TIMES));
-                    triangles.push(flux_triangle(bundle, corners, flux));
-                });
-                continue;
-            }
+            let triangles = triangles.entry(bundle.receiver()).or_default();
             bundle.triangles(square.place.area(), |corners, flux_w| {
                 drawn = drawn.wrapping_add(1);
-                for part in self.parts(bundle, drawn) {
-                    let flux_w = part.hue.channels.apply(flux_w) * (f64::from(TIMES) * part.share);
-                    let moved = bundle.shift.at(&part.origin);
+                let lamp_points = self.lamp_points(bundle, drawn);
+                let part = f64::from(TIMES) / lamp_points.len() as f64;
+                let flux = self.rules.unit.count(flux_w * part);
+                for lamp in lamp_points {
+                    let moved = bundle.shift.at(lamp);
                     let corners = corners.map(|corner| corner + moved);
-                    let triangle = flux_triangle(bundle, corners, self.rules.unit.count(flux_w));
-                    let map = (set_of(part.hue.band, sets), bundle.receiver());
-                    triangles.entry(map).or_default().push(triangle);
+                    triangles.push(flux_triangle(bundle, corners, flux));
                 }
             });
         }
     }
 
-    /// Samples of lamp and wavelength for a triangle of a bundle.
-    fn parts(&self, bundle: &Bundle, number: u32) -> Vec<Part<'_>> {
-        let mut hues: Vec<(Hue, f64)> = Vec::new();
-        match self.rules.spectrum {
-            Some(spectrum) if bundle.route.is_dispersed => {
-                let within = even_point(number, WAVELENGTH_DIMENSION, self.rules.seed).x;
-                let parts = bundle.shift.hue_parts();
-                for part in 0..parts as u32 {
-                    let hue = spectrum.one((f64::from(part) + within) / parts);
-                    hues.extend(hue.map(|hue| (hue, parts.recip())));
-                }
-            }
-            _ => hues.push((self.rules.whole_hue(), 1.0)),
-        }
-        let offsets = self.launch.lamp_offsets();
-        let lamp_parts = bundle.shift.lamp_parts(hues.len() > 1);
-        let on_lamp = even_point(number, LAMP_DIMENSION, self.rules.seed);
-        let mut parts = Vec::with_capacity(hues.len());
-        for part in 0..(lamp_parts.x * lamp_parts.y) as u32 {
+    /// Points of the lamp that a triangle of a bundle is deposited for, in half-axes from its centre.
+    fn lamp_points(&self, bundle: &Bundle, number: u32) -> Vec<DVec2> {
+        let Some(offsets) = self.launch.lamp_offsets() else {
+            return vec![DVec2::ZERO];
+        };
+        let parts = bundle.shift.parts();
+        let within = even_point(number, LAMP_DIMENSION, self.rules.seed);
+        let of_part = |part: u32| {
             let part = f64::from(part);
-            let part = DVec2::new(part % lamp_parts.x, (part / lamp_parts.x).floor());
-            let lamp = offsets.map_or(DVec2::ZERO, |offsets| offsets((part + on_lamp) / lamp_parts));
-            for &(hue, share) in &hues {
-                parts.push(Part {
-                    origin: Origin { lamp, ends: hue.ends },
-                    hue,
-                    share: share / lamp_parts.element_product(),
-                });
-            }
-        }
-        parts
+            let part = DVec2::new(part % parts.x, (part / parts.x).floor());
+            offsets((part + within) / parts)
+        };
+        (0..parts.element_product() as u32).map(of_part).collect()
     }
 }
 
-/// Triangles by set of maps and receiver.
-type TrianglesByMap = BTreeMap<(usize, Receiver), Vec<FluxTriangle>>;
-
-/// A sample of lamp and wavelength.
-struct Part<'a> {
-    origin: Origin,
-    hue: Hue<'a>,
-    /// Of the flux.
-    share: f64,
-}
+/// Triangles to be deposited.
+type TrianglesByReceiver = BTreeMap<Receiver, Vec<FluxTriangle>>;
 
 /// Chooses how finely each bundle is deposited. Returns the squared relative error that this leaves.
 fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receivers) -> f64 {
@@ -505,10 +469,7 @@ impl ResidualPhotons<'_> {
             guides: &square.guides,
             within,
             scale: unit_squares,
-            origin: Origin {
-                lamp: offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp)),
-                ..Origin::default()
-            },
+            lamp: offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp)),
         };
         let mut removals = std::mem::take(&mut draw.removals);
         let mut maps = Changes {
