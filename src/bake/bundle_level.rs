@@ -25,8 +25,9 @@ use crate::transport::EffectSet;
 /// Goal of the first level, which gives the first picture.
 const FIRST_GOAL: f64 = 0.2;
 
-/// A level aims a little below what is asked, so that a near miss does not cost another one.
-const AIM: f64 = 0.92;
+/// A level aims a little below what is asked: a near miss costs another level, and of levels that differ by chance, one
+/// ends the bake that looks better than it is, by up to a sixth where light is uneven.
+const AIM: f64 = 0.85;
 
 /// Minimum and maximum of a goal relative to the one before.
 const STEPS: (f64, f64) = (0.08, 0.8);

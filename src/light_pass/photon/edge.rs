@@ -99,7 +99,7 @@ impl Cutter<'_, '_> {
     fn measure_shifts(&self, square: &mut Square) -> (u64, u64) {
         let root = square.place.corner.root as usize;
         let middle = square.place.node(CENTRE).square();
-        let Some(lamp_sides) = self.finder.from_lamp_sides(root, middle) else {
+        let Some(lamp_sides) = self.finder.at_lamp_sides(root, middle) else {
             return (0, 0);
         };
         let centre = Arc::clone(&square.points[CENTRE]);

@@ -311,8 +311,8 @@ impl ResidualPhotons<'_> {
         // Photons of each square in each half, and blocks of squares.
         let squares = &self.squares.squares;
         let mut orders = Vec::with_capacity(squares.len());
-        let mut blocks = vec![0..0];
-        let (mut first, mut in_block) = (0_u32, 0_u64);
+        let mut blocks = Vec::new();
+        let (mut begin, mut first, mut in_block) = (0, 0_u32, 0_u64);
         for (number, square) in squares.iter().enumerate() {
             let wanted = 0.5 * self.squares.plan.photons(square);
             let photons = wanted.ceil().clamp(1.0, f64::from(u32::MAX >> 8)) as u32;
@@ -324,10 +324,10 @@ impl ResidualPhotons<'_> {
             });
             first = first.wrapping_add(photons);
             in_block += u64::from(photons);
-            blocks.last_mut().expect("there is one").end = number + 1;
-            if in_block >= BLOCK_PHOTONS {
-                blocks.push(number + 1..number + 1);
-                in_block = 0;
+            let end = number + 1;
+            if in_block >= BLOCK_PHOTONS || end == squares.len() {
+                blocks.push(begin..end);
+                (begin, in_block) = (end, 0);
             }
         }
 
