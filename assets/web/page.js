@@ -27,21 +27,21 @@ let isDue = true, wake = () => {}, turn = Promise.resolve();
 
 const nextFrame = () => new Promise((resolve) => requestAnimationFrame(resolve));
 const asset = (name) => files.get(name) ?? files.set(name, read(name)).get(name);
-
 const request = () => { isDue = true; state.drawn = 0; wake(); };
-
-/** Runs one thing after the other that uses the device. */
+// Runs one thing after the other that uses the device.
 const inTurn = (task) => (turn = turn.then(task, task));
 
 /** Shows another moment: its light, and what has moved. */
 async function show(moment) {
   const scene = moment ? opened(await asset(about.moments[moment]), first) : first;
+  // What is drawn meanwhile is given up.
+  request();
   await inTurn(() => eye.show(scene));
 }
 
 /** Draws coarser while something moves, and finer and finer at rest. */
 async function drawAll() {
-  let before = 0, isRefined = false;
+  let before = 0, isRefined = false, finer = 0;
   for (;;) {
     const now = await nextFrame();
     const moved = navigation.isMoving;
@@ -50,9 +50,13 @@ async function drawAll() {
     if (isDue || moved) {
       isDue = false;
       await inTurn(() => drawMoving());
-      isRefined = false;
+      [isRefined, finer] = [false, state.level - 1];
     } else if (!navigation.fingers.size && !state.motion?.isPlaying && eye.count < (isRefined ? MOST_PICTURES : Infinity)) {
-      isRefined = await inTurn(() => eye.draw(view(1, 1, BRANCHING.resting), isRefined, () => isDue)) || isRefined;
+      // Slow devices show something finer first.
+      const [scale, traced] = LEVELS[Math.max(finer, 0)], isLast = finer < 1;
+      const wanted = view(scale, traced, isLast ? BRANCHING.resting : BRANCHING.moving);
+      isRefined = (await inTurn(() => eye.draw(wanted, isRefined, () => isDue)) && isLast) || isRefined;
+      finer -= 1;
     } else {
       await new Promise((resolve) => { wake = resolve; });
     }
@@ -177,9 +181,10 @@ async function start() {
     fields.camera.value = navigation.shown;
     request();
   });
-  Object.assign(state, { eye, navigation, level: isSoftware ? LEVELS.length - 2 : 0 });
+  Object.assign(state, { eye, navigation, level: LEVELS.length - 1 });
   obey();
   await drawMoving();
+  state.level = isSoftware ? LEVELS.length - 2 : 0;
   for (const error of [await device.popErrorScope(), await device.popErrorScope()]) {
     if (error) throw new Error(`the graphics device refused the scene (${error.message})`);
   }
