@@ -127,14 +127,15 @@ export class EyePass {
   }
 
   // Everything that pictures of these draws need.
-  async makePipelines(lists, toneMap) {
+  async makePipelines(lists, toneMap, isResting) {
     const { scene: { draws, pipelines, formats, samples, tone_maps: toneMaps }, device } = this;
     const groups = { traced: ["frame", "traced", ...(this.sky ? ["sky"] : [])], composed: ["frame", "composed"] };
     const surfaces = lists.flatMap((list) => draws[list]).map(([key]) =>
       this.pipeline(key, groups[pipelines[key].entry] ?? ["frame"], "place", pipelines[key]));
     const mean = { program: "accumulated", entry: "accumulated", format: formats.mean };
     const display = { program: "tone_mapping", entry: "to_display", format: this.screenFormat, constants: toneMaps[toneMap] };
-    const others = [this.pipeline("mean", ["mean"], "cover", mean), this.pipeline(toneMap, ["shown"], "cover", display)];
+    const others = [this.pipeline(toneMap, ["shown"], "cover", display)];
+    if (isResting) others.push(this.pipeline("mean", ["mean"], "cover", mean));
     const behind = { program: "sky", entry: "sky_drawn", format: formats.radiance, depth: [false, "always"], samples };
     if (this.sky) others.push(this.pipeline("sky", ["frame", "nothing", "sky"], "behind", behind));
     const compute = { module: this.module("summed"), entryPoint: "summed" };
@@ -195,7 +196,7 @@ export class EyePass {
     if (!refines) this.count = 0;
     const lists = view.colours ? ["colours"] : view.traced ? ["depths", "traced", "surfaces"] : ["plain"];
     const toneMap = view.colours ? "none" : view.toneMap;
-    await this.makePipelines(lists, toneMap);
+    await this.makePipelines(lists, toneMap, view.isResting);
     const size = [view.width, view.height];
     this.makeTargets(size, size.map((side) => Math.max(Math.ceil(side * (view.traced || 1)), 1)));
     this.setLight(0, view.layers);
@@ -208,7 +209,7 @@ export class EyePass {
     if (lists.includes("traced") && scene.draws.traced.length && !(await this.trace(sides, isOutdated))) return false;
     const encoder = device.createCommandEncoder();
     this.drawSurfaces(encoder, sides, lists.filter((list) => !["depths", "traced"].includes(list)), view);
-    this.display(encoder, toneMap);
+    this.display(encoder, toneMap, view.isResting);
     device.queue.submit([encoder.finish()]);
     await device.queue.onSubmittedWorkDone();
     this.count += 1;
@@ -317,8 +318,8 @@ export class EyePass {
     }
   }
 
-  // Takes a picture up in the mean, and the mean to the screen.
-  display(encoder, toneMap) {
+  // Takes a picture to the screen; at rest, the mean with those before.
+  display(encoder, toneMap, isResting) {
     const { device, targets, uniforms, canvas, count } = this;
     const cover = (pipeline, bound, view) => {
       const pass = encoder.beginRenderPass({ colorAttachments: [cleared(view)] });
@@ -330,9 +331,9 @@ export class EyePass {
     device.queue.writeBuffer(uniforms.share, 0, new Float32Array([1 / (count + 1), 0, 0, 0]));
     const { means, otherMean, radiance, size: [width, height] } = targets;
     const [before, after] = count % 2 ? [otherMean, means] : [means, otherMean];
-    cover("mean", this.bind("mean", [uniforms.share, radiance, before]), after);
+    if (isResting) cover("mean", this.bind("mean", [uniforms.share, radiance, before]), after);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    cover(toneMap, this.bind("shown", [after, uniforms.white]), this.screen.getCurrentTexture().createView());
+    cover(toneMap, this.bind("shown", [isResting ? after : radiance, uniforms.white]), this.screen.getCurrentTexture().createView());
   }
 }
 
