@@ -181,10 +181,10 @@ async function start() {
     fields.camera.value = navigation.shown;
     request();
   });
-  Object.assign(state, { eye, navigation, level: LEVELS.length - 1 });
+  Object.assign(state, { eye, navigation, level: isSoftware ? LEVELS.length - 1 : 0 });
   obey();
   await drawMoving();
-  state.level = isSoftware ? LEVELS.length - 2 : 0;
+  if (isSoftware) state.level = LEVELS.length - 2;
   const error = (await device.popErrorScope()) ?? (await device.popErrorScope());
   if (error) throw new Error(`the graphics device refused the scene (${error.message})`);
   document.body.className = "ready";

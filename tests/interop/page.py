@@ -23,7 +23,7 @@ import websocket
 
 PATIENCE_S = 3600
 # Software draws them.
-SIZE = (640, 360)
+SIZE = (960, 540)
 PICTURES = 4
 PHONE = (390, 844)
 # Mean FLIP beside `nephroid render` [1].
