@@ -157,7 +157,7 @@ pub(super) struct BakeContext<'a> {
     pub(super) sizes: Sizes,
     /// Mean footprints, if needed.
     pub(super) statistics: Option<Arc<FootprintStatistics>>,
-    /// What each light may keep besides its last maps [bytes].
+    /// What each light may keep besides its last maps, of coarser levels and again of squares [bytes].
     pub(super) spare_bytes: u64,
     /// Lights that are still being refined.
     pub(super) open_lights: usize,

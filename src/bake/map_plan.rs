@@ -50,10 +50,11 @@ impl CausticLayer<'_> {
         )
     }
 
-    /// What each light may keep besides its last maps: what these leave of the memory limit [bytes].
+    /// What each light may keep besides its last maps, of coarser levels and again of squares: half of what the maps
+    /// leave of the memory limit [bytes].
     pub(super) fn spare_bytes(&self, sizes: &Sizes, statistics: Option<&FootprintStatistics>) -> u64 {
         let (limit, memory) = self.map_memory(statistics);
-        limit.saturating_sub(memory.of_sizes(sizes)) / self.lit().count().max(1) as u64
+        limit.saturating_sub(memory.of_sizes(sizes)) / (2 * self.lit().count().max(1)) as u64
     }
 
     /// What each light may keep for the next bake [bytes].

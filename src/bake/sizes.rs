@@ -31,17 +31,15 @@ pub const LARGEST_TILED_SIDE: usize = 4096;
 /// area.
 pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
 
-/// In addition, while errors are estimated and weighted [bytes].
-const BYTES_PER_ESTIMATED_TEXEL: u64 = 6 * 8;
-
 /// What a light keeps per texel of a level [bytes]: at most three 64-bit sums with their bit, and an error.
 const BYTES_PER_LIT_TEXEL: u64 = 24 + 1 + 4;
 
 /// Sums of both halves of the photons, per texel [bytes].
 const BYTES_PER_PHOTON_TEXEL: u64 = 2 * 24;
 
-/// Sums of bundles, per texel [bytes].
-const BYTES_PER_BUNDLE_TEXEL: u64 = 24;
+/// Per texel in the course of a bake [bytes]: the maps of the light that is traced, its bundles and the sums of its
+/// photons, or about as much for finished maps and the weights of their errors.
+const BYTES_PER_WORKED_TEXEL: u64 = 2 * 24 + BYTES_PER_PHOTON_TEXEL;
 
 /// Per texel of the map whose photons are being filtered, with its details at all levels [bytes].
 const BYTES_PER_FILTERED_TEXEL: u64 = 136;
@@ -72,17 +70,16 @@ impl MapMemory {
 
     /// Maps that are made. `keeps_photons`: lights keep the sums of their photons.
     pub(super) fn with(estimator: Estimator, keeps_photons: bool, lights: BTreeMap<Receiver, u64>) -> Self {
-        let estimated = BYTES_PER_TEXEL + BYTES_PER_ESTIMATED_TEXEL;
         match estimator {
             // Maps are filtered one after another.
             Estimator::Auto | Estimator::Photon => Self {
-                per_texel: estimated + BYTES_PER_BUNDLE_TEXEL + BYTES_PER_PHOTON_TEXEL,
+                per_texel: BYTES_PER_WORKED_TEXEL,
                 per_lit_texel: BYTES_PER_LIT_TEXEL + if keeps_photons { BYTES_PER_PHOTON_TEXEL } else { 0 },
                 per_texel_of_largest: BYTES_PER_FILTERED_TEXEL,
                 lights,
             },
             Estimator::Wavefront | Estimator::Splat => Self {
-                per_texel: estimated,
+                per_texel: BYTES_PER_WORKED_TEXEL,
                 // The levels that an error estimate needs.
                 per_lit_texel: ESTIMATED_LEVELS as u64 * BYTES_PER_LIT_TEXEL,
                 per_texel_of_largest: 0,
