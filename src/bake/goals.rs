@@ -97,11 +97,6 @@ impl CausticLayer<'_> {
         sends_w(light) < NEGLIGIBLE * target * all_w / f64::from(count).sqrt()
     }
 
-    /// What a light aims at while its error is unknown: as if all lights were alike, whose errors add in squares.
-    pub(super) fn first_target(&self, target: f64) -> f64 {
-        target * (self.lit().count() as f64).sqrt()
-    }
-
     /// Lights that were treated as negligible but are bright enough on some spot to need refinement.
     pub(super) fn promote_dim_lights(&self, errors: &Errors, lights: &[LightProgress]) -> Vec<usize> {
         let Some(target) = self.settings.max_error else {

@@ -135,7 +135,7 @@ impl CausticLayer<'_> {
         let is_left_to_photons = matches!(last.and_then(|last| last.key.photons), Some(PhotonAim::Count(_)));
         match self.settings.max_error {
             Some(target) if !is_left_to_photons && self.has_bundles(light) => {
-                let goal = self.next_goal(last, target_rmse.unwrap_or_else(|| self.first_target(target)));
+                let goal = self.next_goal(last, target_rmse.unwrap_or(target));
                 goal.map(PhotonAim::Goal)
             }
             _ => self.next_photons(light, last, target_rmse).map(PhotonAim::Count),

@@ -37,9 +37,12 @@ const BYTES_PER_LIT_TEXEL: u64 = 24 + 1 + 4;
 /// Sums of both halves of the photons, per texel [bytes].
 const BYTES_PER_PHOTON_TEXEL: u64 = 2 * 24;
 
-/// Per texel in the course of a bake [bytes]: the maps of the light that is traced, its bundles and the sums of its
+/// Per texel in the course of a bake by photons [bytes]: the maps of the light that is traced, its bundles and its
 /// photons, or about as much for finished maps and the weights of their errors.
-const BYTES_PER_WORKED_TEXEL: u64 = 2 * 24 + BYTES_PER_PHOTON_TEXEL;
+const BYTES_PER_TRACED_TEXEL: u64 = 2 * 24 + BYTES_PER_PHOTON_TEXEL;
+
+/// The same by patches and splats, whose errors are estimated from differences between maps.
+const BYTES_PER_ESTIMATED_TEXEL: u64 = BYTES_PER_TEXEL + 2 * 8;
 
 /// Per texel of the map whose photons are being filtered, with its details at all levels [bytes].
 const BYTES_PER_FILTERED_TEXEL: u64 = 136;
@@ -73,13 +76,13 @@ impl MapMemory {
         match estimator {
             // Maps are filtered one after another.
             Estimator::Auto | Estimator::Photon => Self {
-                per_texel: BYTES_PER_WORKED_TEXEL,
+                per_texel: BYTES_PER_TRACED_TEXEL,
                 per_lit_texel: BYTES_PER_LIT_TEXEL + if keeps_photons { BYTES_PER_PHOTON_TEXEL } else { 0 },
                 per_texel_of_largest: BYTES_PER_FILTERED_TEXEL,
                 lights,
             },
             Estimator::Wavefront | Estimator::Splat => Self {
-                per_texel: BYTES_PER_WORKED_TEXEL,
+                per_texel: BYTES_PER_ESTIMATED_TEXEL,
                 // The levels that an error estimate needs.
                 per_lit_texel: ESTIMATED_LEVELS as u64 * BYTES_PER_LIT_TEXEL,
                 per_texel_of_largest: 0,
