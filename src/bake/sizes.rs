@@ -41,8 +41,9 @@ const BYTES_PER_PHOTON_TEXEL: u64 = 2 * 24;
 /// photons, or about as much for finished maps and the weights of their errors.
 const BYTES_PER_TRACED_TEXEL: u64 = 2 * 24 + BYTES_PER_PHOTON_TEXEL;
 
-/// The same by patches and splats, whose errors are estimated from differences between maps.
-const BYTES_PER_ESTIMATED_TEXEL: u64 = BYTES_PER_TEXEL + 2 * 8;
+/// The same by patches and splats: finished maps and the weights of their errors; estimates from differences between
+/// maps take less.
+const BYTES_PER_ESTIMATED_TEXEL: u64 = BYTES_PER_TEXEL + 8;
 
 /// Per texel of the map whose photons are being filtered, with its details at all levels [bytes].
 const BYTES_PER_FILTERED_TEXEL: u64 = 136;
