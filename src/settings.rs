@@ -447,6 +447,11 @@ impl BakeSettings {
         }
     }
 
+    /// Memory limit for direct light that is kept light by light [bytes]: an eighth of the total.
+    pub fn direct_bytes(&self) -> u64 {
+        self.memory_bytes / 8
+    }
+
     /// Memory limit for traced light that is kept for the next bake [bytes]: a quarter of the total.
     pub fn kept_light_bytes(&self) -> u64 {
         self.memory_bytes / 4

@@ -181,7 +181,9 @@ impl CausticLayer<'_> {
         if report.pass.cancelled {
             return Ok(BundleLevel::Stopped);
         }
-        light.state.squares = Some((key.trace.clone(), key.sizes.clone(), squares));
+        // Squares that memory has no room for are made anew.
+        let is_kept = squares.bytes() <= context.spare_bytes;
+        light.state.squares = is_kept.then(|| (key.trace.clone(), key.sizes.clone(), squares));
         if report.is_left_to_photons {
             return Ok(BundleLevel::LeftToPhotons);
         }

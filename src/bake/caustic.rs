@@ -1,6 +1,7 @@
 //! Bakes the caustic layer of all lights level by level: complete coarse maps first, then finer ones, each with its
 //! error.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::BakeCounts;
@@ -155,7 +156,9 @@ pub(super) struct BakeContext<'a> {
     /// Sizes of all maps.
     pub(super) sizes: Sizes,
     /// Mean footprints, if needed.
-    pub(super) statistics: Option<FootprintStatistics>,
+    pub(super) statistics: Option<Arc<FootprintStatistics>>,
+    /// What each light may keep besides its last maps, of coarser levels and again of squares [bytes].
+    pub(super) spare_bytes: u64,
     /// Lights that are still being refined.
     pub(super) open_lights: usize,
 }
@@ -232,6 +235,7 @@ impl CausticLayer<'_> {
             role,
             sizes: Sizes::default(),
             statistics: None,
+            spare_bytes: 0,
             open_lights: lights.len(),
         };
         self.find_sizes(&mut states.statistics, &mut lights, &mut context)?;
@@ -270,6 +274,7 @@ impl CausticLayer<'_> {
                 showing.show(&shown(&lights), context.outcome, context.clock);
             }
         };
+        let spare_bytes = context.spare_bytes;
         outcome.stopped = self.stopped(&lights, &errors, &limited);
         for mut light in lights {
             if let Some(level) = light.levels.last() {
@@ -280,7 +285,7 @@ impl CausticLayer<'_> {
                     .map(|&receiver| self.stray(light.visible, receiver));
                 outcome.warnings.extend(strays);
             }
-            light.state.keep(light.levels, self.settings.memory_bytes);
+            light.state.keep(light.levels, spare_bytes);
             states.put(light.visible.light, light.state);
         }
         Ok(outcome)
@@ -295,7 +300,7 @@ impl CausticLayer<'_> {
             let mut state = states.take(light.light);
             let has_bumps = self.plan.is_on(Effect::Bumps);
             let spectrum = self.spectra.key(light.light);
-            let bytes = self.settings.kept_light_bytes();
+            let bytes = self.kept_light_bytes();
             state.begin(light, (has_bumps, spectrum), bytes, moving);
             LightProgress::new(light, state, self.carrier())
         };

@@ -1,5 +1,7 @@
 //! The sequence of lattices and map sizes that a bake runs through.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use super::caustic::{BakeContext, CausticLayer, ESTIMATED_LEVELS, LightProgress};
@@ -239,7 +241,7 @@ impl CausticLayer<'_> {
     /// Finds the sizes of all maps. Measures mean footprints at the settings' density on a thinner lattice, if needed.
     pub(super) fn find_sizes(
         &self,
-        known: &mut Option<(StatisticsKey, FootprintStatistics)>,
+        known: &mut Option<(StatisticsKey, Arc<FootprintStatistics>)>,
         lights: &mut [LightProgress],
         context: &mut BakeContext,
     ) -> Result<()> {
@@ -253,7 +255,7 @@ impl CausticLayer<'_> {
                 let mut statistics = FootprintStatistics::default();
                 for light in lights {
                     let unit = self.unit(light.visible)?;
-                    statistics.merge(&self.noting(light, |layer, light| {
+                    statistics.add_light(&self.noting(light, |layer, light| {
                         match self.settings.estimator.refines() {
                             true => layer.wavefront_statistics(light, unit, context),
                             false => layer.splat_statistics(light, unit, context),
@@ -262,11 +264,13 @@ impl CausticLayer<'_> {
                 }
                 // A cancelled run has seen only a part.
                 let complete = !context.control.is_cancelled();
-                *known = complete.then_some((key, statistics));
+                *known = complete.then(|| (key, Arc::new(statistics)));
             }
         }
-        context.statistics = known.as_ref().map(|(_, statistics)| statistics.clone());
-        (context.sizes, context.outcome.warnings) = self.map_sizes(context.statistics.as_ref());
+        context.statistics = known.as_ref().map(|(_, statistics)| Arc::clone(statistics));
+        let statistics = context.statistics.as_deref();
+        (context.sizes, context.outcome.warnings) = self.map_sizes(statistics);
+        context.spare_bytes = self.spare_bytes(&context.sizes, statistics);
         Ok(())
     }
 

@@ -9,7 +9,7 @@ use super::map_size::Sizes;
 use super::spectra::SpectralKey;
 use crate::geometry::enclosure::Bounds;
 use crate::illumination::Receiver;
-use crate::illumination::accumulator::{FluxCount, FluxUnit};
+use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
@@ -158,7 +158,7 @@ pub(super) struct KeptError {
 pub(super) struct LightStates {
     by_light: BTreeMap<usize, LightState>,
     /// Mean footprints that set the sizes of maps, and what they depend on.
-    pub(super) statistics: Option<(StatisticsKey, FootprintStatistics)>,
+    pub(super) statistics: Option<(StatisticsKey, Arc<FootprintStatistics>)>,
 }
 
 impl LightStates {
@@ -277,9 +277,9 @@ impl LightLevel {
         let all = std::iter::once(&self.maps)
             .chain(self.bands.iter().map(|band| &band.maps))
             .chain(halves.flat_map(BandMaps::sets));
-        let maps = all.flat_map(ReceiverMaps::iter);
-        let texels = maps.map(|(_, map)| map.chart.texel_count() as u64);
-        texels.sum::<u64>() * size_of::<FluxCount>() as u64
+        let error = self.error.iter().flat_map(|error| error.estimate.maps.values());
+        all.map(ReceiverMaps::bytes).sum::<u64>()
+            + error.map(|map| 4 * map.texels.len() as u64).sum::<u64>()
             + self.traced.as_ref().map_or(0, TracedLight::bytes)
     }
 }
@@ -290,6 +290,7 @@ impl LightState {
         self.rays.bytes()
             + self.levels.iter().map(LightLevel::bytes).sum::<u64>()
             + self.arrivals.as_ref().map_or(0, |(_, arrivals)| arrivals.bytes())
+            + self.squares.as_ref().map_or(0, |(.., squares)| squares.bytes())
     }
 
     /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes. From then on their ways
@@ -356,17 +357,26 @@ impl LightState {
             .and_then(|level| level.traced.take())
     }
 
-    /// Keeps the levels of a bake for the next one, coarse ones only as memory allows.
-    pub(super) fn keep(&mut self, levels: Vec<LightLevel>, memory_bytes: u64) {
+    /// Keeps the levels of a bake for the next one.
+    pub(super) fn keep(&mut self, levels: Vec<LightLevel>, spare_bytes: u64) {
         self.levels = levels;
-        drop_coarse(&mut self.levels, LEVELS_TO_KEEP, memory_bytes / 2);
+        drop_coarse(&mut self.levels, LEVELS_TO_KEEP, spare_bytes);
     }
 }
 
-/// Drops the coarsest levels while all together take more than `most_bytes`, but keeps `least` of them.
-pub(super) fn drop_coarse(levels: &mut Vec<LightLevel>, least: usize, most_bytes: u64) {
-    let mut bytes: u64 = levels.iter().map(LightLevel::bytes).sum();
-    while bytes > most_bytes && levels.len() > least {
-        bytes -= levels.remove(0).bytes();
-    }
+/// Drops the coarsest levels while all but the last `least` take more than `spare_bytes`.
+pub(super) fn drop_coarse(levels: &mut Vec<LightLevel>, least: usize, spare_bytes: u64) {
+    let coarse = levels.len().saturating_sub(least);
+    let mut bytes: u64 = levels[..coarse].iter().map(LightLevel::bytes).sum();
+    let is_dropped = |level: &LightLevel| {
+        let is_over = bytes > spare_bytes;
+        bytes -= level.bytes();
+        is_over
+    };
+    let dropped = levels[..coarse]
+        .iter()
+        .map(is_dropped)
+        .take_while(|is_over| *is_over);
+    let dropped = dropped.count();
+    levels.drain(..dropped);
 }

@@ -172,7 +172,7 @@ impl CausticLayer<'_> {
         light.done |= !light.is_underrated && made.is_some() && self.is_negligible(light.visible);
         light.levels.extend(last.into_iter().chain(made));
         // Only the last level is needed, but the next bake reaches it sooner with all of them.
-        drop_coarse(&mut light.levels, 1, self.settings.memory_bytes / 8);
+        drop_coarse(&mut light.levels, 1, context.spare_bytes);
         Ok(())
     }
 

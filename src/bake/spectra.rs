@@ -222,7 +222,7 @@ impl Spectra {
                 index,
                 radiant: radiant_w / white[channel],
                 band,
-                maps,
+                maps: maps.packed(),
                 channel,
             })
         });

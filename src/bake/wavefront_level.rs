@@ -118,7 +118,7 @@ impl CausticLayer<'_> {
     ) -> LightLevel {
         LightLevel {
             key,
-            maps,
+            maps: maps.packed(),
             bands: self.spectra.level_bands(light.light, bands),
             radiant: self.spectra.radiant(light.light),
             unit,
@@ -210,7 +210,7 @@ impl CausticLayer<'_> {
     }
 
     fn room(&self, keeps_bands: bool) -> Room {
-        let rays_bytes = self.settings.kept_light_bytes() / 2;
+        let rays_bytes = self.kept_light_bytes() / 2;
         Room {
             bands_bytes: if keeps_bands { rays_bytes } else { 0 },
             rays_bytes,

@@ -59,7 +59,7 @@ pub struct MapError {
     pub size: (usize, usize),
     /// Expected error of each texel's luminance, the root of variance and squared bias [W/m², for a light of unit
     /// strength].
-    pub texels: Vec<f64>,
+    pub texels: Vec<f32>,
     /// Squared error times area, summed over each tile [W²/m²].
     pub tiles: Vec<f64>,
 }
@@ -83,10 +83,16 @@ impl LightError {
         }
         self.relative_rmse *= factor;
         for map in self.maps.values_mut() {
-            map.texels.iter_mut().for_each(|error| *error *= factor);
+            let raise = |error: &mut f32| *error = single(f64::from(*error) * factor);
+            map.texels.iter_mut().for_each(raise);
             map.tiles.iter_mut().for_each(|square| *square *= factor * factor);
         }
     }
+}
+
+/// Converts to the precision of an error, which may not become infinite.
+fn single(error: f64) -> f32 {
+    error.min(f64::from(f32::MAX)) as f32
 }
 
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
@@ -314,7 +320,7 @@ pub fn estimate(
         let tiles_of = image.tiles();
         let texels = (0..windowed.len()).map(|texel| match old {
             Some(old) if !is_refined(receiver, tiles_of.of(texel)) => old.texels[texel],
-            _ => (windowed[texel] * share).sqrt(),
+            _ => single((windowed[texel] * share).sqrt()),
         });
         let tiles: Vec<f64> = (0..tile_sums.len())
             .map(|tile| match old {
@@ -420,7 +426,7 @@ fn by_squares(
         (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
         let map = MapError {
             size: (image.width, image.height),
-            texels: squares.iter().map(|square| square.sqrt()).collect(),
+            texels: squares.iter().map(|square| single(square.sqrt())).collect(),
             tiles,
         };
         error.maps.insert(receiver, map);

@@ -52,6 +52,9 @@ const MIN_BUNDLED: f64 = 0.1;
 /// Squares whose triangles are made before they are deposited.
 const SQUARES_AT_ONCE: usize = 1 << 12;
 
+/// Memory of a square with its points and bundles, roughly [bytes].
+const BYTES_PER_SQUARE: u64 = 4 << 10;
+
 /// A half is sampled anew if the other half asks for so many times its photons, with at most as many times.
 const ANEW: (f64, f64) = (2.0, 8.0);
 
@@ -77,6 +80,11 @@ pub struct LightSquares(Squares);
 impl LightSquares {
     pub fn is_empty(&self) -> bool {
         self.0.squares.is_empty()
+    }
+
+    /// Memory, roughly [bytes].
+    pub fn bytes(&self) -> u64 {
+        self.0.squares.len() as u64 * BYTES_PER_SQUARE
     }
 }
 
