@@ -452,6 +452,11 @@ impl BakeSettings {
         self.memory_bytes / 8
     }
 
+    /// Memory limit for the squares of all lights that are refined [bytes]: an eighth of the total.
+    pub fn squares_bytes(&self) -> u64 {
+        self.memory_bytes / 8
+    }
+
     /// Memory limit for traced light that is kept for the next bake [bytes]: a quarter of the total.
     pub fn kept_light_bytes(&self) -> u64 {
         self.memory_bytes / 4

@@ -181,9 +181,8 @@ impl CausticLayer<'_> {
         if report.pass.cancelled {
             return Ok(BundleLevel::Stopped);
         }
-        // Squares that memory has no room for are made anew.
-        let is_kept = squares.bytes() <= context.spare_bytes;
-        light.state.squares = is_kept.then(|| (key.trace.clone(), key.sizes.clone(), squares));
+        light.state.squares = Some((key.trace.clone(), key.sizes.clone(), squares));
+        light.state.fit_squares(self.squares_bytes(context));
         if report.is_left_to_photons {
             return Ok(BundleLevel::LeftToPhotons);
         }

@@ -242,6 +242,11 @@ impl CausticLayer<'_> {
         context.control = &whole;
         let mut is_first = true;
         let errors = loop {
+            // Lights that are done leave their room to the others.
+            context.open_lights = lights.len();
+            let own_bytes = self.squares_bytes(&context);
+            let done = lights.iter_mut().filter(|light| light.done);
+            done.for_each(|light| light.state.fit_squares(own_bytes));
             context.open_lights = lights.iter().filter(|light| !light.done).count();
             for light in lights.iter_mut().filter(|light| !light.done) {
                 self.advance(light, &mut context)?;

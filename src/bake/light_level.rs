@@ -343,6 +343,11 @@ impl LightState {
         self.arrivals = None;
     }
 
+    /// Drops squares that take more than so many bytes. They are made anew when needed, without what photons found.
+    pub(super) fn fit_squares(&mut self, most_bytes: u64) {
+        self.squares.take_if(|(.., squares)| squares.bytes() > most_bytes);
+    }
+
     /// Removes and returns the level with a key, if there is one.
     pub(super) fn take(&mut self, key: &LevelKey) -> Option<LightLevel> {
         let place = self.levels.iter().position(|level| level.key == *key)?;

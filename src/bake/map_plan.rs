@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::caustic::CausticLayer;
+use super::caustic::{BakeContext, CausticLayer};
 use super::map_size::{self, MapSize, SizeRequest, Sizes};
 use super::sizes::{LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE, MapMemory};
 use crate::error::Warning;
@@ -11,7 +11,7 @@ use crate::illumination::tiles::COARSEST;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::plan::Effect;
-use crate::settings::MapResolution;
+use crate::settings::{Estimator, MapResolution};
 
 impl CausticLayer<'_> {
     /// Whether maps of the requested fixed size fit into memory whatever is lit; true for automatic sizes.
@@ -44,8 +44,13 @@ impl CausticLayer<'_> {
         } else {
             0
         };
+        // Squares of lights that are done, and of the others.
+        let squares = match settings.estimator {
+            Estimator::Auto => 2 * settings.squares_bytes(),
+            Estimator::Photon | Estimator::Wavefront | Estimator::Splat => 0,
+        };
         (
-            settings.map_memory_bytes().saturating_sub(direct),
+            settings.map_memory_bytes().saturating_sub(direct + squares),
             MapMemory::with(settings.estimator, keeps_photons, lights),
         )
     }
@@ -55,6 +60,11 @@ impl CausticLayer<'_> {
     pub(super) fn spare_bytes(&self, sizes: &Sizes, statistics: Option<&FootprintStatistics>) -> u64 {
         let (limit, memory) = self.map_memory(statistics);
         limit.saturating_sub(memory.of_sizes(sizes)) / (2 * self.lit().count().max(1)) as u64
+    }
+
+    /// What the squares of a light may take while it is refined [bytes].
+    pub(super) fn squares_bytes(&self, context: &BakeContext) -> u64 {
+        context.spare_bytes + self.settings.squares_bytes() / context.open_lights.max(1) as u64
     }
 
     /// What each light may keep for the next bake [bytes].
