@@ -49,8 +49,8 @@ impl LayerKind {
 choices! {
     /// How the light pass turns rays into irradiance.
     pub enum Estimator {
-        /// Photons for extended lights, for rough surfaces, and without a target. Otherwise patches; for a single light,
-        /// whichever of the two a pilot of both measures to be cheaper for the target.
+        /// Bundles, with photons for what these cannot carry. Photons alone without a target, on rough surfaces, for light
+        /// traced by wavelength, and for lamps that shine in all directions from a sphere or an environment.
         Auto,
         /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
         Wavefront,
@@ -445,6 +445,16 @@ impl BakeSettings {
             Some(target) if target <= 0.01 => 2,
             _ => 1,
         }
+    }
+
+    /// Memory limit for direct light that is kept light by light [bytes]: an eighth of the total.
+    pub fn direct_bytes(&self) -> u64 {
+        self.memory_bytes / 8
+    }
+
+    /// Memory limit for the squares of all lights that are refined [bytes]: an eighth of the total.
+    pub fn squares_bytes(&self) -> u64 {
+        self.memory_bytes / 8
     }
 
     /// Memory limit for traced light that is kept for the next bake [bytes]: a quarter of the total.

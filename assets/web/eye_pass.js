@@ -15,6 +15,10 @@ const LEAST_BYTES = 256;
 // Chains are traced in bands that take about so long [ms], so that a picture at rest can be given up for another.
 const BAND_MS = 100;
 const STORED = ["objects", "image_table", "corners", "map_uvs", "indices", "lights"];
+// Bindings of each group in turn: uniforms, storage buffers, textures and arrays of textures.
+const GROUPS = { frame: "ussaa", traced: "ussssssu", composed: "t", sky: "t", nothing: "", mean: "utt", shown: "tu" };
+const KINDS = { u: { buffer: { type: "uniform" } }, s: { buffer: { type: "read-only-storage" } },
+  t: { texture: { sampleType: "unfilterable-float" } }, a: { texture: { sampleType: "unfilterable-float", viewDimension: "2d-array" } } };
 
 /** A device with all that it has; throws where there is none. */
 export async function openDevice() {
@@ -28,25 +32,22 @@ export async function openDevice() {
 
 export class EyePass {
   constructor(device, canvas, scene) {
-    Object.assign(this, { device, canvas, count: 0, msPerTraced: 1e-3 });
-    this.screenFormat = navigator.gpu.getPreferredCanvasFormat();
-    this.screen = canvas.getContext("webgpu");
-    this.screen.configure({ device, format: this.screenFormat, alphaMode: "opaque" });
+    const [screenFormat, screen] = [navigator.gpu.getPreferredCanvasFormat(), canvas.getContext("webgpu")];
+    Object.assign(this, { device, canvas, screenFormat, screen, msPerTraced: 1e-3, modules: {}, pipelines: new Map(), buffers: {} });
+    screen.configure({ device, format: screenFormat, alphaMode: "opaque" });
     const each = (of, make) => Object.fromEntries(Object.entries(of).map(([label, value]) => [label, make(label, value)]));
-    this.modules = each(scene.programs, (label, code) => device.createShaderModule({ label, code }));
-    this.layouts = each(scene.layouts, (label, entries) => device.createBindGroupLayout({ label, entries }));
-    this.pipelines = new Map();
-    this.buffers = {};
-    this.sizes = {};
+    this.layouts = each(GROUPS, (label, kinds) => {
+      const visibility = GPUShaderStage.FRAGMENT | (label === "frame" ? GPUShaderStage.VERTEX : 0);
+      return device.createBindGroupLayout({ label, entries: [...kinds].map((kind, binding) => ({ binding, visibility, ...KINDS[kind] })) });
+    });
     this.uniforms = each({ frame: scene.Frame.size, tracedFrame: scene.Frame.size, start: scene.contents.start?.length ?? 0,
       wavelengths: scene.contents.wavelengths.length / scene.pictures, white: scene.contents.white.length, share: 16, factors: 16 },
     (label, size) => device.createBuffer({ label, size: Math.max(size, LEAST_BYTES), usage: GPUBufferUsage.UNIFORM | GPUBufferUsage.COPY_DST }));
     device.queue.writeBuffer(this.uniforms.white, 0, scene.contents.white);
     this.bilinear = device.createSampler({ magFilter: "linear", minFilter: "linear" });
     this.black = this.texture("rgb9e5ufloat", [1, 1], new Uint8Array(4));
-    const { texture_tiles: { size, format }, sky } = scene.textures;
-    this.looks = this.texture(format, size, scene.contents.texture_tiles, "2d-array");
-    if (sky) this.sky = this.bind("sky", [this.light(sky.size, scene.contents.sky)]);
+    this.looks = this.texture("rgba8unorm-srgb", scene.textures.texture_tiles.size, scene.contents.texture_tiles, "2d-array");
+    if (scene.textures.sky) this.sky = this.bind("sky", [this.light(scene, "sky")]);
     this.show(scene);
   }
 
@@ -57,21 +58,23 @@ export class EyePass {
     this.scene = scene;
     if (["objects", "corners", "indices", "triangles"].some(isNew)) this.geometry = new Geometry(scene);
     STORED.filter((name) => contents[name] && isNew(name)).forEach((name) => this.store(name, contents[name]));
-    if (scene.local) Object.entries(this.geometry.hierarchy()).forEach(([name, bytes]) => this.store(name, bytes));
-    this.maps = scene.maps.map((sizes, index) => {
-      const was = this.maps?.[index];
-      const layer = (kind) => {
-        const name = `${kind}${index}`;
-        if (!sizes[kind]) return this.black;
-        return isNew(name) || !was ? this.light(sizes[kind], contents[name]) : was.layers[kind];
-      };
-      this.store(`tiles${index}`, contents[`tiles${index}`]);
-      return { count: contents[`tiles${index}`].length / scene.MapTile.size, layers: Object.fromEntries(LAYERS.map((kind) => [kind, layer(kind)])) };
+    const layer = (name, was) => (!scene.textures[name] ? this.black : was && !isNew(name) ? was : this.light(scene, name));
+    const were = this.maps?.map(({ layers }) => layers);
+    this.maps = Object.keys(contents).filter((name) => name.startsWith("tiles")).map((name, index) => {
+      this.store(name, contents[name]);
+      const layers = LAYERS.map((kind, at) => layer(name.replace("tiles", kind), were?.[index][at]));
+      return { tiles: this.buffers[name], count: contents[name].length / scene.MapTile.size, layers };
     });
-    this.lights = [0, 1].map((side) => ({ tiles: this.lights?.[side].tiles }));
-    const traced = ["nodes", "triangles", "corners", "map_uvs", "indices", "lights"].map((name) => this.buffers[name]);
-    if (scene.local) this.traced = this.bind("traced", [this.uniforms.start, ...traced, this.uniforms.wavelengths]);
-    this.count = 0;
+    const kept = new Set([this.black, ...this.maps.flatMap(({ layers }) => layers)]);
+    were?.flat().forEach((layer) => { if (!kept.has(layer)) layer.texture.destroy(); });
+    Object.assign(this, { count: 0, traced: null, lights: [0, 1].map((side) => ({ tiles: this.lights?.[side].tiles })) });
+  }
+
+  // Binds what chains are traced through, which the first of them at a moment need.
+  bindChains() {
+    Object.entries(this.geometry.hierarchy()).forEach(([name, bytes]) => this.store(name, bytes));
+    const stored = ["nodes", "triangles", "corners", "map_uvs", "indices", "lights"].map((name) => this.buffers[name]);
+    return this.bind("traced", [this.uniforms.start, ...stored, this.uniforms.wavelengths]);
   }
 
   store(name, bytes) {
@@ -90,12 +93,12 @@ export class EyePass {
     const usage = GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.COPY_DST, size = [width, height, layers];
     const texture = this.device.createTexture({ size, format, usage });
     this.device.queue.writeTexture({ texture }, bytes, { bytesPerRow: 4 * width, rowsPerImage: height }, size);
-    return texture.createView({ dimension });
+    return Object.assign(texture.createView({ dimension }), { texture });
   }
 
   // A texture of light, whose words are differences from the row before.
-  light([width, height], bytes) {
-    const words = new Uint32Array(bytes.slice().buffer);
+  light({ textures, contents }, name) {
+    const [width, height] = textures[name].size, words = new Uint32Array(contents[name].slice().buffer);
     for (let at = width; at < words.length; at += 1) words[at] += words[at - width];
     return this.texture("rgb9e5ufloat", [width, height], words);
   }
@@ -105,15 +108,18 @@ export class EyePass {
     return this.device.createBindGroup({ layout: this.layouts[layout] ?? layout, entries });
   }
 
-  // A pipeline as the file describes it, with its module and layouts in place of their names; made when it is first needed.
-  pipeline(key, { program, groups, vertex, fragment, ...rest }, changes = {}) {
+  module(label) { return (this.modules[label] ??= this.device.createShaderModule({ label, code: this.scene.programs[label] })); }
+
+  // A pipeline, made when it is first needed.
+  pipeline(key, groups, vertex, { program, entry, format, constants, cull = "none", depth, samples: count = 1 }) {
     if (!this.pipelines.has(key)) {
-      const module = this.modules[program];
+      const { formats, vertices } = this.scene, module = this.module(program);
       const made = this.device.createRenderPipelineAsync({
-        ...rest, label: fragment?.entryPoint ?? "depth",
-        layout: this.device.createPipelineLayout({ bindGroupLayouts: groups.map((name) => this.layouts[name]) }),
-        vertex: { module, entryPoint: vertex, buffers: vertex === "place" ? this.scene.vertices : [] },
-        ...(fragment && { fragment: { ...fragment, module, ...changes } }),
+        label: key, layout: this.device.createPipelineLayout({ bindGroupLayouts: groups.map((name) => this.layouts[name]) }),
+        vertex: { module, entryPoint: vertex, buffers: vertex === "place" ? vertices : [] },
+        ...(entry && { fragment: { module, entryPoint: entry, constants, targets: format ? [{ format }] : [] } }),
+        primitive: { cullMode: cull }, multisample: { count },
+        ...(depth && { depthStencil: { format: formats.depth, depthWriteEnabled: depth[0], depthCompare: depth[1] } }),
       });
       this.pipelines.set(key, made.then((pipeline) => this.pipelines.set(key, pipeline)));
     }
@@ -121,13 +127,18 @@ export class EyePass {
   }
 
   // Everything that pictures of these draws need.
-  async makePipelines(lists, toneMap) {
-    const { scene, device } = this;
-    const surfaces = lists.flatMap((list) => scene.draws[list]).map(([index]) => this.pipeline(index, scene.surfaces[index]));
-    const display = { constants: scene.tone_maps[toneMap], targets: [{ format: this.screenFormat }] };
-    const others = [this.pipeline("mean", scene.mean), this.pipeline(toneMap, scene.shown, display)];
-    if (this.sky) others.push(this.pipeline("sky", scene.sky));
-    const compute = { module: this.modules.summed, entryPoint: "summed" };
+  async makePipelines(lists, toneMap, isResting) {
+    const { scene: { draws, pipelines, formats, samples, tone_maps: toneMaps }, device } = this;
+    const groups = { traced: ["frame", "traced", ...(this.sky ? ["sky"] : [])], composed: ["frame", "composed"] };
+    const surfaces = lists.flatMap((list) => draws[list]).map(([key]) =>
+      this.pipeline(key, groups[pipelines[key].entry] ?? ["frame"], "place", pipelines[key]));
+    const mean = { program: "accumulated", entry: "accumulated", format: formats.mean };
+    const display = { program: "tone_mapping", entry: "to_display", format: this.screenFormat, constants: toneMaps[toneMap] };
+    const others = [this.pipeline(toneMap, ["shown"], "cover", display)];
+    if (isResting) others.push(this.pipeline("mean", ["mean"], "cover", mean));
+    const behind = { program: "sky", entry: "sky_drawn", format: formats.radiance, depth: [false, "always"], samples };
+    if (this.sky) others.push(this.pipeline("sky", ["frame", "nothing", "sky"], "behind", behind));
+    const compute = { module: this.module("summed"), entryPoint: "summed" };
     this.summed ??= await device.createComputePipelineAsync({ layout: "auto", compute });
     this.isFresh = surfaces.some((made) => made instanceof Promise);
     await Promise.all([...surfaces, ...others]);
@@ -139,18 +150,18 @@ export class EyePass {
     const factors = LAYERS.map((layer) => Number(layers[layer] ?? 1));
     const light = this.lights[side], key = factors.join();
     if (light.key === key) return;
-    const { size, format } = scene.textures.map_tiles;
+    const { formats: { radiance: format }, textures: { map_tiles: { size } } } = scene;
     const usage = GPUTextureUsage.TEXTURE_BINDING | GPUTextureUsage.STORAGE_BINDING;
     light.tiles ??= device.createTexture({ label: "map tiles", size, format, usage }).createView({ dimension: "2d-array" });
     device.queue.writeBuffer(uniforms.factors, 0, new Float32Array(factors));
     const encoder = device.createCommandEncoder();
     const pass = encoder.beginComputePass();
     pass.setPipeline(this.summed);
-    this.maps.forEach(({ count, layers }, index) => {
-      const bound = [uniforms.factors, buffers[`tiles${index}`], this.bilinear, ...LAYERS.map((kind) => layers[kind]), light.tiles];
+    for (const { tiles, count, layers } of this.maps) {
+      const bound = [uniforms.factors, tiles, this.bilinear, ...layers, light.tiles];
       pass.setBindGroup(0, this.bind(this.summed.getBindGroupLayout(0), bound));
       if (count) pass.dispatchWorkgroups(TILE_GROUPS, TILE_GROUPS, count);
-    });
+    }
     pass.end();
     device.queue.submit([encoder.finish()]);
     const bound = [buffers.objects, buffers.image_table, light.tiles, this.looks];
@@ -183,9 +194,9 @@ export class EyePass {
   async draw(view, refines = false, isOutdated = () => false) {
     const { scene, device } = this;
     if (!refines) this.count = 0;
-    const lists = view.colours ? ["colours"] : view.traced ? ["depths", "traced", "composed", "own"] : ["plain"];
+    const lists = view.colours ? ["colours"] : view.traced ? ["depths", "traced", "surfaces"] : ["plain"];
     const toneMap = view.colours ? "none" : view.toneMap;
-    await this.makePipelines(lists, toneMap);
+    await this.makePipelines(lists, toneMap, view.isResting);
     const size = [view.width, view.height];
     this.makeTargets(size, size.map((side) => Math.max(Math.ceil(side * (view.traced || 1)), 1)));
     this.setLight(0, view.layers);
@@ -198,7 +209,7 @@ export class EyePass {
     if (lists.includes("traced") && scene.draws.traced.length && !(await this.trace(sides, isOutdated))) return false;
     const encoder = device.createCommandEncoder();
     this.drawSurfaces(encoder, sides, lists.filter((list) => !["depths", "traced"].includes(list)), view);
-    this.display(encoder, toneMap);
+    this.display(encoder, toneMap, view.isResting);
     device.queue.submit([encoder.finish()]);
     await device.queue.onSubmittedWorkDone();
     this.count += 1;
@@ -266,7 +277,7 @@ export class EyePass {
       const colour = { ...cleared(targets.traced), loadOp: top ? "load" : "clear" };
       const depth = { view: targets.tracedDepth, depthLoadOp: "load", depthStoreOp: "store" };
       const pass = encoder.beginRenderPass({ colorAttachments: [colour], depthStencilAttachment: depth });
-      pass.setBindGroup(1, this.traced);
+      pass.setBindGroup(1, this.traced ??= this.bindChains());
       if (this.sky) pass.setBindGroup(2, this.sky);
       this.within(pass, width, [top, bottom], sides, "tracedFrame", () => this.drawEach(pass, "traced"));
       device.queue.submit([encoder.finish()]);
@@ -307,8 +318,8 @@ export class EyePass {
     }
   }
 
-  // Takes a picture up in the mean, and the mean to the screen.
-  display(encoder, toneMap) {
+  // Takes a picture to the screen; at rest, the mean with those before.
+  display(encoder, toneMap, isResting) {
     const { device, targets, uniforms, canvas, count } = this;
     const cover = (pipeline, bound, view) => {
       const pass = encoder.beginRenderPass({ colorAttachments: [cleared(view)] });
@@ -320,9 +331,9 @@ export class EyePass {
     device.queue.writeBuffer(uniforms.share, 0, new Float32Array([1 / (count + 1), 0, 0, 0]));
     const { means, otherMean, radiance, size: [width, height] } = targets;
     const [before, after] = count % 2 ? [otherMean, means] : [means, otherMean];
-    cover("mean", this.bind("mean", [uniforms.share, radiance, before]), after);
+    if (isResting) cover("mean", this.bind("mean", [uniforms.share, radiance, before]), after);
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    cover(toneMap, this.bind("shown", [after, uniforms.white]), this.screen.getCurrentTexture().createView());
+    cover(toneMap, this.bind("shown", [isResting ? after : radiance, uniforms.white]), this.screen.getCurrentTexture().createView());
   }
 }
 

@@ -2,19 +2,15 @@
 
 /** Bytes of a file, unpacked; `came(share)` is told how much of it is there. */
 export async function read(name, came = () => {}) {
-  let stream, length;
-  if (globalThis.packedFile) stream = new Blob([globalThis.packedFile(name)]).stream();
-  else {
-    const answer = await fetch(name);
-    if (!answer.ok) throw new Error(`${name} is not there (${answer.status})`);
-    [stream, length] = [answer.body, Number(answer.headers.get("content-length"))];
-  }
+  const answer = globalThis.packedFile ? new Response(packedFile(name)) : await fetch(name);
+  if (!answer.ok) throw new Error(`${name} is not there (${answer.status})`);
+  const length = Number(answer.headers.get("content-length")) || Infinity;
   let count = 0;
   const counted = new TransformStream({ transform(chunk, out) {
-    came((count += chunk.length) / (length || Infinity));
+    came((count += chunk.length) / length);
     out.enqueue(chunk);
   } });
-  const bytes = await whole(stream.pipeThrough(counted));
+  const bytes = await whole(answer.body.pipeThrough(counted));
   // Servers may have unpacked it.
   if (bytes[0] !== 0x1f || bytes[1] !== 0x8b) return bytes;
   return whole(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip")));

@@ -33,7 +33,7 @@ export class Geometry {
     const { contents: { objects }, draws, ObjectRecord: { size, fields } } = this.scene;
     const records = new DataView(objects.buffer, objects.byteOffset);
     const shapes = [];
-    for (const [, count, objectCount, first, firstObject] of [...draws.own, ...draws.composed]) {
+    for (const [, count, objectCount, first, firstObject] of draws.surfaces) {
       for (let object = firstObject; object < firstObject + objectCount; object += 1) {
         const places = new Float64Array(3 * count);
         const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];

@@ -11,8 +11,8 @@ const LUMENS_PER_WATT = 683;
 const LEVELS = [[1, 1], [1, 0.5], [1, 0.25], [0.5, 0.25], [0.5, 0.125], [0.5, 0]];
 // A moving picture that takes longer is drawn coarser, a faster one finer; above the last, without what is traced [ms].
 const LATE_MS = 50, EARLY_MS = 14, HOPELESS_MS = 400;
-// Pictures of a view at rest, each through other places of its pixels; surfaces at which both ways on are followed.
-const MOST_PICTURES = 16, BRANCHING = { moving: 2, resting: 4 };
+// Pictures of a view at rest, each through other places of its pixels; surfaces that split chains, moving and at rest.
+const MOST_PICTURES = 16, BRANCHING = [2, 4];
 const by = (id) => document.getElementById(id);
 const about = JSON.parse(by("about").textContent);
 const query = new URLSearchParams(location.search);
@@ -27,32 +27,35 @@ let isDue = true, wake = () => {}, turn = Promise.resolve();
 
 const nextFrame = () => new Promise((resolve) => requestAnimationFrame(resolve));
 const asset = (name) => files.get(name) ?? files.set(name, read(name)).get(name);
-
 const request = () => { isDue = true; state.drawn = 0; wake(); };
-
-/** Runs one thing after the other that uses the device. */
+// Runs one thing after the other that uses the device.
 const inTurn = (task) => (turn = turn.then(task, task));
 
 /** Shows another moment: its light, and what has moved. */
 async function show(moment) {
   const scene = moment ? opened(await asset(about.moments[moment]), first) : first;
+  // What is drawn meanwhile is given up.
+  request();
   await inTurn(() => eye.show(scene));
 }
 
 /** Draws coarser while something moves, and finer and finer at rest. */
 async function drawAll() {
-  let before = 0, isRefined = false;
+  let before = 0, isRefined = false, finer = 0;
   for (;;) {
-    const now = await nextFrame();
-    const moved = navigation.isMoving;
+    const now = await nextFrame(), moved = navigation.isMoving;
     if (moved) navigation.advance(Math.min((now - before) / 1000, 0.1) || 0.016);
     before = moved ? now : 0;
     if (isDue || moved) {
       isDue = false;
       await inTurn(() => drawMoving());
-      isRefined = false;
+      [isRefined, finer] = [false, state.level - 1];
     } else if (!navigation.fingers.size && !state.motion?.isPlaying && eye.count < (isRefined ? MOST_PICTURES : Infinity)) {
-      isRefined = await inTurn(() => eye.draw(view(1, 1, BRANCHING.resting), isRefined, () => isDue)) || isRefined;
+      // Slow devices show something finer first.
+      const [scale, traced] = LEVELS[Math.max(finer, 0)], isLast = finer < 1;
+      const wanted = view(scale, traced, isLast);
+      isRefined = (await inTurn(() => eye.draw(wanted, isRefined, () => isDue)) && isLast) || isRefined;
+      finer -= 1;
     } else {
       await new Promise((resolve) => { wake = resolve; });
     }
@@ -64,17 +67,18 @@ async function drawAll() {
 async function drawMoving() {
   const [scale, traced] = LEVELS[state.level];
   const began = performance.now();
-  await eye.draw(view(scale, traced, BRANCHING.moving));
+  await eye.draw(view(scale, traced, false));
   const took = performance.now() - began, isLast = state.level >= LEVELS.length - 2;
   if (eye.isFresh) return request();
   if (took > (isLast ? HOPELESS_MS : LATE_MS)) state.level = Math.min(state.level + 1, LEVELS.length - 1);
   else if (took < EARLY_MS) state.level = Math.max(state.level - 1, 0);
 }
 
-function view(scale, traced, branching) {
+function view(scale, traced, isResting) {
   const density = Math.min(devicePixelRatio, 2) * scale;
   const [width, height] = [innerWidth, innerHeight].map((side) => Math.max(Math.round(side * density), 1));
-  return { ...shown, layers: { ...shown.layers }, width, height, traced, branching, camera: navigation.camera(width / height) };
+  const [camera, branching] = [navigation.camera(width / height), BRANCHING[Number(isResting)]];
+  return { ...shown, layers: { ...shown.layers }, width, height, traced, isResting, branching, camera };
 }
 
 function expose(stops) {
@@ -177,12 +181,12 @@ async function start() {
     fields.camera.value = navigation.shown;
     request();
   });
-  Object.assign(state, { eye, navigation, level: isSoftware ? LEVELS.length - 2 : 0 });
+  Object.assign(state, { eye, navigation, level: isSoftware ? LEVELS.length - 1 : 0 });
   obey();
   await drawMoving();
-  for (const error of [await device.popErrorScope(), await device.popErrorScope()]) {
-    if (error) throw new Error(`the graphics device refused the scene (${error.message})`);
-  }
+  if (isSoftware) state.level = LEVELS.length - 2;
+  const error = (await device.popErrorScope()) ?? (await device.popErrorScope());
+  if (error) throw new Error(`the graphics device refused the scene (${error.message})`);
   document.body.className = "ready";
   await nextFrame();
   Object.assign(state, { state: "drawing", firstPicture_ms: performance.now() });

@@ -38,10 +38,11 @@ fn irradiance(layer: texture_2d<f32>, uv: vec2f, extent: vec2f) -> vec3f {
 
 @compute @workgroup_size(8, 8)
 fn summed(@builtin(global_invocation_id) id: vec3u) {
-    if any(id.xy >= vec2u(STORED)) {
+    let tile = tiles[id.z];
+    // Coarse levels cost many lookups a texel, and few of their tile's texels are ever read: those of the level, and the next.
+    if any(id.xy >= vec2u(STORED)) || any(vec2f(id.xy) > tile.extent - tile.first_texel) {
         return;
     }
-    let tile = tiles[id.z];
     let uv = (tile.first_texel + vec2f(id.xy) + 0.5) / tile.extent;
     let sum = factors.x * irradiance(caustic, uv, tile.extent)
         + factors.y * irradiance(direct, uv, tile.extent)

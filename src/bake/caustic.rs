@@ -1,6 +1,7 @@
 //! Bakes the caustic layer of all lights level by level: complete coarse maps first, then finer ones, each with its
 //! error.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::BakeCounts;
@@ -42,9 +43,6 @@ const ROUND_GAIN: f64 = 0.4;
 
 /// Maximum rounds of refinement; cells are then 2¹⁶ times smaller than the first ones.
 const MAX_ROUNDS: usize = 8;
-
-/// Lumped share of patches above which photons take over: such light looks more converged than it is.
-const MAX_LUMPED_SHARE: f64 = 0.3;
 
 /// Fraction of the time limit for this layer if indirect light is still to be gathered.
 const PART_BEFORE_INDIRECT: f64 = 0.85;
@@ -99,22 +97,13 @@ pub(super) struct LightProgress<'a> {
     /// What is kept of it between bakes.
     pub(super) state: LightState,
     pub(super) carrier: Carrier,
-    /// Last level of the other carrier, shown while its error is lower: photons traced to predict their cost, or
-    /// abandoned patches.
-    pub(super) rival: Option<LightLevel>,
     /// From coarse to fine.
     pub(super) levels: Vec<LightLevel>,
-    /// Wall-clock time of the last level of patches [s].
-    pub(super) level_s: f64,
     pub(super) rounds: Vec<Round>,
     /// Relative RMSE that the last round aims at.
     pub(super) goal: Option<f64>,
     /// Relative RMSE of this light's maps that the target of the whole bake asks for.
     pub(super) target_rmse: Option<f64>,
-    /// Number of levels, and the light's share of the error of the whole bake with that many, in the target metric.
-    pub(super) shares: Vec<(usize, f64)>,
-    /// Upper limit of that share.
-    pub(super) most_share: Option<f64>,
     pub(super) done: bool,
     /// Whether it was treated as negligible by mistake.
     pub(super) is_underrated: bool,
@@ -126,14 +115,10 @@ impl<'a> LightProgress<'a> {
             visible,
             state,
             carrier,
-            rival: None,
             levels: Vec::new(),
-            level_s: 0.0,
             rounds: Vec::new(),
             goal: None,
             target_rmse: None,
-            shares: Vec::new(),
-            most_share: None,
             done: false,
             is_underrated: false,
         }
@@ -147,26 +132,6 @@ impl<'a> LightProgress<'a> {
         };
     }
 
-    /// The level to show: the last one, or the rival while it is better.
-    pub(super) fn shown(&self) -> Option<&LightLevel> {
-        if self.is_rival_better() {
-            self.rival.as_ref()
-        } else {
-            self.levels.last()
-        }
-    }
-
-    fn is_rival_better(&self) -> bool {
-        let rmse = |level: &LightLevel| {
-            let error = level.error.as_ref();
-            error.map_or(f64::INFINITY, |error| error.estimate.relative_rmse)
-        };
-        match (self.levels.last(), &self.rival) {
-            (Some(level), Some(rival)) => rmse(rival) < rmse(level),
-            (level, _) => level.is_none(),
-        }
-    }
-
     /// Error of the last level, if known.
     pub(super) fn error(&self) -> Option<&LightError> {
         Some(&self.levels.last()?.error.as_ref()?.estimate)
@@ -177,7 +142,7 @@ impl<'a> LightProgress<'a> {
 pub(super) fn shown<'a>(lights: &'a [LightProgress]) -> Vec<CompletedLevel<'a>> {
     lights
         .iter()
-        .filter_map(|light| Some((light.visible.light, light.shown()?)))
+        .filter_map(|light| Some((light.visible.light, light.levels.last()?)))
         .collect()
 }
 
@@ -191,11 +156,9 @@ pub(super) struct BakeContext<'a> {
     /// Sizes of all maps.
     pub(super) sizes: Sizes,
     /// Mean footprints, if needed.
-    pub(super) statistics: Option<FootprintStatistics>,
-    /// Receiver queries after which the next level of patches is abandoned.
-    pub(super) most_queries: u64,
-    /// Cancellation, including the time limit.
-    pub(super) limited: &'a Control,
+    pub(super) statistics: Option<Arc<FootprintStatistics>>,
+    /// What each light may keep besides its last maps, of coarser levels and again of squares [bytes].
+    pub(super) spare_bytes: u64,
     /// Lights that are still being refined.
     pub(super) open_lights: usize,
 }
@@ -272,14 +235,18 @@ impl CausticLayer<'_> {
             role,
             sizes: Sizes::default(),
             statistics: None,
-            most_queries: u64::MAX,
-            limited: &limited,
+            spare_bytes: 0,
             open_lights: lights.len(),
         };
         self.find_sizes(&mut states.statistics, &mut lights, &mut context)?;
         context.control = &whole;
         let mut is_first = true;
         let errors = loop {
+            // Lights that are done leave their room to the others.
+            context.open_lights = lights.len();
+            let own_bytes = self.squares_bytes(&context);
+            let done = lights.iter_mut().filter(|light| light.done);
+            done.for_each(|light| light.state.fit_squares(own_bytes));
             context.open_lights = lights.iter().filter(|light| !light.done).count();
             for light in lights.iter_mut().filter(|light| !light.done) {
                 self.advance(light, &mut context)?;
@@ -312,14 +279,9 @@ impl CausticLayer<'_> {
                 showing.show(&shown(&lights), context.outcome, context.clock);
             }
         };
+        let spare_bytes = context.spare_bytes;
         outcome.stopped = self.stopped(&lights, &errors, &limited);
         for mut light in lights {
-            // The last level is shown; a rival that is worse is kept for the next bake.
-            let is_better = light.is_rival_better();
-            if let Some(rival) = light.rival.take() {
-                let index = if is_better { light.levels.len() } else { 0 };
-                light.levels.insert(index, rival);
-            }
             if let Some(level) = light.levels.last() {
                 outcome.finished.push(light.visible.light);
                 let strays = level
@@ -328,7 +290,7 @@ impl CausticLayer<'_> {
                     .map(|&receiver| self.stray(light.visible, receiver));
                 outcome.warnings.extend(strays);
             }
-            light.state.keep(light.levels, self.settings.memory_bytes);
+            light.state.keep(light.levels, spare_bytes);
             states.put(light.visible.light, light.state);
         }
         Ok(outcome)
@@ -343,9 +305,9 @@ impl CausticLayer<'_> {
             let mut state = states.take(light.light);
             let has_bumps = self.plan.is_on(Effect::Bumps);
             let spectrum = self.spectra.key(light.light);
-            let bytes = self.settings.kept_light_bytes();
+            let bytes = self.kept_light_bytes();
             state.begin(light, (has_bumps, spectrum), bytes, moving);
-            LightProgress::new(light, state, self.carrier(light))
+            LightProgress::new(light, state, self.carrier())
         };
         lights.into_iter().map(begin).collect()
     }
@@ -359,15 +321,10 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) {
         let error = errors.error();
-        // The cost of the first photons says nothing about patches.
-        let is_open = lights.iter().any(|light| {
-            let last = light.levels.last();
-            light.carrier == Carrier::Undecided && last.is_none_or(|level| level.error.is_none())
-        });
         // An unchanged error means that the level was cut off.
         let last = context.outcome.course.last();
         let is_known = last.is_some_and(|last| last.error == error);
-        if !errors.are_of_all(lights) || !error.is_finite() || is_open || is_known {
+        if !errors.are_of_all(lights) || !error.is_finite() || is_known {
             return;
         }
         let kept = lights.iter().map(|light| light.state.bytes());
@@ -389,7 +346,11 @@ impl CausticLayer<'_> {
                 };
                 !light.done && light.levels.len() < begins
             }),
-            is_by_photons: lights.iter().any(|light| light.carrier == Carrier::Photons),
+            is_by_photons: lights
+                .iter()
+                .filter_map(|light| light.levels.last()?.key.photons?.count())
+                .next()
+                .is_some(),
         };
         context.outcome.course.push(point);
         let Some(target) = self.settings.max_error else {
@@ -456,40 +417,24 @@ impl CausticLayer<'_> {
     }
 
     fn next_level(&self, light: &mut LightProgress, context: &mut BakeContext) -> Result<()> {
-        // Photons are shown before patches, which take longer.
-        if light.carrier == Carrier::Undecided && self.decide_carrier(light, context)? {
-            return Ok(());
-        }
         if light.carrier == Carrier::Photons {
             return self.advance_photons(light, context);
         }
         let unit = self.unit(light.visible)?;
         let key = self.key(light, None, context);
-        let began = Instant::now();
         let made = match light.state.take(&key) {
             Some(level) => Some(level),
             None => self.make(light, key, unit, context)?,
         };
-        light.level_s = began.elapsed().as_secs_f64();
-        context.most_queries = u64::MAX;
         let Some(mut level) = made else {
-            if light.carrier == Carrier::Undecided && !context.control.is_cancelled() {
-                light.turn_to_photons();
-            }
             return Ok(());
         };
-        if light.carrier == Carrier::Undecided && level.lumped_share > MAX_LUMPED_SHARE {
-            light.turn_to_photons();
-            light.rival = None;
-            return Ok(());
-        }
         if level.key.trace.is_negligible {
             // No better estimate is worth its cost: all of its light counts as error.
             let whole = accuracy::images(&level.maps, level.unit);
             let estimate = accuracy::by_difference(&whole, &Images::new(), 1.0, &level.energy());
             level.error = estimate.map(|estimate| KeptError {
                 predecessors: 0,
-                auditors: None,
                 estimate,
             });
             light.levels.push(level);
@@ -507,13 +452,11 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> Result<()> {
         let predecessors = light.levels.len().min(ESTIMATED_LEVELS - 1);
-        let auditors = light.rival.as_ref().and_then(|rival| rival.key.photons);
-        let is_known = |error: &KeptError| error.predecessors == predecessors && error.auditors == auditors;
+        let is_known = |error: &KeptError| error.predecessors == predecessors;
         if !level.error.as_ref().is_some_and(is_known) && !context.control.is_cancelled() {
             let estimate = self.error_of(light, &level, context)?;
             level.error = estimate.map(|estimate| KeptError {
                 predecessors,
-                auditors,
                 estimate,
             });
         }
@@ -526,7 +469,7 @@ impl CausticLayer<'_> {
         let goals = self.goals(lights, errors);
         for (light, goal) in lights.iter_mut().zip(goals).filter(|(light, _)| !light.done) {
             light.done = match goal {
-                Goal::Converged => !self.lacks_auditors(light),
+                Goal::Converged => true,
                 Goal::NextLevel => !self.has_next_level(light),
                 Goal::Refine(target) if light.carrier == Carrier::Photons => {
                     let is_good = light.error().is_some_and(|error| error.relative_rmse <= target);
@@ -539,10 +482,9 @@ impl CausticLayer<'_> {
 
     pub(super) fn has_next_level(&self, light: &LightProgress) -> bool {
         match light.carrier {
-            Carrier::Photons => {
-                let next = self.next_photons(light.visible, light.levels.last(), light.target_rmse);
-                next.is_some()
-            }
+            Carrier::Photons => self
+                .next_aim(light.visible, light.levels.last(), light.target_rmse)
+                .is_some(),
             _ => light.levels.len() < self.lattices(light.visible).len(),
         }
     }
@@ -582,11 +524,7 @@ impl CausticLayer<'_> {
                     PreviousRound { error, refined }
                 });
                 let fine = accuracy::images(&level.maps, level.unit);
-                let mut estimate =
-                    accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &energy);
-                if let (Some(estimate), Some(photons)) = (&mut estimate, &light.rival) {
-                    self.audit(light.visible, &fine, photons, estimate);
-                }
+                let estimate = accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &energy);
                 context.clock.deposit.add(watch.elapsed());
                 estimate
             }

@@ -1,10 +1,8 @@
 //! Assembles the finished maps from the levels of the lights, which are stored at unit strength.
 
 use std::collections::BTreeMap;
-use std::ops::Range;
 use std::sync::Arc;
 
-use glam::DVec2;
 use rayon::prelude::*;
 
 use super::caustic::{CausticOutcome, Stopped};
@@ -19,14 +17,11 @@ use crate::effect::EffectSwitch;
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
-use crate::illumination::lookup::bilinear;
 use crate::illumination::resolution::variance_within;
 use crate::illumination::smoothing::smooth;
-use crate::illumination::tiles::Tile;
 use crate::illumination::visible::visible_error;
 use crate::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
 use crate::light_pass::accuracy;
-use crate::light_pass::direct::DirectLayer;
 use crate::light_pass::ledger::LightLedger;
 use crate::light_pass::receiver_maps::ReceiverMap;
 use crate::optics::{LinearSrgb, luminance};
@@ -178,9 +173,20 @@ impl MapAssembler<'_> {
                 wishes.insert(receiver, wish);
             }
         }
-        let memory = MapMemory::PLAIN;
-        let caustic = memory.bytes(charts.values().map(|chart| chart.texel_count() as u64));
-        let left = self.settings.memory_bytes.saturating_sub(caustic);
+        let lights = |receiver: Receiver| {
+            levels
+                .iter()
+                .filter(move |(_, level)| level.maps.get(receiver).is_some())
+        };
+        let lights = charts
+            .keys()
+            .map(|&receiver| (receiver, lights(receiver).count() as u64));
+        let memory = &MapMemory::finished(lights.collect());
+        let texels = charts
+            .iter()
+            .map(|(&receiver, chart)| (receiver, chart.texel_count() as u64));
+        let taken = memory.bytes(texels) + self.settings.direct_bytes();
+        let left = self.settings.memory_bytes.saturating_sub(taken);
         let requested = map_size::requested(&wishes);
         let sizes = map_size::fit(&wishes, (left, memory));
         for (&receiver, size) in &sizes {
@@ -223,6 +229,7 @@ impl MapAssembler<'_> {
         let is_fixed = chart.uv_set == UvSet::Generated || self.coarsening == 0;
         if chart.layout.is_none() && is_fixed && doublings == 0 {
             return Some(DirectChart {
+                map: Arc::clone(chart),
                 own: Arc::clone(chart),
                 smaller: None,
             });
@@ -236,6 +243,7 @@ impl MapAssembler<'_> {
         let of_size = |times: u32| self.sizes.chart(chart.receiver, map_size::halved(size, times));
         let finer = times.min(doublings);
         Some(DirectChart {
+            map: Arc::clone(chart),
             own: of_size(times)?,
             smaller: (finer > 0).then(|| of_size(times - finer)).flatten(),
         })
@@ -270,28 +278,25 @@ impl MapAssembler<'_> {
 
     /// E = ΣΦ/A per texel; 0 where the texel holds no surface, except in the gutter.
     fn caustic_layer(&self, chart: &Chart, lit: &[LitMap]) -> Layer {
-        let fluxes: Vec<(FluxAccumulator, LinearSrgb)> = lit
-            .iter()
-            .map(|(light, level, map)| {
-                let mut flux = map.flux().into_owned();
-                self.smooth(chart, level, &mut flux);
-                (flux, level.strength(light) * level.unit.watts())
-            })
-            .collect();
-        let mut irradiance: Vec<[f32; 3]> = (0..chart.texel_count())
-            .into_par_iter()
-            .map(|texel| {
-                let area_m2 = chart.texel_area_m2(texel);
-                if area_m2 <= 0.0 {
-                    return [0.0; 3];
-                }
-                let sum = fluxes.iter().fold(LinearSrgb::BLACK, |sum, (flux, scale)| {
-                    let counts = flux.texels()[texel].map(|count| count as f64);
-                    sum + LinearSrgb::from(counts) * *scale
-                });
-                (sum / area_m2).to_array().map(single)
-            })
-            .collect();
+        let mut sums = vec![LinearSrgb::BLACK; chart.texel_count()];
+        for (light, level, map) in lit {
+            let mut flux = map.flux().into_owned();
+            self.smooth(chart, level, &mut flux);
+            let scale = level.strength(light) * level.unit.watts();
+            let texels = sums.par_iter_mut().zip(flux.texels());
+            texels.for_each(|(sum, counts)| {
+                *sum += LinearSrgb::from(counts.map(|count| count as f64)) * scale;
+            });
+        }
+        let mean = |(texel, sum): (usize, &LinearSrgb)| {
+            let area_m2 = chart.texel_area_m2(texel);
+            if area_m2 > 0.0 {
+                (*sum / area_m2).to_array().map(single)
+            } else {
+                [0.0; 3]
+            }
+        };
+        let mut irradiance: Vec<[f32; 3]> = sums.par_iter().enumerate().map(mean).collect();
         fill_gutter(chart, &mut irradiance);
         Layer {
             kind: LayerKind::Caustic,
@@ -334,7 +339,7 @@ impl MapAssembler<'_> {
             if self.plan.is_on(Effect::Direct) {
                 let lights = 0..self.scene.lights.len();
                 layers.extend(lights.filter_map(|light| {
-                    let irradiance = self.direct_of(chart, direct, light..light + 1)?;
+                    let irradiance = direct.of_light(light, &self.direct_chart(chart)?, self.scene)?;
                     let kind = LayerKind::Direct;
                     Some(part(light, Layer { kind, irradiance }))
                 }));
@@ -344,44 +349,15 @@ impl MapAssembler<'_> {
     }
 
     pub(super) fn direct_layer(&self, chart: &Arc<Chart>, direct: &DirectCache) -> Option<Layer> {
-        let lights = 0..self.scene.lights.len();
         Some(Layer {
             kind: LayerKind::Direct,
-            irradiance: direct.together(chart, || self.direct_of(chart, direct, lights))?,
-        })
-    }
-
-    /// Direct light of some lights [W/m²]; `None` if the layer of one is missing.
-    fn direct_of(
-        &self,
-        chart: &Arc<Chart>,
-        direct: &DirectCache,
-        lights: Range<usize>,
-    ) -> Option<Vec<[f32; 3]>> {
-        let baked_on = self.direct_chart(chart)?;
-        let own = &*baked_on.own;
-        let mut sums = vec![LinearSrgb::BLACK; own.texel_count()];
-        let mut lit = Vec::new();
-        for light in lights {
-            let strength = self.scene.lights[light].strength();
-            let layer = direct.layer(light, &baked_on)?;
-            for (sum, unit) in sums.iter_mut().zip(&layer.irradiance) {
-                *sum += LinearSrgb::from(unit.map(f64::from)) * strength;
-            }
-            lit.push((layer, strength));
-        }
-        let irradiance: Vec<[f32; 3]> = sums.iter().map(|sum| sum.to_array().map(single)).collect();
-        let is_other = chart.layout.is_some() || own.texel_count() < chart.texel_count();
-        Some(if is_other {
-            Resampled { chart, own, lit }.of(&irradiance)
-        } else {
-            irradiance
+            irradiance: direct.together(&self.direct_chart(chart)?, &self.scene.lights)?,
         })
     }
 }
 
 /// Converts to the precision of maps, clamped to `f32::MAX`; [`beyond_single`] reports clamped texels.
-fn single(value: f64) -> f32 {
+pub(super) fn single(value: f64) -> f32 {
     value.min(f64::from(f32::MAX)) as f32
 }
 
@@ -402,81 +378,6 @@ fn beyond_single(maps: &[IlluminationMap]) -> Option<Warning> {
             "make the lights weaker",
         )
     })
-}
-
-/// Direct light on a map whose texels differ from those it was baked on.
-struct Resampled<'a> {
-    chart: &'a Chart,
-    /// The chart that it was baked on.
-    own: &'a Chart,
-    /// Each light's layer at unit strength, and the strength.
-    lit: Vec<(&'a DirectLayer, LinearSrgb)>,
-}
-
-impl Resampled<'_> {
-    /// Values of the sum of all lights at texel centres; means where texels are larger than those of `own`.
-    fn of(&self, sum: &[[f32; 3]]) -> Vec<[f32; 3]> {
-        let value = |corner: [usize; 2], side: f64| self.value(sum, corner, side).to_array().map(single);
-        let Some(layout) = &self.chart.layout else {
-            let across = self.chart.width;
-            let texels = (0..self.chart.texel_count()).into_par_iter();
-            return texels
-                .map(|texel| value([texel % across, texel / across], 1.0))
-                .collect();
-        };
-        let of_tile = |tile: usize| {
-            let Tile {
-                level, origin, size, ..
-            } = layout.tile(tile);
-            let corner = move |texel: usize| {
-                [
-                    origin.0 + ((texel % size.0) << level),
-                    origin.1 + ((texel / size.0) << level),
-                ]
-            };
-            (0..size.0 * size.1).map(move |texel| value(corner(texel), f64::from(1_u32 << level)))
-        };
-        let tiles = (0..layout.tile_count()).into_par_iter();
-        tiles.flat_map_iter(of_tile).collect()
-    }
-
-    /// Value of one texel, given by its corner and side in texels of the finest size.
-    fn value(&self, sum: &[[f32; 3]], corner: [usize; 2], side: f64) -> LinearSrgb {
-        let size = DVec2::new(self.chart.width as f64, self.chart.height as f64);
-        let own_size = DVec2::new(self.own.width as f64, self.own.height as f64);
-        let low = DVec2::new(corner[0] as f64, corner[1] as f64);
-        if let Some(value) = self.divided((low + 0.5 * side) / size, side / size.x) {
-            return value;
-        }
-        let times = (DVec2::splat(side) * own_size / size).ceil().max(DVec2::ONE);
-        let mut mean = LinearSrgb::BLACK;
-        for row in 0..times.y as usize {
-            for column in 0..times.x as usize {
-                let part = (DVec2::new(column as f64, row as f64) + 0.5) / times;
-                mean += bilinear(sum, self.own.width, self.own.height, (low + part * side) / size);
-            }
-        }
-        mean / (times.x * times.y)
-    }
-
-    /// Sum of all lights where one of them was subdivided at a shadow border, for texels as small as its subdivision.
-    /// `width` is relative to that of the map.
-    fn divided(&self, uv: DVec2, width: f64) -> Option<LinearSrgb> {
-        let divided = |layer: &DirectLayer| {
-            let divided = layer.divided.as_ref()?;
-            let smallest = 1.0 / (self.own.width * divided.side()) as f64;
-            (width < 1.5 * smallest).then(|| divided.at(uv)).flatten()
-        };
-        let mut sum = LinearSrgb::BLACK;
-        let mut is_divided = false;
-        for (layer, strength) in &self.lit {
-            let small = divided(layer);
-            is_divided |= small.is_some();
-            let whole = || bilinear(&layer.irradiance, self.own.width, self.own.height, uv);
-            sum += small.unwrap_or_else(whole) * *strength;
-        }
-        is_divided.then_some(sum)
-    }
 }
 
 /// The error including detail lost in texels that are larger than requested.
@@ -522,7 +423,7 @@ fn error_of(chart: &Chart, lit: &[LitMap]) -> Option<Vec<f32>> {
         let strength = light.strength().luminance();
         let error = &level.error.as_ref()?.estimate;
         for (square, texel) in squares.iter_mut().zip(&error.maps.get(&chart.receiver)?.texels) {
-            *square += (texel * strength) * (texel * strength);
+            *square += (f64::from(*texel) * strength).powi(2);
         }
     }
     let root = |square: &f64| single(square.sqrt());

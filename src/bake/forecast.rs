@@ -24,7 +24,7 @@ pub struct CostPoint {
     pub error: f64,
     /// Whether the lattice that refinement starts from is still to come; no bake ends before it.
     pub is_coarse: bool,
-    /// Whether photons carry some light; they then dominate the cost.
+    /// Whether photons carry some light without bundles; they then dominate the cost.
     #[serde(default)]
     pub is_by_photons: bool,
 }

@@ -123,7 +123,7 @@ impl CausticLayer<'_> {
             return self.errors_by_rmse(lights);
         };
         let of = |(index, light): (usize, &LightProgress)| {
-            let level = light.shown()?;
+            let level = light.levels.last()?;
             let error = &level.error.as_ref()?.estimate;
             let strength = level.strength(&self.tracer.scene().lights[light.visible.light]);
             Some(ErrorOfLight {
@@ -141,7 +141,7 @@ impl CausticLayer<'_> {
     fn errors_by_rmse(&self, lights: &[LightProgress]) -> Errors {
         let (mut areas_m2, mut all_w) = (BTreeMap::new(), 0.0);
         let of = |(index, light): (usize, &LightProgress)| {
-            let level = light.shown()?;
+            let level = light.levels.last()?;
             let strength = level.strength(&self.tracer.scene().lights[light.visible.light]);
             let flux_w = level.ledger.watts(Account::Deposited, level.unit, strength);
             // Lights without a known error count in the total, too.
@@ -172,7 +172,7 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// The next goal of each light. Also updates its target and its shares of the error.
+    /// The next goal of each light. Also updates its target.
     pub(super) fn goals(&self, lights: &mut [LightProgress], errors: &Errors) -> Vec<Goal> {
         let has_ladder = |light: &LightProgress| {
             light.carrier != Carrier::Photons && light.levels.len() < self.lattices(light.visible).len()
@@ -199,15 +199,8 @@ impl CausticLayer<'_> {
         } in &errors.lights
         {
             let light = &mut lights[index];
-            let count = light.levels.len();
-            light.shares.retain(|(levels, _)| *levels < count);
-            light.shares.push((count, share));
-            light.most_share = level.is_finite().then_some(level);
             light.target_rmse = (share > 0.0 && level.is_finite()).then(|| relative_rmse * level / share);
-            goals[index] = if level.is_infinite() && all_known && light.carrier == Carrier::Undecided {
-                // Its first photons suffice.
-                Goal::Converged
-            } else if has_ladder(light) {
+            goals[index] = if has_ladder(light) {
                 let is_negligible = all_known && has_others && share < NEGLIGIBLE * level;
                 if is_negligible && level.is_finite() {
                     Goal::Converged

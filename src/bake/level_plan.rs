@@ -1,9 +1,11 @@
 //! The sequence of lattices and map sizes that a bake runs through.
 
+use std::sync::Arc;
+
 use glam::DVec2;
 
 use super::caustic::{BakeContext, CausticLayer, ESTIMATED_LEVELS, LightProgress};
-use super::light_level::{LevelKey, StatisticsKey, TraceKey};
+use super::light_level::{LevelKey, PhotonAim, StatisticsKey, TraceKey};
 use super::splat_level::LEVEL_STRIDES;
 use crate::error::{Error, Result};
 use crate::illumination::accumulator::FluxUnit;
@@ -84,7 +86,12 @@ impl CausticLayer<'_> {
     }
 
     /// Everything that a level depends on.
-    pub(super) fn key(&self, light: &LightProgress, photons: Option<u32>, context: &BakeContext) -> LevelKey {
+    pub(super) fn key(
+        &self,
+        light: &LightProgress,
+        photons: Option<PhotonAim>,
+        context: &BakeContext,
+    ) -> LevelKey {
         let lattices = self.lattices(light.visible);
         // Photons are not refined.
         let (step, rounds, goal, is_underrated) = match photons {
@@ -234,7 +241,7 @@ impl CausticLayer<'_> {
     /// Finds the sizes of all maps. Measures mean footprints at the settings' density on a thinner lattice, if needed.
     pub(super) fn find_sizes(
         &self,
-        known: &mut Option<(StatisticsKey, FootprintStatistics)>,
+        known: &mut Option<(StatisticsKey, Arc<FootprintStatistics>)>,
         lights: &mut [LightProgress],
         context: &mut BakeContext,
     ) -> Result<()> {
@@ -248,7 +255,7 @@ impl CausticLayer<'_> {
                 let mut statistics = FootprintStatistics::default();
                 for light in lights {
                     let unit = self.unit(light.visible)?;
-                    statistics.merge(&self.noting(light, |layer, light| {
+                    statistics.add_light(&self.noting(light, |layer, light| {
                         match self.settings.estimator.refines() {
                             true => layer.wavefront_statistics(light, unit, context),
                             false => layer.splat_statistics(light, unit, context),
@@ -257,11 +264,13 @@ impl CausticLayer<'_> {
                 }
                 // A cancelled run has seen only a part.
                 let complete = !context.control.is_cancelled();
-                *known = complete.then_some((key, statistics));
+                *known = complete.then(|| (key, Arc::new(statistics)));
             }
         }
-        context.statistics = known.as_ref().map(|(_, statistics)| statistics.clone());
-        (context.sizes, context.outcome.warnings) = self.map_sizes(context.statistics.as_ref());
+        context.statistics = known.as_ref().map(|(_, statistics)| Arc::clone(statistics));
+        let statistics = context.statistics.as_deref();
+        (context.sizes, context.outcome.warnings) = self.map_sizes(statistics);
+        context.spare_bytes = self.spare_bytes(&context.sizes, statistics);
         Ok(())
     }
 

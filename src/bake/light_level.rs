@@ -9,11 +9,12 @@ use super::map_size::Sizes;
 use super::spectra::SpectralKey;
 use crate::geometry::enclosure::Bounds;
 use crate::illumination::Receiver;
-use crate::illumination::accumulator::{FluxCount, FluxUnit};
+use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::ledger::{CarriedFlux, EnergyLedger};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::light_pass::photon::residual::LightSquares;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::splat::arrival_cache::ArrivalCache;
 use crate::light_pass::visibility::VisibleLight;
@@ -65,8 +66,27 @@ pub(super) struct LevelKey {
     pub(super) kernels: BakeSettings,
     /// Only every `stride`-th ray across and down is traced (splats).
     pub(super) stride: usize,
-    /// Photons in each half; `None` for other carriers.
-    pub(super) photons: Option<u32>,
+    /// What photons aim at; `None` for other carriers.
+    pub(super) photons: Option<PhotonAim>,
+}
+
+/// What a level of photons aims at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum PhotonAim {
+    /// So many photons in each half, and no bundles.
+    Count(u32),
+    /// A relative RMSE, by bundles and residual photons.
+    Goal(f64),
+}
+
+impl PhotonAim {
+    /// Photons in each half, if that is the aim.
+    pub(super) fn count(self) -> Option<u32> {
+        match self {
+            Self::Count(photons) => Some(photons),
+            Self::Goal(_) => None,
+        }
+    }
 }
 
 /// Levels that are kept whatever their size, because an error estimate needs them.
@@ -93,6 +113,8 @@ pub(super) struct LightLevel {
     pub(super) overshoots: Vec<PatchOvershoot>,
     /// Squared difference between the half sets of splats, by receiver.
     pub(super) noise: Option<Noise>,
+    /// Relative RMSE that bundles and residual photons aimed at; 0 for other carriers.
+    pub(super) goal: f64,
     /// `None` if there are too few levels before it, or no light arrived.
     pub(super) error: Option<KeptError>,
     /// Sums that the next level adds to; only the last level of a light by photons has them.
@@ -100,8 +122,6 @@ pub(super) struct LightLevel {
     /// Work of the level if nothing were cached: cells of patches and receiver queries, or closest-hit queries of
     /// photons and 0.
     pub(super) work: (u64, u64),
-    /// Share of the patches' flux that concentrates a part of the spectrum in one place.
-    pub(super) lumped_share: f64,
     /// Paths that can be deposited again; `None` if they were too large to keep.
     pub(super) traced: Option<TracedLight>,
     /// Whether the maps include the light's colour.
@@ -130,8 +150,6 @@ impl PhotonSums {
 pub(super) struct KeptError {
     /// Number of coarser levels that it is based on.
     pub(super) predecessors: usize,
-    /// Photons in each half that audited the patches.
-    pub(super) auditors: Option<u32>,
     pub(super) estimate: LightError,
 }
 
@@ -140,7 +158,7 @@ pub(super) struct KeptError {
 pub(super) struct LightStates {
     by_light: BTreeMap<usize, LightState>,
     /// Mean footprints that set the sizes of maps, and what they depend on.
-    pub(super) statistics: Option<(StatisticsKey, FootprintStatistics)>,
+    pub(super) statistics: Option<(StatisticsKey, Arc<FootprintStatistics>)>,
 }
 
 impl LightStates {
@@ -194,6 +212,10 @@ pub(super) struct LightState {
     pub(super) levels: Vec<LightLevel>,
     /// Wall-clock time per photon of each half in the last level of photons [s].
     pub(super) photon_s: Option<f64>,
+    /// Squares of its launch domain, and what they depend on.
+    pub(super) squares: Option<(TraceKey, Sizes, LightSquares)>,
+    /// Wall-clock time of the last level with a goal [s].
+    pub(super) goal_s: Option<f64>,
     /// Arrivals that splats were made of.
     pub(super) arrivals: Option<(TraceKey, ArrivalCache)>,
 }
@@ -255,9 +277,9 @@ impl LightLevel {
         let all = std::iter::once(&self.maps)
             .chain(self.bands.iter().map(|band| &band.maps))
             .chain(halves.flat_map(BandMaps::sets));
-        let maps = all.flat_map(ReceiverMaps::iter);
-        let texels = maps.map(|(_, map)| map.chart.texel_count() as u64);
-        texels.sum::<u64>() * size_of::<FluxCount>() as u64
+        let error = self.error.iter().flat_map(|error| error.estimate.maps.values());
+        all.map(ReceiverMaps::bytes).sum::<u64>()
+            + error.map(|map| 4 * map.texels.len() as u64).sum::<u64>()
             + self.traced.as_ref().map_or(0, TracedLight::bytes)
     }
 }
@@ -268,6 +290,7 @@ impl LightState {
         self.rays.bytes()
             + self.levels.iter().map(LightLevel::bytes).sum::<u64>()
             + self.arrivals.as_ref().map_or(0, |(_, arrivals)| arrivals.bytes())
+            + self.squares.as_ref().map_or(0, |(.., squares)| squares.bytes())
     }
 
     /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes. From then on their ways
@@ -316,7 +339,13 @@ impl LightState {
     /// Drops maps whose paths changed. Rays stay, as their cache knows which of them are valid.
     pub(super) fn forget_maps(&mut self) {
         self.levels.clear();
+        self.squares = None;
         self.arrivals = None;
+    }
+
+    /// Drops squares that take more than so many bytes. They are made anew when needed, without what photons found.
+    pub(super) fn fit_squares(&mut self, most_bytes: u64) {
+        self.squares.take_if(|(.., squares)| squares.bytes() > most_bytes);
     }
 
     /// Removes and returns the level with a key, if there is one.
@@ -333,17 +362,26 @@ impl LightState {
             .and_then(|level| level.traced.take())
     }
 
-    /// Keeps the levels of a bake for the next one, coarse ones only as memory allows.
-    pub(super) fn keep(&mut self, levels: Vec<LightLevel>, memory_bytes: u64) {
+    /// Keeps the levels of a bake for the next one.
+    pub(super) fn keep(&mut self, levels: Vec<LightLevel>, spare_bytes: u64) {
         self.levels = levels;
-        drop_coarse(&mut self.levels, LEVELS_TO_KEEP, memory_bytes / 2);
+        drop_coarse(&mut self.levels, LEVELS_TO_KEEP, spare_bytes);
     }
 }
 
-/// Drops the coarsest levels while all together take more than `most_bytes`, but keeps `least` of them.
-pub(super) fn drop_coarse(levels: &mut Vec<LightLevel>, least: usize, most_bytes: u64) {
-    let mut bytes: u64 = levels.iter().map(LightLevel::bytes).sum();
-    while bytes > most_bytes && levels.len() > least {
-        bytes -= levels.remove(0).bytes();
-    }
+/// Drops the coarsest levels while all but the last `least` take more than `spare_bytes`.
+pub(super) fn drop_coarse(levels: &mut Vec<LightLevel>, least: usize, spare_bytes: u64) {
+    let coarse = levels.len().saturating_sub(least);
+    let mut bytes: u64 = levels[..coarse].iter().map(LightLevel::bytes).sum();
+    let is_dropped = |level: &LightLevel| {
+        let is_over = bytes > spare_bytes;
+        bytes -= level.bytes();
+        is_over
+    };
+    let dropped = levels[..coarse]
+        .iter()
+        .map(is_dropped)
+        .take_while(|is_over| *is_over);
+    let dropped = dropped.count();
+    levels.drain(..dropped);
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::caustic::CausticLayer;
+use super::caustic::{BakeContext, CausticLayer};
 use super::map_size::{self, MapSize, SizeRequest, Sizes};
 use super::sizes::{LARGEST_AUTOMATIC_SIDE, LARGEST_TILED_SIDE, MapMemory};
 use crate::error::Warning;
@@ -11,7 +11,7 @@ use crate::illumination::tiles::COARSEST;
 use crate::illumination::{Chart, Receiver};
 use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::plan::Effect;
-use crate::settings::MapResolution;
+use crate::settings::{Estimator, MapResolution};
 
 impl CausticLayer<'_> {
     /// Whether maps of the requested fixed size fit into memory whatever is lit; true for automatic sizes.
@@ -21,18 +21,55 @@ impl CausticLayer<'_> {
         };
         let scene = self.tracer.scene();
         let is_receiver = |&object: &usize| scene.material_of(object).surface.is_receiver();
-        // Both sides of each object.
-        let receivers = 2 * (0..scene.objects.len()).filter(is_receiver).count();
-        let (limit, memory) = self.map_memory();
-        memory.bytes(std::iter::repeat_n(width as u64 * height as u64, receivers)) <= limit
+        let receivers = Receiver::all(scene.objects.len()).filter(|receiver| is_receiver(&receiver.object()));
+        let (limit, memory) = self.map_memory(None);
+        memory.bytes(receivers.map(|receiver| (receiver, width as u64 * height as u64))) <= limit
     }
 
-    /// Memory limit of all maps [bytes], and the memory that they need.
-    fn map_memory(&self) -> (u64, MapMemory) {
+    /// Memory limit of all maps [bytes], and the memory that they need. All lights reach all receivers, unless a coarse
+    /// run tells which.
+    fn map_memory(&self, statistics: Option<&FootprintStatistics>) -> (u64, MapMemory) {
+        let settings = self.settings;
+        let lights = statistics.map_or_else(
+            || {
+                let all = Receiver::all(self.tracer.scene().objects.len());
+                let lights = self.lit().count() as u64;
+                all.map(|receiver| (receiver, lights)).collect()
+            },
+            |statistics| statistics.lights().clone(),
+        );
+        let keeps_photons = self.lit().any(|light| !self.has_bundles(light));
+        let direct = if self.plan.is_on(Effect::Direct) {
+            settings.direct_bytes()
+        } else {
+            0
+        };
+        // Squares of lights that are done, and of the others.
+        let squares = match settings.estimator {
+            Estimator::Auto => 2 * settings.squares_bytes(),
+            Estimator::Photon | Estimator::Wavefront | Estimator::Splat => 0,
+        };
         (
-            self.settings.map_memory_bytes(),
-            MapMemory::with(self.settings.estimator),
+            settings.map_memory_bytes().saturating_sub(direct + squares),
+            MapMemory::with(settings.estimator, keeps_photons, lights),
         )
+    }
+
+    /// What each light may keep besides its last maps, of coarser levels and again of squares: half of what the maps
+    /// leave of the memory limit [bytes].
+    pub(super) fn spare_bytes(&self, sizes: &Sizes, statistics: Option<&FootprintStatistics>) -> u64 {
+        let (limit, memory) = self.map_memory(statistics);
+        limit.saturating_sub(memory.of_sizes(sizes)) / (2 * self.lit().count().max(1)) as u64
+    }
+
+    /// What the squares of a light may take while it is refined [bytes].
+    pub(super) fn squares_bytes(&self, context: &BakeContext) -> u64 {
+        context.spare_bytes + self.settings.squares_bytes() / context.open_lights.max(1) as u64
+    }
+
+    /// What each light may keep for the next bake [bytes].
+    pub(super) fn kept_light_bytes(&self) -> u64 {
+        self.settings.kept_light_bytes() / self.lit().count().max(1) as u64
     }
 
     /// Sizes of the maps that the coarse run found lit, and warnings about them.
@@ -56,9 +93,9 @@ impl CausticLayer<'_> {
             wish.map(|wish| (receiver, wish))
         };
         let wishes: BTreeMap<Receiver, SizeRequest> = receivers.filter_map(wish).collect();
-        let (limit, memory) = self.map_memory();
+        let (limit, memory) = self.map_memory(statistics);
         let requested = map_size::requested(&wishes);
-        let mut sizes = map_size::fit(&wishes, (limit, memory));
+        let mut sizes = map_size::fit(&wishes, (limit, &memory));
         let is_scarce = sizes != requested;
         if let (MapResolution::Fixed { width, height }, false) = (self.settings.map_resolution, is_scarce) {
             // Maps that only the full lattice lights.
@@ -67,7 +104,7 @@ impl CausticLayer<'_> {
             }
         }
         let warnings = if is_scarce {
-            vec![memory_warning(&requested, &sizes, self.map_memory())]
+            vec![memory_warning(&requested, &sizes, (limit, &memory))]
         } else if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, statistics) {
             self.coarse_maps(&sizes, statistics)
         } else {
@@ -203,17 +240,22 @@ pub(super) const MEMORY: &str = "--memory";
 pub(super) fn memory_warning(
     requested: &Sizes,
     granted: &Sizes,
-    (limit, memory): (u64, MapMemory),
+    (limit, memory): (u64, &MapMemory),
 ) -> Warning {
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-    let taken = |sizes: &Sizes| mebibytes(memory.bytes(sizes.values().map(MapSize::texels)));
+    let taken = memory.of_sizes(granted);
     Warning::new(
         MEMORY,
         format!(
-            "the maps need {:.1} MiB, the limit is {:.1} MiB: they were made coarser and take {:.1} MiB",
-            taken(requested),
+            "the maps need {:.1} MiB, the limit is {:.1} MiB: they were made {} {:.1} MiB",
+            mebibytes(memory.of_sizes(requested)),
             mebibytes(limit),
-            taken(granted),
+            if taken <= limit {
+                "coarser and take"
+            } else {
+                "as coarse as can be and still take"
+            },
+            mebibytes(taken),
         ),
         "allow more --memory, or ask for a smaller --map-resolution",
     )

@@ -254,8 +254,8 @@ fn granted(wishes: &BTreeMap<Receiver, SizeRequest>, sparing: MemoryReduction) -
 }
 
 /// Sizes of all maps within a memory limit [bytes]: as requested, or as little coarser as possible.
-pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u64, MapMemory)) -> Sizes {
-    let fits = |sizes: &Sizes| memory.bytes(sizes.values().map(MapSize::texels)) <= limit;
+pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u64, &MapMemory)) -> Sizes {
+    let fits = |sizes: &Sizes| memory.of_sizes(sizes) <= limit;
     let requested = requested(wishes);
     if fits(&requested) {
         return requested;

@@ -136,7 +136,7 @@ impl Counts {
         };
         let texels = counts.iter().zip(&map.texels).zip(&image.luminance);
         texels
-            .map(|((count, error), e)| count * (error * error + (truncated * e).powi(2)))
+            .map(|((count, error), e)| count * (f64::from(*error).powi(2) + (truncated * e).powi(2)))
             .collect()
     }
 }

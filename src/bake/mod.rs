@@ -2,6 +2,7 @@
 
 mod band_layers;
 mod band_maps;
+mod bundle_level;
 mod carrier;
 mod caustic;
 mod clock;
@@ -382,7 +383,7 @@ impl Baker {
             plan,
             coarsening: 0,
         };
-        self.direct.begin();
+        self.direct.begin(settings);
         let mut lamps = DirectWork::default();
         if plan.is_on(Effect::Direct) {
             lamps.look_for_borders(tracer, &self.sizes, settings, control);

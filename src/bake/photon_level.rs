@@ -3,13 +3,15 @@
 use std::borrow::Cow;
 use std::time::Instant;
 
+use super::band_maps::BandMaps;
+use super::bundle_level::BundleLevel;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonSums, drop_coarse};
+use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::accuracy::{self, Images, LightError};
+use crate::light_pass::accuracy;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::ProgressScope;
 use crate::light_pass::photon::filter;
@@ -33,9 +35,6 @@ const MAX_WITHOUT_ERROR: u32 = 1 << 20;
 /// Minimum and maximum growth from level to level.
 pub(super) const GROWTH: (f64, f64) = (1.5, 8.0);
 
-/// Exponent of the squared error with which photons grow where bundles become finer with their number.
-const POWER_WITH_BUNDLES: f64 = 0.8;
-
 /// Margin over the photons that the target should need, so that a near miss does not cost another level.
 const MARGIN: f64 = 1.1;
 
@@ -46,24 +45,29 @@ const MIN_NOISE: f64 = 0.7;
 const MEAN_MARGIN: f64 = 4.0;
 
 /// Fraction of the remaining time that a level may take, as predicted from the level before.
-const PART_OF_TIME: f64 = 0.85;
-
-/// The same where bundles add to the cost.
-const PART_OF_TIME_WITH_BUNDLES: f64 = 0.5;
+pub(super) const PART_OF_TIME: f64 = 0.85;
 
 /// Minimum growth that is worth another level.
 const MIN_GROWTH: f64 = 1.2;
 
-/// Limits the photons of a level to what `part` of the remaining time allows, because an interrupted level is lost. The
+/// Limits the photons of a level to what the remaining time allows, because an interrupted level is lost. The
 /// first level is not limited.
-fn in_time(photons: u32, before: u32, part: f64, state: &LightState, context: &BakeContext) -> u32 {
+fn in_time(photons: u32, before: u32, state: &LightState, context: &BakeContext) -> u32 {
     let (1.., Some(left_s), Some(photon_s)) = (before, context.control.time_left_s(), state.photon_s) else {
         return photons;
     };
-    let own_s = part * left_s / context.open_lights as f64;
+    let own_s = PART_OF_TIME * left_s / context.open_lights as f64;
     let affordable = f64::from(before) + own_s / photon_s;
     let least = MIN_GROWTH * f64::from(before);
     (affordable.max(least) as u32).min(photons)
+}
+
+/// What a level consists of.
+#[derive(Clone, Copy)]
+pub(super) struct Layers<'a> {
+    /// Light that bundles carry.
+    pub(super) bundles: Option<&'a ReceiverMaps>,
+    pub(super) photons: &'a PhotonSums,
 }
 
 impl CausticLayer<'_> {
@@ -74,7 +78,7 @@ impl CausticLayer<'_> {
         last: Option<&LightLevel>,
         target_rmse: Option<f64>,
     ) -> Option<u32> {
-        let before = last.and_then(|level| level.key.photons);
+        let before = last.and_then(|level| level.key.photons?.count());
         let Some(target) = self.settings.max_error else {
             let wanted = self.photons_at_density(light);
             return match before {
@@ -99,12 +103,7 @@ impl CausticLayer<'_> {
                 if noise2 <= wanted2 {
                     return None;
                 }
-                let power = if self.has_bundles(light) {
-                    POWER_WITH_BUNDLES
-                } else {
-                    1.0
-                };
-                (MARGIN * (noise2 / wanted2).powf(power)).clamp(GROWTH.0, GROWTH.1)
+                (MARGIN * noise2 / wanted2).clamp(GROWTH.0, GROWTH.1)
             }
             None if before >= MAX_WITHOUT_ERROR => return None,
             None => GROWTH.1,
@@ -126,14 +125,24 @@ impl CausticLayer<'_> {
             .clamp(1.0, f64::from(MAX_PHOTONS)) as u32
     }
 
-    /// Whether photons of the light may form bundles.
-    fn has_bundles(&self, light: &VisibleLight) -> bool {
-        let spectrum = self.spectra.photons(light.light);
-        let is_smooth = spectrum.is_none_or(|spectrum| spectrum.tracers().is_some());
-        is_smooth && self.rough_object(light).is_none()
+    /// What the next level of a light aims at, towards a relative RMSE; `None` if nothing is left to do.
+    pub(super) fn next_aim(
+        &self,
+        light: &VisibleLight,
+        last: Option<&LightLevel>,
+        target_rmse: Option<f64>,
+    ) -> Option<PhotonAim> {
+        let is_left_to_photons = matches!(last.and_then(|last| last.key.photons), Some(PhotonAim::Count(_)));
+        match self.settings.max_error {
+            Some(target) if !is_left_to_photons && self.has_bundles(light) => {
+                let goal = self.next_goal(last, target_rmse.unwrap_or(target));
+                goal.map(PhotonAim::Goal)
+            }
+            _ => self.next_photons(light, last, target_rmse).map(PhotonAim::Count),
+        }
     }
 
-    fn with_launch<T>(&self, light: &VisibleLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
+    pub(super) fn with_launch<T>(&self, light: &VisibleLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
         let source = self.tracer.scene().lights[light.light].of_unit_strength();
         if self.has_places(light) {
             let spheres = light.spheres(self.tracer, &source);
@@ -163,7 +172,7 @@ impl CausticLayer<'_> {
         light.done |= !light.is_underrated && made.is_some() && self.is_negligible(light.visible);
         light.levels.extend(last.into_iter().chain(made));
         // Only the last level is needed, but the next bake reaches it sooner with all of them.
-        drop_coarse(&mut light.levels, 1, self.settings.memory_bytes / 8);
+        drop_coarse(&mut light.levels, 1, context.spare_bytes);
         Ok(())
     }
 
@@ -179,17 +188,23 @@ impl CausticLayer<'_> {
         target_rmse: Option<f64>,
         context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
-        let Some(photons) = self.next_photons(light.visible, last.as_deref(), target_rmse) else {
+        let Some(aim) = self.next_aim(light.visible, last.as_deref(), target_rmse) else {
             return Ok(None);
         };
-        let before = last.as_ref().and_then(|last| last.key.photons).unwrap_or(0);
-        let part = if self.has_bundles(light.visible) {
-            PART_OF_TIME_WITH_BUNDLES
-        } else {
-            PART_OF_TIME
+        let photons = match aim {
+            PhotonAim::Goal(goal) => match self.next_bundles(light, last.as_deref(), goal, context)? {
+                BundleLevel::Made(level) => return Ok(Some(*level)),
+                BundleLevel::Stopped => return Ok(None),
+                BundleLevel::LeftToPhotons => FIRST_PHOTONS,
+            },
+            PhotonAim::Count(photons) => photons,
         };
-        let photons = in_time(photons, before, part, &light.state, context);
-        let key = self.key(light, Some(photons), context);
+        let before = last
+            .as_ref()
+            .and_then(|last| last.key.photons?.count())
+            .unwrap_or(0);
+        let photons = in_time(photons, before, &light.state, context);
+        let key = self.key(light, Some(PhotonAim::Count(photons)), context);
         match light.state.take(&key) {
             Some(level) => Ok(Some(level)),
             None => {
@@ -211,10 +226,13 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         let unit = self.photon_unit(light)?;
-        let photons = key.photons.unwrap_or(FIRST_PHOTONS);
+        let photons = key.photons.and_then(PhotonAim::count).unwrap_or(FIRST_PHOTONS);
         let alike = |level: &&mut LightLevel| level.key.trace == key.trace && level.key.sizes == key.sizes;
         let earlier = before.filter(|level| alike(level) && level.photons.is_some());
-        let first = earlier.as_ref().and_then(|level| level.key.photons).unwrap_or(0);
+        let first = earlier
+            .as_ref()
+            .and_then(|level| level.key.photons?.count())
+            .unwrap_or(0);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
         let spectrum = self.spectra.photons(light.light);
@@ -239,7 +257,6 @@ impl CausticLayer<'_> {
                 let pass = PhotonPass {
                     launch,
                     rules,
-                    has_bundles: self.has_bundles(light),
                     chart_for: &chart_for,
                 };
                 pass.run(first..photons, share, &mut halves, &listener)
@@ -279,76 +296,89 @@ impl CausticLayer<'_> {
         raw: PhotonSums,
         is_shard: bool,
     ) -> LightLevel {
-        let mut ledger = raw.ledger;
+        let level = self.level_of_layers(
+            light,
+            (key, unit),
+            Layers {
+                bundles: None,
+                photons: &raw,
+            },
+            0.0,
+        );
+        LightLevel {
+            error: level.error.filter(|_| !is_shard),
+            photons: Some(raw),
+            ..level
+        }
+    }
+
+    /// A level from its bundles and the photons of both halves. `bundle_square`: squared relative error of bundles that
+    /// photons do not correct.
+    pub(super) fn level_of_layers(
+        &self,
+        light: &VisibleLight,
+        (key, unit): (LevelKey, FluxUnit),
+        layers: Layers,
+        bundle_square: f64,
+    ) -> LightLevel {
+        let mut ledger = layers.photons.ledger;
         self.spectra
             .to_linear_srgb(light.light, &mut self.no_maps(), &mut ledger);
-        let [first, second] = self.half_maps(light, &raw);
+        let [first, second] = self.half_maps(light, layers.photons);
+        let bundles = layers.bundles;
         let is_signed = self.spectra.has(light.light);
         let mut maps = first.clone().into_owned();
         maps.add(&second);
+        // Bundles belong to either half.
+        for _ in 0..HALVES {
+            bundles.into_iter().for_each(|bundles| maps.add(bundles));
+        }
         let mut left = [0; 3];
         let noise = if self.settings.filters() {
-            filter::filter(&mut maps, [&first, &second], (unit, is_signed), &mut left)
+            let halves = [&first, &second].map(|half| &**half);
+            filter::filter(&mut maps, halves, bundles, (unit, is_signed), &mut left)
         } else {
             accuracy::half_set_noise(&accuracy::images(&first, unit), &accuracy::images(&second, unit))
         };
         filter::without_negative(&mut maps, is_signed, &mut left);
         ledger.book_sum(Account::Sampling, left);
         ledger.book_sum(Account::Deposited, left.map(|count| -count));
-        drop((first, second));
-        let mut bands = raw.halves[0].bands().to_vec();
-        for (band, more) in bands.iter_mut().zip(raw.halves[1].bands()) {
+        let mut bands = layers.photons.halves[0].bands().to_vec();
+        for (band, more) in bands.iter_mut().zip(layers.photons.halves[1].bands()) {
             band.add(more);
         }
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
         let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
-        let error = estimate.filter(|_| !is_shard).map(|estimate| KeptError {
-            predecessors: 0,
-            auditors: None,
-            estimate,
+        let error = estimate.map(|mut estimate| {
+            estimate.raise_to(estimate.relative_rmse.powi(2) + bundle_square);
+            KeptError {
+                predecessors: 0,
+                estimate,
+            }
         });
         LightLevel {
             error,
-            photons: Some(raw),
             ..self.level(light, (key, unit), (maps, bands), ledger)
         }
     }
 
-    /// Maps of both halves, not divided by the number of photons.
-    fn half_maps<'a>(&self, light: &VisibleLight, raw: &'a PhotonSums) -> [Cow<'a, ReceiverMaps>; HALVES] {
-        [0, 1].map(|half| {
-            let mut maps = raw.halves[half].sum();
-            if self.spectra.has(light.light) {
-                let mut none = LedgerSum::default();
-                self.spectra.to_linear_srgb(light.light, maps.to_mut(), &mut none);
-            }
-            maps
-        })
+    /// The sum of all bands, in linear sRGB.
+    fn srgb_sum<'a>(&self, light: &VisibleLight, maps: &'a BandMaps) -> Cow<'a, ReceiverMaps> {
+        let mut sum = maps.sum();
+        if self.spectra.has(light.light) {
+            let mut none = LedgerSum::default();
+            self.spectra.to_linear_srgb(light.light, sum.to_mut(), &mut none);
+        }
+        sum
     }
 
-    /// Raises the estimated error of a level of patches to what photons of the same light reveal: no difference between
-    /// levels shows what patches miss at every level.
-    pub(super) fn audit(
-        &self,
-        light: &VisibleLight,
-        patches: &Images,
-        photons: &LightLevel,
-        estimate: &mut LightError,
-    ) {
-        let Some(raw) = &photons.photons else {
-            return;
-        };
-        let unit = photons.unit.times(HALVES as f64);
-        let [first, second] = self
-            .half_maps(light, raw)
-            .map(|maps| accuracy::images(&maps, unit));
-        if let Some(square) = accuracy::audited_square(patches, [&first, &second]) {
-            estimate.raise_to(square);
-        }
+    /// Maps of both halves, not divided by the number of photons.
+    fn half_maps<'a>(&self, light: &VisibleLight, raw: &'a PhotonSums) -> [Cow<'a, ReceiverMaps>; HALVES] {
+        [0, 1].map(|half| self.srgb_sum(light, &raw.halves[half]))
     }
 
     /// Unit of a single photon's flux, for sums over the maximum number of photons.
-    fn photon_unit(&self, light: &VisibleLight) -> Result<FluxUnit> {
+    pub(super) fn photon_unit(&self, light: &VisibleLight) -> Result<FluxUnit> {
         let mean_w = self.with_launch(light, |launch| launch.mean_flux_w(self.settings.seed));
         // If no photon starts, any unit will do.
         let power_w = (mean_w * MEAN_MARGIN).max(f64::MIN_POSITIVE);

@@ -5,7 +5,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
 
-use super::map_size::{self, Borders, MapSize, SizeRequest, TileDemand};
+use super::caustic::ESTIMATED_LEVELS;
+use super::map_size::{self, Borders, MapSize, SizeRequest, Sizes, TileDemand};
 use crate::illumination::parametrisation::{Parametrisation, parametrise};
 use crate::illumination::tiles::{TileLayout, tile_counts};
 use crate::illumination::{Chart, Receiver, Side, UvSet};
@@ -30,46 +31,82 @@ pub const LARGEST_TILED_SIDE: usize = 4096;
 /// area.
 pub const BYTES_PER_TEXEL: u64 = 24 + 2 * 12 + 8;
 
+/// What a light keeps per texel of a level [bytes]: at most three 64-bit sums with their bit, and an error.
+const BYTES_PER_LIT_TEXEL: u64 = 24 + 1 + 4;
+
 /// Sums of both halves of the photons, per texel [bytes].
 const BYTES_PER_PHOTON_TEXEL: u64 = 2 * 24;
+
+/// Per texel in the course of a bake by photons [bytes]: the maps of the light that is traced, its bundles and its
+/// photons, or about as much for finished maps and the weights of their errors.
+const BYTES_PER_TRACED_TEXEL: u64 = 2 * 24 + BYTES_PER_PHOTON_TEXEL;
+
+/// The same by patches and splats: finished maps and the weights of their errors; estimates from differences between
+/// maps take less.
+const BYTES_PER_ESTIMATED_TEXEL: u64 = BYTES_PER_TEXEL + 8;
 
 /// Per texel of the map whose photons are being filtered, with its details at all levels [bytes].
 const BYTES_PER_FILTERED_TEXEL: u64 = 136;
 
 /// Memory of maps while they are made.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct MapMemory {
-    /// Per texel of every map [bytes].
+    /// Per texel of every map, for the sum of all lights and the one that is being traced [bytes].
     per_texel: u64,
+    /// In addition, per texel and light [bytes].
+    per_lit_texel: u64,
     /// In addition, per texel of the largest map [bytes].
     per_texel_of_largest: u64,
+    /// Number of lights that reach each receiver.
+    lights: BTreeMap<Receiver, u64>,
 }
 
 impl MapMemory {
-    /// Maps that are only summed and finished.
-    pub(super) const PLAIN: Self = Self {
-        per_texel: BYTES_PER_TEXEL,
-        per_texel_of_largest: 0,
-    };
+    /// Maps that are finished.
+    pub(super) fn finished(lights: BTreeMap<Receiver, u64>) -> Self {
+        Self {
+            per_texel: BYTES_PER_TEXEL,
+            per_lit_texel: BYTES_PER_LIT_TEXEL,
+            per_texel_of_largest: 0,
+            lights,
+        }
+    }
 
-    pub(super) fn with(estimator: Estimator) -> Self {
+    /// Maps that are made. `keeps_photons`: lights keep the sums of their photons.
+    pub(super) fn with(estimator: Estimator, keeps_photons: bool, lights: BTreeMap<Receiver, u64>) -> Self {
         match estimator {
             // Maps are filtered one after another.
             Estimator::Auto | Estimator::Photon => Self {
-                per_texel: BYTES_PER_TEXEL + BYTES_PER_PHOTON_TEXEL,
+                per_texel: BYTES_PER_TRACED_TEXEL,
+                per_lit_texel: BYTES_PER_LIT_TEXEL + if keeps_photons { BYTES_PER_PHOTON_TEXEL } else { 0 },
                 per_texel_of_largest: BYTES_PER_FILTERED_TEXEL,
+                lights,
             },
-            Estimator::Wavefront | Estimator::Splat => Self::PLAIN,
+            Estimator::Wavefront | Estimator::Splat => Self {
+                per_texel: BYTES_PER_ESTIMATED_TEXEL,
+                // The levels that an error estimate needs.
+                per_lit_texel: ESTIMATED_LEVELS as u64 * BYTES_PER_LIT_TEXEL,
+                per_texel_of_largest: 0,
+                lights,
+            },
         }
     }
 
     /// Memory of maps with these numbers of texels [bytes].
-    pub(super) fn bytes(self, texels: impl Iterator<Item = u64>) -> u64 {
-        let (all, largest) = texels.fold((0_u64, 0), |(all, largest), texels| {
-            (all.saturating_add(texels), largest.max(texels))
-        });
-        let all = all.saturating_mul(self.per_texel);
+    pub(super) fn bytes(&self, texels: impl Iterator<Item = (Receiver, u64)>) -> u64 {
+        let (mut all, mut largest) = (0_u64, 0);
+        for (receiver, texels) in texels {
+            let lights = self.lights.get(&receiver).copied().unwrap_or(0);
+            let per_texel = self.per_texel + lights * self.per_lit_texel;
+            all = all.saturating_add(texels.saturating_mul(per_texel));
+            largest = largest.max(texels);
+        }
         all.saturating_add(largest.saturating_mul(self.per_texel_of_largest))
+    }
+
+    /// Memory of maps of these sizes [bytes].
+    pub(super) fn of_sizes(&self, sizes: &Sizes) -> u64 {
+        self.bytes(sizes.iter().map(|(&receiver, size)| (receiver, size.texels())))
     }
 }
 

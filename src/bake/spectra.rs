@@ -167,12 +167,6 @@ impl Spectra {
         self.of_lights.get(&light)?.photons.as_ref()
     }
 
-    /// Whether patches interpolate a light between a few wavelengths, with the same error at every level.
-    pub(super) fn is_interpolated(&self, light: usize) -> bool {
-        let spectral = self.of_lights.get(&light);
-        spectral.is_some_and(|light| matches!(light.traced, Traced::Whole(_)))
-    }
-
     /// Position of a band's rays in their cells, [0, 1)². Bands that share rays are spread evenly (M. Roberts' R₂
     /// sequence).
     pub(super) fn ray_place(&self, light: usize, band: Option<usize>) -> DVec2 {
@@ -228,7 +222,7 @@ impl Spectra {
                 index,
                 radiant: radiant_w / white[channel],
                 band,
-                maps,
+                maps: maps.packed(),
                 channel,
             })
         });

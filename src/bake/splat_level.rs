@@ -54,7 +54,7 @@ impl CausticLayer<'_> {
         };
         let source = match source_of(state, &key.trace) {
             PassInput::Rays { .. } if key.stride == 1 && !self.spectra.has(light.light) => PassInput::Rays {
-                keep_bytes: self.settings.kept_light_bytes(),
+                keep_bytes: self.kept_light_bytes(),
             },
             source => source,
         };
@@ -151,7 +151,7 @@ impl CausticLayer<'_> {
         let depositor = Depositor {
             lattice,
             settings: self.settings,
-            statistics: context.statistics.as_ref(),
+            statistics: context.statistics.as_deref(),
             gathers: false,
         };
         let listener = ProgressScope {

@@ -71,7 +71,6 @@ impl CausticLayer<'_> {
                     },
                     reference_w: reference_w(light),
                     coarseness: key.coarseness,
-                    most_queries: context.most_queries.saturating_sub(sums.report.receiver_queries),
                 };
                 let cells = depositor.lattice.cell_count();
                 let listener = ProgressScope {
@@ -105,7 +104,6 @@ impl CausticLayer<'_> {
             overshoots: report.overshoots,
             traced,
             work: (report.cells, report.receiver_queries),
-            lumped_share: report.lumped_flux[1] as f64 / report.lumped_flux[0].max(1) as f64,
             ..self.level(light, (key, unit), (maps, bands), report.ledger)
         }))
     }
@@ -120,7 +118,7 @@ impl CausticLayer<'_> {
     ) -> LightLevel {
         LightLevel {
             key,
-            maps,
+            maps: maps.packed(),
             bands: self.spectra.level_bands(light.light, bands),
             radiant: self.spectra.radiant(light.light),
             unit,
@@ -129,10 +127,10 @@ impl CausticLayer<'_> {
             strays: Vec::new(),
             overshoots: Vec::new(),
             noise: None,
+            goal: 0.0,
             error: None,
             photons: None,
             work: (0, 0),
-            lumped_share: 0.0,
             traced: None,
             has_own_colour: self.spectra.has(light.light),
         }
@@ -159,7 +157,7 @@ impl CausticLayer<'_> {
             ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, context.control)
         };
         // Patches reuse these rays. If photons may take over, the strong branches are enough.
-        let is_for_patches = self.carrier(light) == Carrier::Patches;
+        let is_for_patches = self.carrier() == Carrier::Patches;
         let mut own = RayCache::default();
         let rays = if is_for_patches {
             &mut progress.state.rays
@@ -176,7 +174,6 @@ impl CausticLayer<'_> {
             lattice,
             reference_w: reference_w(light),
             coarseness: 1.0,
-            most_queries: u64::MAX,
         };
         let listener = unwatched(context.control);
         let room = self.room(false);
@@ -213,7 +210,7 @@ impl CausticLayer<'_> {
     }
 
     fn room(&self, keeps_bands: bool) -> Room {
-        let rays_bytes = self.settings.kept_light_bytes() / 2;
+        let rays_bytes = self.kept_light_bytes() / 2;
         Room {
             bands_bytes: if keeps_bands { rays_bytes } else { 0 },
             rays_bytes,

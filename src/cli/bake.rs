@@ -234,17 +234,19 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
         line("next", next.in_words());
     }
     let energy = &manifest.energy_w;
-    line(
-        "watts",
-        format!(
-            "{:.6} emitted = {:.6} deposited + {:.6} absorbed + {:.6} escaped + {:.6} truncated",
-            energy.emitted,
-            energy.deposited,
-            energy.absorbed,
-            energy.escaped,
-            energy.truncated.total()
-        ),
+    let mut watts = format!(
+        "{:.6} emitted = {:.6} deposited + {:.6} absorbed + {:.6} escaped + {:.6} truncated",
+        energy.emitted,
+        energy.deposited,
+        energy.absorbed,
+        energy.escaped,
+        energy.truncated.total()
     );
+    if energy.sampling != 0.0 {
+        let sign = if energy.sampling < 0.0 { '-' } else { '+' };
+        watts += &format!(" {sign} {:.6} sampling", energy.sampling.abs());
+    }
+    line("watts", watts);
     if let Some(parts) = CarriedFlux::sum(&result.ledgers).in_words(energy.deposited) {
         line("carried", parts);
     }

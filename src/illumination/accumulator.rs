@@ -117,3 +117,59 @@ impl FluxAccumulator {
         &mut self.texels
     }
 }
+
+/// The same sums in less memory: dark texels take a bit, grey light a single count per texel.
+#[derive(Clone, Debug)]
+pub struct PackedFlux {
+    width: usize,
+    height: usize,
+    /// A bit per texel that has flux.
+    lit: Vec<u64>,
+    /// Whether all channels are alike; `counts` then has one of the three.
+    is_grey: bool,
+    counts: Vec<i64>,
+}
+
+impl PackedFlux {
+    pub fn new(flux: &FluxAccumulator) -> Self {
+        let is_lit = |texel: &&FluxCount| **texel != [0; 3];
+        let bits = |texels: &[FluxCount]| {
+            let bits = texels.iter().enumerate();
+            bits.fold(0, |bits, (place, texel)| {
+                bits | u64::from(is_lit(&texel)) << place
+            })
+        };
+        let is_grey = flux.texels.iter().all(|[r, g, b]| r == g && g == b);
+        let channels = if is_grey { 1 } else { 3 };
+        let lit = flux.texels.iter().filter(is_lit);
+        let mut counts = Vec::with_capacity(channels * lit.clone().count());
+        lit.for_each(|texel| counts.extend_from_slice(&texel[..channels]));
+        Self {
+            width: flux.width,
+            height: flux.height,
+            lit: flux.texels.chunks(64).map(bits).collect(),
+            is_grey,
+            counts,
+        }
+    }
+
+    pub fn unpacked(&self) -> FluxAccumulator {
+        let mut flux = FluxAccumulator::new(self.width, self.height);
+        let is_lit = |texel: usize| self.lit[texel / 64] >> (texel % 64) & 1 == 1;
+        let lit = flux.texels.iter_mut().enumerate();
+        let lit = lit.filter(|(texel, _)| is_lit(*texel)).map(|(_, count)| count);
+        if self.is_grey {
+            lit.zip(&self.counts)
+                .for_each(|(texel, count)| *texel = [*count; 3]);
+        } else {
+            let (counts, _) = self.counts.as_chunks();
+            lit.zip(counts).for_each(|(texel, count)| *texel = *count);
+        }
+        flux
+    }
+
+    /// Memory [bytes].
+    pub fn bytes(&self) -> u64 {
+        8 * (self.lit.len() + self.counts.len()) as u64
+    }
+}

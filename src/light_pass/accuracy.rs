@@ -8,7 +8,7 @@
 //! A difference does not show what all levels miss: truncated light (threshold, depth, unresolved) is added by its
 //! watts.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use rayon::prelude::*;
@@ -59,7 +59,7 @@ pub struct MapError {
     pub size: (usize, usize),
     /// Expected error of each texel's luminance, the root of variance and squared bias [W/m², for a light of unit
     /// strength].
-    pub texels: Vec<f64>,
+    pub texels: Vec<f32>,
     /// Squared error times area, summed over each tile [W²/m²].
     pub tiles: Vec<f64>,
 }
@@ -72,24 +72,27 @@ pub struct LightError {
     pub relative_rmse: f64,
     /// Error of the level before over that of the last level.
     pub ratio: f64,
-    /// Whether an audit found a larger error than the differences between levels show.
-    pub is_raised: bool,
 }
 
 impl LightError {
-    /// Scales all errors up if the relative squared error is found to be larger.
+    /// Scales all errors up to a larger relative squared error.
     pub fn raise_to(&mut self, relative_square: f64) {
         let factor = relative_square.sqrt() / self.relative_rmse;
         if !(factor > 1.0 && factor.is_finite()) {
             return;
         }
-        self.is_raised = true;
         self.relative_rmse *= factor;
         for map in self.maps.values_mut() {
-            map.texels.iter_mut().for_each(|error| *error *= factor);
+            let raise = |error: &mut f32| *error = single(f64::from(*error) * factor);
+            map.texels.iter_mut().for_each(raise);
             map.tiles.iter_mut().for_each(|square| *square *= factor * factor);
         }
     }
+}
+
+/// Converts to the precision of an error, which may not become infinite.
+fn single(error: f64) -> f32 {
+    error.min(f64::from(f32::MAX)) as f32
 }
 
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
@@ -317,7 +320,7 @@ pub fn estimate(
         let tiles_of = image.tiles();
         let texels = (0..windowed.len()).map(|texel| match old {
             Some(old) if !is_refined(receiver, tiles_of.of(texel)) => old.texels[texel],
-            _ => (windowed[texel] * share).sqrt(),
+            _ => single((windowed[texel] * share).sqrt()),
         });
         let tiles: Vec<f64> = (0..tile_sums.len())
             .map(|tile| match old {
@@ -388,9 +391,12 @@ pub fn estimate_splats(
     })
 }
 
-/// The error of photons: half sets give the noise. `None` if no light arrived.
+/// The error of photons: half sets give the noise. Maps that no photon changed have none. `None` if no light arrived.
 pub fn by_noise(fine: &Images, mut noise: Noise, ledger: &EnergyLedger) -> Option<LightError> {
-    by_squares(fine, ledger, |receiver, _| noise.remove(&receiver))
+    by_squares(fine, ledger, |receiver, image| {
+        let quiet = || vec![0.0; image.luminance.len()];
+        Some(noise.remove(&receiver).unwrap_or_else(quiet))
+    })
 }
 
 /// The error of `fine`, whose square is a share of the squared difference from `other`. `None` if no light arrived.
@@ -420,7 +426,7 @@ fn by_squares(
         (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
         let map = MapError {
             size: (image.width, image.height),
-            texels: squares.iter().map(|square| square.sqrt()).collect(),
+            texels: squares.iter().map(|square| single(square.sqrt())).collect(),
             tiles,
         };
         error.maps.insert(receiver, map);
@@ -462,33 +468,6 @@ pub fn truncated_share(ledger: &EnergyLedger) -> f64 {
     } else {
         0.0
     }
-}
-
-/// Standard deviations by which a mean square has to exceed zero to be significant.
-const SIGNIFICANT: f64 = 4.0;
-
-/// Relative mean square error of `maps`, from the product of their differences to two independent noisy maps of the
-/// same light, whose noise cancels in the mean. `None` if it is not significant.
-pub fn audited_square(maps: &Images, halves: [&Images; 2]) -> Option<f64> {
-    let noise = half_set_noise(halves[0], halves[1]);
-    let (mut sum, mut variance, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0, 0.0);
-    let receivers: BTreeSet<&Receiver> = maps.keys().chain(noise.keys()).collect();
-    for &receiver in &receivers {
-        let [own, first, second] = [maps, halves[0], halves[1]].map(|images| images.get(receiver));
-        let image = own.or(first).or(second)?;
-        let value = |image: Option<&Image>, texel: usize| image.map_or(0.0, |image| image.luminance[texel]);
-        let noise = noise.get(receiver);
-        for texel in 0..image.luminance.len() {
-            let (own, texel_m2) = (value(own, texel), image.area_m2(texel));
-            sum += (own - value(first, texel)) * (own - value(second, texel)) * texel_m2;
-            // Each half has half the variance of their difference.
-            variance += (0.5 * noise.map_or(0.0, |noise| noise[texel]) * texel_m2).powi(2);
-            flux_w += own * texel_m2;
-            area_m2 += texel_m2;
-        }
-    }
-    let is_bias = sum > SIGNIFICANT * variance.sqrt();
-    is_bias.then(|| sum * area_m2 / (flux_w * flux_w))
 }
 
 /// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`, if refinement divides their error

@@ -9,6 +9,8 @@ use glam::DVec2;
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FootprintStatistics {
     receivers: BTreeMap<Receiver, Sums>,
+    /// Number of lights that reach a receiver.
+    lights: BTreeMap<Receiver, u64>,
     spots: Vec<FootprintSample>,
 }
 
@@ -90,6 +92,19 @@ impl FootprintStatistics {
             sums.log_area_m2 += part.log_area_m2;
             sums.log_area_share += part.log_area_share;
         }
+    }
+
+    /// Adds all of one light.
+    pub fn add_light(&mut self, light: &Self) {
+        for &receiver in light.receivers.keys() {
+            *self.lights.entry(receiver).or_default() += 1;
+        }
+        self.merge(light);
+    }
+
+    /// Number of lights that reach a receiver, by receiver.
+    pub fn lights(&self) -> &BTreeMap<Receiver, u64> {
+        &self.lights
     }
 
     /// The mean footprint on a receiver; `None` without one.

@@ -95,6 +95,12 @@ impl LedgerSum {
         (flux_w * strength).luminance()
     }
 
+    /// The largest channel of an account [W, of a light of unit strength].
+    pub fn watts_of_largest(&self, account: Account, unit: FluxUnit) -> f64 {
+        let counts = self.counts[account as usize].map(|channel| channel as f64);
+        counts.into_iter().fold(f64::MIN, f64::max) * unit.watts()
+    }
+
     /// The ledger in watts.
     pub fn report(&self, light: &str, unit: FluxUnit, strength: LinearSrgb) -> LightLedger {
         let watts = |account| self.watts(account, unit, strength);

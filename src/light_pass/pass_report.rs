@@ -27,8 +27,6 @@ pub struct PassReport {
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their traced rays.
     pub overshoots: Vec<PatchOvershoot>,
-    /// Luminous flux [counts] of all patches, and of those that concentrate a part of the spectrum in one place.
-    pub lumped_flux: [i128; 2],
     /// Of tracing.
     pub trace_s: Seconds,
     /// Of depositing.
@@ -104,8 +102,6 @@ impl PassReport {
         self.receiver_queries += other.receiver_queries;
         self.statistics.merge(&other.statistics);
         self.overshoots.extend(other.overshoots);
-        let flux = self.lumped_flux.iter_mut().zip(other.lumped_flux);
-        flux.for_each(|(sum, flux)| *sum += flux);
         self.trace_s.add(other.trace_s);
         self.deposit_s.add(other.deposit_s);
         self.cancelled |= other.cancelled;

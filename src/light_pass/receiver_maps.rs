@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::path::Arrival;
-use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
+use crate::illumination::accumulator::{FluxAccumulator, FluxCount, PackedFlux};
 use crate::illumination::islands::Islands;
 use crate::illumination::{Chart, Receiver, smoothing};
 use crate::optics::LinearSrgb;
@@ -29,6 +29,8 @@ pub struct ReceiverMap {
     /// Accumulated flux: `levels[0]` at the map's size, each further level at half the size of the one before,
     /// allocated once a kernel is smooth enough for it. Tiled maps have one level.
     levels: Vec<FluxAccumulator>,
+    /// All flux at the map's size, in place of the levels, once no more is added.
+    packed: Option<PackedFlux>,
 }
 
 /// Returns the chart of a receiver at a suitable size; `None` if it cannot take a map.
@@ -98,6 +100,21 @@ impl ReceiverMaps {
                 }
             }
         }
+    }
+
+    /// The same maps in less memory, to be kept: no more flux can be added.
+    #[must_use]
+    pub fn packed(mut self) -> Self {
+        for (_, map) in self.iter_mut() {
+            map.packed = Some(PackedFlux::new(&map.flux()));
+            map.levels.clear();
+        }
+        self
+    }
+
+    /// Memory of the flux [bytes].
+    pub fn bytes(&self) -> u64 {
+        self.iter().map(|(_, map)| map.bytes()).sum()
     }
 
     /// Adds the flux of other maps of the same sizes.
@@ -176,6 +193,7 @@ impl ReceiverMap {
         Self {
             chart,
             levels: vec![flux],
+            packed: None,
         }
     }
 
@@ -226,10 +244,17 @@ impl ReceiverMap {
 
     /// Total flux over all levels.
     pub fn flux_counts(&self) -> [i128; 3] {
-        let texels = self.levels.iter().flat_map(|level| level.texels());
+        let packed = self.packed.as_ref().map(PackedFlux::unpacked);
+        let texels = self.levels.iter().chain(&packed).flat_map(|level| level.texels());
         texels.fold([0; 3], |sum, texel| {
             std::array::from_fn(|channel| sum[channel] + i128::from(texel[channel]))
         })
+    }
+
+    fn bytes(&self) -> u64 {
+        let texels: usize = self.levels.iter().map(|level| level.texels().len()).sum();
+        let packed = self.packed.as_ref().map_or(0, PackedFlux::bytes);
+        (texels * size_of::<FluxCount>()) as u64 + packed
     }
 
     fn add(&mut self, part: &Self) {
@@ -243,6 +268,9 @@ impl ReceiverMap {
 
     /// Total flux at the map's size, with coarser levels interpolated smoothly.
     pub fn flux(&self) -> Cow<'_, FluxAccumulator> {
+        if let Some(packed) = &self.packed {
+            return Cow::Owned(packed.unpacked());
+        }
         let mut levels = self.levels.iter().rev();
         let mut sum = Cow::Borrowed(levels.next().expect("a map has a level"));
         for level in levels {

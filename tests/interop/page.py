@@ -166,6 +166,19 @@ def steer(browser, faults):
     browser.call("Emulation.setTouchEmulationEnabled", enabled=False)
 
 
+def play(browser, faults):
+    """The button plays moments, and pauses them."""
+    click = "document.querySelector('#motion button').click()"
+    seen, end = set(), time.time() + PATIENCE_S / 60
+    browser.value(click)
+    while len(seen) < 3 and time.time() < end:
+        seen.add(browser.value("nephroid.motion.shown"))
+        time.sleep(0.1)
+    browser.value(click)
+    if len(seen) < 3 or browser.value("nephroid.motion.isPlaying"):
+        faults.append(f"the page plays moments {seen}")
+
+
 @contextmanager
 def served(folder):
     """Address of a folder behind a server."""
@@ -209,7 +222,9 @@ def check(nephroid, browser, scene, maps, folder, run, faults):
         for what, url, allowed in [("folder", own, own), ("one file", file.as_uri(), file.as_uri())]:
             asked = tab.open(url, SIZE)
             away = [url for url in asked if not url.startswith((allowed, "data:", "blob:"))]
-            for moment, picture in enumerate(wanted):
+            print(f"{scene}, web as {what}: first picture after {tab.value('nephroid.firstPicture_ms'):.0f} ms")
+            # One file has the same moments.
+            for moment, picture in enumerate(wanted if what == "folder" else wanted[:1]):
                 if moment:
                     tab.value(f"nephroid.motion.seek({moment})")
                     tab.wait()
@@ -225,6 +240,8 @@ def check(nephroid, browser, scene, maps, folder, run, faults):
             tab.wait()
             if not flip(lit, tab.picture()) > FLIP:
                 faults.append(f"{scene} as {what}: false colours")
+        if sequence:
+            play(tab, faults)
         steer(tab, faults)
         tab.open(own, PHONE, is_phone=True)
         wide = tab.value("document.scrollingElement.scrollWidth - innerWidth")

@@ -156,7 +156,7 @@ fn auto_comes_close(scene: &Scene) {
     let result = bake(scene.clone(), &settings);
     let error = distance(scene, &result.maps);
     let estimate = result.estimated_relative_rmse.expect("an estimate");
-    assert!(error <= AIM, "{}: {error}", scene.name);
+    assert!(error <= AIM, "{}: {error}, estimated {estimate}", scene.name);
     assert!(
         (0.5..=2.0).contains(&(error / estimate)),
         "{}: {error}, estimated {estimate}",

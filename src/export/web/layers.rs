@@ -1,23 +1,18 @@
 //! The light of a map as textures of the page: moment by moment, layer by layer.
 
-use std::collections::BTreeMap;
 use std::sync::Arc;
-
-use serde_json::{Map, Value, json};
 
 use super::sizes;
 use crate::export::textures::shared_exponent::{RGB9E5, rgb9e5_word};
 use crate::export::textures::texels::Texels;
 use crate::eye_pass::renderer::Content;
 use crate::illumination::{Chart, IlluminationMap, Parametrisation};
-use crate::scene::Scene;
+use crate::scene::{Environment, Scene};
 use crate::settings::LayerKind;
 
-/// A map of many moments.
+/// What the maps of a receiver have in common, whatever the moment.
 pub(super) struct ShownMap {
     chart: Arc<Chart>,
-    /// By moment; layers without light are left out.
-    pub(super) moments: Vec<BTreeMap<LayerKind, Texture>>,
     /// Of the largest layer [texels].
     size: (usize, usize),
     /// Nothing in it is brighter [W/m²].
@@ -27,29 +22,35 @@ pub(super) struct ShownMap {
 /// Irradiance [W/m²], or radiance [W/(m² sr)] over a scale, in E5B9G9R9: words of four bytes, each the difference from the
 /// one in the row before.
 pub(super) struct Texture {
-    size: (usize, usize),
+    pub(super) size: (usize, usize),
+    pub(super) scale: f32,
     pub(super) content: Content,
 }
 
 impl Texture {
-    pub(super) fn new(texels: &Texels) -> Self {
-        let (size, values) = (texels.size(), texels.values());
-        let words = values
-            .iter()
-            .map(|value| u32::from_le_bytes(rgb9e5_word(RGB9E5.code(*value))));
-        let words: Vec<u32> = words.collect();
+    fn new(texels: &Texels, scale: f32) -> Self {
+        let size = texels.size();
+        let word =
+            |value: &[f32; 3]| u32::from_le_bytes(rgb9e5_word(RGB9E5.code(value.map(|of| of / scale))));
+        let words: Vec<u32> = texels.values().iter().map(word).collect();
         let before = |texel: usize| texel.checked_sub(size.0).map_or(0, |before| words[before]);
-        let changes =
-            (0..words.len()).flat_map(|texel| words[texel].wrapping_sub(before(texel)).to_le_bytes());
+        let changes = (0..words.len()).map(|texel| words[texel].wrapping_sub(before(texel)));
         let content = Content {
-            bytes: changes.collect(),
+            bytes: changes.flat_map(u32::to_le_bytes).collect(),
             record_bytes: None,
         };
-        Self { size, content }
+        Self { size, scale, content }
     }
 
-    pub(super) fn size(&self) -> Value {
-        json!([self.size.0, self.size.1])
+    /// Of an environment.
+    pub(super) fn of_sky(environment: &Environment) -> Self {
+        let mut texels = Texels::of(environment.size(), environment.pixels().to_vec());
+        // Powers of two are lossless.
+        let scale = (texels.peak() / RGB9E5.most).log2().ceil().exp2().max(1.0);
+        while texels.size().0 > sizes::MAX_SIDE {
+            texels = texels.halved();
+        }
+        Self::new(&texels, scale)
     }
 }
 
@@ -57,33 +58,23 @@ impl ShownMap {
     pub(super) fn new(chart: &Arc<Chart>) -> Self {
         Self {
             chart: Arc::clone(chart),
-            moments: Vec::new(),
             size: (1, 1),
             peak_w_m2: 0.0,
         }
     }
 
-    /// Takes up the map at a moment.
-    pub(super) fn add(&mut self, moment: usize, map: &IlluminationMap) {
-        self.moments.resize_with(moment + 1, BTreeMap::new);
-        let mut peak_w_m2 = 0.0;
-        for (layer, texels) in map.layers.iter().zip(sizes::fitted(map)) {
-            if texels.peak() > 0.0 {
-                peak_w_m2 += texels.peak();
-                self.size = self.size.max(texels.size());
-                self.moments[moment].insert(layer.kind, Texture::new(&texels));
-            }
-        }
+    /// Takes up the map at a moment: its layers but for those without light.
+    pub(super) fn add(&mut self, map: &IlluminationMap) -> Vec<(LayerKind, Texture)> {
+        let layers = map.layers.iter().map(|layer| layer.kind).zip(sizes::fitted(map));
+        let lit: Vec<_> = layers.filter(|(_, texels)| texels.peak() > 0.0).collect();
+        let peak_w_m2 = lit.iter().map(|(_, texels)| texels.peak()).sum();
         self.peak_w_m2 = self.peak_w_m2.max(peak_w_m2);
-    }
-
-    /// Sizes of its textures at a moment, by layer.
-    pub(super) fn sizes(&self, moment: usize) -> Value {
-        let layers = self.moments.get(moment).into_iter().flatten();
-        let sizes: Map<String, Value> = layers
-            .map(|(kind, texture)| (kind.name().into(), texture.size()))
-            .collect();
-        sizes.into()
+        self.size = lit
+            .iter()
+            .fold(self.size, |size, (_, texels)| size.max(texels.size()));
+        lit.iter()
+            .map(|(kind, texels)| (*kind, Texture::new(texels, 1.0)))
+            .collect()
     }
 
     /// A map of its size, as bright all over as it is anywhere.

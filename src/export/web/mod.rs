@@ -13,18 +13,15 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use self::layers::{ShownMap, Texture};
-use self::packed::{Packed, gzip};
+use self::packed::gzip;
 use crate::error::{Error, Result, Warning};
 use crate::export::map_set::MapSet;
-use crate::export::textures::shared_exponent::RGB9E5;
-use crate::export::textures::texels::Texels;
-use crate::eye_pass::renderer::{Content, WebScene};
+use crate::eye_pass::renderer::WebScene;
 use crate::eye_pass::{Picture, ToneMap, View, tone_mapping};
 use crate::files::{self, OutputFolder, StagedFolder};
 use crate::illumination::false_colours::viridis;
-use crate::illumination::{IlluminationMap, Receiver};
 use crate::progress::Control;
-use crate::scene::{Camera, Environment, Scene};
+use crate::scene::{Camera, Scene};
 use crate::settings::LayerKind;
 
 mod layers;
@@ -37,35 +34,14 @@ const PAGE: &str = include_str!("../../../assets/web/index.html");
 const PLACE: &str = "<!-- nephroid -->";
 /// What marks a page of ours.
 const MARK: &str = "name=\"generator\" content=\"nephroid";
-/// Where its scripts' data begins.
-const ABOUT: &str = "<script type=\"application/json\" id=\"about\">";
 /// Most that a page of a folder has [bytes].
 const MAX_PAGE_BYTES: u64 = 16 << 20;
 
-/// What names of packed files and of the still picture end with.
-const ENDS: [&str; 2] = [".gz", ".jpg"];
-
-/// Name of a file in the folder, name by which scripts import it, and the file.
-type Module = (&'static str, &'static str, &'static str);
-
-macro_rules! module {
-    ($name:literal) => {
-        (
-            concat!($name, ".js"),
-            $name,
-            include_str!(concat!("../../../assets/web/", $name, ".js")),
-        )
-    };
+/// Scripts by the names that they import each other by.
+macro_rules! modules {
+    ($($name:literal)+) => { [$(($name, include_str!(concat!("../../../assets/web/", $name, ".js")))),+] };
 }
-
-const MODULES: [Module; 6] = [
-    module!("page"),
-    module!("files"),
-    module!("eye_pass"),
-    module!("geometry"),
-    module!("navigation"),
-    module!("motion"),
-];
+const MODULES: [(&str, &str); 6] = modules!("page" "files" "eye_pass" "geometry" "navigation" "motion");
 
 /// What a browser without WebGPU shows of the first camera: name, size [pixels] and quality [%].
 const STILL: &str = "still.jpg";
@@ -116,22 +92,25 @@ impl Site {
         let Some(first) = moments.first() else {
             return Err(Error::failure("maps", "there are none", "bake the scene again"));
         };
-        let mut shown: BTreeMap<Receiver, ShownMap> = BTreeMap::new();
-        for (moment, set) in moments.iter().enumerate() {
+        let (mut shown, mut layers, mut light) = (BTreeMap::new(), BTreeSet::new(), Vec::new());
+        for set in moments {
+            let mut textures = BTreeMap::new();
             for map in set.read_all()? {
                 if control.is_cancelled() {
                     return Err(Error::cancelled(&scene.source));
                 }
-                let map = map.dense();
-                let shown = shown.entry(map.chart.receiver);
-                shown
-                    .or_insert_with(|| ShownMap::new(&map.chart))
-                    .add(moment, &map);
+                let (map, receiver) = (map.dense(), map.chart.receiver);
+                let shown = shown.entry(receiver).or_insert_with(|| ShownMap::new(&map.chart));
+                for (kind, texture) in shown.add(&map) {
+                    layers.insert(kind);
+                    textures.insert(format!("{}{}", kind.name(), receiver.index()), texture);
+                }
             }
+            if let Some(environment) = &set.scene().environment {
+                textures.insert("sky".into(), Texture::of_sky(environment));
+            }
+            light.push(textures);
         }
-        let shown: Vec<ShownMap> = shown.into_values().collect();
-        let layers = shown.iter().flat_map(|map| &map.moments).flat_map(BTreeMap::keys);
-        let layers: BTreeSet<LayerKind> = layers.copied().collect();
         let mut site = Self {
             about: json!({}),
             files: Vec::new(),
@@ -143,9 +122,36 @@ impl Site {
                 warnings: first.warnings(),
             },
         };
-        let moment_files = site.push_moments(moments, &shown, control)?;
+        let stand_ins: Vec<_> = shown.values().map(|map| map.stand_in(first.scene())).collect();
+        let mut first_contents = BTreeMap::new();
+        for (set, textures) in moments.iter().zip(light) {
+            if control.is_cancelled() {
+                return Err(Error::cancelled(&scene.source));
+            }
+            let WebScene {
+                mut description,
+                mut contents,
+                refusal,
+            } = WebScene::new(set.scene(), &stand_ins)?;
+            for (name, texture) in textures {
+                description["textures"][&name] = json!({"size": texture.size, "scale": texture.scale});
+                contents.insert(name, texture.content);
+            }
+            if site.files.is_empty() {
+                let refused = refusal.map(|error| Warning::new(error.location, error.what, error.remedy));
+                site.report.warnings.extend(refused);
+            } else {
+                // The programs are those of the first.
+                description["programs"] = Value::Null;
+            }
+            let file = packed::file(description, &contents, &first_contents);
+            site.files.push((moment_file(site.files.len()), file));
+            if first_contents.is_empty() {
+                first_contents = contents;
+            }
+        }
+        let names: Vec<String> = (0..moments.len()).map(moment_file).collect();
         let cameras = site.push_still(scene, eye)?;
-        let names: Vec<&str> = site.files.iter().map(|(name, _)| &**name).collect();
         let (low, high) = scene.bounds().unwrap_or_default();
         let colour = |stop: usize| {
             let colour = viridis(stop as f64 / (COLOURS - 1) as f64);
@@ -159,64 +165,17 @@ impl Site {
             "cameras": cameras,
             "bounds_m": [low.to_array(), high.to_array()],
             "colours": (0..COLOURS).map(colour).collect::<Vec<_>>(),
-            "moments": moment_files,
+            "moments": names,
             "fps": first.fps(),
-            "files": names,
         });
-        site.note_missing_light(scene, first);
-        Ok(site)
-    }
-
-    /// Adds a file of each moment; returns their names.
-    fn push_moments(
-        &mut self,
-        moments: &[MapSet<'_>],
-        shown: &[ShownMap],
-        control: &Control,
-    ) -> Result<Vec<String>> {
-        let stand_ins: Vec<IlluminationMap> =
-            shown.iter().map(|map| map.stand_in(moments[0].scene())).collect();
-        let mut first: BTreeMap<String, Content> = BTreeMap::new();
-        let mut names = Vec::new();
-        for (moment, set) in moments.iter().enumerate() {
-            if control.is_cancelled() {
-                return Err(Error::cancelled(&set.scene().source));
-            }
-            let made = WebScene::new(set.scene(), &stand_ins)?;
-            let (mut description, mut contents) = (made.description, BTreeMap::new());
-            contents.extend(
-                made.contents
-                    .into_iter()
-                    .map(|(name, content)| (name.to_owned(), content)),
-            );
-            for (index, (map, tiles)) in shown.iter().zip(made.map_tiles).enumerate() {
-                contents.insert(format!("tiles{index}"), tiles);
-                for (kind, texture) in map.moments.get(moment).into_iter().flatten() {
-                    contents.insert(format!("{}{index}", kind.name()), texture.content.clone());
-                }
-            }
-            description["maps"] = shown.iter().map(|map| map.sizes(moment)).collect();
-            if let Some(environment) = &set.scene().environment {
-                let (texture, scale) = sky(environment);
-                description["textures"]["sky"] = json!({"size": texture.size(), "scale": scale});
-                contents.insert("sky".into(), texture.content);
-            }
-            let mut packed = Packed::default();
-            for (name, content) in &contents {
-                packed.add(name, content, first.get(name));
-            }
-            match moment {
-                0 => {
-                    first = contents;
-                    self.report.warnings.extend(made.refusal.map(warning));
-                }
-                // The programs are those of the first.
-                _ => description["programs"] = Value::Null,
-            }
-            names.push(format!("moment{moment}.gz"));
-            self.files.push((names[moment].clone(), packed.file(description)));
+        if !site.report.layers.contains(&LayerKind::Direct) && !scene.lights.is_empty() {
+            site.report.warnings.push(Warning::new(
+                first.folder().display().to_string(),
+                "holds no direct light, which the page does not compute; it is dark beside the caustics",
+                "bake all layers (--layers caustic,direct,indirect)",
+            ));
         }
-        Ok(names)
+        Ok(site)
     }
 
     /// Adds the still picture; returns what the page reads of each camera, of which there is at least one.
@@ -247,37 +206,25 @@ impl Site {
         Ok(described)
     }
 
-    fn note_missing_light(&mut self, scene: &Scene, set: &MapSet<'_>) {
-        if !self.report.layers.contains(&LayerKind::Direct) && !scene.lights.is_empty() {
-            self.report.warnings.push(Warning::new(
-                set.folder().display().to_string(),
-                "holds no direct light, which the page does not compute; it is dark beside the caustics",
-                "bake all layers (--layers caustic,direct,indirect)",
-            ));
-        }
-    }
-
     /// Writes the folder, all of it or nothing. A page of ours is replaced; another folder that is not empty is taken only
     /// with `force`.
     ///
     /// # Errors
     /// Other people's files; a place that cannot be written.
     pub fn write_folder(mut self, path: &Path, force: bool) -> Result<WebReport> {
-        let previous = files_of_ours(path);
-        let root = OutputFolder::open_own(path, previous.is_some(), force, "an export for the web")?;
-        let imports: BTreeMap<_, _> = MODULES
-            .iter()
-            .map(|(file, name, _)| (*name, format!("./{file}")))
-            .collect();
+        let page = files::read_file(&path.join("index.html"), MAX_PAGE_BYTES);
+        let is_ours = page.is_ok_and(|page| String::from_utf8_lossy(&page).contains(MARK));
+        let root = OutputFolder::open_own(path, is_ours, force, "an export for the web")?;
+        let imports: BTreeMap<_, _> = MODULES.map(|(name, _)| (name, format!("./{name}.js"))).into();
         let scripts = format!(
             "{}<script type=\"importmap\">{}</script>\n<script type=\"module\">import \"page\";</script>",
             self.about_tag(),
             json!({ "imports": imports }),
         );
-        let texts = MODULES.iter().map(|(file, _, text)| (*file, *text));
-        for (file, text) in texts.chain([("index.html", &*PAGE.replace(PLACE, &scripts))]) {
-            self.files.push((file.into(), text.as_bytes().to_vec()));
-        }
+        let page = PAGE.replace(PLACE, &scripts);
+        self.files
+            .extend(MODULES.map(|(name, text)| (format!("{name}.js"), text.into())));
+        self.files.push(("index.html".into(), page.into()));
         let mut folder = StagedFolder::new(root)?;
         for (name, bytes) in &self.files {
             folder.write(name, bytes)?;
@@ -285,9 +232,10 @@ impl Site {
         }
         self.report.files = self.files.len();
         folder.commit()?;
-        let is_written = |name: &&String| self.files.iter().any(|(written, _)| written == *name);
-        for outdated in previous.iter().flatten().filter(|name| !is_written(name)) {
-            files::remove_file(&path.join(outdated))?;
+        // Moments of an earlier page of more.
+        let beyond = (self.report.moments..).map(|moment| path.join(moment_file(moment)));
+        for outdated in beyond.take_while(|file| is_ours && file.exists()) {
+            files::remove_file(&outdated)?;
         }
         Ok(self.report)
     }
@@ -299,10 +247,7 @@ impl Site {
     pub fn write_file(mut self, path: &Path) -> Result<WebReport> {
         let mut inline = self.about_tag();
         let mut still = String::new();
-        let modules = MODULES.iter().map(|(_, name, text)| {
-            let name = format!("module:{name}");
-            (name, gzip(&[text.as_bytes()]))
-        });
+        let modules = MODULES.map(|(name, text)| (format!("module:{name}"), gzip(&[text.as_bytes()])));
         for (name, bytes) in self.files.drain(..).chain(modules) {
             let bytes = BASE64.encode(bytes);
             if name == STILL {
@@ -325,39 +270,12 @@ impl Site {
     /// What scripts read, in the page. No text of a scene ends its element.
     fn about_tag(&self) -> String {
         let about = self.about.to_string().replace('<', "\\u003c");
-        format!("{ABOUT}{about}</script>\n")
+        format!("<script type=\"application/json\" id=\"about\">{about}</script>\n")
     }
 }
 
-/// Files that an earlier page of ours in a folder names as its data; `None` where there is none.
-fn files_of_ours(path: &Path) -> Option<Vec<String>> {
-    let page = files::read_file(&path.join("index.html"), MAX_PAGE_BYTES).ok()?;
-    let page = String::from_utf8_lossy(&page);
-    let (_, about) = page.split_once(MARK)?.1.split_once(ABOUT)?;
-    let about: Value = serde_json::from_str(about.split_once("</script>")?.0).ok()?;
-    let names = about["files"].as_array()?.iter().filter_map(Value::as_str);
-    // None that leads out of the folder.
-    let is_plain = |name: &&str| {
-        let is_known = |byte: u8| byte.is_ascii_alphanumeric() || byte == b'.';
-        !name.starts_with('.') && name.bytes().all(is_known) && ENDS.iter().any(|end| name.ends_with(end))
-    };
-    Some(names.filter(is_plain).map(str::to_owned).collect())
-}
-
-/// A texture of an environment, and what its values are multiplied by.
-fn sky(environment: &Environment) -> (Texture, f32) {
-    let peak = environment.pixels().iter().flatten().copied().fold(0.0, f32::max);
-    // Powers of two are lossless.
-    let scale = (peak / RGB9E5.most).log2().ceil().exp2().max(1.0);
-    let scaled = environment
-        .pixels()
-        .iter()
-        .map(|pixel| pixel.map(|channel| channel / scale));
-    let mut texels = Texels::of(environment.size(), scaled.collect());
-    while texels.size().0 > sizes::MAX_SIDE {
-        texels = texels.halved();
-    }
-    (Texture::new(&texels), scale)
+fn moment_file(moment: usize) -> String {
+    format!("moment{moment}.gz")
 }
 
 /// A picture as the page shows it, as JPEG.
@@ -376,14 +294,4 @@ fn still(picture: &Picture, view: &View) -> Result<Vec<u8>> {
         Error::failure(&view.camera.name, what, "choose another first camera")
     })?;
     Ok(bytes)
-}
-
-fn warning(error: Error) -> Warning {
-    let Error {
-        location,
-        what,
-        remedy,
-        ..
-    } = error;
-    Warning::new(location, what, remedy)
 }

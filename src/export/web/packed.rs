@@ -1,50 +1,43 @@
 //! The file of a moment: a description, then what buffers and textures hold.
 
+use std::collections::BTreeMap;
 use std::io::Write as _;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 
 use crate::eye_pass::renderer::Content;
+
+/// By name.
+pub(super) type Contents = BTreeMap<String, Content>;
 
 /// Contents start at multiples of this [bytes].
 const ALIGNMENT: usize = 4;
 
-/// Contents of a moment, and their places by name: the first byte, counted from the description's end, the length and,
-/// where they are filtered, that of a record.
-#[derive(Debug, Default)]
-pub(super) struct Packed {
-    places: Map<String, Value>,
-    bytes: Vec<u8>,
-}
-
-impl Packed {
-    /// Adds content, unless it is that of the first moment.
-    pub(super) fn add(&mut self, name: &str, content: &Content, first: Option<&Content>) {
-        if first == Some(content) {
-            return;
-        }
-        let place = json!([self.bytes.len(), content.bytes.len(), content.record_bytes]);
-        self.places.insert(name.into(), place);
+/// The file of a moment, which gzip packed: length of the description [u32], description as JSON, contents but for those of
+/// the first moment. The description has their places by name: the first byte, counted from the description's end, the
+/// length and, where they are filtered, that of a record.
+pub(super) fn file(mut description: Value, contents: &Contents, first: &Contents) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for (name, content) in contents
+        .iter()
+        .filter(|(name, content)| first.get(*name) != Some(*content))
+    {
+        description["contents"][name] = json!([bytes.len(), content.bytes.len(), content.record_bytes]);
         match content.record_bytes {
             Some(record) => {
-                let first = first.map_or(&[][..], |first| &first.bytes);
-                self.bytes.extend(filtered(&content.bytes, record, first));
+                let first = first.get(name).map_or(&[][..], |first| &first.bytes);
+                bytes.extend(filtered(&content.bytes, record, first));
             }
-            None => self.bytes.extend(&content.bytes),
+            None => bytes.extend(&content.bytes),
         }
-        self.bytes.resize(self.bytes.len().next_multiple_of(ALIGNMENT), 0);
+        bytes.resize(bytes.len().next_multiple_of(ALIGNMENT), 0);
     }
-
-    /// The file, which gzip packed: length of the description [u32], description as JSON, contents.
-    pub(super) fn file(self, mut description: Value) -> Vec<u8> {
-        description["contents"] = self.places.into();
-        let mut description = description.to_string().into_bytes();
-        description.resize(description.len().next_multiple_of(ALIGNMENT), b' ');
-        let length = (description.len() as u32).to_le_bytes();
-        gzip(&[&length, &description, &self.bytes])
-    }
+    let mut description = description.to_string().into_bytes();
+    description.resize(description.len().next_multiple_of(ALIGNMENT), b' ');
+    let length = (description.len() as u32).to_le_bytes();
+    gzip(&[&length, &description, &bytes])
 }
 
 pub(super) fn gzip(parts: &[&[u8]]) -> Vec<u8> {

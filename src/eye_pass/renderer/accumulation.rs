@@ -8,7 +8,7 @@ use crate::gpu::{Gpu, texture_of};
 /// Half floats are too coarse for the mean of many frames.
 pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
-pub(super) const BINDINGS: [Binding; 3] = [
+const BINDINGS: [Binding; 3] = [
     uniform(wgpu::ShaderStages::FRAGMENT),
     texture(false, wgpu::TextureViewDimension::D2),
     texture(false, wgpu::TextureViewDimension::D2),

@@ -20,7 +20,7 @@ pub(super) const HDR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba16Fl
 pub(super) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// Group 0 of all surfaces: frame, objects, images and their tiles.
-pub(super) const FRAME_BINDINGS: [Binding; 5] = [
+const FRAME_BINDINGS: [Binding; 5] = [
     uniform(wgpu::ShaderStages::VERTEX_FRAGMENT),
     storage(),
     storage(),
@@ -28,7 +28,7 @@ pub(super) const FRAME_BINDINGS: [Binding; 5] = [
     texture(false, wgpu::TextureViewDimension::D2Array),
 ];
 /// Group 1 of what traces: start, nodes, triangles, corners, map coordinates, indices, lights, wavelengths.
-pub(super) const TRACED_BINDINGS: [Binding; 8] = [
+const TRACED_BINDINGS: [Binding; 8] = [
     uniform(wgpu::ShaderStages::FRAGMENT),
     storage(),
     storage(),
@@ -39,7 +39,7 @@ pub(super) const TRACED_BINDINGS: [Binding; 8] = [
     uniform(wgpu::ShaderStages::FRAGMENT),
 ];
 /// Group 1 of what shows what was traced.
-pub(super) const COMPOSED_BINDINGS: [Binding; 1] = [texture(false, wgpu::TextureViewDimension::D2)];
+const COMPOSED_BINDINGS: [Binding; 1] = [texture(false, wgpu::TextureViewDimension::D2)];
 
 /// What a pipeline writes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -209,11 +209,6 @@ impl PipelineKey {
         } else {
             of_picture
         }
-    }
-
-    /// Whether chains end in an environment.
-    pub(super) fn has_sky(self) -> bool {
-        self.flags.has_sky
     }
 
     /// Values of the shader's overrides.

@@ -15,7 +15,7 @@ use crate::scene::Environment;
 pub(super) const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba32Float;
 
 /// Group 2 of what shows the environment.
-pub(super) const BINDINGS: [Binding; 1] = [texture(false, wgpu::TextureViewDimension::D2)];
+const BINDINGS: [Binding; 1] = [texture(false, wgpu::TextureViewDimension::D2)];
 
 /// An environment, uploaded and ready to be drawn.
 #[derive(Debug)]

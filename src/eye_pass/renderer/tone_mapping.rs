@@ -9,7 +9,7 @@ use crate::eye_pass::ToneMap;
 use crate::gpu::Gpu;
 use crate::optics::spectrum::xyz::{IDENTITY, Matrix3};
 
-pub(super) const BINDINGS: [Binding; 2] = [
+const BINDINGS: [Binding; 2] = [
     texture(false, wgpu::TextureViewDimension::D2),
     uniform(wgpu::ShaderStages::FRAGMENT),
 ];

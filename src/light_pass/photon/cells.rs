@@ -156,6 +156,11 @@ impl Cells {
         self.inherited(0, [0.0; N], |level, index| values[level][index])
     }
 
+    /// Surface area in each of a level's cells [m²].
+    pub fn areas_m2(&self, level: usize) -> &[f32] {
+        &self.levels[level].areas_m2
+    }
+
     /// Area of each texel, relative to the largest of its size.
     pub fn shares(&self) -> Vec<f32> {
         self.inherited(0, 0.0, |level, index| {

@@ -41,16 +41,23 @@ const DARKEST: f32 = 1e-4;
 /// other, by all threads.
 const SMALL_TEXELS: usize = 1 << 18;
 
-/// Filters the sum of two halves and returns the remaining squared error of each texel [W²/m⁴]. `is_signed`: channels
-/// may be negative. Adds counts that a map could not take to `left`.
+/// Filters the photons of two halves, which a map holds together with twice the `bundles`, and returns the remaining
+/// squared error of each texel [W²/m⁴]. `is_signed`: channels may be negative. Adds counts that a map could not take to
+/// `left`.
 pub fn filter(
     sum: &mut ReceiverMaps,
     halves: [&ReceiverMaps; 2],
+    bundles: Option<&ReceiverMaps>,
     (unit, is_signed): (FluxUnit, bool),
     left: &mut Sums,
 ) -> Noise {
     let of_map = |(receiver, map): (Receiver, &mut ReceiverMap)| {
-        let details = Details::new(map, halves.map(|half| half.get(receiver)), unit, is_signed);
+        let layers = [
+            halves[0].get(receiver),
+            halves[1].get(receiver),
+            bundles.and_then(|maps| maps.get(receiver)),
+        ];
+        let details = Details::new(map, layers, unit, is_signed);
         let kept = details.filtered();
         let squares = details.squares(&kept, map);
         ((receiver, squares), details.put(&kept, map, unit))
@@ -102,6 +109,20 @@ type Raw = [f32; 6];
 /// A filtered cell: its channels, the luminance of each half, the squared bias.
 type FilteredCell = [f32; 6];
 
+/// A filtered cell with the light of bundles.
+fn with_bundles(filtered: &FilteredCell, bundled: &[f32; 3]) -> FilteredCell {
+    let [red, green, blue, a, b, missed] = *filtered;
+    let bundled_luminance = luminance(bundled) as f32;
+    [
+        red + bundled[0],
+        green + bundled[1],
+        blue + bundled[2],
+        a + bundled_luminance,
+        b + bundled_luminance,
+        missed,
+    ]
+}
+
 /// Luminance of each half.
 fn luminances(raw: &Raw) -> [f32; 2] {
     let [r, g, b, r2, g2, b2] = *raw;
@@ -129,7 +150,10 @@ fn tints(detail: &Raw, smooth: &FilteredCell) -> [[f32; 3]; 2] {
 
 struct Details {
     cells: Cells,
+    /// Light of photons.
     raw: Values<6>,
+    /// Channels of light that bundles carry, which has no noise.
+    bundled: Values<3>,
     /// Mean luminance of the map [W/m²].
     mean: f64,
     /// Channels may be negative, as those of pure colours are.
@@ -137,28 +161,32 @@ struct Details {
 }
 
 impl Details {
-    fn new(map: &ReceiverMap, halves: [Option<&ReceiverMap>; 2], unit: FluxUnit, is_signed: bool) -> Self {
+    /// Layers: photons of both halves, and bundles.
+    fn new(map: &ReceiverMap, layers: [Option<&ReceiverMap>; 3], unit: FluxUnit, is_signed: bool) -> Self {
         let cells = Cells::new(&map.chart);
         let counts = map.levels()[0].texels();
-        let halves = halves.map(|half| half.map(|half| half.levels()[0].texels()));
+        let layers = layers.map(|layer| layer.map(|layer| layer.levels()[0].texels()));
         let flux_w: f64 = counts.iter().map(|&count| unit.flux_w(count).luminance()).sum();
         let per_w = if flux_w > 0.0 {
             map.chart.area_m2() / flux_w
         } else {
             0.0
         };
+        let relative = |layer: usize, texel: usize| {
+            layers[layer].map_or([0.0; 3], |counts| {
+                let flux_w = unit.flux_w(counts[texel]).to_array();
+                flux_w.map(|watts| (2.0 * watts * per_w) as f32)
+            })
+        };
         let raw = cells.densities(|texel| {
-            let [first, second] = halves.map(|half| {
-                half.map_or([0.0; 3], |counts| {
-                    let flux_w = unit.flux_w(counts[texel]).to_array();
-                    flux_w.map(|watts| (2.0 * watts * per_w) as f32)
-                })
-            });
+            let [first, second] = [0, 1].map(|half| relative(half, texel));
             [first[0], first[1], first[2], second[0], second[1], second[2]]
         });
+        let bundled = cells.densities(|texel| relative(2, texel));
         Self {
             cells,
             raw,
+            bundled,
             mean: flux_w / map.chart.area_m2(),
             is_signed,
         }
@@ -177,10 +205,14 @@ impl Details {
             kept[level] = self.refined(level, &kept);
         }
         let mut texels = self.cells.texels(&kept);
-        let is_reached =
-            |level: usize, cell: usize| self.raw[level][cell].iter().any(|channel| *channel != 0.0);
+        let is_reached = |level: usize, cell: usize| {
+            let layers = self.raw[level][cell].iter().chain(&self.bundled[level][cell]);
+            layers.copied().any(|channel| channel != 0.0)
+        };
         let reached = self.cells.inherited(DARK_LEVEL.min(coarsest), false, is_reached);
-        for (texel, is_reached) in texels.iter_mut().zip(reached) {
+        let bundled = self.cells.texels(&self.bundled);
+        for ((texel, is_reached), bundled) in texels.iter_mut().zip(reached).zip(bundled) {
+            *texel = with_bundles(texel, &bundled);
             let [.., a, b, _] = *texel;
             if !is_reached && 0.5 * (a + b) < DARK {
                 *texel = [0.0; 6];
@@ -202,7 +234,12 @@ impl Details {
         // Noise is proportional to light where photons carry equal flux.
         let light = |smooth: &FilteredCell| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
         let areas = self.cells.relative_areas(level);
-        let cells = details.par_iter().zip(&refined).zip(&areas);
+        let whole: Vec<FilteredCell> = refined
+            .par_iter()
+            .zip(&self.bundled[level])
+            .map(|(filtered, bundled)| with_bundles(filtered, bundled))
+            .collect();
+        let cells = details.par_iter().zip(&whole).zip(&areas);
         let both = cells
             .clone()
             .map(|((detail, smooth), area)| [noise(detail) * area, light(smooth)]);
@@ -235,9 +272,14 @@ impl Details {
         drop(by_light);
         let pooled = self.cells.around(level, &power, &areas);
         drop(power);
-        let cells = refined.par_iter_mut().zip(&details).zip(&pooled).zip(&areas);
+        let cells = refined
+            .par_iter_mut()
+            .zip(&whole)
+            .zip(&details)
+            .zip(&pooled)
+            .zip(&areas);
         cells.for_each(
-            |(((kept, detail), [signal, noise, tint_signal, tint_noise]), area)| {
+            |((((kept, whole), detail), [signal, noise, tint_signal, tint_noise]), area)| {
                 let part = |signal: f32, noise: f32| {
                     if signal > 0.0 && *area > 0.0 {
                         signal / (signal + noise.max(0.0) / area)
@@ -248,11 +290,13 @@ impl Details {
                 let share = part(*signal, *noise);
                 let [first, second] = luminances(detail);
                 let missed = (1.0 - share) * (1.0 - share) * first * second;
-                let [red, green, blue] =
-                    self.channels_of(kept, detail, [share, part(*tint_signal, *tint_noise)]);
-                let [.., a, b, missed_before] = *kept;
-                let [a, b] = [a + share * first, b + share * second];
-                *kept = [red, green, blue, a, b, missed_before + missed];
+                let lit = self.channels_of(whole, detail, [share, part(*tint_signal, *tint_noise)]);
+                for channel in 0..3 {
+                    kept[channel] += lit[channel] - whole[channel];
+                }
+                kept[3] += share * first;
+                kept[4] += share * second;
+                kept[5] += missed;
             },
         );
         refined
@@ -285,13 +329,27 @@ impl Details {
     /// the square of their area, and distributed among them by their irradiance.
     fn squares(&self, of_texels: &[FilteredCell], map: &ReceiverMap) -> Vec<f64> {
         let expected = |[.., a, b, _]: &FilteredCell| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
-        let square = |[.., a, b, missed]: &FilteredCell| missed + 0.25 * (a - b) * (a - b);
         let shares = self.cells.shares();
+        let area_of = |texel: usize| shares[texel] * map.chart.texel_area_m2(texel) as f32;
+
+        // What the filter took from both halves alike is its bias, of whatever levels it is made. Levels by themselves
+        // tell of less, as those details are dropped that happen to disagree.
+        let raw = self.cells.texels(&self.raw);
+        let bundled = self.cells.texels(&self.bundled);
+        let untold = |texel: usize| {
+            let [.., a, b, missed] = of_texels[texel];
+            let [first, second] = luminances(&raw[texel]);
+            let bundled = luminance(&bundled[texel]) as f32;
+            (a - bundled - first) * (b - bundled - second) - missed
+        };
         let mut ratios = self.cells.densities(|texel| {
-            let weight = shares[texel] * map.chart.texel_area_m2(texel) as f32;
-            [square(&of_texels[texel]), expected(&of_texels[texel])].map(|value| value * weight)
+            let kept = &of_texels[texel];
+            let [.., a, b, missed] = *kept;
+            let square = missed + 0.25 * (a - b) * (a - b);
+            [square, expected(kept), untold(texel)].map(|value| value * area_of(texel))
         });
         let pool = self.cells.pool();
+        add_untold(&mut ratios[pool], self.cells.areas_m2(pool));
         for level in (0..pool).rev() {
             ratios[level] = self.cells.between(level, &ratios);
         }
@@ -299,7 +357,7 @@ impl Details {
         let squares = of_texels
             .iter()
             .zip(&ratios)
-            .map(|(kept, [square, expected_there])| {
+            .map(|(kept, [square, expected_there, _])| {
                 let ratio = if *expected_there > 0.0 {
                     (square / expected_there).max(0.0)
                 } else {
@@ -319,6 +377,21 @@ impl Details {
             [0, 1, 2].map(|channel| f64::from(of_texels[texel][channel]) * counts)
         };
         put(map, flux, self.is_signed)
+    }
+}
+
+/// Adds the bias that levels do not tell of to the squared errors of cells. Over the whole map,
+/// noise cancels from its products; they tell where it lies as far as they are positive.
+fn add_untold(cells: &mut [[f32; 3]], areas_m2: &[f32]) {
+    let (mut sum, mut positive) = (0.0, 0.0);
+    for ([_, _, untold], area_m2) in cells.iter().zip(areas_m2) {
+        sum += f64::from(untold * area_m2);
+        positive += f64::from(untold.max(0.0) * area_m2);
+    }
+    if sum > 0.0 {
+        for [square, _, untold] in cells {
+            *square += (sum / positive) as f32 * untold.max(0.0);
+        }
     }
 }
 

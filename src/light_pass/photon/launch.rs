@@ -186,12 +186,50 @@ impl<'a> PhotonLaunch<'a> {
         even_code(index, seed)
     }
 
-    /// Number of cells. All get equally many photons, and neighbours within one take much the same path. 0 for an
-    /// extended light without [`Self::lamp_offsets`].
-    pub(super) fn cell_count(&self) -> usize {
+    /// Number of unit squares that make up the whole domain: faces of the launch, or squares of spheres.
+    pub(super) fn root_count(&self) -> usize {
         match &self.domain {
-            Domain::Cells { cells, .. } => cells.len(),
-            Domain::Spheres(lamp) => lamp.places.offsets().map_or(0, |_| lamp.spheres.cell_count()),
+            Domain::Cells { launch, .. } => launch.face_count(),
+            Domain::Spheres(lamp) => lamp.spheres.sphere_count(),
+        }
+    }
+
+    /// Cells that light is aimed at, as (root, column, row); `None` for an extended light.
+    pub(super) fn marked_cells(&self) -> Option<Vec<(u32, u32, u32)>> {
+        match &self.domain {
+            Domain::Cells { cells, .. } => {
+                let place = |cell: &Cell| (cell.face.into(), cell.column.into(), cell.row.into());
+                Some(cells.iter().map(place).collect())
+            }
+            Domain::Spheres(_) => None,
+        }
+    }
+
+    /// The launch of a light without extent, whose roots are its faces.
+    pub(super) fn of_faces(&self) -> Option<&'a Launch> {
+        match &self.domain {
+            Domain::Cells { launch, .. } => Some(launch),
+            Domain::Spheres(_) => None,
+        }
+    }
+
+    /// The light that starts at a point of a root and a point of its lamp's unit square, with its flux per unit square;
+    /// `None` if none does.
+    pub(super) fn start_at(&self, root: usize, square: DVec2, lamp: DVec2) -> Option<Start> {
+        match &self.domain {
+            Domain::Cells { launch, .. } => {
+                let ray = launch.ray(root, square);
+                Some(Start {
+                    flux_w: launch.flux_density_w(square, ray.direction),
+                    ray,
+                    media: *launch.media(),
+                })
+            }
+            Domain::Spheres(of) => {
+                let emitter = of.places.sample(lamp)?;
+                let light = of.spheres.aim_at(&emitter, root, square, of.across_m)?;
+                Some(of.start(&emitter, light))
+            }
         }
     }
 
@@ -203,6 +241,11 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
+    /// Whether the lamp, if it has a size, faces one way.
+    pub fn has_offsets(&self) -> bool {
+        matches!(self.domain, Domain::Cells { .. }) || self.lamp_offsets().is_some()
+    }
+
     /// Maps the unit square of a lamp that faces one way to half-axes from its centre; `None` for other lights.
     pub(super) fn lamp_offsets(&self) -> Option<fn(DVec2) -> DVec2> {
         match &self.domain {
@@ -211,50 +254,36 @@ impl<'a> PhotonLaunch<'a> {
         }
     }
 
-    /// The photon from a point of a cell and a point of its lamp's unit square; `None` if no light starts there.
-    pub(super) fn start_in(&self, cell: usize, within: DVec2, lamp: DVec2) -> Option<Start> {
+    /// The photon of an index at a place along the domain's curve; `None` if its point of the lamp emits nothing
+    /// towards specular surfaces.
+    pub fn start(&self, index: u32, place: u64, seed: u64) -> Option<Start> {
         let (launch, cells, full_w) = match &self.domain {
             Domain::Cells {
                 launch,
                 cells,
                 full_w,
             } => (launch, cells, full_w),
-            Domain::Spheres(of) => {
-                let emitter = of.places.sample(lamp)?;
-                let visible_light = of.spheres.aim_in(&emitter, (cell, within), of.across_m)?;
-                return Some(of.start(&emitter, visible_light));
+            Domain::Spheres(lamp) => {
+                let emitter = lamp.places.sample(self.lamp_place(index, seed))?;
+                let visible_light = lamp.spheres.aim(&emitter, place, lamp.across_m)?;
+                return Some(lamp.start(&emitter, visible_light));
             }
         };
-        let count = cells.len();
+        // All cells get equally many photons.
+        let (cell, rest) = chosen(place, cells.len());
         let cell = cells.get(cell)?;
         let side = CELLS_PER_SIDE as f64;
-        let square = (DVec2::new(f64::from(cell.column), f64::from(cell.row)) + within) / side;
+        let square = (DVec2::new(f64::from(cell.column), f64::from(cell.row)) + in_square(rest)) / side;
         let ray = launch.ray(usize::from(cell.face), square);
         let flux_w = match full_w {
             Some(full_w) => *full_w * launch.emitter().kind.falloff(ray.direction),
-            None => launch.flux_density_w(square, ray.direction) * cell_share(count),
+            None => launch.flux_density_w(square, ray.direction) * cell_share(cells.len()),
         };
         Some(Start {
             ray,
             flux_w,
             media: *launch.media(),
         })
-    }
-
-    /// The photon of an index at a place along the domain's curve; `None` if its point of the lamp emits nothing
-    /// towards specular surfaces.
-    pub fn start(&self, index: u32, place: u64, seed: u64) -> Option<Start> {
-        match &self.domain {
-            Domain::Cells { .. } => {
-                let (cell, rest) = chosen(place, self.cell_count());
-                self.start_in(cell, in_square(rest), LAMP_MIDDLE)
-            }
-            Domain::Spheres(lamp) => {
-                let emitter = lamp.places.sample(self.lamp_place(index, seed))?;
-                let visible_light = lamp.spheres.aim(&emitter, place, lamp.across_m)?;
-                Some(lamp.start(&emitter, visible_light))
-            }
-        }
     }
 }
 

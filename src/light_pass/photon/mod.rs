@@ -1,15 +1,24 @@
-//! Photons: paths sampled from a light, one branch at each event, each hit counted in its texel.
+//! Light by bundles and photons.
 //!
-//! Where patches of a wavefront shatter (cut glass, rough glass, many internal reflections) or would have to be
-//! averaged over an extended light, a photon still costs one path. Point of the lamp, micro-normals and wavelength are
-//! dimensions of the path. Bundles carry coherent light, photons the difference.
+//! Light that stays together is computed: the launch domain is divided into squares, and the light of one path over a
+//! square is a *bundle*, which is deposited as a whole. What bundles get wrong is left to photons: paths sampled from a
+//! light, one branch at each event, each hit counted in its texel. In the mean, photons contribute exactly the difference
+//! between the light and its bundles. The steps are in `residual`.
+//!
+//! Point of the lamp, micro-normals and wavelength are dimensions of a photon's path. Without squares (`pass`), photons
+//! carry all of the light.
 
-mod bundles;
+mod bundle;
 mod cells;
+pub mod domain;
+mod edge;
 pub mod filter;
 pub mod launch;
 pub mod pass;
+mod paths;
+mod receivers;
+pub mod residual;
 pub mod spectrum;
 pub mod spheres;
-mod survey;
+mod squares;
 pub mod walk;

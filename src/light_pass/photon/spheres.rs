@@ -89,26 +89,23 @@ impl Spheres {
         Some((ray, choice.measure))
     }
 
-    pub(super) fn cell_count(&self) -> usize {
-        self.0.len() * CELLS
+    pub(super) fn sphere_count(&self) -> usize {
+        self.0.len()
     }
 
-    /// A ray from a point of a lamp through a point of a cell, and the measure [sr or m²] that a photon represents if
-    /// its cell is drawn uniformly. `None` if nothing is emitted towards the cell's sphere, or the ray belongs to an
-    /// earlier one.
-    pub(super) fn aim_in(
+    /// A ray from a point of a lamp through a point of a sphere's unit square, and the measure [sr or m²] of that square.
+    /// `None` if nothing is emitted towards the sphere, or the ray belongs to an earlier one.
+    pub(super) fn aim_at(
         &self,
         emitter: &Emitter,
-        (cell, within): (usize, DVec2),
+        which: usize,
+        square: DVec2,
         across_m: f64,
     ) -> Option<(Ray, f64)> {
-        let which = cell / CELLS;
-        let measure = self.0.get(which)?.sphere.measure(emitter) * self.0.len() as f64;
+        let measure = self.0.get(which)?.sphere.measure(emitter);
         if !(measure > 0.0 && measure.is_finite()) {
             return None;
         }
-        let [column, row] = unfolded((cell % CELLS) as u64).map(f64::from);
-        let square = (DVec2::new(column, row) + within) / SIDE as f64;
         Some((self.ray(emitter, which, square, across_m)?, measure))
     }
 

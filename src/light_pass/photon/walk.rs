@@ -2,9 +2,11 @@
 
 use glam::DVec2;
 
-use super::bundles::{Bundle, Carried, Step};
+use super::bundle::Bundle;
 use super::launch::{LAMP_DIMENSION, Start};
+use super::paths::{Chain, ChainStep};
 use super::spectrum::{Hue, PhotonSpectrum};
+use super::squares::Guide;
 use crate::geometry::Ray;
 use crate::geometry::sampling::{GOLDEN_64, even_number, even_point, mix64};
 use crate::illumination::accumulator::FluxUnit;
@@ -16,6 +18,12 @@ use crate::transport::{Branch, EffectSet, Event, MediumStack, Meeting, Tracer};
 /// Fraction of its initial flux (largest channel) below which a photon plays Russian roulette. Survivors return to this
 /// fraction.
 const ROULETTE_BELOW: f64 = 0.1;
+
+/// The same for photons with guides, which choose faint branches on purpose.
+const GUIDED_ROULETTE_BELOW: f64 = 1e-3;
+
+/// Part of a choice that is left to the shares of flux; guides decide the rest. Weights are at most its reciprocal.
+const UNGUIDED: f64 = 0.5;
 
 /// Dimension of [`even_point`] from which wavelengths are drawn.
 pub(super) const WAVELENGTH_DIMENSION: u32 = 1 << 16;
@@ -38,8 +46,28 @@ pub enum PhotonArrival {
         triangle: usize,
         barycentric: [f64; 3],
     },
-    /// Position on the map [texels] at which a bundle's flux is removed.
-    Map(DVec2),
+    /// Where the flux of a bundle is removed.
+    Map {
+        /// [texels].
+        place: DVec2,
+        /// Index among the bundles that the photon follows.
+        bundle: usize,
+    },
+}
+
+/// Bundles that a photon follows, and ways that it is led along.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Followed<'a> {
+    pub(super) bundles: &'a [Bundle],
+    /// One bit for each bundle that exists where the photon starts.
+    pub(super) mask: u64,
+    pub(super) guides: &'a [Guide],
+    /// Where the photon starts in its square.
+    pub(super) within: DVec2,
+    /// Unit squares of the launch domain that the photon stands for.
+    pub(super) scale: f64,
+    /// Where it starts on the lamp, in half-axes from its centre.
+    pub(super) lamp: DVec2,
 }
 
 /// What all photons of a light share.
@@ -56,6 +84,20 @@ pub struct PhotonRules<'a> {
     pub seed: u64,
 }
 
+impl<'a> PhotonRules<'a> {
+    /// All wavelengths together.
+    pub(super) fn whole_hue(&self) -> Hue<'a> {
+        match self.spectrum {
+            Some(spectrum) => spectrum.whole(),
+            None => Hue {
+                tracer: self.tracer,
+                channels: ColourMatrix::IDENTITY,
+                band: None,
+            },
+        }
+    }
+}
+
 /// Traces photons one after the other and books their flux.
 #[derive(Debug)]
 pub struct PhotonWalk<'a> {
@@ -66,16 +108,16 @@ pub struct PhotonWalk<'a> {
 }
 
 /// The photon that is being traced.
-struct Photon<'a> {
+struct Photon<'a, 'b> {
     hue: Hue<'a>,
     /// Its single wavelength, once the light is dispersed.
     own_hue: Option<Hue<'a>>,
     flux_w: LinearSrgb,
     index: u32,
     choice: Choice,
-    carried: Carried<'a>,
-    /// Bit mask of the bundles that it has followed so far.
-    followed: u32,
+    followed: Followed<'b>,
+    /// Bit mask of the guides that it has followed so far.
+    guided: u64,
     /// Probability of its random choices so far.
     probability: f64,
     /// Whether it is still direct light.
@@ -89,6 +131,10 @@ impl<'a> PhotonWalk<'a> {
             ledger: LedgerSum::default(),
             segments: 0,
         }
+    }
+
+    pub(super) fn seed(&self) -> u64 {
+        self.rules.seed
     }
 
     #[inline]
@@ -113,33 +159,24 @@ impl<'a> PhotonWalk<'a> {
         &mut self,
         index: u32,
         start: Option<Start>,
-        mut carried: Carried<'a>,
+        followed: Followed<'_>,
         mut arrive: impl FnMut(Hit),
     ) {
-        let whole = match self.rules.spectrum {
-            Some(spectrum) => spectrum.whole(),
-            None => Hue {
-                tracer: self.rules.tracer,
-                channels: ColourMatrix::IDENTITY,
-                band: None,
-                ends: [0.0; 2],
-            },
-        };
         let own_hue = self.rules.spectrum.and_then(|spectrum| {
             let place = even_point(index, WAVELENGTH_DIMENSION, self.rules.seed).x;
             spectrum.one(place)
         });
-        if let Some(hue) = own_hue {
-            carried.origin.ends = hue.ends;
-        }
         let mut photon = Photon {
-            hue: whole,
+            hue: self.rules.whole_hue(),
             own_hue,
             flux_w: start.map_or(LinearSrgb::BLACK, |start| start.flux_w),
             choice: Choice::new(index, self.rules.seed),
             index,
-            carried,
-            followed: (1 << carried.bundles.len()) - 1,
+            followed,
+            guided: match followed.guides.len() as u32 {
+                0 => 0,
+                guides => u64::MAX >> (u64::BITS - guides),
+            },
             probability: 1.0,
             is_straight: true,
         };
@@ -150,6 +187,11 @@ impl<'a> PhotonWalk<'a> {
         if self.rules.spectrum.is_some_and(PhotonSpectrum::starts_parted) {
             self.part(&mut photon);
         }
+        let roulette_below = if followed.guides.is_empty() {
+            ROULETTE_BELOW
+        } else {
+            GUIDED_ROULETTE_BELOW
+        };
         let (mut ray, mut media) = (start.ray, start.media);
         for depth in 0.. {
             let Some(branch) = self.step(&mut photon, depth, &ray, &media, &mut arrive) else {
@@ -158,7 +200,7 @@ impl<'a> PhotonWalk<'a> {
             if depth >= self.rules.max_depth {
                 return self.book(Account::Depth, &photon.hue.channels, photon.flux_w);
             }
-            if !self.survives(&mut photon, ROULETTE_BELOW * brightest_w) {
+            if !self.survives(&mut photon, roulette_below * brightest_w) {
                 return;
             }
             (ray, media) = (branch.ray, branch.media);
@@ -168,7 +210,7 @@ impl<'a> PhotonWalk<'a> {
     /// Traces to the next surface and returns the branch that is followed from there; `None` at the end of the path.
     fn step(
         &mut self,
-        photon: &mut Photon<'a>,
+        photon: &mut Photon<'a, '_>,
         depth: u32,
         ray: &Ray,
         media: &MediumStack,
@@ -208,8 +250,8 @@ impl<'a> PhotonWalk<'a> {
         let tracer = photon.hue.tracer;
         let meeting = tracer.meet(effects, &hit, ray.direction, media, micro);
         let deposit_w = photon.flux_w * meeting.deposit;
-        if photon.followed != 0 {
-            photon.part_at(depth as usize, hit.object, &meeting, arrive);
+        if photon.followed.mask != 0 {
+            photon.leave_at(depth as usize, hit.object, &meeting, arrive);
         }
         if photon.is_straight {
             // Before any specular event, deposits are direct light.
@@ -238,11 +280,11 @@ impl<'a> PhotonWalk<'a> {
             &photon.hue.channels,
             photon.flux_w * meeting.switched_off,
         );
-        self.choose(photon, depth as usize, &meeting)
+        self.choose(photon, (depth as usize, hit.object), &meeting)
     }
 
     /// Reduces a photon of all wavelengths to its own one.
-    fn part(&mut self, photon: &mut Photon<'a>) {
+    fn part(&mut self, photon: &mut Photon<'a, '_>) {
         if photon.hue.band.is_some() {
             return;
         }
@@ -253,8 +295,14 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
-    /// Draws reflection or transmission in proportion to flux; `None` if neither carries any.
-    fn choose(&mut self, photon: &mut Photon<'a>, depth: usize, meeting: &Meeting) -> Option<Branch> {
+    /// Draws reflection or transmission at an object, in proportion to flux and towards guides; `None` if neither carries
+    /// any.
+    fn choose(
+        &mut self,
+        photon: &mut Photon<'a, '_>,
+        (depth, object): (usize, usize),
+        meeting: &Meeting,
+    ) -> Option<Branch> {
         let carried = |share: Option<LinearSrgb>| {
             let flux_w = share.map_or(LinearSrgb::BLACK, |share| photon.flux_w * share);
             (flux_w, flux_w.to_array().iter().sum::<f64>())
@@ -265,7 +313,7 @@ impl<'a> PhotonWalk<'a> {
         if both <= 0.0 {
             return None;
         }
-        let share = reflected / both;
+        let share = photon.guided_share(depth, object, reflected / both);
         let is_reflected = share >= 1.0 || (share > 0.0 && photon.choice.falls_below(share));
         let probability = if is_reflected { share } else { 1.0 - share };
         let (branch, flux_w) = if is_reflected {
@@ -273,8 +321,11 @@ impl<'a> PhotonWalk<'a> {
         } else {
             (meeting.transmission()?, transmitted_w * probability.recip())
         };
-        if photon.followed != 0 {
+        if photon.followed.mask != 0 {
             photon.follow_only(depth, is_reflected, probability);
+        }
+        if photon.guided != 0 {
+            photon.follow_guides(depth, object, is_reflected);
         }
         if !(flux_w.is_finite() && branch.ray.direction.is_finite() && branch.ray.origin.is_finite()) {
             let lost_w = (reflected_w + transmitted_w).map(|w| if w.is_finite() { w } else { 0.0 });
@@ -292,7 +343,7 @@ impl<'a> PhotonWalk<'a> {
     }
 
     /// Russian roulette for photons of little flux.
-    fn survives(&mut self, photon: &mut Photon<'a>, least_w: f64) -> bool {
+    fn survives(&mut self, photon: &mut Photon<'a, '_>, least_w: f64) -> bool {
         let probability = photon.flux_w.max_channel() / least_w;
         if probability >= 1.0 {
             return true;
@@ -310,41 +361,48 @@ impl<'a> PhotonWalk<'a> {
     }
 }
 
-impl Photon<'_> {
+impl Photon<'_, '_> {
     /// Separates the photon from all bundles that it has followed.
     #[inline]
     fn leave_all(&mut self, arrive: &mut impl FnMut(Hit)) {
-        if self.followed != 0 {
+        if self.followed.mask != 0 {
             self.leave_where(|_| true, arrive);
         }
     }
 
     /// Separates the photon from some of the bundles that it has followed: their flux is removed at their predicted
     /// arrival.
-    fn leave_where(&mut self, is_left: impl Fn(&Bundle) -> bool, arrive: &mut impl FnMut(Hit)) {
-        let carried = self.carried;
-        for (number, bundle) in carried.bundles.iter().enumerate() {
+    fn leave_where(&mut self, is_left: impl Fn(&Chain) -> bool, arrive: &mut impl FnMut(Hit)) {
+        let followed = self.followed;
+        for (number, bundle) in followed.bundles.iter().enumerate() {
             let bit = 1 << number;
-            if self.followed & bit != 0 && is_left(bundle) {
-                self.followed &= !bit;
-                let flux_w = bundle.flux_w() * (-carried.scale / self.probability);
-                arrive(Hit {
-                    receiver: bundle.receiver,
-                    place: PhotonArrival::Map(bundle.place(&carried)),
-                    flux_w: self.own_hue.map_or(flux_w, |hue| hue.channels.apply(flux_w)),
-                    band: self.own_hue.and_then(|hue| hue.band),
-                });
+            if self.followed.mask & bit == 0 || !is_left(&bundle.route.chain) {
+                continue;
             }
+            self.followed.mask &= !bit;
+            let Some(predicted) = bundle.at(followed.within, followed.lamp) else {
+                continue;
+            };
+            let flux_w = predicted.flux_w * (-followed.scale / self.probability);
+            arrive(Hit {
+                receiver: bundle.receiver(),
+                place: PhotonArrival::Map {
+                    place: predicted.place,
+                    bundle: number,
+                },
+                flux_w,
+                band: None,
+            });
         }
     }
 
     /// Separates the photon from bundles that end here, miss this surface, or go on from it where no light goes.
-    fn part_at(&mut self, depth: usize, object: usize, meeting: &Meeting, arrive: &mut impl FnMut(Hit)) {
+    fn leave_at(&mut self, depth: usize, object: usize, meeting: &Meeting, arrive: &mut impl FnMut(Hit)) {
         let flux_w = self.flux_w;
         let goes =
             |share: Option<LinearSrgb>| share.is_some_and(|share| (flux_w * share).max_channel() > 0.0);
         let (is_reflected, is_transmitted) = (goes(meeting.reflected), goes(meeting.transmitted));
-        let follows = |step: &Step| {
+        let follows = |step: ChainStep| {
             let goes_on = if step.is_reflected {
                 is_reflected
             } else {
@@ -352,18 +410,54 @@ impl Photon<'_> {
             };
             step.object as usize == object && goes_on
         };
-        self.leave_where(|bundle| !bundle.steps.get(depth).is_some_and(follows), arrive);
+        self.leave_where(|chain| !chain.step(depth).is_some_and(follows), arrive);
     }
 
     /// Drops the bundles that took the other outcome of a random choice: photons with that outcome remove their flux.
     fn follow_only(&mut self, depth: usize, is_reflected: bool, probability: f64) {
-        for (number, bundle) in self.carried.bundles.iter().enumerate() {
-            let step = bundle.steps.get(depth);
+        for (number, bundle) in self.followed.bundles.iter().enumerate() {
+            let step = bundle.route.chain.step(depth);
             if step.is_none_or(|step| step.is_reflected != is_reflected) {
-                self.followed &= !(1 << number);
+                self.followed.mask &= !(1 << number);
             }
         }
         self.probability *= probability;
+    }
+
+    /// Probability of reflection where it carries this share of the flux: higher towards ways on which bundles leave
+    /// light.
+    fn guided_share(&self, depth: usize, object: usize, share: f64) -> f64 {
+        if self.guided == 0 || share <= 0.0 || share >= 1.0 {
+            return share;
+        }
+        let mut weights = [0.0; 2];
+        for (number, guide) in self.followed.guides.iter().enumerate() {
+            if self.guided >> number & 1 != 0
+                && let Some(step) = guide.chain.step(depth)
+                && step.object as usize == object
+            {
+                weights[usize::from(step.is_reflected)] += guide.weight;
+            }
+        }
+        let sum = weights[0] + weights[1];
+        if sum > 0.0 {
+            UNGUIDED * share + (1.0 - UNGUIDED) * weights[1] / sum
+        } else {
+            share
+        }
+    }
+
+    /// Drops the guides that go another way.
+    fn follow_guides(&mut self, depth: usize, object: usize, is_reflected: bool) {
+        let taken = ChainStep {
+            object: object as u32,
+            is_reflected,
+        };
+        for (number, guide) in self.followed.guides.iter().enumerate() {
+            if guide.chain.step(depth) != Some(taken) {
+                self.guided &= !(1 << number);
+            }
+        }
     }
 }
 

@@ -19,6 +19,13 @@ impl EdgeSearch {
         cells_across_casters: 160.0,
     };
 
+    /// To find small casters at all.
+    pub const ROUGH: Self = Self {
+        cut_bits: 0,
+        corner_levels: 0,
+        cells_across_casters: 2.0,
+    };
+
     /// For light that hardly shows next to that of other lights.
     pub const DIM: Self = Self {
         cut_bits: 5,

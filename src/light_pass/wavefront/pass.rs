@@ -63,8 +63,6 @@ pub struct WavefrontDepositor<'a> {
     pub reference_w: f64,
     /// Coarseness of triangles relative to the usual one: above 1 is coarser.
     pub coarseness: f64,
-    /// Limit on receiver queries; a run that exceeds it ends as if it were cancelled.
-    pub most_queries: u64,
 }
 
 impl WavefrontDepositor<'_> {
@@ -96,7 +94,7 @@ impl WavefrontDepositor<'_> {
                 report.trace_s.add(watch.elapsed());
                 report.count_traced(&band);
                 self.deposit(&band, maps.as_deref_mut(), listener.control, &mut report);
-                if listener.control.is_cancelled() || report.receiver_queries > self.most_queries {
+                if listener.control.is_cancelled() {
                     report.cancelled = true;
                     return (report, None);
                 }
@@ -152,7 +150,7 @@ impl WavefrontDepositor<'_> {
             .collect();
         let mut maps = maps;
         let (mut rest, mut at_once) = (&tasks[..], FIRST_AT_ONCE);
-        while !rest.is_empty() && report.receiver_queries <= self.most_queries {
+        while !rest.is_empty() {
             let (tasks, later) = rest.split_at(at_once.min(rest.len()));
             rest = later;
             let parts = self.spread(band, tasks, control, maps.is_none());
@@ -161,8 +159,6 @@ impl WavefrontDepositor<'_> {
                 report.receiver_queries += part.queries;
                 report.statistics.merge(&part.statistics);
                 report.overshoots.extend_from_slice(&part.overshoots);
-                let flux = report.lumped_flux.iter_mut().zip(part.lumped_flux);
-                flux.for_each(|(sum, flux)| *sum += flux);
             }
             let triangles: usize = parts.iter().map(SpreadOutput::triangle_count).sum();
             // Neighbouring patches are divided alike.

@@ -60,9 +60,6 @@ pub struct SpreadOutput {
     pub statistics: FootprintStatistics,
     /// Patches that reach farther than their traced rays.
     pub overshoots: Vec<PatchOvershoot>,
-    /// Luminous flux [counts] of all patches, and of those that concentrate a part of the spectrum in one place because
-    /// other wavelengths take other paths.
-    pub lumped_flux: [i128; 2],
 }
 
 impl SpreadOutput {
@@ -140,15 +137,11 @@ impl Spreader<'_> {
                 self.spread_spectrum(patch, segments, (others, parted), spectrum, out);
             }
             (SpectralTag::Node(node), light) => {
-                let before = out.lumped_flux[0];
                 let node = light.node(usize::from(node));
                 let tint = node.map_or(PatchColour::WHITE, |node| {
                     PatchColour::of_node(node.channels, own)
                 });
                 self.spread_segments(patch, own, tint, out);
-                if matches!(light, LightPart::Spectrum(_)) {
-                    out.lumped_flux[1] += out.lumped_flux[0] - before;
-                }
             }
             (SpectralTag::White | SpectralTag::Spectrum { .. }, _) => {
                 self.spread_segments(patch, own, PatchColour::WHITE, out)
@@ -232,7 +225,6 @@ impl Spreader<'_> {
             channels_w
         };
         out.ledger.book(Account::Quadrature, flux.map(|count| -count));
-        out.lumped_flux[0] += i128::from(flux[1]);
         let before: Vec<usize> = out.triangles.iter().map(|(_, list)| list.len()).collect();
         let course = if tint.lands_alike {
             self.course(segments)

@@ -151,9 +151,8 @@ pub fn energy(ui: &mut Ui, last: Option<&BakedLevel>) {
     }
 }
 
-const CARRIERS: &str = "What brought the deposited light to the maps. Patches of the wavefront are unbeaten where light stays \
-    together, photons where it scatters. Bundles are laid down whole before photons, which carry the difference: less than \
-    nothing where bundles brought too much.";
+const CARRIERS: &str = "What brought the deposited light to the maps. Bundles carry light that stays together and are laid down whole; \
+    photons carry the difference: less than nothing where bundles brought too much.";
 
 /// One line about the last level: "estimated error 2.1 %, 0.42 s: level 2, goes on".
 fn level_line(last: &BakedLevel) -> String {

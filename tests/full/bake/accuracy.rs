@@ -177,8 +177,9 @@ fn random_glass_within_a_factor_of_two() {
         if few == 0 {
             continue;
         }
+        // The noise of fewer photons, 2 %, is seen beside bakes that turn out better than they were asked to.
         let truths = [1, 2].map(|seed| {
-            let many = photons(1e4 * 4e5 / few as f64, 64);
+            let many = photons(1e4 * 1e6 / few as f64, 64);
             bake(scene.clone(), &BakeSettings { seed, ..many })
         });
         for ((estimator, metric), ratios) in ways.iter().zip(&mut ratios) {

@@ -74,49 +74,6 @@ fn photons_are_unbiased() {
     }
 }
 
-/// Few photons have no bundles: the mean of many bakes with few is that of one with many, which has some. Brute force parts
-/// no wavelengths.
-#[test]
-fn bundles_of_a_spectrum_are_unbiased() {
-    const SEEDS: u64 = 24;
-    let mut scene = builtin_scene("ball");
-    let glass = scene.materials.iter_mut().find(|it| it.surface.is_specular());
-    *glass.expect("glass") = parts::glass("N-SF11");
-    let blocks_of = |result: &Bake| {
-        let light = caustic(map_of(result, &scene, "floor"));
-        block_sums(|texel| light[texel])
-    };
-    let baked = |seed: u64, density_per_sr: f64| {
-        let settings = BakeSettings {
-            seed,
-            ..photons(density_per_sr, SIDE)
-        };
-        bake(scene.clone(), &settings)
-    };
-    let bundled = |result: &Bake| result.ledgers[0].carried_w.bundles / result.ledgers[0].energy_w.deposited;
-    let few: Vec<Vec<f64>> = (0..SEEDS)
-        .map(|seed| {
-            let result = baked(seed, 3e4);
-            assert_eq!(bundled(&result), 0.0);
-            blocks_of(&result)
-        })
-        .collect();
-    let many = baked(SEEDS, 1e6);
-    assert_eq!(energy_fault(&many), None);
-    assert!(bundled(&many) > 0.5, "{}", bundled(&many));
-    let blocks = blocks_of(&many);
-    let outliers = blocks.iter().enumerate().filter(|(block, e)| {
-        let mean = few.iter().map(|blocks| blocks[*block]).sum::<f64>() / SEEDS as f64;
-        let square = few
-            .iter()
-            .map(|blocks| (blocks[*block] - mean).powi(2))
-            .sum::<f64>();
-        (*e - mean).abs() > 3.0 * (square / (SEEDS * (SEEDS - 1)) as f64).sqrt()
-    });
-    let count = outliers.count();
-    assert!(count <= 3, "{count} blocks");
-}
-
 /// The target is met by the true error too, within a factor of two; and filtering reaches it with fewer photons.
 #[test]
 fn targets_are_met_and_filtering_saves_photons() {

@@ -1,5 +1,7 @@
 //! Maps in tiles: how much memory they save and what that costs; direct light beside caustics, and levels on the way.
 
+use std::f64::consts::TAU;
+
 use glam::{DQuat, DVec3};
 use nephroid::bake::{BYTES_PER_TEXEL, Bake};
 use nephroid::illumination::IlluminationMap;
@@ -10,7 +12,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::units::Flux;
 
 use crate::bake::common::{
-    CAUSTIC_AND_DIRECT, assert_same, automatic, rmse, session, sized, torus, towards, with_layers,
+    CAUSTIC_AND_DIRECT, all_bits, assert_same, automatic, rmse, session, sized, torus, towards, with_layers,
 };
 use support::tools::{at, bake, builtin_scene, caustic, energy_fault, map_of, set};
 
@@ -100,6 +102,59 @@ fn a_tenth_of_the_memory_costs_what_it_says() {
         let off = rmse(&dense_floor(&scene, &result), &truth);
         let ratio = off / estimate(&result);
         assert!((0.5..2.0).contains(&ratio), "{case}: {ratio} of the estimate");
+    }
+}
+
+/// Many lamps around a ball of glass, all alike.
+fn lamps_around_a_ball(count: usize) -> Scene {
+    let mut scene = builtin_scene("ball");
+    let lamp = |index: usize| {
+        let place = DQuat::from_rotation_y(index as f64 * TAU / count as f64) * DVec3::new(0.6, 2.5, 0.0);
+        parts::point_light(&format!("lamp{index}"), place, Flux(100.0))
+    };
+    scene.lights = (0..count).map(lamp).collect();
+    scene
+}
+
+/// Every lamp keeps maps of its own, and the limit is for all of them together.
+#[test]
+fn many_lamps_keep_to_the_memory() {
+    let scene = lamps_around_a_ball(12);
+    let settings = automatic(towards(0.1, 1));
+    let held = |result: &Bake| {
+        result
+            .course
+            .iter()
+            .map(|point| point.bytes)
+            .max()
+            .expect("a level")
+    };
+    let ample = bake(scene.clone(), &settings);
+    assert_eq!(ample.warnings, []);
+    let memory_bytes = held(&ample) / 4;
+    let scarce = bake(scene, &set(settings, |s| s.memory_bytes = memory_bytes));
+    let held = held(&scarce);
+    assert!(held <= memory_bytes, "{held} of {memory_bytes} bytes");
+    let [warning] = &scarce.warnings[..] else {
+        panic!("{:?}", scarce.warnings)
+    };
+    assert_eq!(warning.location, "--memory");
+    assert_eq!(energy_fault(&scarce), None);
+}
+
+/// Where there is no room for direct light lamp by lamp, it is added up at once, to the same bits.
+#[test]
+fn lamps_that_are_not_kept_add_up_alike() {
+    let scene = lamps_around_a_ball(4);
+    let fixed = sized(auto(500.0), (64, 64));
+    for settings in [fixed, auto(500.0)] {
+        let settings = with_layers(&[LayerKind::Direct], settings);
+        let kept = bake(scene.clone(), &settings);
+        let texels: usize = kept.maps.iter().map(|map| map.chart.texel_count()).sum();
+        let scarce = set(settings, |s| s.memory_bytes = 100 * texels as u64);
+        let added_up = bake(scene.clone(), &scarce);
+        assert_eq!(added_up.warnings, kept.warnings);
+        assert_eq!(all_bits(&added_up), all_bits(&kept));
     }
 }
 

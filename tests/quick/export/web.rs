@@ -98,8 +98,8 @@ fn about(page: &str) -> Value {
     serde_json::from_str(about).expect("it is JSON")
 }
 
-fn files(about: &Value) -> Vec<&str> {
-    let names = about["files"].as_array().expect("a list").iter();
+fn moments(about: &Value) -> Vec<&str> {
+    let names = about["moments"].as_array().expect("a list").iter();
     names.map(|name| name.as_str().expect("a name")).collect()
 }
 
@@ -112,8 +112,8 @@ fn a_folder_holds_all_that_its_page_names() {
     let baked = baked();
     let (report, about, page) = written(&baked);
     assert_eq!(about["layers"], json!(["caustic", "direct"]));
-    assert_eq!(files(&about), ["moment0.gz", "still.jpg"]);
-    for file in files(&about).into_iter().chain(["page.js"]) {
+    assert_eq!(moments(&about), ["moment0.gz"]);
+    for file in moments(&about).into_iter().chain(["still.jpg", "page.js"]) {
         assert!(baked.path("site").join(file).is_file(), "{file}");
     }
     let imports = page.split_once("importmap\">").expect("it imports").1;
@@ -153,8 +153,8 @@ fn maps_hold_the_light_that_was_baked() {
     let (_, about, _) = written(&baked);
     let wanted = baked.light("direct");
     let mean = wanted.iter().map(|texel| f64::from(texel[1])).sum::<f64>() / wanted.len() as f64;
-    let moment = Moment::read(&baked.path("site").join(files(&about)[0]), None);
-    let side = moment.description["maps"][0]["direct"][0]
+    let moment = Moment::read(&baked.path("site").join(moments(&about)[0]), None);
+    let side = moment.description["textures"]["direct0"]["size"][0]
         .as_u64()
         .expect("a size") as usize;
     // Words are differences from the row before.
@@ -218,8 +218,8 @@ fn a_sequence_has_what_differs_at_each_moment() {
     let rest = built_in("pool");
     let water = times.scene(&rest).at(times.time_s(2));
     for (name, content) in WebScene::new(&water, &[]).expect("it is small").contents {
-        if ["corners", "nodes", "triangles", "indices"].contains(&name) {
-            assert!(last.contents[name] == content.bytes, "{name}");
+        if ["corners", "nodes", "triangles", "indices"].contains(&&*name) {
+            assert!(last.contents[&name] == content.bytes, "{name}");
         }
     }
     std::fs::write(sandbox.path("site/mine.txt"), "mine").expect("it can be written");

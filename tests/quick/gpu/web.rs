@@ -34,8 +34,7 @@ fn gathered(has_ball: bool) -> WebScene {
 }
 
 fn buffer<'a>(made: &'a WebScene, wanted: &str) -> Option<&'a [u8]> {
-    let found = made.contents.iter().find(|(name, _)| *name == wanted);
-    found.map(|(_, content)| &*content.bytes)
+    made.contents.get(wanted).map(|content| &*content.bytes)
 }
 
 /// Objects by list of draws, each of which lies within its buffers and has a pipeline.
@@ -49,10 +48,10 @@ fn drawn(made: &WebScene) -> BTreeMap<&str, usize> {
     for (list, draws) in about["draws"].as_object().expect("lists") {
         drawn.insert(list.as_str(), 0);
         for draw in draws.as_array().expect("draws") {
-            let [pipeline, index_count, object_count, first_index, first_object] =
-                std::array::from_fn(|which: usize| number(&draw[which]));
-            let surface = &about["surfaces"][pipeline];
-            assert!(about["programs"][surface["program"].as_str().expect("a name")].is_string());
+            let [index_count, object_count, first_index, first_object] =
+                std::array::from_fn(|which: usize| number(&draw[1 + which]));
+            let pipeline = &about["pipelines"][draw[0].as_str().expect("a name")];
+            assert!(about["programs"][pipeline["program"].as_str().expect("a name")].is_string());
             assert!(first_index + index_count <= indices && first_object + object_count <= objects);
             *drawn.entry(list).or_default() += object_count;
         }
@@ -63,13 +62,12 @@ fn drawn(made: &WebScene) -> BTreeMap<&str, usize> {
 #[test]
 fn draws_lie_within_their_buffers() {
     let made = gathered(true);
-    // The floor and the ball: both hide, the ball is traced and composed, the floor shows itself. Without chains, and in
-    // false colours, clear bodies are left out.
+    // The floor and the ball: both hide, the ball is traced, and both are surfaces. Without chains, and in false colours,
+    // clear bodies are left out.
     let wanted = [
         ("depths", 2),
         ("traced", 1),
-        ("composed", 1),
-        ("own", 1),
+        ("surfaces", 2),
         ("plain", 1),
         ("colours", 1),
     ];
@@ -119,7 +117,7 @@ fn tiles_hold_the_whole_map() {
     let made = gathered(true);
     let size = &made.description["textures"]["map_tiles"]["size"];
     let [across, down] = [0, 1].map(|axis| size[axis].as_u64().expect("a size") as usize);
-    let words: Vec<u32> = bytemuck::pod_collect_to_vec(&made.map_tiles[0].bytes);
+    let words: Vec<u32> = bytemuck::pod_collect_to_vec(buffer(&made, "tiles0").expect("a map"));
     let tiles: Vec<&[u32]> = words.chunks_exact(8).collect();
     let mut texels = 0;
     let mut corners = Vec::new();
@@ -145,8 +143,7 @@ fn a_scene_without_mirrors_and_glass_traces_nothing() {
     let wanted = [
         ("depths", 0),
         ("traced", 0),
-        ("composed", 0),
-        ("own", 1),
+        ("surfaces", 1),
         ("plain", 1),
         ("colours", 1),
     ];

@@ -1,0 +1,219 @@
+//! One level of one light by bundles and residual photons: finer squares than the level before, and photons drawn anew,
+//! as many as those before tell.
+
+use std::time::Instant;
+
+use glam::DVec2;
+
+use super::caustic::{BakeContext, CausticLayer, LightProgress};
+use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums};
+use super::photon_level::{Layers, PART_OF_TIME};
+use crate::error::Result;
+use crate::illumination::Receiver;
+use crate::light_pass::accuracy;
+use crate::light_pass::pass_report::ProgressScope;
+use crate::light_pass::photon::domain::FIRST_LEVEL;
+use crate::light_pass::photon::pass::HALVES;
+use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, TIMES};
+use crate::light_pass::photon::walk::PhotonRules;
+use crate::light_pass::visibility::VisibleLight;
+use crate::light_pass::wavefront::edge_search::EdgeSearch;
+use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
+use crate::settings::Estimator;
+use crate::transport::EffectSet;
+
+/// Goal of the first level, which gives the first picture.
+const FIRST_GOAL: f64 = 0.2;
+
+/// A level aims a little below what is asked: a near miss costs another level, and of levels that differ by chance, one
+/// ends the bake that looks better than it is, by up to a sixth where light is uneven.
+const AIM: f64 = 0.85;
+
+/// Minimum and maximum of a goal relative to the one before.
+const STEPS: (f64, f64) = (0.08, 0.8);
+
+/// A goal so much larger than the target tells little about it.
+const FAR: f64 = 2.5;
+
+/// An error so much larger than its goal comes from light that the plan did not know, and knows now.
+const SURPRISE: f64 = 2.0;
+
+/// Noise below this fraction of the goal is low enough, whatever else the error contains.
+const MIN_NOISE: f64 = 0.7;
+
+/// A light whose error is still unknown at this goal is given up.
+const LEAST_WITHOUT_ERROR: f64 = 0.05;
+
+/// A light of which less than this fraction arrives is not followed any further.
+const LEAST_ARRIVING: f64 = 1e-6;
+
+/// What became of a level of bundles.
+pub(super) enum BundleLevel {
+    Made(Box<LightLevel>),
+    Stopped,
+    /// Bundles can carry next to nothing of the light.
+    LeftToPhotons,
+}
+
+impl CausticLayer<'_> {
+    /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way, and is not
+    /// traced by wavelength, where the few hues of a deposit leave an error that no half shows.
+    pub(super) fn has_bundles(&self, light: &VisibleLight) -> bool {
+        self.settings.estimator != Estimator::Photon
+            && !self.spectra.has(light.light)
+            && (!self.has_places(light) || self.with_launch(light, |launch| launch.has_offsets()))
+    }
+
+    /// Goal of the level after `last`, towards a relative RMSE; `None` if nothing is left to do.
+    pub(super) fn next_goal(&self, last: Option<&LightLevel>, target: f64) -> Option<f64> {
+        let Some(last) = last else {
+            return Some(FIRST_GOAL.max(AIM * target));
+        };
+        let before = last.goal;
+        let error = last.error.as_ref().map(|error| error.estimate.relative_rmse);
+        let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
+            return (before > LEAST_WITHOUT_ERROR).then_some(STEPS.0 * before);
+        };
+        let energy = last.energy();
+        if energy.deposited < LEAST_ARRIVING * energy.emitted {
+            return None;
+        }
+        // Finer squares do not recover truncated light.
+        let truncated = accuracy::truncated_share(&energy);
+        let noise2 = error * error - truncated * truncated;
+        let wanted2 = (target * target - truncated * truncated).max((MIN_NOISE * target).powi(2));
+        // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the target
+        // is near.
+        let scaled = AIM * before * (wanted2 / noise2).sqrt();
+        let next = if error > SURPRISE * before {
+            AIM * target
+        } else if before > FAR * target {
+            scaled.max(AIM * target).clamp(STEPS.0 * before, STEPS.1 * before)
+        } else {
+            scaled.clamp(STEPS.0 * before, STEPS.1 * before)
+        };
+        (noise2 > wanted2).then_some(next)
+    }
+
+    /// The level of a light with a goal.
+    ///
+    /// # Errors
+    /// A power that is not finite.
+    pub(super) fn next_bundles(
+        &self,
+        light: &mut LightProgress,
+        last: Option<&LightLevel>,
+        goal: f64,
+        context: &mut BakeContext,
+    ) -> Result<BundleLevel> {
+        let before = last.map(|last| last.goal).filter(|goal| *goal > 0.0);
+        let goal = in_time(goal, before, &light.state, context);
+        let key = self.key(light, Some(PhotonAim::Goal(goal)), context);
+        if let Some(level) = light.state.take(&key) {
+            return Ok(BundleLevel::Made(Box::new(level)));
+        }
+        let began = Instant::now();
+        let made = self.make_bundles(light, key, goal, context)?;
+        let is_made = matches!(made, BundleLevel::Made(_));
+        light.state.goal_s = is_made.then(|| began.elapsed().as_secs_f64());
+        Ok(made)
+    }
+
+    fn make_bundles(
+        &self,
+        light: &mut LightProgress,
+        key: LevelKey,
+        goal: f64,
+        context: &mut BakeContext,
+    ) -> Result<BundleLevel> {
+        let unit = self.photon_unit(light.visible)?;
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
+        let mut squares = match light.state.squares.take() {
+            Some((trace, sizes, squares)) if trace == key.trace && sizes == key.sizes => squares,
+            _ => LightSquares::default(),
+        };
+        let mut bundles = self.no_maps();
+        let mut halves = vec![self.part_maps(), self.part_maps()];
+        let listener = ProgressScope {
+            progress: self.progress,
+            control: context.control,
+            done: context.outcome.counts.rays,
+            total: 0,
+        };
+        let rules = PhotonRules {
+            tracer: self.tracer,
+            spectrum: self.spectra.photons(light.visible.light),
+            effects: EffectSet::of(self.plan),
+            max_depth: self.settings.photon_depth(),
+            unit,
+            seed: self.settings.seed,
+        };
+        let [first, second] = &mut halves[..] else {
+            unreachable!("there are two halves");
+        };
+        let mut maps = ResidualMaps {
+            bundles: &mut bundles,
+            halves: [first.sets_mut(), second.sets_mut()],
+        };
+        let is_of_faces = !self.has_places(light.visible);
+        let sought = (squares.is_empty() && is_of_faces).then(|| {
+            let cell = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
+            let visible = light.visible;
+            SubcellFeatures::find(
+                self.tracer,
+                &visible.launch,
+                visible.visible(),
+                cell,
+                EdgeSearch::ROUGH,
+            )
+        });
+        let report = self.with_launch(light.visible, |launch| {
+            let pass = ResidualPass {
+                launch,
+                rules,
+                chart_for: &chart_for,
+                sought: sought.as_ref(),
+                is_rough: self.rough_object(light.visible).is_some(),
+            };
+            pass.run(goal, &mut squares, &mut maps, &listener)
+        });
+        context.outcome.count(&report.pass, context.clock);
+        if report.pass.cancelled {
+            return Ok(BundleLevel::Stopped);
+        }
+        light.state.squares = Some((key.trace.clone(), key.sizes.clone(), squares));
+        light.state.fit_squares(self.squares_bytes(context));
+        if report.is_left_to_photons {
+            return Ok(BundleLevel::LeftToPhotons);
+        }
+        let photons = PhotonSums {
+            ledger: report.pass.ledger,
+            halves,
+        };
+        let layers = Layers {
+            bundles: Some(&bundles),
+            photons: &photons,
+        };
+        let unit = unit.per(u64::from(TIMES) * HALVES as u64);
+        let level = context.clock.time(
+            |clock| &mut clock.deposit,
+            || self.level_of_layers(light.visible, (key, unit), layers, report.deposit_square),
+        );
+        Ok(BundleLevel::Made(Box::new(LightLevel {
+            work: (report.pass.segments, 0),
+            goal: report.goal,
+            ..level
+        })))
+    }
+}
+
+/// Limits a goal to what the remaining time allows, because an interrupted level is lost: time grows with the inverse
+/// square of the goal. The first level is not limited.
+fn in_time(goal: f64, before: Option<f64>, state: &LightState, context: &BakeContext) -> f64 {
+    let (Some(before), Some(left_s), Some(took_s)) = (before, context.control.time_left_s(), state.goal_s)
+    else {
+        return goal;
+    };
+    let own_s = PART_OF_TIME * left_s / context.open_lights as f64;
+    goal.max((before * (took_s / own_s.max(f64::MIN_POSITIVE)).sqrt()).min(STEPS.1 * before))
+}

@@ -1,0 +1,492 @@
+//! A bundle: the light of one path over a square of the launch domain.
+//!
+//! Where all nine points of the square have the path, place and flux are biquadratic in the position within the square.
+//! Where only some have it, the square is cut along the edge of the path, and the bundle consists of triangles between
+//! which both are linear.
+
+use glam::{DVec2, Vec2};
+
+use super::paths::{PathEnd, PointPaths, Route};
+use crate::illumination::Receiver;
+use crate::light_pass::wavefront::coverage::FluxTriangle;
+use crate::optics::LinearSrgb;
+
+/// Weights of the nine points in a mean over the square (Simpson's rule).
+pub(super) const MEAN_WEIGHTS: [f64; 9] = [
+    1.0 / 36.0,
+    4.0 / 36.0,
+    1.0 / 36.0,
+    4.0 / 36.0,
+    16.0 / 36.0,
+    4.0 / 36.0,
+    1.0 / 36.0,
+    4.0 / 36.0,
+    1.0 / 36.0,
+];
+
+/// Extent of the light from one part of a lamp on the map [texels], unless that takes too many parts.
+const PART_TEXELS: f64 = 0.1;
+
+/// Maximum number of parts of a lamp along each axis.
+const MAX_LAMP_PARTS: f64 = 4.0;
+
+/// Maximum distance between the arrivals from neighbouring parts of a lamp [texels]. A larger lamp is left to photons.
+const MAX_STEP_TEXELS: f64 = 0.5;
+
+/// Maximum number of divisions of a square's sides for its deposit.
+const MAX_DIVISIONS: usize = 64;
+
+/// Largest distance between a curve and its chord in a deposit [texels].
+const MAX_CHORD_TEXELS: f64 = 0.25;
+
+/// Relative error of light that is laid down displaced, per displacement over its width: an upper bound, which measured
+/// errors of the built-in scenes stay below by a factor of 2 to 10.
+const ERROR_PER_SHIFT: f64 = 4.65;
+
+/// Images at least so wide are smooth enough to be moved by bilinear weights [texels].
+const SMOOTH_TEXELS: f64 = 1.5;
+
+/// Light at one point of a bundle.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Node {
+    /// On the map [texels].
+    pub(super) place: Vec2,
+    /// Per unit square of the launch domain [W per channel].
+    pub(super) flux_w: [f32; 3],
+}
+
+impl Node {
+    pub(super) fn of(end: &PathEnd) -> Self {
+        Self {
+            place: end.place.as_vec2(),
+            flux_w: end.flux_w.to_array().map(|watts| watts as f32),
+        }
+    }
+
+    pub(super) fn flux_w(&self) -> LinearSrgb {
+        LinearSrgb::from(self.flux_w.map(f64::from))
+    }
+}
+
+/// Interpolated light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Predicted {
+    /// On the map [texels].
+    pub(super) place: DVec2,
+    /// Per unit square of the launch domain [W per channel].
+    pub(super) flux_w: LinearSrgb,
+}
+
+/// A triangle of a cut square.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    /// Within the square.
+    pub(super) corners: [Vec2; 3],
+    pub(super) nodes: [Node; 3],
+}
+
+/// The part of the square that has the path.
+#[derive(Clone, Debug)]
+pub(super) enum Shape {
+    /// All of it, with nodes row by row.
+    Whole(Box<[Node; 9]>),
+    Cut(Vec<Piece>),
+    /// Left to photons.
+    Nothing,
+}
+
+/// Displacement of an arrival on the map for light from the end of each half-axis of an extended lamp, relative to light
+/// from its centre [texels].
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct LampShift([Vec2; 2]);
+
+impl LampShift {
+    /// Measured at the square's middle, by light from half-way out along both axes; `None` if light takes another path
+    /// from there, or if the lamp is too large.
+    pub(super) fn measured(middle: &PathEnd, lamp_sides: &[PointPaths; 2]) -> Option<Self> {
+        let moved = |paths: &PointPaths| {
+            let end = paths.end(middle.route.signature)?;
+            Some((end.place - middle.place).as_vec2() * 2.0)
+        };
+        let [x, y] = lamp_sides;
+        let shift = Self([moved(x)?, moved(y)?]);
+        (shift.step_texels() < MAX_STEP_TEXELS).then_some(shift)
+    }
+
+    /// Whether the lamp spreads the light over several texels.
+    pub(super) fn is_smooth(&self) -> bool {
+        let [x, y] = self.0.map(|moved| 2.0 * moved.abs().max_element());
+        f64::from(x.min(y)) >= SMOOTH_TEXELS
+    }
+
+    /// Displacement for a point on the lamp, in half-axes from its centre.
+    pub(super) fn at(&self, lamp: DVec2) -> DVec2 {
+        let [x, y] = self.0.map(|moved| moved.as_dvec2());
+        x * lamp.x + y * lamp.y
+    }
+
+    /// Parts of a lamp for which a bundle is deposited, along both axes.
+    pub(super) fn parts(&self) -> DVec2 {
+        let parts = |moved: Vec2| (2.0 * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
+        DVec2::from(self.0.map(parts)).clamp(DVec2::ONE, DVec2::splat(MAX_LAMP_PARTS))
+    }
+
+    /// Distance between the arrivals from neighbouring parts of a lamp [texels].
+    fn step_texels(&self) -> f64 {
+        let parts = self.parts().to_array();
+        let step = |axis: usize| 2.0 * f64::from(self.0[axis].abs().max_element()) / parts[axis];
+        step(0).max(step(1))
+    }
+}
+
+/// The light of one path over a square.
+#[derive(Clone, Debug)]
+pub(super) struct Bundle {
+    pub(super) route: Route,
+    pub(super) shape: Shape,
+    /// Displacement for other points of the lamp.
+    pub(super) shift: LampShift,
+    /// Mean flux over the square [W, largest channel].
+    pub(super) flux_w: f64,
+    /// Expected displacement of its predictions [texels].
+    pub(super) displaced_texels: f64,
+    /// Divisions of the square's sides for the deposit.
+    pub(super) divisions: usize,
+    /// Whether light varies little from texel to texel.
+    pub(super) is_smooth: bool,
+}
+
+impl Bundle {
+    /// A bundle of nothing yet.
+    pub(super) fn new(route: Route, flux_w: f64) -> Self {
+        Self {
+            route,
+            shape: Shape::Nothing,
+            shift: LampShift::default(),
+            flux_w,
+            displaced_texels: 0.0,
+            divisions: 1,
+            is_smooth: true,
+        }
+    }
+
+    /// Chooses the divisions of the deposit so that it errs no more than `allowed`, the squared flux of the bundle with
+    /// this weight [W²/m²]. Returns the squared error that is left.
+    pub(super) fn plan_deposit(&mut self, weight: f64, allowed: f64) -> f64 {
+        let Shape::Whole(nodes) = &self.shape else {
+            return 0.0;
+        };
+        let (divisions, left) = Image::of(nodes).divisions(self.flux_w * weight, allowed);
+        self.divisions = divisions;
+        left
+    }
+
+    pub(super) fn receiver(&self) -> Receiver {
+        self.route.receiver
+    }
+
+    /// Light predicted at a point of the square and of the lamp, which is given in half-axes from its centre; `None`
+    /// where it does not have the path.
+    pub(super) fn at(&self, within: DVec2, lamp: DVec2) -> Option<Predicted> {
+        let predicted = match &self.shape {
+            Shape::Whole(nodes) => biquadratic(nodes, within),
+            Shape::Cut(pieces) => pieces.iter().find_map(|piece| piece.at(within))?,
+            Shape::Nothing => return None,
+        };
+        Some(Predicted {
+            place: predicted.place + self.shift.at(lamp),
+            ..predicted
+        })
+    }
+
+    /// Whether the path exists at a point of the square.
+    pub(super) fn has(&self, within: DVec2) -> bool {
+        match &self.shape {
+            Shape::Whole(_) => true,
+            Shape::Cut(pieces) => pieces.iter().any(|piece| piece.weights(within).is_some()),
+            Shape::Nothing => false,
+        }
+    }
+
+    /// Triangles of the map with the light of the square, whose area is `area` unit squares. `add` gets corners
+    /// [texels] and flux [W].
+    pub(super) fn triangles(&self, area: f64, mut add: impl FnMut([DVec2; 3], LinearSrgb)) {
+        match &self.shape {
+            Shape::Nothing => {}
+            Shape::Cut(pieces) => {
+                for piece in pieces {
+                    let flux_w = mean(piece.nodes.map(|node| node.flux_w()));
+                    let corners = piece.nodes.map(|node| node.place.as_dvec2());
+                    add(corners, flux_w * (f64::from(piece.area()) * area));
+                }
+            }
+            Shape::Whole(nodes) => {
+                let divisions = self.divisions;
+                let step = 1.0 / divisions as f64;
+                let point = |column: usize, row: usize| DVec2::new(column as f64, row as f64) * step;
+                let row_of = |row: usize| -> Vec<Predicted> {
+                    let columns = 0..=divisions;
+                    columns
+                        .map(|column| biquadratic(nodes, point(column, row)))
+                        .collect()
+                };
+                let triangle_area = 0.5 * area * step * step;
+                let mut above = row_of(0);
+                for row in 1..=divisions {
+                    let below = row_of(row);
+                    for column in 0..divisions {
+                        let (a, b) = (above[column], above[column + 1]);
+                        let (c, d) = (below[column], below[column + 1]);
+                        for corners in [[a, b, d], [a, d, c]] {
+                            let flux_w = mean(corners.map(|corner| corner.flux_w));
+                            add(corners.map(|corner| corner.place), flux_w * triangle_area);
+                        }
+                    }
+                    above = below;
+                }
+            }
+        }
+    }
+}
+
+fn mean(fluxes: [LinearSrgb; 3]) -> LinearSrgb {
+    (fluxes[0] + fluxes[1] + fluxes[2]) * (1.0 / 3.0)
+}
+
+impl Piece {
+    /// Of the square's area.
+    fn area(&self) -> f32 {
+        let [a, b, c] = self.corners;
+        0.5 * (b - a).perp_dot(c - a).abs()
+    }
+
+    /// Barycentric coordinates of a point of the square; `None` outside the triangle.
+    fn weights(&self, within: DVec2) -> Option<[f64; 3]> {
+        let [a, b, c] = self.corners.map(|corner| corner.as_dvec2());
+        let area = (b - a).perp_dot(c - a);
+        let second = (within - a).perp_dot(c - a) / area;
+        let third = (b - a).perp_dot(within - a) / area;
+        let weights = [1.0 - second - third, second, third];
+        // False for NaN: a triangle without area has no inside.
+        weights.iter().all(|weight| *weight >= 0.0).then_some(weights)
+    }
+
+    fn at(&self, within: DVec2) -> Option<Predicted> {
+        let weights = self.weights(within)?;
+        let mut predicted = Predicted {
+            place: DVec2::ZERO,
+            flux_w: LinearSrgb::BLACK,
+        };
+        for (node, weight) in self.nodes.iter().zip(weights) {
+            predicted.place += node.place.as_dvec2() * weight;
+            predicted.flux_w += node.flux_w() * weight;
+        }
+        Some(predicted)
+    }
+}
+
+/// The quadratic through values at 0, 1/2 and 1, as weights of these.
+fn quadratic(at: f64) -> [f64; 3] {
+    [
+        (1.0 - at) * (1.0 - 2.0 * at),
+        4.0 * at * (1.0 - at),
+        at * (2.0 * at - 1.0),
+    ]
+}
+
+/// Light at a point of a square with these nodes.
+pub(super) fn biquadratic(nodes: &[Node; 9], within: DVec2) -> Predicted {
+    let (across, down) = (quadratic(within.x), quadratic(within.y));
+    let mut predicted = Predicted {
+        place: DVec2::ZERO,
+        flux_w: LinearSrgb::BLACK,
+    };
+    for (number, node) in nodes.iter().enumerate() {
+        let weight = across[number % 3] * down[number / 3];
+        predicted.place += node.place.as_dvec2() * weight;
+        predicted.flux_w += node.flux_w() * weight;
+    }
+    // Between points where light nearly vanishes, a parabola may fall below 0.
+    predicted.flux_w = predicted.flux_w.map(|watts| watts.max(0.0));
+    predicted
+}
+
+/// The four quarters of a square, as nodes row by row.
+const QUARTERS: [[usize; 4]; 4] = [[0, 1, 3, 4], [1, 2, 4, 5], [3, 4, 6, 7], [4, 5, 7, 8]];
+
+/// Size of the image of a whole square on the map.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Image {
+    /// Longest side along an axis of the map [texels].
+    length: f64,
+    /// Area over length [texels].
+    width: f64,
+    /// Largest deviation of a node from the middle between its neighbours [texels].
+    pub(super) bend: f64,
+    /// Largest difference of irradiance between quarters, relative to their mean.
+    variation: f64,
+}
+
+impl Image {
+    pub(super) fn of(nodes: &[Node; 9]) -> Self {
+        let place = |node: usize| nodes[node].place.as_dvec2();
+        let (mut low, mut high) = (place(0), place(0));
+        for node in 1..9 {
+            low = low.min(place(node));
+            high = high.max(place(node));
+        }
+        let mut bend = 0.0_f64;
+        for [a, b, c] in [[0, 1, 2], [3, 4, 5], [6, 7, 8], [0, 3, 6], [1, 4, 7], [2, 5, 8]] {
+            bend = bend.max((0.5 * (place(a) + place(c)) - place(b)).abs().max_element());
+        }
+
+        // Area and irradiance of each quarter.
+        let (mut area, mut darkest, mut brightest) = (0.0, f64::INFINITY, 0.0_f64);
+        for [a, b, c, d] in QUARTERS {
+            let across = place(b) - place(a);
+            let diagonal = place(d) - place(a);
+            let down = place(c) - place(a);
+            let quarter = 0.5 * (across.perp_dot(diagonal).abs() + diagonal.perp_dot(down).abs());
+            let flux_w: f64 = [a, b, c, d]
+                .iter()
+                .map(|&node| nodes[node].flux_w().max_channel())
+                .sum();
+            let light = flux_w / quarter.max(1e-12);
+            darkest = darkest.min(light);
+            brightest = brightest.max(light);
+            area += quarter;
+        }
+        let length = (high - low).max_element();
+        Self {
+            length,
+            width: area / length.max(1e-9),
+            bend,
+            variation: 4.0 * (brightest - darkest) / (brightest + darkest).max(f64::MIN_POSITIVE),
+        }
+    }
+
+    pub(super) fn is_smooth(&self) -> bool {
+        self.width >= SMOOTH_TEXELS
+    }
+
+    /// Texels that the image covers, at least one along each axis.
+    fn spread_texels(&self) -> f64 {
+        self.length.max(1.0) * self.width.max(1.0)
+    }
+
+    /// Squared error that a deposit in n² parts of this flux leaves, and the least n for which it is at most
+    /// `allowed`: chords in the place of curves, and even light in each triangle.
+    fn divisions(&self, flux: f64, allowed: f64) -> (usize, f64) {
+        let least = (self.bend / MAX_CHORD_TEXELS)
+            .sqrt()
+            .ceil()
+            .clamp(1.0, MAX_DIVISIONS as f64) as usize;
+        let error = |divisions: usize| {
+            let parts = divisions as f64;
+            let chord = self.bend / (parts * parts);
+            let moved = (ERROR_PER_SHIFT * chord / (self.width / parts).max(1.0)).min(1.0);
+            // √12, of even light in the place of a slope.
+            let shade = if self.length / parts < 1.0 {
+                0.0
+            } else {
+                self.variation / (12.0_f64.sqrt() * parts)
+            };
+            flux * flux / self.spread_texels() * (moved * moved + shade * shade)
+        };
+        let divisions = (least..MAX_DIVISIONS)
+            .find(|&n| error(n) <= allowed)
+            .unwrap_or(MAX_DIVISIONS);
+        (divisions, error(divisions))
+    }
+}
+
+/// A triangle of flux for the map of a bundle's receiver.
+pub(super) fn flux_triangle(bundle: &Bundle, corners: [DVec2; 3], flux: [i64; 3]) -> FluxTriangle {
+    FluxTriangle {
+        corners,
+        flux,
+        island: bundle.route.island,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::sampling::even_point;
+    use crate::light_pass::path::PathSignature;
+    use crate::light_pass::photon::paths::Chain;
+
+    /// Nodes of a square whose place and flux are these functions.
+    fn nodes(place: impl Fn(DVec2) -> DVec2, flux_w: impl Fn(DVec2) -> f64) -> Box<[Node; 9]> {
+        Box::new(std::array::from_fn(|node| {
+            let within = DVec2::new((node % 3) as f64, (node / 3) as f64) * 0.5;
+            Node {
+                place: place(within).as_vec2(),
+                flux_w: [flux_w(within) as f32; 3],
+            }
+        }))
+    }
+
+    fn route() -> Route {
+        Route {
+            signature: PathSignature::default(),
+            chain: Chain::default(),
+            receiver: Receiver::front(0),
+            island: 0,
+        }
+    }
+
+    fn curved(within: DVec2) -> DVec2 {
+        let DVec2 { x, y } = within;
+        DVec2::new(
+            3.0 + 5.0 * x - 2.0 * x * x + x * y,
+            1.0 + 4.0 * y + y * y - 0.5 * x * y,
+        )
+    }
+
+    #[test]
+    fn parabolas_are_interpolated_exactly() {
+        let flux_w = |within: DVec2| 2.0 + within.x - within.x * within.x * within.y;
+        let nodes = nodes(curved, flux_w);
+        for index in 0..100 {
+            let within = even_point(index, 0, 1);
+            let predicted = biquadratic(&nodes, within);
+            assert!((predicted.place - curved(within)).length() < 1e-5, "{within}");
+            assert!((predicted.flux_w.g - flux_w(within)).abs() < 1e-5, "{within}");
+        }
+    }
+
+    /// The flux of all triangles is that of the square, and their area that of its image.
+    #[test]
+    fn triangles_carry_the_light_of_the_square() {
+        let flux_w = |within: DVec2| 2.0 + within.x + within.y;
+        let bundle = Bundle {
+            shape: Shape::Whole(nodes(|within| within * DVec2::new(3.0, 2.0), flux_w)),
+            divisions: 4,
+            ..Bundle::new(route(), 3.0)
+        };
+        let (mut flux, mut area) = (0.0, 0.0);
+        bundle.triangles(0.25, |[a, b, c], flux_w| {
+            flux += flux_w.g;
+            area += 0.5 * (b - a).perp_dot(c - a).abs();
+        });
+        assert!((flux - 0.25 * 3.0).abs() < 1e-6, "{flux} W");
+        assert!((area - 6.0).abs() < 1e-5, "{area} texels");
+    }
+
+    /// A finer deposit errs less, and no more than it is allowed.
+    #[test]
+    fn deposits_are_as_fine_as_asked() {
+        let mut bundle = Bundle {
+            shape: Shape::Whole(nodes(|within| curved(within) * 8.0, |within| 1.0 + within.x)),
+            ..Bundle::new(route(), 1.0)
+        };
+        let mut before = 0;
+        for allowed in [1e-3, 1e-5, 1e-6] {
+            let left = bundle.plan_deposit(1.0, allowed);
+            assert!(left <= allowed, "{left} of {allowed}");
+            assert!(bundle.divisions > before, "{} divisions", bundle.divisions);
+            before = bundle.divisions;
+        }
+    }
+}

@@ -1,0 +1,583 @@
+//! A quadtree over the launch domain, divided until photons cost no more than finer squares would.
+//!
+//! Every square has nine points, whose light is followed along all paths. Each path is a bundle; what bundles get wrong
+//! is left to photons, and how much that is decides how many photons start in a square, and whether it is divided.
+
+use std::collections::{BTreeSet, HashMap, HashSet};
+use std::sync::Arc;
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::bundle::{Bundle, Image, MEAN_WEIGHTS, Node, Shape, biquadratic};
+use super::domain::{DomainPoint, LAST_LEVEL, LitCells, PointHash, SquarePlace};
+use super::paths::{Chain, PathEnd, PathFinder, PointPaths, Route};
+use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
+use crate::progress::Control;
+
+/// The finest level of squares around small casters and openings, and how many squares there are at most until these
+/// are found.
+const FINEST_SOUGHT: u32 = 20;
+const MAX_SOUGHT: usize = 1 << 16;
+
+/// Approximate limit on the squares of a light, each of some kilobytes.
+const MAX_SQUARES: usize = 1 << 18;
+
+/// Rounds of division.
+const MAX_ROUNDS: usize = 12;
+
+/// A square is divided if its photons take more segments than this many points do; a division takes 12 to 16.
+const DIVISION_COST: f64 = 40.0;
+
+/// A square is cut if that saves more segments than this many points take.
+const CUT_COST: f64 = 30.0;
+
+/// Division of a square reduces the displacement of its predictions by up to 8. That of a child is its parent's
+/// deviation from the child's new points over this; audits by photons show 0.1 to 3 times as much.
+const GAIN_OF_DIVISION: f64 = 6.0;
+
+/// Maximum number of photons of the first level, and the least and most of a later one relative to the level before.
+const FIRST_PHOTONS: f64 = 1e5;
+const GROWTH: (f64, f64) = (1.25, 8.0);
+
+/// Number of photons that a square's plan counts for against photons that were traced.
+const PLAN_PHOTONS: f64 = 4.0;
+
+/// A division replaces what photons found by the plan, unless they found a variance so much larger.
+const SURPRISE: f64 = 4.0;
+
+/// Part of a path's photons that a cut square leaves to them: of a square with the side 1, and at least.
+const LEFT_BY_CUT: (f64, f64) = (0.3, 0.004);
+
+/// The same of a square that is not cut.
+const LEFT_UNCUT: f64 = 0.4;
+
+/// The same of a square with so many edges that cuts miss some of them.
+const LEFT_BY_MANY_CUTS: (usize, f64) = (8, 0.5);
+
+/// Minimum number of audits. With a fifth of it, bakes of random scenes to 20 % state a third of the error that is
+/// visible, since few photons meet the light in dark places.
+const MIN_AUDITS: f64 = 16384.0;
+
+/// Paths that photons compare themselves with, and that lead them.
+const MAX_BUNDLES: usize = 48;
+const MAX_GUIDES: usize = 64;
+
+/// Expected squared change of a map for a photon of unit flux whose prediction is displaced: by tents over two texels,
+/// per squared texel of displacement along an axis, averaged over places.
+const TENT_SQUARE: f64 = 4.0 / 3.0;
+
+/// Probability that two places lie in different texels, per texel between them, averaged over directions: 4/π.
+const CROSSINGS: f64 = 1.27;
+
+/// The light of points, each traced once.
+pub(super) type Points = HashMap<DomainPoint, Arc<PointPaths>, PointHash>;
+
+/// A way on which bundles leave light to photons.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Guide {
+    pub(super) chain: Chain,
+    pub(super) weight: f64,
+}
+
+/// Roots of the variance of a photon that stands for the whole square, added up over paths. All but `lost` are weighted
+/// by the texels that they fall into [W/m].
+#[derive(Clone, Copy, Debug, Default)]
+struct Residual {
+    /// Of whole bundles.
+    displaced: f64,
+    /// Of bundles that not all points have, if the square is cut, and if it is not.
+    cut: f64,
+    uncut: f64,
+    /// Light that bundles do not follow [W].
+    lost_w: f64,
+}
+
+/// What photons of a square found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Found {
+    pub(super) photons: f64,
+    /// Sum over photons of the squared contribution of each, as if it stood for the whole square [W²/m²].
+    pub(super) squares: f64,
+}
+
+impl Found {
+    fn variance(&self) -> f64 {
+        if self.photons > 0.0 {
+            self.squares / self.photons
+        } else {
+            0.0
+        }
+    }
+
+    fn of_quarter(&self) -> Self {
+        Self {
+            photons: 0.25 * self.photons,
+            squares: self.squares / 64.0,
+        }
+    }
+}
+
+/// A square of the domain.
+#[derive(Debug)]
+pub(super) struct Square {
+    pub(super) place: SquarePlace,
+    pub(super) points: [Arc<PointPaths>; 9],
+    /// Brightest first.
+    pub(super) bundles: Vec<Bundle>,
+    pub(super) guides: Vec<Guide>,
+    /// Emitted flux [W, largest channel].
+    pub(super) start_w: f64,
+    /// Flux that arrives at the end of its bundles [W, largest channel].
+    arriving_w: f64,
+    residual: Residual,
+    /// Mean segments of a photon.
+    segments: f64,
+    /// Mean segments traced for a point.
+    traced: f64,
+    pub(super) is_cut: bool,
+    pub(super) is_finished: bool,
+    pub(super) found: Found,
+}
+
+/// How many photons the squares need for a goal.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Plan {
+    /// Photons of a square per root of variance, times the root of segments [m/W].
+    per_root: f64,
+    /// Weight of light without a known receiver [1/m].
+    lost_weight: f64,
+    /// Number of texels of all receivers.
+    texels: f64,
+    /// All emitted flux [W].
+    start_w: f64,
+    /// Flux that arrives on maps [W, largest channel]: as photons found or, before any were traced, all that bundles
+    /// carry or leave.
+    arriving_w: f64,
+    /// Factor from squared errors [W²/m²] to squared relative errors of all maps.
+    pub(super) relative: f64,
+    /// Part of the light that bundles follow to its end.
+    pub(super) bundled_part: f64,
+    /// Goal that the photons of this plan reach: the one asked for, or a larger one if that would take too many.
+    pub(super) goal: f64,
+}
+
+impl Plan {
+    /// Photons of a square, without audits.
+    fn photons_for(&self, root: f64, square: &Square) -> f64 {
+        self.per_root * root / square.segments.sqrt()
+    }
+
+    pub(super) fn photons_for_variance(&self, variance: f64, square: &Square) -> f64 {
+        self.photons_for(variance.sqrt(), square)
+    }
+
+    /// Photons of a square. Audits look everywhere: as many that a single one that contradicts its bundle adds at most
+    /// a quarter of the goal to the error, and enough for what is dim but seen.
+    pub(super) fn photons(&self, square: &Square) -> f64 {
+        let audits = (4.0 * self.texels.sqrt() / self.goal).max(MIN_AUDITS);
+        self.photons_for(square.root(self), square)
+            + audits * square.start_w / self.start_w.max(f64::MIN_POSITIVE)
+    }
+
+    pub(super) fn is_worth_a_cut(&self, square: &Square) -> bool {
+        let saved = square.residual.uncut - square.residual.cut;
+        self.per_root * saved * square.segments.sqrt() > CUT_COST * square.traced
+    }
+}
+
+impl Square {
+    /// Root of the variance of a photon that stands for the whole square [W/m].
+    fn root(&self, plan: &Plan) -> f64 {
+        let planned = self.planned_root(plan);
+        let sum = PLAN_PHOTONS * planned * planned + self.found.squares;
+        (sum / (PLAN_PHOTONS + self.found.photons)).sqrt()
+    }
+
+    fn planned_root(&self, plan: &Plan) -> f64 {
+        let Residual {
+            displaced,
+            cut,
+            uncut,
+            lost_w,
+        } = self.residual;
+        let edges = if self.is_cut || plan.is_worth_a_cut(self) {
+            cut
+        } else {
+            uncut
+        };
+        displaced + edges + lost_w * plan.lost_weight
+    }
+
+    /// Variance after photons were traced, which may be those of another half [W²/m²].
+    pub(super) fn variance_with(&self, found: Found, plan: &Plan) -> f64 {
+        let before = self.root(plan);
+        (PLAN_PHOTONS * before * before + found.squares) / (PLAN_PHOTONS + found.photons)
+    }
+
+    /// Leaves a bundle to photons.
+    pub(super) fn give_up(&mut self, bundle: usize) {
+        let bundle = &mut self.bundles[bundle];
+        bundle.shape = Shape::Nothing;
+        self.residual.lost_w += bundle.flux_w;
+    }
+}
+
+/// The squares of one light.
+#[derive(Debug, Default)]
+pub(super) struct Squares {
+    pub(super) squares: Vec<Square>,
+    pub(super) points: Points,
+    pub(super) plan: Plan,
+    /// Photons of the last level.
+    pub(super) photons: f64,
+    /// Flux that arrived in the last level [W, largest channel].
+    pub(super) arrived_w: Option<f64>,
+}
+
+/// Builds squares.
+pub(super) struct Surveyor<'a> {
+    pub(super) finder: PathFinder<'a>,
+    pub(super) control: &'a Control,
+    pub(super) lit: LitCells,
+    /// What the first squares might miss.
+    pub(super) sought: Option<&'a SubcellFeatures>,
+}
+
+impl Surveyor<'_> {
+    /// Divides squares for a goal, the relative root mean square error of all maps together.
+    pub(super) fn refine(&self, squares: &mut Squares, goal: f64) {
+        if squares.squares.is_empty() {
+            let places = self.with_small_casters(self.lit.first());
+            self.trace_points(
+                places
+                    .iter()
+                    .flat_map(|place| (0..9).map(|node| place.node(node))),
+                &mut squares.points,
+            );
+            let points = &squares.points;
+            squares.squares = places
+                .par_iter()
+                .map(|&place| self.square(place, points, None))
+                .collect();
+        }
+        for round in 0..=MAX_ROUNDS {
+            squares.plan = self.plan(squares, goal);
+            let plan = squares.plan;
+            let is_last = round == MAX_ROUNDS || squares.squares.len() > MAX_SQUARES;
+            if is_last || plan.per_root.is_infinite() || self.control.is_cancelled() {
+                break;
+            }
+
+            // Photons that finer squares would save are dearer than the points of these.
+            let is_divided = |square: &Square| {
+                let segments = plan.photons_for(square.dividable_root(&plan), square) * square.segments;
+                square.place.level < LAST_LEVEL && segments > DIVISION_COST * square.traced
+            };
+            let divided: Vec<bool> = squares.squares.iter().map(is_divided).collect();
+            if !divided.contains(&true) {
+                break;
+            }
+            let new_points = squares
+                .squares
+                .iter()
+                .zip(&divided)
+                .filter(|(_, divided)| **divided)
+                .flat_map(|(square, _)| {
+                    let place = square.place;
+                    (0..25)
+                        .filter(|n| n % 5 % 2 == 1 || n / 5 % 2 == 1)
+                        .map(move |n| place.point(n % 5, n / 5, 4))
+                });
+            self.trace_points(new_points, &mut squares.points);
+
+            let points = &squares.points;
+            let before = std::mem::take(&mut squares.squares);
+            let after = before
+                .into_par_iter()
+                .zip(divided)
+                .flat_map_iter(|(square, is_divided)| {
+                    if !is_divided {
+                        return vec![square];
+                    }
+                    let quarters = square
+                        .place
+                        .quarters()
+                        .into_iter()
+                        .filter(|place| self.lit.has(*place));
+                    quarters
+                        .map(|place| self.square(place, points, Some(&square)))
+                        .collect()
+                });
+            squares.squares = after.collect();
+        }
+    }
+
+    /// Divides the first squares until small casters and openings are as large as the squares around them.
+    fn with_small_casters(&self, mut places: Vec<SquarePlace>) -> Vec<SquarePlace> {
+        let (Some(sought), Some(launch)) = (self.sought, self.finder.launch.of_faces()) else {
+            return places;
+        };
+        let Some(first) = places.first().map(|place| place.level) else {
+            return places;
+        };
+        for level in first..FINEST_SOUGHT {
+            let is_divided = |place: &SquarePlace| {
+                let square = (place.at(DVec2::ZERO), place.at(DVec2::ONE));
+                let root = place.corner.root as usize;
+                place.level == level
+                    && sought.ask_for_finer(launch, root, square, level - first, f64::INFINITY)
+            };
+            let before = places.len();
+            let of_place = |place: SquarePlace| -> Vec<SquarePlace> {
+                if !is_divided(&place) {
+                    return vec![place];
+                }
+                let quarters = place.quarters().into_iter();
+                quarters.filter(|quarter| self.lit.has(*quarter)).collect()
+            };
+            places = places.into_par_iter().flat_map_iter(of_place).collect();
+            if places.len() == before || places.len() > MAX_SOUGHT {
+                break;
+            }
+        }
+        places
+    }
+
+    /// Traces the points that are not known yet, neighbours one after the other.
+    fn trace_points(&self, wanted: impl Iterator<Item = DomainPoint>, points: &mut Points) {
+        let new: HashSet<DomainPoint, PointHash> =
+            wanted.filter(|point| !points.contains_key(point)).collect();
+        let mut new: Vec<DomainPoint> = new.into_iter().collect();
+        new.sort_unstable_by_key(|point| (point.root, point.y >> 14, point.x >> 14, point.y, point.x));
+        let traced: Vec<(DomainPoint, Arc<PointPaths>)> = new
+            .into_par_iter()
+            .with_min_len(16)
+            .map(|point| {
+                // Whoever cancels drops the squares.
+                let paths = match self.control.is_cancelled() {
+                    true => PointPaths::default(),
+                    false => self.finder.paths(point.root as usize, point.square()),
+                };
+                (point, Arc::new(paths))
+            })
+            .collect();
+        points.extend(traced);
+    }
+
+    /// How many photons each square needs, as its bundles and the photons so far tell.
+    fn plan(&self, squares: &Squares, goal: f64) -> Plan {
+        let mut plan = Plan {
+            // Decides on cuts in the first round.
+            per_root: match squares.plan.per_root {
+                0.0 => f64::INFINITY,
+                known => known,
+            },
+            ..Plan::default()
+        };
+        let mut receivers = BTreeSet::new();
+        let (mut weighted_w, mut bundled_w, mut lost_w) = (0.0, 0.0, 0.0);
+        for square in &squares.squares {
+            plan.start_w += square.start_w;
+            bundled_w += square.arriving_w;
+            lost_w += square.residual.lost_w;
+            for bundle in &square.bundles {
+                receivers.insert(bundle.receiver());
+                weighted_w += bundle.flux_w * self.finder.receivers.weight(bundle.receiver());
+            }
+        }
+        plan.goal = goal;
+        plan.bundled_part = if lost_w > 0.0 {
+            bundled_w / (bundled_w + lost_w)
+        } else {
+            1.0
+        };
+        plan.arriving_w = squares.arrived_w.unwrap_or(bundled_w + lost_w);
+        if bundled_w <= 0.0 || plan.arriving_w <= 0.0 {
+            return plan;
+        }
+        plan.lost_weight = weighted_w / bundled_w;
+        let mut area_m2 = 0.0;
+        for receiver in receivers {
+            if let Some(chart) = self.finder.receivers.get(receiver) {
+                area_m2 += chart.area_m2;
+                plan.texels += chart.chart.texel_count() as f64;
+            }
+        }
+        plan.relative = area_m2 / (plan.arriving_w * plan.arriving_w);
+        let sum = |of: &dyn Fn(&Square) -> f64| squares.squares.iter().map(of).sum::<f64>();
+        let roots = sum(&|square| square.root(&plan) * square.segments.sqrt());
+        plan.per_root = roots * plan.relative / (goal * goal);
+
+        // A level that would take very many photons stops half-way: the next one knows more.
+        // One that would take hardly more than the last one tells no more than that.
+        let photons = sum(&|square| plan.photons_for(square.root(&plan), square));
+        let least = GROWTH.0 * squares.photons;
+        let most = (GROWTH.1 * squares.photons).max(FIRST_PHOTONS);
+        let allowed = photons.clamp(least, most);
+        if photons > 0.0 && allowed != photons {
+            plan.per_root *= allowed / photons;
+            plan.goal *= (photons / allowed).sqrt();
+        }
+        plan
+    }
+
+    /// The square of a place, whose points are known.
+    fn square(&self, place: SquarePlace, points: &Points, parent: Option<&Square>) -> Square {
+        let points: [Arc<PointPaths>; 9] = std::array::from_fn(|node| Arc::clone(&points[&place.node(node)]));
+        let mean = |value: &dyn Fn(&PointPaths) -> f64| -> f64 {
+            points
+                .iter()
+                .zip(MEAN_WEIGHTS)
+                .map(|(point, weight)| weight * value(point))
+                .sum()
+        };
+        let area = place.area();
+        let mut square = Square {
+            place,
+            bundles: Vec::new(),
+            guides: Vec::new(),
+            start_w: mean(&|point| point.start_w) * area,
+            arriving_w: 0.0,
+            residual: Residual::default(),
+            segments: mean(&|point| point.segments).max(1.0),
+            traced: points.iter().map(|point| f64::from(point.traced)).sum::<f64>() / 9.0,
+            is_cut: false,
+            is_finished: false,
+            found: parent.map_or_else(Found::default, inherited),
+            points,
+        };
+
+        // Every path that any of its points has.
+        let mut routes: Vec<Route> = Vec::new();
+        for end in square.points.iter().flat_map(|point| &point.ends) {
+            if routes.iter().all(|route| route.signature != end.route.signature) {
+                routes.push(end.route);
+            }
+        }
+        let is_partial = |route: &Route| {
+            square
+                .points
+                .iter()
+                .any(|point| point.end(route.signature).is_none())
+        };
+        let edges = routes.iter().filter(|route| is_partial(route)).count();
+        for route in routes {
+            self.add_bundle(&mut square, route, parent, edges);
+        }
+        square.bundles.sort_by(|a, b| b.flux_w.total_cmp(&a.flux_w));
+        for bundle in square.bundles.drain(MAX_BUNDLES.min(square.bundles.len())..) {
+            square.residual.lost_w += bundle.flux_w;
+        }
+
+        // Light that was not followed.
+        let mut lost: Vec<Guide> = Vec::new();
+        for (point, weight) in square.points.iter().zip(MEAN_WEIGHTS) {
+            for &(chain, flux_w) in &point.lost {
+                let weight = flux_w * weight * area;
+                square.residual.lost_w += weight;
+                match lost.iter_mut().find(|guide| guide.chain == chain) {
+                    Some(known) => known.weight += weight,
+                    None => lost.push(Guide { chain, weight }),
+                }
+            }
+        }
+        square.guides.append(&mut lost);
+        // Long ways need more photons than they are worth.
+        for guide in &mut square.guides {
+            guide.weight *= (4.0 / (4.0 + guide.chain.len() as f64)).sqrt();
+        }
+        square.guides.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        square.guides.truncate(MAX_GUIDES);
+        square
+    }
+
+    /// Adds the bundle of a path, and what it leaves to photons. `edges`: paths that not all points have.
+    fn add_bundle(&self, square: &mut Square, route: Route, parent: Option<&Square>, edges: usize) {
+        let ends: [Option<&PathEnd>; 9] =
+            std::array::from_fn(|node| square.points[node].end(route.signature));
+        let mut flux_w = 0.0;
+        for (end, weight) in ends.iter().zip(MEAN_WEIGHTS) {
+            flux_w += end.map_or(0.0, |end| end.flux_w.max_channel()) * weight * square.place.area();
+        }
+        square.arriving_w += flux_w;
+        let mut bundle = Bundle::new(route, flux_w);
+        let root = flux_w * self.finder.receivers.weight(route.receiver);
+        let left: f64;
+        if ends.iter().all(Option::is_some) {
+            let nodes: [Node; 9] = std::array::from_fn(|node| Node::of(ends[node].expect("all are there")));
+            let image = Image::of(&nodes);
+            bundle.displaced_texels = parent
+                .and_then(|parent| deviation_texels(parent, route, square.place, &nodes))
+                .map_or(0.5 * image.bend, |deviation| deviation / GAIN_OF_DIVISION);
+            bundle.shape = Shape::Whole(Box::new(nodes));
+            bundle.is_smooth = image.is_smooth();
+            left = displaced_square(bundle.displaced_texels, bundle.is_smooth);
+            square.residual.displaced += root * left.sqrt();
+        } else {
+            let side = (-f64::from(square.place.level)).exp2();
+            let of_cut = if edges > LEFT_BY_MANY_CUTS.0 {
+                LEFT_BY_MANY_CUTS.1
+            } else {
+                (LEFT_BY_CUT.0 * side + LEFT_BY_CUT.1).min(0.25)
+            };
+            // A photon that contradicts its bundle changes two texels.
+            square.residual.cut += root * (2.0 * of_cut).sqrt();
+            square.residual.uncut += root * (2.0 * LEFT_UNCUT).sqrt();
+            left = 2.0 * of_cut;
+        }
+        square.guides.push(Guide {
+            chain: route.chain,
+            weight: flux_w * (left + 0.002).sqrt(),
+        });
+        square.bundles.push(bundle);
+    }
+}
+
+impl Square {
+    /// Root of the variance that finer squares reduce [W/m].
+    fn dividable_root(&self, plan: &Plan) -> f64 {
+        let lost = self.residual.lost_w * plan.lost_weight;
+        (self.root(plan) - lost).max(0.0)
+    }
+}
+
+/// Mean squared change of the map, for unit flux, by a photon whose prediction is displaced.
+fn displaced_square(texels: f64, is_smooth: bool) -> f64 {
+    match texels {
+        1.0.. => 2.0,
+        _ if is_smooth => TENT_SQUARE * texels * texels,
+        // Two texels change if a border lies between both places.
+        _ => 2.0 * (CROSSINGS * texels).min(1.0),
+    }
+}
+
+/// What a quarter takes over of what its parent's photons found: nothing, unless that was a surprise.
+fn inherited(parent: &Square) -> Found {
+    let Residual { displaced, cut, .. } = parent.residual;
+    let planned = displaced + cut;
+    if parent.found.variance() > SURPRISE * planned * planned {
+        parent.found.of_quarter()
+    } else {
+        Found::default()
+    }
+}
+
+/// Largest deviation of the nodes that are new in a square from its parent's interpolation [texels]; `None` if the
+/// parent does not have the whole path.
+fn deviation_texels(parent: &Square, route: Route, place: SquarePlace, nodes: &[Node; 9]) -> Option<f64> {
+    let bundle = parent
+        .bundles
+        .iter()
+        .find(|bundle| bundle.route.signature == route.signature)?;
+    let Shape::Whole(old) = &bundle.shape else {
+        return None;
+    };
+    let mut worst = 0.0_f64;
+    for node in [1, 3, 4, 5, 7] {
+        let within = parent.place.within(place.node(node).square());
+        let predicted = biquadratic(old, within).place;
+        worst = worst.max((predicted - nodes[node].place.as_dvec2()).abs().max_element());
+    }
+    Some(worst)
+}
