@@ -45,7 +45,7 @@ const MIN_NOISE: f64 = 0.7;
 const LEAST_WITHOUT_ERROR: f64 = 0.05;
 
 /// A light of which less than this fraction arrives is not followed any further.
-const LEAST_ARRIVING: f64 = 1e-6;
+const LEAST_ARRIVING: f64 = 1e-5;
 
 /// What became of a level of bundles.
 pub(super) enum BundleLevel {

@@ -67,14 +67,15 @@ struct Growth {
     beginning: f64,
 }
 
-/// Medians of the built-in scenes for targets of 10 to 0.5 %.
+/// Bundles, measured on eight built-in scenes from their first level to targets of 10 to 1 %: growth by 1.8 times
+/// gain^0.7 is within a factor of 1.6 of every one but a flat mirror, whose rays it forecasts three times too low.
 const RAYS: Growth = Growth {
-    usual_exponent: 1.4,
+    usual_exponent: 0.7,
     beginning: 2.2,
 };
 /// The same; smaller, because the cost of texels does not depend on rays.
 const SECONDS: Growth = Growth {
-    usual_exponent: 0.85,
+    usual_exponent: 0.55,
     beginning: 2.0,
 };
 /// Splats: every cost is proportional to rays, and the error falls about with their square root.
@@ -101,8 +102,11 @@ const WEIGHT_OF_USUAL: f64 = 2.0;
 /// Spread of exponents across scenes.
 const DOUBT: f64 = 0.35;
 
-/// Refinement comes in whole rounds, and one may double the work: no forecast is more certain than this.
-const WHOLE_ROUND: f64 = 2.0;
+/// Growth of the cost by one more level of bundles, however little is missing.
+const WHOLE_LEVEL: f64 = 1.8;
+
+/// Refinement comes in whole levels, and one may double the work: no forecast is more certain than this.
+const MIN_FACTOR: f64 = 2.0;
 
 /// Predicted cost of `target` with an estimator; `None` while no error is known. Splats are not refined: for them it is
 /// the cost of another bake with more rays.
@@ -122,10 +126,10 @@ pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Opti
         return Some(of_point(point, [1.0, 1.0], 1.0));
     }
     let last = course.last()?;
-    let (growths, is_coarse) = match estimator {
-        Estimator::Splat => ([SPLATS, SPLATS], false),
-        _ if last.is_by_photons => ([PHOTONS, PHOTONS], false),
-        _ => ([RAYS, SECONDS], last.is_coarse),
+    let (growths, is_coarse, level) = match estimator {
+        Estimator::Splat => ([SPLATS, SPLATS], false, 1.0),
+        _ if last.is_by_photons => ([PHOTONS, PHOTONS], false, 1.0),
+        _ => ([RAYS, SECONDS], last.is_coarse, WHOLE_LEVEL),
     };
     let beginning = if is_coarse { BEGINNING_GAIN } else { 1.0 };
     let gain = (last.error / beginning / target).max(1.0);
@@ -133,11 +137,11 @@ pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Opti
     let times = [0, 1].map(|which| {
         let begun = if is_coarse { growths[which].beginning } else { 1.0 };
         let slope = Slope::of(course, costs[which], growths[which].usual_exponent);
-        begun * gain.powf(slope.exponent)
+        begun * level * gain.powf(slope.exponent)
     });
     let doubt = Slope::of(course, costs[1], growths[1].usual_exponent).doubt;
     let factor = (doubt * gain.ln()).exp().max(1.0);
-    Some(of_point(last, times, factor.max(WHOLE_ROUND)))
+    Some(of_point(last, times, factor.max(MIN_FACTOR)))
 }
 
 /// Growth of a cost over a course.
@@ -247,11 +251,10 @@ mod tests {
         let course: Vec<_> = (0..10).map(|level| law(0.5_f64.powi(level))).collect();
         let target = 0.5_f64.powi(11);
         let (next, truth) = (to(&course, target), law(target));
-        assert!(
-            (next.rays as f64 / truth.rays as f64).ln().abs() < 0.06,
-            "{next:?}"
-        );
-        assert!((next.cpu_s / truth.cpu_s).ln().abs() < 0.03, "{next:?}");
+        // Rays and seconds of the level that the target comes in.
+        let ratio = |cost: f64, truth: f64| (cost / (WHOLE_LEVEL * truth)).ln().abs();
+        assert!(ratio(next.rays as f64, truth.rays as f64) < 0.06, "{next:?}");
+        assert!(ratio(next.cpu_s, truth.cpu_s) < 0.03, "{next:?}");
         assert!((next.wall_s - 0.5 * next.cpu_s).abs() < 1e-9, "{next:?}");
     }
 
@@ -280,7 +283,7 @@ mod tests {
             vec![point(900, 0.1, 0.2), point(1_000, 0.1, 0.2)],
         ] {
             let next = to(&course, 0.02);
-            let usual = 0.1 * 10_f64.powf(SECONDS.usual_exponent);
+            let usual = 0.1 * WHOLE_LEVEL * 10_f64.powf(SECONDS.usual_exponent);
             assert!((next.cpu_s / usual - 1.0).abs() < 1e-9, "{next:?}");
         }
     }
