@@ -246,8 +246,8 @@ mod tests {
 
     #[test]
     fn a_power_law_that_was_seen_long_enough_goes_on() {
-        // Rays grow with 1/error², seconds with 1/error, over a factor of a thousand.
-        let law = |error: f64| point((1e3 / (error * error)) as u64, 0.1 / error, error);
+        // Rays grow with 1/error, seconds with its root, over a factor of five hundred.
+        let law = |error: f64| point((1e6 / error) as u64, 0.1 / error.sqrt(), error);
         let course: Vec<_> = (0..10).map(|level| law(0.5_f64.powi(level))).collect();
         let target = 0.5_f64.powi(11);
         let (next, truth) = (to(&course, target), law(target));

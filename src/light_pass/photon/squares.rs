@@ -89,6 +89,8 @@ struct Residual {
     /// Of bundles that not all points have, if the square is cut, and if it is not.
     cut: f64,
     uncut: f64,
+    /// Of an edge in a neighbour, the end or bend of which may lie between the points here.
+    beside: f64,
     /// Light that bundles do not follow [W].
     lost_w: f64,
 }
@@ -199,6 +201,7 @@ impl Square {
             displaced,
             cut,
             uncut,
+            beside,
             lost_w,
         } = self.residual;
         let edges = if self.is_cut || plan.is_worth_a_cut(self) {
@@ -206,7 +209,7 @@ impl Square {
         } else {
             uncut
         };
-        displaced + edges + lost_w * plan.lost_weight
+        displaced + edges + beside + lost_w * plan.lost_weight
     }
 
     /// Variance after photons were traced, which may be those of another half [W²/m²].
@@ -260,6 +263,7 @@ impl Surveyor<'_> {
                 .par_iter()
                 .map(|&place| self.square(place, points, None))
                 .collect();
+            look_beside_edges(&mut squares.squares);
         }
         for round in 0..=MAX_ROUNDS {
             squares.plan = self.plan(squares, goal);
@@ -465,6 +469,9 @@ impl Surveyor<'_> {
         for route in routes {
             self.add_bundle(&mut square, route, parent, edges);
         }
+        if let Some(parent) = parent.filter(|_| edges == 0) {
+            square.residual.beside = 0.25 * parent.residual.beside;
+        }
         square.bundles.sort_by(|a, b| b.flux_w.total_cmp(&a.flux_w));
         for bundle in square.bundles.drain(MAX_BUNDLES.min(square.bundles.len())..) {
             square.residual.lost_w += bundle.flux_w;
@@ -552,10 +559,31 @@ fn displaced_square(texels: f64, is_smooth: bool) -> f64 {
     }
 }
 
+/// Squares without an edge beside squares with one: the corner of a receiver may reach in between all their points. Few
+/// photons would miss it, both halves would agree, and no error would tell.
+fn look_beside_edges(squares: &mut [Square]) {
+    let mut by_node: HashMap<DomainPoint, f64, PointHash> = HashMap::default();
+    for square in squares.iter().filter(|square| square.residual.cut > 0.0) {
+        for node in 0..9 {
+            let cut = by_node.entry(square.place.node(node)).or_default();
+            *cut = cut.max(square.residual.cut);
+        }
+    }
+    for square in squares.iter_mut().filter(|square| square.residual.cut == 0.0) {
+        let nodes = (0..9).filter_map(|node| by_node.get(&square.place.node(node)));
+        square.residual.beside = nodes.copied().fold(0.0, f64::max);
+    }
+}
+
 /// What a quarter takes over of what its parent's photons found: nothing, unless that was a surprise.
 fn inherited(parent: &Square) -> Found {
-    let Residual { displaced, cut, .. } = parent.residual;
-    let planned = displaced + cut;
+    let Residual {
+        displaced,
+        cut,
+        beside,
+        ..
+    } = parent.residual;
+    let planned = displaced + cut + beside;
     if parent.found.variance() > SURPRISE * planned * planned {
         parent.found.of_quarter()
     } else {
