@@ -100,8 +100,8 @@ fn memory_that_is_refused_is_told() {
     sandbox.succeed(&format!("bake builtin:mirror -o out {QUICK}"));
     let before = contents(&sandbox.path("."));
     let line =
-        "bake builtin:mirror -o out --density 1e3 --map-resolution 8192 --threads 1 --estimator wavefront";
-    let run = run_under("ulimit -v 1000000", &sandbox, line);
+        "bake builtin:mirror -o out --density 1e3 --map-resolution 16384 --threads 1 --estimator wavefront";
+    let run = run_under("ulimit -v 450000", &sandbox, line);
     assert_eq!(run.code, 1, "{}", run.stderr);
     let errors: Vec<&str> = run
         .stderr
