@@ -7,7 +7,8 @@
 //! Handscomb, "Monte Carlo Methods", 1964, section 5.5).
 //!
 //! A photon that arrives near its prediction changes both places by bilinear weights, so that the noise of the
-//! difference is proportional to its length. Bundles are deposited once; halves hold photons alone.
+//! difference is proportional to its length. Bundles are deposited once, and halves hold photons alone; but of dispersed
+//! bundles each half samples the wavelengths anew, so that their noise is seen.
 
 use std::collections::BTreeMap;
 
