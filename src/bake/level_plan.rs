@@ -257,7 +257,7 @@ impl CausticLayer<'_> {
                     let unit = self.unit(light.visible)?;
                     statistics.add_light(&self.noting(light, |layer, light| {
                         match self.settings.estimator.refines() {
-                            true => layer.wavefront_statistics(light, unit, context),
+                            true => layer.bundle_statistics(light, unit, context),
                             false => layer.splat_statistics(light, unit, context),
                         }
                     }));

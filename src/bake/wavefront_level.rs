@@ -28,12 +28,6 @@ use crate::light_pass::wavefront::trace::StrandTracer;
 use crate::progress::Control;
 use crate::settings::Estimator;
 
-/// Relative RMSE up to which automatic maps are as fine as in a preview.
-const USUAL_MAP_ERROR: f64 = 0.03;
-
-/// Branches with a smaller share of their ray's light do not influence the sizes of maps.
-const MIN_SIZED_SHARE: f64 = 0.01;
-
 impl CausticLayer<'_> {
     /// Traces and deposits a level, or deposits cached paths on other maps; `None` if it was stopped.
     pub(super) fn make_wavefront(
@@ -133,70 +127,6 @@ impl CausticLayer<'_> {
             work: (0, 0),
             traced: None,
             has_own_colour: self.spectra.has(light.light),
-        }
-    }
-
-    /// Footprints at the density that maps are made for, from a thinner lattice.
-    pub(super) fn wavefront_statistics(
-        &self,
-        progress: &mut LightProgress,
-        unit: FluxUnit,
-        context: &mut BakeContext,
-    ) -> FootprintStatistics {
-        let light = progress.visible;
-        let chart_for: &ChartFor = &|receiver: Receiver| {
-            self.sizes
-                .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
-        };
-        let receivers = Receivers::new(self.tracer, chart_for);
-        let none = SubcellFeatures::default();
-        let size = self.statistics_size(light);
-        let mut lattice = WavefrontLattice {
-            // Light that takes very many paths is spread as wide as its cells: splitting them shows nothing of it.
-            splits: SubdivisionLimits::NONE,
-            ..self.wavefront_lattice(light, LightPart::White, size, &none, unit, context.control)
-        };
-        // Patches reuse these rays. If photons may take over, the strong branches are enough.
-        let is_for_patches = self.carrier() == Carrier::Patches;
-        let mut own = RayCache::default();
-        let rays = if is_for_patches {
-            &mut progress.state.rays
-        } else {
-            &mut own
-        };
-        if !is_for_patches {
-            let threshold = &mut lattice.tracer.limits.branch_threshold;
-            *threshold = threshold.max(MIN_SIZED_SHARE);
-        }
-        let depositor = WavefrontDepositor {
-            receivers: &receivers,
-            chart_for,
-            lattice,
-            reference_w: reference_w(light),
-            coarseness: 1.0,
-        };
-        let listener = unwatched(context.control);
-        let room = self.room(false);
-        let (mut report, _) = depositor.run(None, rays, None, &listener, room);
-        // Patches of this run are on no map.
-        (report.cells, report.splats) = (0, 0);
-        context.outcome.count(&report, context.clock);
-        let cells = |size: (usize, usize)| size.0 as f64 * size.1 as f64;
-        let meant = light
-            .launch
-            .lattice_size(self.map_density_per_sr(), light.reach_m);
-        report.statistics.refined(cells(meant) / cells(size))
-    }
-
-    /// Density that automatic maps are made for [rays/sr]. With a target it does not depend on the lattice, and texels
-    /// are as long as the error allows.
-    pub(super) fn map_density_per_sr(&self) -> f64 {
-        match self.settings.max_error {
-            Some(target) => {
-                let coarser = (target / USUAL_MAP_ERROR).max(1.0);
-                Estimator::Wavefront.preview_density_per_sr() / (coarser * coarser)
-            }
-            None => self.settings.density_per_sr,
         }
     }
 

@@ -13,6 +13,7 @@ mod cells;
 pub mod domain;
 mod edge;
 pub mod filter;
+pub mod footprints;
 pub mod launch;
 pub mod pass;
 mod paths;

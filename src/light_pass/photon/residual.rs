@@ -220,11 +220,11 @@ impl ResidualPass<'_> {
         let mut drawn = (place.x >> 10).wrapping_mul(0x9e37_79b1) ^ (place.y >> 10).wrapping_mul(0x85eb_ca6b);
         for bundle in &square.bundles {
             let triangles = triangles.entry(bundle.receiver()).or_default();
-            bundle.triangles(square.place.area(), |corners, flux_w| {
+            bundle.triangles(square.place.area(), |corners, flux_w, area| {
                 drawn = drawn.wrapping_add(1);
                 let lamp_points = self.lamp_points(bundle, drawn);
                 let part = f64::from(TIMES) / lamp_points.len() as f64;
-                let flux = self.rules.unit.count(flux_w * part);
+                let flux = self.rules.unit.count(flux_w * (area * part));
                 for lamp in lamp_points {
                     let moved = bundle.shift.at(lamp);
                     let corners = corners.map(|corner| corner + moved);
