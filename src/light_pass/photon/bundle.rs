@@ -163,11 +163,20 @@ impl OriginShift {
         step(0).max(step(1))
     }
 
+    /// Extent of the spectrum on the map [texels].
+    fn hues_across(&self) -> f64 {
+        let [first, last] = self.hues;
+        f64::from((first - last).abs().max_element())
+    }
+
+    /// Whether the spectrum spreads farther than one part of it should.
+    pub(super) fn parts_hues(&self) -> bool {
+        self.hues_across() > PART_TEXELS
+    }
+
     /// Parts of the spectrum for which a bundle is deposited.
     pub(super) fn hue_parts(&self) -> f64 {
-        let [first, last] = self.hues;
-        let across = f64::from((first - last).abs().max_element());
-        (across / PART_TEXELS).ceil().clamp(HUE_PARTS.0, HUE_PARTS.1)
+        (self.hues_across() / PART_TEXELS).ceil().clamp(HUE_PARTS.0, HUE_PARTS.1)
     }
 }
 

@@ -247,7 +247,7 @@ impl ResidualPass<'_> {
             }
             bundle.triangles(square.place.area(), |corners, flux_w| {
                 drawn = drawn.wrapping_add(1);
-                for part in self.parts(bundle, drawn) {
+                for part in self.parts(bundle, drawn, sets) {
                     let flux_w = part.hue.channels.apply(flux_w) * (f64::from(TIMES) * part.share);
                     let moved = bundle.shift.at(&part.origin);
                     let corners = corners.map(|corner| corner + moved);
@@ -260,15 +260,23 @@ impl ResidualPass<'_> {
     }
 
     /// Samples of lamp and wavelength for a triangle of a bundle.
-    fn parts(&self, bundle: &Bundle, number: u32) -> Vec<Part<'_>> {
+    fn parts(&self, bundle: &Bundle, number: u32, sets: usize) -> Vec<Part<'_>> {
         let mut hues: Vec<(Hue, f64)> = Vec::new();
         match self.rules.spectrum {
-            Some(spectrum) if bundle.route.is_dispersed => {
+            Some(spectrum) if bundle.route.is_dispersed && (sets > 1 || bundle.shift.parts_hues()) => {
                 let within = even_point(number, WAVELENGTH_DIMENSION, self.rules.seed).x;
                 let parts = bundle.shift.hue_parts();
                 for part in 0..parts as u32 {
                     let hue = spectrum.one((f64::from(part) + within) / parts);
                     hues.extend(hue.map(|hue| (hue, parts.recip())));
+                }
+                // The few hues of a triangle have another colour than all: what is missing is spread over them.
+                if sets == 1 {
+                    let of_parts = hues.iter().map(|(hue, share)| hue.channels.scaled(*share)).sum();
+                    let missing = self.rules.whole_hue().channels.minus(of_parts);
+                    for (hue, _) in &mut hues {
+                        hue.channels = hue.channels + missing;
+                    }
                 }
             }
             _ => hues.push((self.rules.whole_hue(), 1.0)),
