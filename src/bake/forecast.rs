@@ -67,8 +67,8 @@ struct Growth {
     beginning: f64,
 }
 
-/// Bundles, measured on eight built-in scenes from their first level to targets of 10 to 1 %: growth by 1.8 times
-/// gain^0.7 is within a factor of 1.6 of every one but a flat mirror, whose rays it forecasts three times too low.
+/// Bundles, fitted to eight built-in scenes. `nephroid study accuracy`, targets of 5 to 1 %: forecast over actual rays is
+/// 0.46 to 1.45; at 0.5 % it is down to 0.19, as finer levels take more photons beside edges.
 const RAYS: Growth = Growth {
     usual_exponent: 0.7,
     beginning: 2.2,
