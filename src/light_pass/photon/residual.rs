@@ -48,7 +48,8 @@ const MEASURED_OVER_PLANNED: f64 = 0.25;
 /// Photons in a block, at least.
 const BLOCK_PHOTONS: u64 = 1 << 12;
 
-/// Where surfaces are rough, bundles have to carry this part of the light, or photons are better off without them.
+/// Where surfaces are rough, bundles have to carry this part of the light, or photons are better off without them;
+/// elsewhere any part.
 const MIN_BUNDLED: f64 = 0.1;
 
 /// Squares whose triangles are made before they are deposited: of light of one hue, and of a spectrum, which takes many
@@ -140,7 +141,12 @@ impl ResidualPass<'_> {
         };
         let before = squares.points.len();
         surveyor.refine(squares, goal);
-        if self.is_rough && squares.plan.bundled_part < MIN_BUNDLED {
+        let least = if self.is_rough {
+            MIN_BUNDLED
+        } else {
+            f64::MIN_POSITIVE
+        };
+        if squares.plan.bundled_part < least {
             report.is_left_to_photons = true;
             report.pass.rays = squares.points.len() as u64;
             report.pass.trace_s.add(watch.elapsed());
