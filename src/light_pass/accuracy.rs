@@ -367,8 +367,8 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
     noise
 }
 
-/// How much larger the squared error may be than half sets show, by one standard deviation: few texels, or few photons in
-/// them, tell little. The squares d² of differences have the variance 2v² if d is normal, and then d⁴ is 3v² in the mean.
+/// How much larger the squared error may be than half sets show, by two standard deviations: few texels, or few photons in
+/// them, tell little, and of levels that differ by chance, one ends the bake that looks good. The squares d² of differences have the variance 2v² if d is normal, and then d⁴ is 3v² in the mean.
 pub fn doubt_of_halves(a: &Images, b: &Images) -> f64 {
     let (mut squares, mut fourths) = (0.0, 0.0);
     for (&receiver, image) in a {
@@ -380,7 +380,7 @@ pub fn doubt_of_halves(a: &Images, b: &Images) -> f64 {
         }
     }
     if squares > 0.0 {
-        (2.0 / 3.0 * fourths).sqrt() / squares
+        2.0 * (2.0 / 3.0 * fourths).sqrt() / squares
     } else {
         0.0
     }

@@ -62,9 +62,9 @@ const MIN_AUDITS: f64 = 16384.0;
 /// Audits know no smaller part of the light to arrive than this: of a receiver seen edge-on, they would never end.
 const LEAST_AUDITED: f64 = 0.01;
 
-/// Squares beside an edge are audited for a goal of at most this: the corner of a receiver may reach in between all
-/// their points, a thousandth of its light. A few photons would miss it, both halves would agree, and no error would
-/// tell.
+/// Squares beside an edge are audited four times as often, and at least for this goal: the corner of a receiver may reach
+/// in between all their points, a thousandth of its light, or a caster may hide a sliver of itself. A few photons would
+/// miss it, both halves would agree, and no error would tell.
 const GOAL_BESIDE_EDGES: f64 = 0.02;
 
 /// Paths that photons compare themselves with, and that lead them.
@@ -189,7 +189,7 @@ impl Plan {
     /// single one that contradicts its bundle adds at most a quarter of the goal to the error.
     pub(super) fn photons(&self, square: &Square) -> f64 {
         let goal = if square.is_beside_edge {
-            self.goal.min(GOAL_BESIDE_EDGES)
+            (0.25 * self.goal).min(GOAL_BESIDE_EDGES)
         } else {
             self.goal
         };
