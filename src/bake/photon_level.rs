@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::band_maps::BandMaps;
 use super::bundle_level::BundleLevel;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
+use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
@@ -90,7 +90,7 @@ impl CausticLayer<'_> {
             return Some(FIRST_PHOTONS);
         };
         let known = last.and_then(|level| {
-            let error = level.error.as_ref()?.estimate.relative_rmse;
+            let error = level.error.as_ref()?.relative_rmse;
             let truncated = accuracy::truncated_share(&level.energy());
             (error.is_finite() && error > 0.0).then_some((error, truncated))
         });
@@ -272,7 +272,7 @@ impl CausticLayer<'_> {
             ledger: sums.report.ledger,
             halves: sums.maps,
         };
-        if let Some((earlier, so_far)) = earlier.and_then(|level| Some((level.photons.take()?, level.work.0)))
+        if let Some((earlier, so_far)) = earlier.and_then(|level| Some((level.photons.take()?, level.segments)))
         {
             raw.add(&earlier);
             segments += so_far;
@@ -283,10 +283,7 @@ impl CausticLayer<'_> {
             |clock| &mut clock.deposit,
             || self.photon_level(light, (key, unit), raw, is_shard),
         );
-        Ok(Some(LightLevel {
-            work: (segments, 0),
-            ..level
-        }))
+        Ok(Some(LightLevel { segments, ..level }))
     }
 
     fn photon_level(
@@ -334,11 +331,13 @@ impl CausticLayer<'_> {
             bundles.into_iter().for_each(|bundles| maps.add(bundles));
         }
         let mut left = [0; 3];
+        let [one, other] = [&first, &second].map(|half| accuracy::images(half, unit));
+        let doubt = accuracy::doubt_of_halves(&one, &other);
         let noise = if self.settings.filters() {
             let halves = [&first, &second].map(|half| &**half);
             filter::filter(&mut maps, halves, bundles, (unit, is_signed), &mut left)
         } else {
-            accuracy::half_set_noise(&accuracy::images(&first, unit), &accuracy::images(&second, unit))
+            accuracy::half_set_noise(&one, &other)
         };
         filter::without_negative(&mut maps, is_signed, &mut left);
         ledger.book_sum(Account::Sampling, left);
@@ -348,14 +347,12 @@ impl CausticLayer<'_> {
             band.add(more);
         }
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
-        let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
-        let error = estimate.map(|mut estimate| {
-            estimate.raise_to(estimate.relative_rmse.powi(2) + bundle_square);
-            KeptError {
-                predecessors: 0,
-                estimate,
-            }
-        });
+        let mut error = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
+        if let Some(error) = &mut error {
+            let square = error.relative_rmse.powi(2);
+            if std::env::var("NUDBG").is_ok() { eprintln!("doubt {doubt:.3} stated {:.4} bundle {:.4}", square.sqrt(), bundle_square.sqrt()); }
+            error.raise_to(square * (1.0 + doubt) + bundle_square);
+        }
         LightLevel {
             error,
             ..self.level(light, (key, unit), (maps, bands), ledger)

@@ -1,9 +1,7 @@
 //! Light transport at a surface, shared by the light pass, the direct layer and the CPU eye pass.
 
 pub mod bend;
-pub mod corners;
-pub mod curvature;
-pub mod differential;
+pub mod sharp_edges;
 mod hierarchy;
 pub mod interaction;
 pub mod medium;
@@ -15,7 +13,6 @@ pub mod tracer;
 mod traversed;
 
 pub use crate::plan::EffectSet;
-pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use hierarchy::SceneNode;
 pub use interaction::{Branch, DiffuseResponse, Event, Interaction, Meeting, NormalSource};
 pub use medium::{MediumStack, media_at};

@@ -40,9 +40,12 @@ pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
     by(Estimator::Splat, density_per_sr, side)
 }
 
-/// Wavefronts at a density [rays/sr], with maps of side² texels.
+/// Bundles with photons to an error that falls with a density [rays/sr], with maps of side² texels.
 pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
-    by(Estimator::Wavefront, density_per_sr, side)
+    BakeSettings {
+        max_error: Some((0.02 * (1e3 / density_per_sr).powf(0.4)).clamp(0.003, 0.05)),
+        ..by(Estimator::Auto, density_per_sr, side)
+    }
 }
 
 /// Photons at a density [rays/sr] without filtering, with maps of side² texels.

@@ -113,13 +113,11 @@ fn seconds(reader: &mut impl Read) -> io::Result<f64> {
 }
 
 /// Counters of a report, in the order of the file.
-fn counts_of(report: &mut PassReport) -> [&mut u64; 5] {
+fn counts_of(report: &mut PassReport) -> [&mut u64; 3] {
     [
         &mut report.rays,
         &mut report.segments,
         &mut report.splats,
-        &mut report.cells,
-        &mut report.receiver_queries,
     ]
 }
 
