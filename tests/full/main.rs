@@ -19,7 +19,7 @@ mod bake {
     mod spectral;
     mod surfaces;
     mod tiles;
-    mod wavefront;
+    mod solver;
 }
 
 mod cli {

@@ -8,13 +8,13 @@ use nephroid::scene::{Mesh, Scene, contacts};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table};
-use support::tools::{at, set};
+use support::tools::{set, to};
 
 /// Gaps of a rounding error to single precision, one way and the other.
 const GAPS_M: [f64; 3] = [0.0, 6e-8, -6e-8];
 
 pub fn fill(t: &mut Table) {
-    let bright_branches = || set(at(1e3, 16), |s| s.branch_threshold = Some(1e-4));
+    let bright_branches = || set(to(0.03, 16), |s| s.branch_threshold = Some(1e-4));
     for gap_m in GAPS_M {
         t.case("touching-glass")
             .bake_with(slabs(&[[0.3, 0.7]], 1.5), bright_branches())

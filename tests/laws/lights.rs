@@ -14,7 +14,7 @@ use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, values};
-use support::tools::{at, photons, set, settings};
+use support::tools::{photons, set, settings, to};
 
 pub fn fill(t: &mut Table) {
     // Powers from the smallest that single precision knows to the largest: the map is a scale of itself.
@@ -202,7 +202,7 @@ fn sent_to_a_mirror(t: &mut Table) {
         ("sun", sun, 1.2 * -slanting.y),
     ] {
         for item_buffer in [ItemBufferKind::Equal, ItemBufferKind::Cube] {
-            for settings in [at(4e3, 16), settings(6.4e5, 16)] {
+            for settings in [to(0.03, 16), settings(6.4e5, 16)] {
                 t.case(format!("{name}-above-a-mirror"))
                     .bake_with(
                         over.clone().lit(light(kind)),
@@ -228,7 +228,7 @@ fn direct(t: &mut Table) {
     let layer = || BakeSettings {
         max_error: None,
         layers: vec![LayerKind::Direct],
-        ..at(300.0, 16)
+        ..to(0.05, 16)
     };
     let sky = |pixels, radiance, scale| under_sky(below(), pixels, radiance, scale);
     let panel = |half_m: f64, radiance: f64| {

@@ -11,7 +11,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table};
-use support::tools::{at, builtin_scene, photons, set, settings};
+use support::tools::{builtin_scene, photons, set, settings, to};
 
 pub fn fill(t: &mut Table) {
     t.case("focus-paraboloid")
@@ -44,7 +44,7 @@ pub fn fill(t: &mut Table) {
             .averages_to_coarser();
     }
     t.case("hall-of-mirrors")
-        .bake_with(hall().lamp(HALL_LAMP), depth(40, at(1e3, 32)))
+        .bake_with(hall().lamp(HALL_LAMP), depth(40, to(0.03, 32)))
         .e("that of all mirrored lamps", 0.01, all_mirrored);
     for (name, reflectance) in [("mirror-box", 1.0), ("dim-mirror-box", 0.9)] {
         let to_the_end = set(depth(10_000, settings(40.0, 16)), |s| {
@@ -60,7 +60,7 @@ pub fn fill(t: &mut Table) {
                 });
         }
         t.case(format!("{name}-by-patches"))
-            .bake_with(box_of_mirrors(reflectance), depth(6, at(20.0, 16)))
+            .bake_with(box_of_mirrors(reflectance), depth(6, to(0.05, 16)))
             .share("escapes", 1e-3, |energy| energy.escaped);
     }
     let above_a_thousandth = set(depth(1000, settings(20.0, 16)), |s| {
@@ -80,7 +80,7 @@ pub fn fill(t: &mut Table) {
             bake.result.counts.segments as f64 / bake.result.counts.rays as f64 / (1000.0 / 1e-3)
         });
     t.case("mirror-box-with-glass-by-patches")
-        .bake_with(hall_with_a_ball(), depth(24, at(100.0, 64)))
+        .bake_with(hall_with_a_ball(), depth(24, to(0.05, 64)))
         .share("escapes", 1e-3, |energy| energy.escaped)
         .ledger("light arrives, and the rest is given up", 0.0, |energy| {
             no(energy.deposited > 0.0 && energy.truncated.depth + energy.truncated.threshold > 0.0)

@@ -11,7 +11,7 @@ use crate::mirrors::paraboloid;
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Table, is_long};
-use support::tools::{at, set, settings, transformed};
+use support::tools::{set, settings, transformed, to};
 
 pub fn fill(t: &mut Table) {
     t.case("units-of-flux")
@@ -19,7 +19,7 @@ pub fn fill(t: &mut Table) {
     t.case("coarse-map-on-a-finer-one")
         .check("every count is kept, and even light stays even", spread_map);
     let sized = |width, height| {
-        set(at(1e3, 1), |s| {
+        set(to(0.03, 1), |s| {
             s.map_resolution = MapResolution::Fixed { width, height }
         })
     };
@@ -66,7 +66,7 @@ pub fn fill(t: &mut Table) {
     // Spreads from a millionth of a footprint to ten thousand of them.
     let of_sigma = |sigma, settings| set(settings, |s| s.sigma = Sigma::Constant(sigma));
     for sigma in [1e-6, 1.0, 1e4] {
-        for settings in [settings(2e3, 32), at(1e3, 32)] {
+        for settings in [settings(2e3, 32), to(0.03, 32)] {
             t.case("sigma-from-nothing-to-huge")
                 .bake_with(glass_ball(3), of_sigma(sigma, settings))
                 .arrives_of_sent(1.0);
@@ -74,7 +74,7 @@ pub fn fill(t: &mut Table) {
     }
     t.case("hardly-any-sigma")
         .bake(glass_ball(3), 1e3, 32)
-        .bake_with(glass_ball(3), of_sigma(1e-6, at(1e3, 32)))
+        .bake_with(glass_ball(3), of_sigma(1e-6, to(0.03, 32)))
         .as_first("is hardly any blur", 0.02, 1.0);
 }
 

@@ -48,6 +48,14 @@ pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
     }
 }
 
+/// Bundles and photons to a relative RMSE, with maps of side² texels.
+pub fn to(target: f64, side: usize) -> BakeSettings {
+    BakeSettings {
+        max_error: Some(target),
+        ..by(Estimator::Auto, BakeSettings::default().density_per_sr, side)
+    }
+}
+
 /// Photons at a density [rays/sr] without filtering, with maps of side² texels.
 pub fn photons(density_per_sr: f64, side: usize) -> BakeSettings {
     BakeSettings {
