@@ -86,5 +86,4 @@ quantity!(
 product!(RadiantIntensity * SolidAngle = Flux);
 product!(Irradiance * Area = Flux);
 
-impl Irradiance {
-}
+impl Irradiance {}

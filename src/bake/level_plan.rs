@@ -150,9 +150,9 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> Result<()> {
         if self.wants_statistics() {
-            let paths = lights.iter().map(|light| {
-                (light.visible.light, self.trace_key(light.visible))
-            });
+            let paths = lights
+                .iter()
+                .map(|light| (light.visible.light, self.trace_key(light.visible)));
             let key = (paths.collect(), self.map_density_per_sr());
             if known.as_ref().is_none_or(|(known, _)| *known != key) {
                 let mut statistics = FootprintStatistics::default();

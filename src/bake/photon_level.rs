@@ -272,7 +272,8 @@ impl CausticLayer<'_> {
             ledger: sums.report.ledger,
             halves: sums.maps,
         };
-        if let Some((earlier, so_far)) = earlier.and_then(|level| Some((level.photons.take()?, level.segments)))
+        if let Some((earlier, so_far)) =
+            earlier.and_then(|level| Some((level.photons.take()?, level.segments)))
         {
             raw.add(&earlier);
             segments += so_far;
@@ -350,7 +351,13 @@ impl CausticLayer<'_> {
         let mut error = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
         if let Some(error) = &mut error {
             let square = error.relative_rmse.powi(2);
-            if std::env::var("NUDBG").is_ok() { eprintln!("doubt {doubt:.3} stated {:.4} bundle {:.4}", square.sqrt(), bundle_square.sqrt()); }
+            if std::env::var("NUDBG").is_ok() {
+                eprintln!(
+                    "doubt {doubt:.3} stated {:.4} bundle {:.4}",
+                    square.sqrt(),
+                    bundle_square.sqrt()
+                );
+            }
             error.raise_to(square * (1.0 + doubt) + bundle_square);
         }
         LightLevel {

@@ -115,7 +115,11 @@ impl Spectra {
                 let bands = nodes(tracer, &key.lamp, &spectra.bands);
                 let photons = matches!(settings.estimator, Estimator::Auto | Estimator::Photon).then(|| {
                     let sampled = nodes(tracer, &key.lamp, &photon_bands(settings));
-                    PhotonSpectrum::new(tracer.with_metals_under(&key.lamp), sampled, settings.keep_spectrum)
+                    PhotonSpectrum::new(
+                        tracer.with_metals_under(&key.lamp),
+                        sampled,
+                        settings.keep_spectrum,
+                    )
                 });
                 let light = SpectralLight { key, bands, photons };
                 spectra.of_lights.insert(visible_light.light, light);
@@ -186,7 +190,10 @@ impl Spectra {
 
     /// Maps of a light's bands with what they mean; empty if the light has no bands.
     pub(super) fn level_bands(&self, light: usize, maps: Vec<ReceiverMaps>) -> Vec<LevelBand> {
-        let Some(SpectralLight { key, bands: nodes, .. }) = self.of_lights.get(&light) else {
+        let Some(SpectralLight {
+            key, bands: nodes, ..
+        }) = self.of_lights.get(&light)
+        else {
             return Vec::new();
         };
         let with_maps = maps.into_iter().enumerate();

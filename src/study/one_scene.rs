@@ -191,9 +191,17 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
         ..with(Estimator::Auto, wavelengths, None)
     };
     for &count in wavelengths {
-        add("sampled", count.to_string(), to(TARGET, Wavelengths::Fixed(count)));
+        add(
+            "sampled",
+            count.to_string(),
+            to(TARGET, Wavelengths::Fixed(count)),
+        );
     }
-    add("sampled", "continuous".into(), to(TARGET, Wavelengths::Continuous));
+    add(
+        "sampled",
+        "continuous".into(),
+        to(TARGET, Wavelengths::Continuous),
+    );
     let finest = to(REFERENCE_TARGET, Wavelengths::Continuous);
     if !Baker::new(Arc::clone(&scene))?
         .plan(&finest)?

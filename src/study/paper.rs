@@ -21,7 +21,8 @@ use crate::optics::LinearSrgb;
 use crate::scene::builtin::{self, parts, pool, shapes};
 use crate::scene::{Camera, LightKind, Mesh, Scene};
 use crate::settings::{
-    BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement, Sigma,
+    BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement,
+    Sigma,
 };
 use crate::transport::{EffectSet, MediumStack, Tracer};
 use crate::units::Flux;
@@ -150,16 +151,14 @@ pub(super) fn rays(bench: &Bench) -> Result<Sweep> {
         Variant::new(labels, &scene, bench.at(auto(target), bench.side()))
     });
     let at_targets: Vec<Variant> = at_targets.collect();
-    let variants = [AS_PAPER, SPLAT]
-        .into_iter()
-        .flat_map(|(name, settings)| {
-            let densities = bench.some(&DENSITIES, 4).iter();
-            let scene = &scene;
-            densities.map(move |&density| {
-                let settings = bench.at(settings(density), bench.side());
-                Variant::new(vec![name.into(), density.into()], scene, settings)
-            })
-        });
+    let variants = [AS_PAPER, SPLAT].into_iter().flat_map(|(name, settings)| {
+        let densities = bench.some(&DENSITIES, 4).iter();
+        let scene = &scene;
+        densities.map(move |&density| {
+            let settings = bench.at(settings(density), bench.side());
+            Variant::new(vec![name.into(), density.into()], scene, settings)
+        })
+    });
     Ok(Sweep {
         note: format!("`ring`. {AS_PAPER_NOTE}"),
         labels: &["estimator", "density_per_sr"],
@@ -455,11 +454,7 @@ pub(super) fn pool_plates(bench: &Bench) -> Result<Sweep> {
     let mut variants: Vec<Variant> = Vec::new();
     for (name, scene) in &waters {
         let labels = vec![name.clone().into(), Cell::Count(scene.triangle_count() as u64)];
-        variants.push(Variant::new(
-            labels,
-            scene,
-            bench.at(auto(0.005), bench.side()),
-        ));
+        variants.push(Variant::new(labels, scene, bench.at(auto(0.005), bench.side())));
     }
     let from = |file: &str, position: DVec3| {
         let target = DVec3::new(0.0, 0.1, 0.0);

@@ -1,13 +1,13 @@
 //! Light transport at a surface, shared by the light pass, the direct layer and the CPU eye pass.
 
 pub mod bend;
-pub mod sharp_edges;
 mod hierarchy;
 pub mod interaction;
 pub mod medium;
 pub mod microfacets;
 mod normal_texture;
 mod packed;
+pub mod sharp_edges;
 pub mod smoothing;
 pub mod tracer;
 mod traversed;

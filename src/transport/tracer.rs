@@ -7,10 +7,10 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bend;
-use super::sharp_edges::sharp_edges;
 use super::hierarchy::{self, Hierarchy, SceneNode};
 use super::interaction::DiffuseResponse;
 use super::normal_texture;
+use super::sharp_edges::sharp_edges;
 use super::smoothing::smoothing_groups;
 use super::traversed::TraversedCells;
 use crate::geometry::{Ray, ray};

@@ -59,7 +59,7 @@ fn slabs_and_angles(t: &mut Table) {
     let place = DVec3::new(0.1, 1.5, 0.05);
     for ior in [1.0, 1.0 + 1e-6, 1.0 - 1e-6] {
         t.case("index-1")
-            .bake(under_slab(ior).lamp(place), 2e3, 32)
+            .bake(under_slab(ior).lamp(place), 0.03, 32)
             .e_of_lamp("that of the lamp alone", 1e-3, place);
     }
     t.case("every-angle")
@@ -71,12 +71,12 @@ fn slabs_and_angles(t: &mut Table) {
         .fact("Snell: sines by their indices", 1e-8, || {
             over_angles(|eta, _, [incident, out]| (out.x * eta - incident.x).abs())
         });
-    for (elevation_deg, density_per_sr) in [(10.0_f64, 1e4), (1.0, 1e5)] {
+    for (elevation_deg, target) in [(10.0_f64, 0.02), (1.0, 0.005)] {
         let (sine, cosine) = elevation_deg.to_radians().sin_cos();
         let water = shapes::floor([-3.0, 3.0], [-3.0, 3.0], 0.5);
         let sun = DVec3::new(cosine, -sine, 0.0);
         t.case("grazing-sun")
-            .bake(floor(0.5).glass(1.333, water).sun(sun), density_per_sr, 32)
+            .bake(floor(0.5).glass(1.333, water).sun(sun), target, 32)
             .e("(1 − R) sin h", 1e-6, move |_| {
                 sine * (1.0 - dielectric_reflectance(sine, 1.333))
             });
@@ -85,20 +85,20 @@ fn slabs_and_angles(t: &mut Table) {
     let critical_rad = (1.0 / 1.5_f64).asin();
     let below = 1.0 - dielectric_reflectance((critical_rad - 1e-7).cos(), 1.0 / 1.5);
     t.case("below-the-critical-angle")
-        .bake(out_of_glass(critical_rad - 1e-7), 1e6, 32)
+        .bake(out_of_glass(critical_rad - 1e-7), 0.005, 32)
         .ledger("1 − R gets out", 1e-6, move |energy| {
             off(energy.deposited, below * energy.emitted)
         });
     t.case("above-the-critical-angle")
-        .bake(out_of_glass(critical_rad + 1e-7), 1e6, 32)
+        .bake(out_of_glass(critical_rad + 1e-7), 0.005, 32)
         .arrives(0.0);
 }
 
 fn bodies(t: &mut Table) {
     let inner = shapes::sphere(DVec3::new(0.05, 0.52, 0.0), 0.15, 3);
     t.case("glass-in-the-same-glass")
-        .bake(glass_ball(4), 4e3, 32)
-        .bake(glass_ball(4).glass(1.5, inner), 4e3, 32)
+        .bake(glass_ball(4), 0.03, 32)
+        .bake(glass_ball(4).glass(1.5, inner), 0.03, 32)
         .watts_as_first("watts as without it", 2e-3)
         .as_first_within_errors();
     let bright_branches = || set(to(0.03, 16), |s| s.branch_threshold = Some(1e-4));
@@ -114,7 +114,7 @@ fn bodies(t: &mut Table) {
         t.case("open-glass")
             .bake(
                 floor(0.5).glass(1.5, block).lamp(DVec3::new(0.1, 1.5, 0.05)),
-                60.0,
+                0.05,
                 16,
             )
             .arrives_of_sent(1.0);
@@ -160,7 +160,7 @@ fn absorption(t: &mut Table) {
         let scene = scene.with("water", body, tinted(1.333, WATER_COLOUR, 0.7));
         let says = "E of red, green, blue is what the water leaves";
         t.case(format!("{name}-floor-in-coloured-water"))
-            .bake(scene.clone(), 1e3, 16)
+            .bake(scene.clone(), 0.03, 16)
             .measure(says, 3e-3, move |bake| by_depth(bake, depths_m))
             .splat(scene, 4e4, 16)
             .measure(says, 3e-3, move |bake| by_depth(bake, depths_m));
@@ -188,7 +188,10 @@ fn truncated(t: &mut Table) {
     let slab = shapes::cuboid(DVec3::new(-1.0, 0.5, -1.0), DVec3::new(1.0, 0.7, 1.0));
     let scene = floor(0.5).sun(DVec3::NEG_Y).glass(1.5, slab);
     let r = dielectric_reflectance(1.0, 1.5);
-    for (few, many) in [(to(0.03, 16), to(0.03, 16)), (settings(1e4, 16), settings(4e4, 16))] {
+    for (few, many) in [
+        (to(0.03, 16), to(0.03, 16)),
+        (settings(1e4, 16), settings(4e4, 16)),
+    ] {
         let at_most = |max_depth, branch_threshold, settings: &BakeSettings| BakeSettings {
             max_depth: Some(max_depth),
             branch_threshold,

@@ -13,7 +13,7 @@ use nephroid::units::{Flux, Radiance};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, energy_residual, is_long};
-use support::tools::{bake, builtin_scene, photons, set, settings, transformed, to};
+use support::tools::{bake, builtin_scene, photons, set, settings, to, transformed};
 
 pub fn fill(t: &mut Table) {
     for (name, scene) in [
@@ -32,9 +32,9 @@ pub fn fill(t: &mut Table) {
     };
     for name in names {
         t.case(format!("sixteen-times-the-rays-{name}"))
-            .bake(builtin_scene(name), 64e3, 32)
-            .bake(builtin_scene(name), 500.0, 32)
-            .bake(builtin_scene(name), 8e3, 32)
+            .bake(builtin_scene(name), 0.01, 32)
+            .bake(builtin_scene(name), 0.05, 32)
+            .bake(builtin_scene(name), 0.02, 32)
             .law("error at 16 times the rays over that at 1", 0.5, |bakes| {
                 let error = |bake: &Baked| maps_apart(&bake.result.maps, &bakes[0].result.maps, 1.0);
                 error(&bakes[2]) / error(&bakes[1])
@@ -49,20 +49,20 @@ fn symmetries(t: &mut Table, name: &str, scene: &Scene) {
     let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
     let moved = |rotation, offset| transformed(scene.clone(), rotation, 1.0, offset);
     t.case(format!("rigid-motion-{name}"))
-        .bake(scene.clone(), 1e3, 32)
-        .bake(moved(turn, DVec3::new(3.1, -7.3, 0.9)), 1e3, 32)
+        .bake(scene.clone(), 0.03, 32)
+        .bake(moved(turn, DVec3::new(3.1, -7.3, 0.9)), 0.03, 32)
         .watts_as_first("watts", 0.01)
         .as_first_within_errors()
         // Lamps start their rays in the same directions wherever they stand.
-        .bake(moved(DMat3::IDENTITY, DVec3::splat(64.0)), 1e3, 32)
+        .bake(moved(DMat3::IDENTITY, DVec3::splat(64.0)), 0.03, 32)
         .as_first("maps, moved by 64 m along the axes", 1e-5, 1.0);
     let mut triangles = scene.clone();
     for object in &mut triangles.objects {
         object.mesh_in_scene_mut().triangles.reverse();
     }
     t.case(format!("order-of-triangles-{name}"))
-        .bake(scene.clone(), 1e3, 32)
-        .bake(triangles, 1e3, 32)
+        .bake(scene.clone(), 0.03, 32)
+        .bake(triangles, 0.03, 32)
         .watts_as_first("triangles in reverse: watts", 1e-3);
 }
 

@@ -11,7 +11,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use support::laws::law::*;
 use support::laws::{Baked, Table, is_long};
 use support::random_scenes::{MAX_LAMPS, scene};
-use support::tools::{set, settings, transformed, to};
+use support::tools::{set, settings, to, transformed};
 
 /// What may be done to a scene.
 const CHANGES: u64 = 8;

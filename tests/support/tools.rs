@@ -40,14 +40,6 @@ pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
     by(Estimator::Splat, density_per_sr, side)
 }
 
-/// Bundles with photons to an error that falls with a density [rays/sr], with maps of side² texels.
-pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
-    BakeSettings {
-        max_error: Some((0.02 * (1e3 / density_per_sr).powf(0.4)).clamp(0.003, 0.05)),
-        ..by(Estimator::Auto, density_per_sr, side)
-    }
-}
-
 /// Bundles and photons to a relative RMSE, with maps of side² texels.
 pub fn to(target: f64, side: usize) -> BakeSettings {
     BakeSettings {

@@ -176,7 +176,9 @@ impl OriginShift {
 
     /// Parts of the spectrum for which a bundle is deposited.
     pub(super) fn hue_parts(&self) -> f64 {
-        (self.hues_across() / PART_TEXELS).ceil().clamp(HUE_PARTS.0, HUE_PARTS.1)
+        (self.hues_across() / PART_TEXELS)
+            .ceil()
+            .clamp(HUE_PARTS.0, HUE_PARTS.1)
     }
 }
 

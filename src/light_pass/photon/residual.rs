@@ -23,15 +23,15 @@ use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_s
 use super::paths::PathFinder;
 use super::receivers::{MeasuredChart, Receivers};
 use super::spectrum::Hue;
-use super::subcell_features::SubcellFeatures;
 use super::squares::{Found, Square, Squares, Surveyor};
+use super::subcell_features::SubcellFeatures;
 use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk, WAVELENGTH_DIMENSION};
 use crate::geometry::sampling::{GOLDEN_64, even_point, in_square, mix64};
 use crate::illumination::Receiver;
+use crate::light_pass::coverage::{FluxTriangle, deposit_triangles};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::light_pass::coverage::{FluxTriangle, deposit_triangles};
 use crate::optics::LinearSrgb;
 use crate::progress::Stage;
 
@@ -140,7 +140,12 @@ impl ResidualPass<'_> {
         };
         let before = squares.points.len();
         surveyor.refine(squares, goal);
-        if self.is_rough && squares.plan.bundled_part < MIN_BUNDLED {
+        let least = if self.is_rough {
+            MIN_BUNDLED
+        } else {
+            f64::MIN_POSITIVE
+        };
+        if squares.plan.bundled_part < least {
             report.is_left_to_photons = true;
             report.pass.rays = squares.points.len() as u64;
             report.pass.trace_s.add(watch.elapsed());

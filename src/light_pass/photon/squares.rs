@@ -59,6 +59,9 @@ const LEFT_BY_MANY_CUTS: (usize, f64) = (8, 0.5);
 /// visible, since few photons meet the light in dark places.
 const MIN_AUDITS: f64 = 16384.0;
 
+/// Audits know no smaller part of the light to arrive than this: of a receiver seen edge-on, they would never end.
+const LEAST_AUDITED: f64 = 0.01;
+
 /// Squares beside an edge are audited for a goal of at most this: the corner of a receiver may reach in between all
 /// their points, a thousandth of its light. A few photons would miss it, both halves would agree, and no error would
 /// tell.
@@ -162,7 +165,7 @@ pub(super) struct Plan {
     arriving_w: f64,
     /// Factor from squared errors [W²/m²] to squared relative errors of all maps.
     pub(super) relative: f64,
-    /// Part of the light that bundles follow to its end.
+    /// Part of the light that bundles follow to its end; 0 if photons alone found any.
     pub(super) bundled_part: f64,
     /// Goal that the photons of this plan reach: the one asked for, or a larger one if that would take too many.
     pub(super) goal: f64,
@@ -171,7 +174,11 @@ pub(super) struct Plan {
 impl Plan {
     /// Photons of a square, without audits.
     fn photons_for(&self, root: f64, square: &Square) -> f64 {
-        self.per_root * root / square.segments.sqrt()
+        if root > 0.0 {
+            self.per_root * root / square.segments.sqrt()
+        } else {
+            0.0
+        }
     }
 
     pub(super) fn photons_for_variance(&self, variance: f64, square: &Square) -> f64 {
@@ -189,7 +196,7 @@ impl Plan {
         let audits = 4.0 * self.texels.sqrt() / goal;
         let everywhere = audits.max(MIN_AUDITS) * square.start_w / self.start_w.max(f64::MIN_POSITIVE);
         let lit = if square.arriving_w > 0.0 || square.is_beside_edge {
-            audits * square.start_w / self.arriving_w
+            audits * square.start_w / self.arriving_w.max(LEAST_AUDITED * self.start_w)
         } else {
             0.0
         };
@@ -342,8 +349,7 @@ impl Surveyor<'_> {
             let is_divided = |place: &SquarePlace| {
                 let square = (place.at(DVec2::ZERO), place.at(DVec2::ONE));
                 let root = place.corner.root as usize;
-                place.level == level
-                    && sought.ask_for_finer(launch, root, square, level - first)
+                place.level == level && sought.ask_for_finer(launch, root, square, level - first)
             };
             let before = places.len();
             let of_place = |place: SquarePlace| -> Vec<SquarePlace> {
@@ -404,8 +410,14 @@ impl Surveyor<'_> {
             }
         }
         plan.goal = goal;
-        plan.bundled_part = if lost_w > 0.0 {
-            bundled_w / (bundled_w + lost_w)
+        let by_photons_w = if bundled_w > 0.0 {
+            0.0
+        } else {
+            squares.arrived_w.unwrap_or(0.0)
+        };
+        let not_bundled_w = lost_w + by_photons_w;
+        plan.bundled_part = if not_bundled_w > 0.0 {
+            bundled_w / (bundled_w + not_bundled_w)
         } else {
             1.0
         };

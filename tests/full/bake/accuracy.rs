@@ -246,9 +246,7 @@ fn a_weak_light_in_focus_is_not_coarse() {
 /// Bundles of a spectrum are deposited at a few of its wavelengths, drawn anew for each half.
 #[test]
 fn a_spectrum_is_hardly_worse_than_its_estimate() {
-    let auto = |target, seed| {
-        set(to(target, 256), |s| s.seed = seed)
-    };
+    let auto = |target, seed| set(to(target, 256), |s| s.seed = seed);
     let truth = bake(builtin_scene("prism"), &auto(0.03, 2));
     let result = bake(builtin_scene("prism"), &auto(0.1, 1));
     let (error, estimate) = (

@@ -21,8 +21,8 @@ use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
 use crate::bake::common::{
-    CAUSTIC_AND_DIRECT, assert_fresh, assert_same, automatic, difference, edit, run, session,
-    sized, with_layers,
+    CAUSTIC_AND_DIRECT, assert_fresh, assert_same, automatic, difference, edit, run, session, sized,
+    with_layers,
 };
 use support::hard_scenes::under_square_lamp;
 use support::tools::{bake, builtin_scene, energy_fault, photons, set, settings, to};

@@ -255,9 +255,8 @@ fn kept_bands_add_up_to_their_colour() {
 fn all_wavelengths_are_as_many_alone() {
     let scene = ball_of("N-BK7");
     let side = 128;
-    let [all, many] = [Wavelengths::Continuous, Wavelengths::Fixed(10)].map(|wavelengths| {
-        floor(&scene, &at_wavelengths(wavelengths, settings(side)))
-    });
+    let [all, many] = [Wavelengths::Continuous, Wavelengths::Fixed(10)]
+        .map(|wavelengths| floor(&scene, &at_wavelengths(wavelengths, settings(side))));
     let middle = 0.5 * side as f64;
     let is_around = |texel: usize| {
         let place = |index: usize| (index as f64 + 0.5 - middle) / side as f64;

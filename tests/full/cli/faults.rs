@@ -99,8 +99,7 @@ fn memory_that_is_refused_is_told() {
     let sandbox = Sandbox::new();
     sandbox.succeed(&format!("bake builtin:mirror -o out {QUICK}"));
     let before = contents(&sandbox.path("."));
-    let line =
-        "bake builtin:mirror -o out --max-error 5% --map-resolution 16384 --threads 1";
+    let line = "bake builtin:mirror -o out --max-error 5% --map-resolution 16384 --threads 1";
     let run = run_under("ulimit -v 450000", &sandbox, line);
     assert_eq!(run.code, 1, "{}", run.stderr);
     let errors: Vec<&str> = run

@@ -214,10 +214,7 @@ fn convergence_measures_what_compare_does() {
     const LINE: &str = "convergence builtin:mirror --map-resolution 32 --quick";
     let sandbox = Sandbox::new();
     let (shipped, _) = study(&sandbox, &format!("{LINE} -o out --densities 1e3,1e4"));
-    assert_eq!(
-        shipped.words("estimator"),
-        ["photon", "photon", "splat", "splat"]
-    );
+    assert_eq!(shipped.words("estimator"), ["photon", "photon", "splat", "splat"]);
     assert_eq!(shipped.words("reference"), ["analytic S5"; 4]);
     for (column, range) in [
         ("rays", 1.0..1e6),

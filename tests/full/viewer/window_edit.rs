@@ -10,7 +10,8 @@ use support::or_skip;
 
 /// The caustic alone, refined until its error is small: several levels, and a bake of seconds, so that no window is so slow
 /// that it sees the last maps only.
-const REFINED: &str = "builtin:ring --error-metric rmse --max-error 0.05% --map-resolution 128 --layers caustic";
+const REFINED: &str =
+    "builtin:ring --error-metric rmse --max-error 0.05% --map-resolution 128 --layers caustic";
 
 /// Takes the last change back.
 fn undo(viewer: &mut Viewer<'_>) {

@@ -89,7 +89,7 @@ fn programs_read_progress_line_by_line() {
 #[test]
 fn bake_prints_the_manifest_that_it_writes() {
     let sandbox = Sandbox::new();
-    let bake = "bake builtin:mirror -o out --max-error 2% --map-resolution 64x32 --layers direct,caustic";
+    let bake = "bake builtin:mirror -o out --density 1e4 --map-resolution 64x32 --layers direct,caustic";
     let run = sandbox.succeed(&format!("{bake} --json"));
     let manifest = sandbox.manifest("out");
     assert_eq!((run.json(), run.stderr.as_str()), (manifest.clone(), ""));

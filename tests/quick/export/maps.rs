@@ -33,7 +33,7 @@ fn files_hold_the_watts_of_their_ledgers() {
         let sum = |names: &[&str]| names.iter().map(|name| number(&energy[name])).sum::<f64>();
         let emitted = sum(&["emitted"]);
         assert!(emitted > 0.1, "{scene}: {emitted} W");
-        let booked = sum(&["deposited", "absorbed", "escaped", "truncated"]);
+        let booked = sum(&["deposited", "absorbed", "escaped", "truncated", "sampling"]);
         assert_close(booked, emitted, 1e-6, scene);
         let ledgers = manifest["ledgers"].as_array().expect("ledgers").iter();
         let by_light: f64 = ledgers.map(|ledger| number(&ledger["energy_w"]["emitted"])).sum();
