@@ -32,6 +32,10 @@ const USUAL_MAP_ERROR: f64 = 0.03;
 /// Density that these maps are made for [rays/sr].
 const PREVIEW_DENSITY_PER_SR: f64 = 25_000.0;
 
+/// Texels for the light of a cell of such a lattice: on the built-in scenes, 0.5 to 2 mm each, as fine as their caustics
+/// are seen to be.
+const TEXELS_PER_CELL: f64 = 64.0;
+
 /// Goal of the first level, which gives the first picture.
 const FIRST_GOAL: f64 = 0.2;
 
@@ -103,7 +107,7 @@ impl CausticLayer<'_> {
                 seed: self.settings.seed,
             },
             chart_for,
-            cells: columns as f64 * rows as f64,
+            cells: TEXELS_PER_CELL * columns as f64 * rows as f64,
         };
         let report = pass.run(context.control);
         context.outcome.count(&report, context.clock);

@@ -24,7 +24,7 @@ pub struct FootprintPass<'a> {
     pub rules: PhotonRules<'a>,
     /// Of any size.
     pub chart_for: &'a ChartFor<'a>,
-    /// Cells of the lattice whose footprints are asked for, on each root of the launch domain.
+    /// Parts of each root of the launch domain whose footprints are asked for.
     pub cells: f64,
 }
 

@@ -226,6 +226,11 @@ impl PathFinder<'_> {
             }
         }
 
+        // Photons give up longer paths as well.
+        if light.chain.len() >= self.rules.max_depth as usize {
+            return;
+        }
+
         // What a specular surface reflects and transmits.
         let signature = light
             .signature
@@ -234,7 +239,7 @@ impl PathFinder<'_> {
         let mut go_on = |branch: Branch| {
             let flux_w = flux_w * branch.share;
             let chain = light.chain.with(hit.object, branch.event.is_reflection());
-            let is_followed = light.chain.len() < MAX_STEPS.min(self.rules.max_depth as usize)
+            let is_followed = light.chain.len() < MAX_STEPS
                 && waiting.len() < MAX_WAITING
                 && flux_w.is_finite()
                 && flux_w.max_channel() >= least_w;
