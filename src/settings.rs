@@ -49,8 +49,8 @@ impl LayerKind {
 choices! {
     /// How the light pass turns rays into irradiance.
     pub enum Estimator {
-        /// Bundles, with photons for what these cannot carry. Photons alone without a target, on rough surfaces, for light
-        /// traced by wavelength, and for lamps that shine in all directions from a sphere or an environment.
+        /// Bundles, with photons for what these cannot carry. Photons alone without a target, on rough surfaces, and for
+        /// lamps that shine in all directions from a sphere or an environment.
         Auto,
         /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
         Wavefront,

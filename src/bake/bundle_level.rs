@@ -56,11 +56,12 @@ pub(super) enum BundleLevel {
 }
 
 impl CausticLayer<'_> {
-    /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way, and is not
-    /// traced by wavelength, where the few hues of a deposit leave an error that no half shows.
+    /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way, and is of
+    /// so many wavelengths that a parabola goes through them.
     pub(super) fn has_bundles(&self, light: &VisibleLight) -> bool {
+        let spectrum = self.spectra.photons(light.light);
         self.settings.estimator != Estimator::Photon
-            && !self.spectra.has(light.light)
+            && spectrum.is_some_and(|spectrum| spectrum.tracers().is_some()) == self.spectra.has(light.light)
             && (!self.has_places(light) || self.with_launch(light, |launch| launch.has_offsets()))
     }
 
@@ -191,7 +192,7 @@ impl CausticLayer<'_> {
             halves,
         };
         let layers = Layers {
-            bundles: Some(&bundles),
+            bundles: rules.spectrum.is_none().then_some(&bundles),
             photons: &photons,
         };
         let unit = unit.per(u64::from(TIMES) * HALVES as u64);

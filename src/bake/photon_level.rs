@@ -334,11 +334,13 @@ impl CausticLayer<'_> {
             bundles.into_iter().for_each(|bundles| maps.add(bundles));
         }
         let mut left = [0; 3];
+        let [one, other] = [&first, &second].map(|half| accuracy::images(half, unit));
+        let doubt = accuracy::doubt_of_halves(&one, &other);
         let noise = if self.settings.filters() {
             let halves = [&first, &second].map(|half| &**half);
             filter::filter(&mut maps, halves, bundles, (unit, is_signed), &mut left)
         } else {
-            accuracy::half_set_noise(&accuracy::images(&first, unit), &accuracy::images(&second, unit))
+            accuracy::half_set_noise(&one, &other)
         };
         filter::without_negative(&mut maps, is_signed, &mut left);
         ledger.book_sum(Account::Sampling, left);
@@ -350,7 +352,10 @@ impl CausticLayer<'_> {
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
         let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
         let error = estimate.map(|mut estimate| {
-            estimate.raise_to(estimate.relative_rmse.powi(2) + bundle_square);
+            let square = estimate.relative_rmse.powi(2);
+            // More photons do not recover truncated light, and nothing about it is left to chance.
+            let noise = square - accuracy::truncated_share(&energy).powi(2);
+            estimate.raise_to(square + noise * doubt + bundle_square);
             KeptError {
                 predecessors: 0,
                 estimate,

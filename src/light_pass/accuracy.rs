@@ -367,6 +367,26 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
     noise
 }
 
+/// How much larger the squared noise may be than half sets show, by two standard deviations: few texels, or few photons
+/// in them, tell little, and of levels that differ by chance, one that looks good ends the bake. The squares d² of
+/// differences have the variance 2v² if d is normal, and then d⁴ is 3v² in the mean.
+pub fn doubt_of_halves(a: &Images, b: &Images) -> f64 {
+    let (mut squares, mut fourths) = (0.0, 0.0);
+    for (&receiver, image) in a {
+        let differences = image.squared_difference(b.get(&receiver));
+        for (texel, square) in differences.iter().enumerate() {
+            let by_area = square * image.area_m2(texel);
+            squares += by_area;
+            fourths += by_area * by_area;
+        }
+    }
+    if squares > 0.0 {
+        2.0 * (2.0 / 3.0 * fourths).sqrt() / squares
+    } else {
+        0.0
+    }
+}
+
 /// Noise of a map's difference from the map of every fourth ray, relative to the map's own noise.
 const NOISE_OF_DIFFERENCE: f64 = 1.5;
 

@@ -24,11 +24,14 @@ pub(super) const MEAN_WEIGHTS: [f64; 9] = [
     1.0 / 36.0,
 ];
 
-/// Extent of the light from one part of a lamp on the map [texels], unless that takes too many parts.
+/// Extent of the light from one part of a lamp, or of a spectrum, on the map [texels], unless that takes too many parts.
 const PART_TEXELS: f64 = 0.1;
 
-/// Maximum number of parts of a lamp along each axis.
-const MAX_LAMP_PARTS: f64 = 4.0;
+/// Maximum number of parts of a lamp along each axis: of light of one hue, and of dispersed light.
+const MAX_LAMP_PARTS: [f64; 2] = [4.0, 2.0];
+
+/// Minimum and maximum number of parts of a spectrum. Fewer would leave colour noise.
+const HUE_PARTS: (f64, f64) = (8.0, 64.0);
 
 /// Maximum distance between the arrivals from neighbouring parts of a lamp [texels]. A larger lamp is left to photons.
 const MAX_STEP_TEXELS: f64 = 0.5;
@@ -95,47 +98,87 @@ pub(super) enum Shape {
     Nothing,
 }
 
-/// Displacement of an arrival on the map for light from the end of each half-axis of an extended lamp, relative to light
-/// from its centre [texels].
+/// Displacement of an arrival on the map, relative to light from the lamp's centre at the middle wavelength [texels].
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct LampShift([Vec2; 2]);
+pub(super) struct OriginShift {
+    /// For light from the end of each half-axis of an extended light.
+    lamp: [Vec2; 2],
+    /// At the first and the last wavelength of dispersed light.
+    hues: [Vec2; 2],
+}
 
-impl LampShift {
-    /// Measured at the square's middle, by light from half-way out along both axes; `None` if light takes another path
-    /// from there, or if the lamp is too large.
-    pub(super) fn measured(middle: &PathEnd, lamp_sides: &[PointPaths; 2]) -> Option<Self> {
-        let moved = |paths: &PointPaths| {
-            let end = paths.end(middle.route.signature)?;
-            Some((end.place - middle.place).as_vec2() * 2.0)
-        };
-        let [x, y] = lamp_sides;
-        let shift = Self([moved(x)?, moved(y)?]);
-        (shift.step_texels() < MAX_STEP_TEXELS).then_some(shift)
+/// Point on the lamp and wavelength.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Origin {
+    /// In half-axes from the lamp's centre.
+    pub(super) lamp: DVec2,
+    /// [`Hue::ends`](super::spectrum::Hue::ends).
+    pub(super) ends: [f64; 2],
+}
+
+impl OriginShift {
+    /// Measured at the square's middle; `None` if light takes another path from there, or if the lamp is too large.
+    pub(super) fn measured(
+        middle: &PathEnd,
+        lamp_sides: Option<&[PointPaths; 2]>,
+        spectrum_ends: Option<&[PointPaths; 2]>,
+    ) -> Option<Self> {
+        let signature = middle.route.signature;
+        let moved = |paths: &PointPaths| Some((paths.end(signature)?.place - middle.place).as_vec2());
+        let mut shift = Self::default();
+        if let Some([x, y]) = lamp_sides {
+            // The sides are half-way out.
+            shift.lamp = [moved(x)? * 2.0, moved(y)? * 2.0];
+        }
+        if let Some([first, last]) = spectrum_ends.filter(|_| middle.route.is_dispersed) {
+            shift.hues = [moved(first)?, moved(last)?];
+        }
+        (shift.lamp_step_texels() < MAX_STEP_TEXELS).then_some(shift)
     }
 
-    /// Whether the lamp spreads the light over several texels.
+    /// Whether lamp and wavelengths spread the light over several texels.
     pub(super) fn is_smooth(&self) -> bool {
-        let [x, y] = self.0.map(|moved| 2.0 * moved.abs().max_element());
-        f64::from(x.min(y)) >= SMOOTH_TEXELS
+        let [x, y] = self.lamp.map(|moved| 2.0 * moved.abs().max_element());
+        let hues = (self.hues[0] - self.hues[1]).abs().max_element();
+        f64::from(hues.max(x.min(y))) >= SMOOTH_TEXELS
     }
 
-    /// Displacement for a point on the lamp, in half-axes from its centre.
-    pub(super) fn at(&self, lamp: DVec2) -> DVec2 {
-        let [x, y] = self.0.map(|moved| moved.as_dvec2());
-        x * lamp.x + y * lamp.y
+    pub(super) fn at(&self, origin: &Origin) -> DVec2 {
+        let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
+        let [first, last] = self.hues.map(|moved| moved.as_dvec2());
+        x * origin.lamp.x + y * origin.lamp.y + first * origin.ends[0] + last * origin.ends[1]
     }
 
     /// Parts of a lamp for which a bundle is deposited, along both axes.
-    pub(super) fn parts(&self) -> DVec2 {
+    pub(super) fn lamp_parts(&self, is_dispersed: bool) -> DVec2 {
         let parts = |moved: Vec2| (2.0 * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
-        DVec2::from(self.0.map(parts)).clamp(DVec2::ONE, DVec2::splat(MAX_LAMP_PARTS))
+        let most = MAX_LAMP_PARTS[usize::from(is_dispersed)];
+        DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(most))
     }
 
     /// Distance between the arrivals from neighbouring parts of a lamp [texels].
-    fn step_texels(&self) -> f64 {
-        let parts = self.parts().to_array();
-        let step = |axis: usize| 2.0 * f64::from(self.0[axis].abs().max_element()) / parts[axis];
+    fn lamp_step_texels(&self) -> f64 {
+        let parts = self.lamp_parts(false).to_array();
+        let step = |axis: usize| 2.0 * f64::from(self.lamp[axis].abs().max_element()) / parts[axis];
         step(0).max(step(1))
+    }
+
+    /// Extent of the spectrum on the map [texels].
+    fn hues_across(&self) -> f64 {
+        let [first, last] = self.hues;
+        f64::from((first - last).abs().max_element())
+    }
+
+    /// Whether the spectrum spreads farther than one part of it should.
+    pub(super) fn parts_hues(&self) -> bool {
+        self.hues_across() > PART_TEXELS
+    }
+
+    /// Parts of the spectrum for which a bundle is deposited.
+    pub(super) fn hue_parts(&self) -> f64 {
+        (self.hues_across() / PART_TEXELS)
+            .ceil()
+            .clamp(HUE_PARTS.0, HUE_PARTS.1)
     }
 }
 
@@ -144,8 +187,8 @@ impl LampShift {
 pub(super) struct Bundle {
     pub(super) route: Route,
     pub(super) shape: Shape,
-    /// Displacement for other points of the lamp.
-    pub(super) shift: LampShift,
+    /// Displacement for other points of the lamp and other wavelengths.
+    pub(super) shift: OriginShift,
     /// Mean flux over the square [W, largest channel].
     pub(super) flux_w: f64,
     /// Expected displacement of its predictions [texels].
@@ -162,7 +205,7 @@ impl Bundle {
         Self {
             route,
             shape: Shape::Nothing,
-            shift: LampShift::default(),
+            shift: OriginShift::default(),
             flux_w,
             displaced_texels: 0.0,
             divisions: 1,
@@ -185,16 +228,15 @@ impl Bundle {
         self.route.receiver
     }
 
-    /// Light predicted at a point of the square and of the lamp, which is given in half-axes from its centre; `None`
-    /// where it does not have the path.
-    pub(super) fn at(&self, within: DVec2, lamp: DVec2) -> Option<Predicted> {
+    /// Light predicted at a point of the square and for an origin; `None` where it does not have the path.
+    pub(super) fn at(&self, within: DVec2, origin: &Origin) -> Option<Predicted> {
         let predicted = match &self.shape {
             Shape::Whole(nodes) => biquadratic(nodes, within),
             Shape::Cut(pieces) => pieces.iter().find_map(|piece| piece.at(within))?,
             Shape::Nothing => return None,
         };
         Some(Predicted {
-            place: predicted.place + self.shift.at(lamp),
+            place: predicted.place + self.shift.at(origin),
             ..predicted
         })
     }
@@ -433,6 +475,7 @@ mod tests {
             chain: Chain::default(),
             receiver: Receiver::front(0),
             island: 0,
+            is_dispersed: false,
         }
     }
 

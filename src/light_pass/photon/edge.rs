@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 
-use super::bundle::{LampShift, Node, Piece, Shape};
+use super::bundle::{Node, OriginShift, Piece, Shape};
 use super::domain::DomainPoint;
 use super::paths::PathFinder;
 use super::squares::{Plan, Points, Square, Squares};
@@ -27,7 +27,7 @@ const CENTRE: usize = 4;
 /// Squares that share the points of their bisections.
 const SQUARES_AT_ONCE: usize = 32;
 
-/// Cuts squares, and finds how their bundles move with the point on the lamp.
+/// Cuts squares, and finds how their bundles move with lamp and wavelength.
 pub(super) fn finish(finder: &PathFinder, squares: &mut Squares, control: &Control, report: &mut PassReport) {
     let Squares {
         squares,
@@ -95,17 +95,21 @@ impl Cutter<'_, '_> {
         self.measure_shifts(square)
     }
 
-    /// Finds how bundles move with the point on the lamp; those of which that is not known are left to photons.
+    /// Finds how bundles move with lamp and wavelength; those of which that is not known are left to photons.
     fn measure_shifts(&self, square: &mut Square) -> (u64, u64) {
         let root = square.place.corner.root as usize;
         let middle = square.place.node(CENTRE).square();
-        let Some(lamp_sides) = self.finder.at_lamp_sides(root, middle) else {
+        let lamp_sides = self.finder.at_lamp_sides(root, middle);
+        let spectrum_ends = self.finder.at_spectrum_ends(root, middle);
+        if lamp_sides.is_none() && spectrum_ends.is_none() {
             return (0, 0);
-        };
+        }
         let centre = Arc::clone(&square.points[CENTRE]);
         for bundle in 0..square.bundles.len() {
             let end = centre.end(square.bundles[bundle].route.signature);
-            match end.and_then(|end| LampShift::measured(end, &lamp_sides)) {
+            let shift =
+                end.and_then(|end| OriginShift::measured(end, lamp_sides.as_ref(), spectrum_ends.as_ref()));
+            match shift {
                 Some(shift) => {
                     square.bundles[bundle].shift = shift;
                     square.bundles[bundle].is_smooth |= shift.is_smooth();
@@ -113,8 +117,10 @@ impl Cutter<'_, '_> {
                 None => square.give_up(bundle),
             }
         }
-        let traced = lamp_sides.iter().map(|paths| u64::from(paths.traced)).sum();
-        (lamp_sides.len() as u64, traced)
+        let traced = lamp_sides.iter().chain(&spectrum_ends).flatten();
+        traced.fold((0, 0), |(rays, segments), paths| {
+            (rays + 1, segments + u64::from(paths.traced))
+        })
     }
 
     /// The parts of a square that have a path.

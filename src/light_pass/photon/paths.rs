@@ -4,12 +4,13 @@ use glam::DVec2;
 
 use super::launch::{LAMP_MIDDLE, PhotonLaunch};
 use super::receivers::Receivers;
+use super::spectrum::PhotonSpectrum;
 use super::walk::PhotonRules;
 use crate::geometry::Ray;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::path::PathSignature;
 use crate::optics::LinearSrgb;
-use crate::transport::{Branch, MediumStack, SurfaceHit};
+use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
 
 /// Longer paths are left to photons.
 pub(super) const MAX_STEPS: usize = 12;
@@ -73,6 +74,8 @@ pub(super) struct Route {
     pub(super) receiver: Receiver,
     /// Island of the receiver's chart.
     pub(super) island: u32,
+    /// Whether a surface on the way separates wavelengths.
+    pub(super) is_dispersed: bool,
 }
 
 /// Light of a point at the end of one path.
@@ -119,6 +122,7 @@ struct QueuedLight {
     flux_w: LinearSrgb,
     signature: PathSignature,
     chain: Chain,
+    is_dispersed: bool,
 }
 
 /// Follows the light of points.
@@ -130,19 +134,30 @@ pub(super) struct PathFinder<'a> {
 }
 
 impl PathFinder<'_> {
-    /// The light of a point of a root's square, from the middle of the lamp.
+    /// The light of a point of a root's square, from the middle of the lamp and at the middle wavelength.
     pub(super) fn paths(&self, root: usize, square: DVec2) -> PointPaths {
-        self.trace(root, square, LAMP_MIDDLE)
+        self.trace(self.middle_tracer(), root, square, LAMP_MIDDLE)
     }
 
     /// Light from half-way out along both axes of an extended light; `None` for light from one point or direction.
     pub(super) fn at_lamp_sides(&self, root: usize, square: DVec2) -> Option<[PointPaths; 2]> {
         self.launch.lamp_offsets()?;
         let half_way = [DVec2::new(0.75, 0.5), DVec2::new(0.5, 0.75)];
-        Some(half_way.map(|lamp| self.trace(root, square, lamp)))
+        Some(half_way.map(|lamp| self.trace(self.middle_tracer(), root, square, lamp)))
     }
 
-    fn trace(&self, root: usize, square: DVec2, lamp: DVec2) -> PointPaths {
+    /// Light at the first and the last wavelength of a spectrum; `None` for light that is not dispersed.
+    pub(super) fn at_spectrum_ends(&self, root: usize, square: DVec2) -> Option<[PointPaths; 2]> {
+        let [_, first, last] = self.rules.spectrum?.tracers()?;
+        Some([first, last].map(|tracer| self.trace(tracer, root, square, LAMP_MIDDLE)))
+    }
+
+    fn middle_tracer(&self) -> &Tracer {
+        let tracers = self.rules.spectrum.and_then(PhotonSpectrum::tracers);
+        tracers.map_or(self.rules.tracer, |[middle, ..]| middle)
+    }
+
+    fn trace(&self, tracer: &Tracer, root: usize, square: DVec2, lamp: DVec2) -> PointPaths {
         let mut paths = PointPaths::default();
         let Some(start) = self.launch.start_at(root, square, lamp) else {
             return paths;
@@ -158,12 +173,13 @@ impl PathFinder<'_> {
             flux_w: start.flux_w,
             signature: PathSignature::default(),
             chain: Chain::default(),
+            is_dispersed: self.rules.spectrum.is_some_and(PhotonSpectrum::starts_parted),
         });
         while let Some(light) = waiting.pop() {
             paths.traced += 1;
             paths.segments += light.flux_w.max_channel() / paths.start_w;
-            if let Some(hit) = self.rules.tracer.closest_hit(&light.ray) {
-                self.meet(light, &hit, &mut paths, &mut waiting);
+            if let Some(hit) = tracer.closest_hit(&light.ray) {
+                self.meet(tracer, light, &hit, &mut paths, &mut waiting);
             }
         }
         let lost_w: f64 = paths.lost.iter().map(|(_, flux_w)| flux_w).sum();
@@ -174,12 +190,13 @@ impl PathFinder<'_> {
     /// Ends a path at a surface, or continues it with what the surface passes on.
     fn meet(
         &self,
+        tracer: &Tracer,
         light: QueuedLight,
         hit: &SurfaceHit,
         paths: &mut PointPaths,
         waiting: &mut Vec<QueuedLight>,
     ) {
-        let PhotonRules { tracer, effects, .. } = self.rules;
+        let effects = self.rules.effects;
         let material = tracer.scene().material_of(hit.object);
         let is_straight = light.chain.len() == 0;
         if is_straight && !material.surface.is_specular() {
@@ -209,14 +226,20 @@ impl PathFinder<'_> {
             }
         }
 
+        // Photons give up longer paths as well.
+        if light.chain.len() >= self.rules.max_depth as usize {
+            return;
+        }
+
         // What a specular surface reflects and transmits.
         let signature = light
             .signature
             .at(hit.object, tracer.smoothing_group(hit.object, hit.triangle));
+        let is_dispersed = light.is_dispersed || material.is_dispersive();
         let mut go_on = |branch: Branch| {
             let flux_w = flux_w * branch.share;
             let chain = light.chain.with(hit.object, branch.event.is_reflection());
-            let is_followed = light.chain.len() < MAX_STEPS.min(self.rules.max_depth as usize)
+            let is_followed = light.chain.len() < MAX_STEPS
                 && waiting.len() < MAX_WAITING
                 && flux_w.is_finite()
                 && flux_w.max_channel() >= least_w;
@@ -230,6 +253,7 @@ impl PathFinder<'_> {
                 flux_w,
                 signature: signature.event(branch.event),
                 chain,
+                is_dispersed,
             });
         };
         meeting.reflection().into_iter().for_each(&mut go_on);
@@ -248,6 +272,7 @@ impl PathFinder<'_> {
                 chain: light.chain,
                 receiver,
                 island,
+                is_dispersed: light.is_dispersed,
             },
             place: chart.place(hit.triangle, hit.barycentric),
             flux_w: LinearSrgb::BLACK,

@@ -7,22 +7,24 @@
 //! Handscomb, "Monte Carlo Methods", 1964, section 5.5).
 //!
 //! A photon that arrives near its prediction changes both places by bilinear weights, so that the noise of the
-//! difference is proportional to its length. Bundles are deposited once; halves hold photons alone.
+//! difference is proportional to its length. Bundles are deposited once, and halves hold photons alone; but of dispersed
+//! bundles each half samples the wavelengths anew, so that their noise is seen.
 
 use std::collections::BTreeMap;
 
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::bundle::{Bundle, flux_triangle};
+use super::bundle::{Bundle, Origin, flux_triangle};
 use super::domain::LitCells;
 use super::edge;
 use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE, PhotonLaunch, Start};
-use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed};
+use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed, set_of};
 use super::paths::PathFinder;
 use super::receivers::{MeasuredChart, Receivers};
+use super::spectrum::Hue;
 use super::squares::{Found, Square, Squares, Surveyor};
-use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk};
+use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk, WAVELENGTH_DIMENSION};
 use crate::geometry::sampling::{GOLDEN_64, even_point, in_square, mix64};
 use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
@@ -46,11 +48,13 @@ const MEASURED_OVER_PLANNED: f64 = 0.25;
 /// Photons in a block, at least.
 const BLOCK_PHOTONS: u64 = 1 << 12;
 
-/// Where surfaces are rough, bundles have to carry this part of the light, or photons are better off without them.
+/// Where surfaces are rough, bundles have to carry this part of the light, or photons are better off without them;
+/// elsewhere any part.
 const MIN_BUNDLED: f64 = 0.1;
 
-/// Squares whose triangles are made before they are deposited.
-const SQUARES_AT_ONCE: usize = 1 << 12;
+/// Squares whose triangles are made before they are deposited: of light of one hue, and of a spectrum, which takes many
+/// times the triangles.
+const SQUARES_AT_ONCE: [usize; 2] = [1 << 12, 1 << 7];
 
 /// Memory of a square with its points and bundles, roughly [bytes].
 const BYTES_PER_SQUARE: u64 = 4 << 10;
@@ -90,9 +94,9 @@ impl LightSquares {
 
 /// Maps that a pass fills.
 pub struct ResidualMaps<'a> {
-    /// Light of all bundles.
+    /// Light of all bundles, unless it is dispersed: then each half samples the spectrum anew, and holds its own.
     pub bundles: &'a mut ReceiverMaps,
-    /// What photons add to it.
+    /// What photons add to it: one set of maps, or one for each band.
     pub halves: [&'a mut [ReceiverMaps]; HALVES],
 }
 
@@ -137,7 +141,12 @@ impl ResidualPass<'_> {
         };
         let before = squares.points.len();
         surveyor.refine(squares, goal);
-        if self.is_rough && squares.plan.bundled_part < MIN_BUNDLED {
+        let least = if self.is_rough {
+            MIN_BUNDLED
+        } else {
+            f64::MIN_POSITIVE
+        };
+        if squares.plan.bundled_part < least {
             report.is_left_to_photons = true;
             report.pass.rays = squares.points.len() as u64;
             report.pass.trace_s.add(watch.elapsed());
@@ -150,7 +159,15 @@ impl ResidualPass<'_> {
         report.pass.trace_s.add(watch.elapsed());
 
         let watch = Stopwatch::start();
-        self.deposit_bundles(squares, maps.bundles, &mut report.pass);
+        if self.rules.spectrum.is_some() {
+            for (half, sets) in maps.halves.iter_mut().enumerate() {
+                self.deposit_bundles(squares, sets, half as u32, 1, &mut report.pass.ledger);
+            }
+        } else {
+            // Photons of both halves remove it.
+            let sets = std::slice::from_mut(maps.bundles);
+            self.deposit_bundles(squares, sets, 0, HALVES, &mut report.pass.ledger);
+        }
         report.pass.deposit_s.add(watch.elapsed());
 
         let watch = Stopwatch::start();
@@ -179,79 +196,127 @@ impl ResidualPass<'_> {
         report
     }
 
-    /// Deposits all bundles into their own maps.
-    fn deposit_bundles(&self, squares: &Squares, maps: &mut ReceiverMaps, report: &mut PassReport) {
-        for squares in squares.squares.chunks(SQUARES_AT_ONCE) {
-            let made: Vec<TrianglesByReceiver> = squares
-                .par_chunks(SQUARES_AT_ONCE / 32)
+    /// Deposits all bundles into a set of maps for each band, and books them so many times.
+    fn deposit_bundles(
+        &self,
+        squares: &Squares,
+        maps: &mut [ReceiverMaps],
+        sample: u32,
+        times: usize,
+        ledger: &mut LedgerSum,
+    ) {
+        let at_once = SQUARES_AT_ONCE[usize::from(self.rules.spectrum.is_some())];
+        for squares in squares.squares.chunks(at_once) {
+            let made: Vec<TrianglesByMap> = squares
+                .par_chunks(at_once / 32)
                 .map(|squares| {
-                    let mut triangles = TrianglesByReceiver::new();
+                    let mut triangles = TrianglesByMap::new();
                     squares
                         .iter()
-                        .for_each(|square| self.triangles(square, &mut triangles));
+                        .for_each(|square| self.triangles(square, (sample, maps.len()), &mut triangles));
                     triangles
                 })
                 .collect();
-            let mut by_receiver = TrianglesByReceiver::new();
-            for (receiver, mut triangles) in made.into_iter().flatten() {
-                by_receiver.entry(receiver).or_default().append(&mut triangles);
+            let mut by_map = TrianglesByMap::new();
+            for (map, mut triangles) in made.into_iter().flatten() {
+                by_map.entry(map).or_default().append(&mut triangles);
             }
-            for (receiver, triangles) in by_receiver {
-                maps.touch(receiver, self.chart_for);
-                if let Some(map) = maps.get_mut(receiver) {
-                    // Photons of both halves remove it.
+            for ((set, receiver), triangles) in by_map {
+                maps[set].touch(receiver, self.chart_for);
+                if let Some(map) = maps[set].get_mut(receiver) {
                     let placed = deposit_triangles(&triangles, map)
                         .deposited
-                        .map(|count| HALVES as i128 * count);
-                    report.ledger.book_sum(Account::Deposited, placed);
-                    report.ledger.book_sum(Account::Bundled, placed);
-                    report
-                        .ledger
-                        .book_sum(Account::Sampling, placed.map(|count| -count));
+                        .map(|count| times as i128 * count);
+                    ledger.book_sum(Account::Deposited, placed);
+                    ledger.book_sum(Account::Bundled, placed);
+                    ledger.book_sum(Account::Sampling, placed.map(|count| -count));
                 }
             }
         }
     }
 
     /// Adds the triangles of a square.
-    fn triangles(&self, square: &Square, triangles: &mut TrianglesByReceiver) {
-        // Neighbouring triangles sample the lamp at different points.
+    fn triangles(&self, square: &Square, (sample, sets): (u32, usize), triangles: &mut TrianglesByMap) {
+        // Neighbouring triangles sample lamp and spectrum at different points, and so does each half.
         let place = square.place.corner;
         let mut drawn = (place.x >> 10).wrapping_mul(0x9e37_79b1) ^ (place.y >> 10).wrapping_mul(0x85eb_ca6b);
+        drawn ^= sample.wrapping_mul(0x2c1b_3c6d);
         for bundle in &square.bundles {
-            let triangles = triangles.entry(bundle.receiver()).or_default();
+            let is_plain = self.rules.spectrum.is_none() && self.launch.lamp_offsets().is_none();
+            if is_plain {
+                let triangles = triangles.entry((0, bundle.receiver())).or_default();
+                bundle.triangles(square.place.area(), |corners, flux_w| {
+                    let flux = self.rules.unit.count(flux_w * f64::from(TIMES));
+                    triangles.push(flux_triangle(bundle, corners, flux));
+                });
+                continue;
+            }
             bundle.triangles(square.place.area(), |corners, flux_w| {
                 drawn = drawn.wrapping_add(1);
-                let lamp_points = self.lamp_points(bundle, drawn);
-                let part = f64::from(TIMES) / lamp_points.len() as f64;
-                let flux = self.rules.unit.count(flux_w * part);
-                for lamp in lamp_points {
-                    let moved = bundle.shift.at(lamp);
+                for part in self.parts(bundle, drawn, sets) {
+                    let flux_w = part.hue.channels.apply(flux_w) * (f64::from(TIMES) * part.share);
+                    let moved = bundle.shift.at(&part.origin);
                     let corners = corners.map(|corner| corner + moved);
-                    triangles.push(flux_triangle(bundle, corners, flux));
+                    let triangle = flux_triangle(bundle, corners, self.rules.unit.count(flux_w));
+                    let map = (set_of(part.hue.band, sets), bundle.receiver());
+                    triangles.entry(map).or_default().push(triangle);
                 }
             });
         }
     }
 
-    /// Points of the lamp that a triangle of a bundle is deposited for, in half-axes from its centre.
-    fn lamp_points(&self, bundle: &Bundle, number: u32) -> Vec<DVec2> {
-        let Some(offsets) = self.launch.lamp_offsets() else {
-            return vec![DVec2::ZERO];
-        };
-        let parts = bundle.shift.parts();
-        let within = even_point(number, LAMP_DIMENSION, self.rules.seed);
-        let of_part = |part: u32| {
+    /// Samples of lamp and wavelength for a triangle of a bundle.
+    fn parts(&self, bundle: &Bundle, number: u32, sets: usize) -> Vec<Part<'_>> {
+        let mut hues: Vec<(Hue, f64)> = Vec::new();
+        match self.rules.spectrum {
+            Some(spectrum) if bundle.route.is_dispersed && (sets > 1 || bundle.shift.parts_hues()) => {
+                let within = even_point(number, WAVELENGTH_DIMENSION, self.rules.seed).x;
+                let parts = bundle.shift.hue_parts();
+                for part in 0..parts as u32 {
+                    let hue = spectrum.one((f64::from(part) + within) / parts);
+                    hues.extend(hue.map(|hue| (hue, parts.recip())));
+                }
+                // The few hues of a triangle have another colour than all: what is missing is spread over them.
+                if sets == 1 {
+                    let of_parts = hues.iter().map(|(hue, share)| hue.channels.scaled(*share)).sum();
+                    let missing = self.rules.whole_hue().channels.minus(of_parts);
+                    for (hue, _) in &mut hues {
+                        hue.channels = hue.channels + missing;
+                    }
+                }
+            }
+            _ => hues.push((self.rules.whole_hue(), 1.0)),
+        }
+        let offsets = self.launch.lamp_offsets();
+        let lamp_parts = bundle.shift.lamp_parts(hues.len() > 1);
+        let on_lamp = even_point(number, LAMP_DIMENSION, self.rules.seed);
+        let mut parts = Vec::with_capacity(hues.len());
+        for part in 0..(lamp_parts.x * lamp_parts.y) as u32 {
             let part = f64::from(part);
-            let part = DVec2::new(part % parts.x, (part / parts.x).floor());
-            offsets((part + within) / parts)
-        };
-        (0..parts.element_product() as u32).map(of_part).collect()
+            let part = DVec2::new(part % lamp_parts.x, (part / lamp_parts.x).floor());
+            let lamp = offsets.map_or(DVec2::ZERO, |offsets| offsets((part + on_lamp) / lamp_parts));
+            for &(hue, share) in &hues {
+                parts.push(Part {
+                    origin: Origin { lamp, ends: hue.ends },
+                    hue,
+                    share: share / lamp_parts.element_product(),
+                });
+            }
+        }
+        parts
     }
 }
 
-/// Triangles to be deposited.
-type TrianglesByReceiver = BTreeMap<Receiver, Vec<FluxTriangle>>;
+/// Triangles by set of maps and receiver.
+type TrianglesByMap = BTreeMap<(usize, Receiver), Vec<FluxTriangle>>;
+
+/// A sample of lamp and wavelength.
+struct Part<'a> {
+    origin: Origin,
+    hue: Hue<'a>,
+    /// Of the flux.
+    share: f64,
+}
 
 /// Chooses how finely each bundle is deposited. Returns the squared relative error that this leaves.
 fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receivers) -> f64 {
@@ -477,7 +542,10 @@ impl ResidualPhotons<'_> {
             guides: &square.guides,
             within,
             scale: unit_squares,
-            lamp: offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp)),
+            origin: Origin {
+                lamp: offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp)),
+                ..Origin::default()
+            },
         };
         let mut removals = std::mem::take(&mut draw.removals);
         let mut maps = Changes {

@@ -1,6 +1,6 @@
 //! Wavelengths of photons: a photon carries all of them until it meets a dispersive surface, and one from there.
 
-use crate::light_pass::spectral_node::SpectralNode;
+use crate::light_pass::spectral_node::{SpectralNode, place_of};
 use crate::optics::ColourMatrix;
 use crate::transport::Tracer;
 
@@ -24,6 +24,8 @@ struct WeightedNode {
     band: usize,
     /// Cumulative probability, including its own.
     upto: f64,
+    /// See [`Hue::ends`].
+    ends: [f64; 2],
 }
 
 /// The wavelengths of a photon: all of them, or one.
@@ -34,6 +36,9 @@ pub struct Hue<'a> {
     pub channels: ColourMatrix,
     /// `None` for all wavelengths.
     pub band: Option<usize>,
+    /// Weights that interpolate how a value differs at this wavelength from the middle one, given its differences at
+    /// the first and at the last: by a parabola in a variable in which refractive indices are smooth.
+    pub ends: [f64; 2],
 }
 
 impl PhotonSpectrum {
@@ -43,11 +48,13 @@ impl PhotonSpectrum {
             |node: &SpectralNode| node.channels.of_white().to_array().iter().sum::<f64>().max(0.0);
         let total: f64 = bands.iter().map(|(_, node)| brightness(node)).sum();
         let mut upto = 0.0;
+        let places: Vec<f64> = bands.iter().map(|(_, node)| place_of(node.wavelength)).collect();
         let channels = bands.iter().map(|(_, node)| node.channels).sum();
         let nodes = bands
             .into_iter()
-            .filter(|(_, node)| brightness(node) > 0.0)
-            .map(|(band, node)| {
+            .zip(&places)
+            .filter(|((_, node), _)| brightness(node) > 0.0)
+            .map(|((band, node), place)| {
                 let probability = brightness(&node) / total;
                 upto += probability;
                 let channels = node.channels.scaled(1.0 / probability);
@@ -55,6 +62,7 @@ impl PhotonSpectrum {
                     node: SpectralNode { channels, ..node },
                     band,
                     upto,
+                    ends: ends(&places, *place),
                 }
             })
             .collect();
@@ -76,13 +84,30 @@ impl PhotonSpectrum {
             tracer: &self.whole,
             channels: self.channels,
             band: None,
+            ends: [0.0; 2],
         }
+    }
+
+    /// The scene at the middle, the first and the last wavelength; `None` if there are fewer than three.
+    pub fn tracers(&self) -> Option<[&Tracer; 3]> {
+        let [first, .., last] = &self.nodes[..] else {
+            return None;
+        };
+        let middle = &self.nodes[self.nodes.len() / 2];
+        (self.nodes.len() > 2).then_some([middle, first, last].map(|node| &node.node.tracer))
     }
 
     /// Samples one wavelength by a number in [0, 1).
     pub fn one(&self, place: f64) -> Option<Hue<'_>> {
         let index = self.nodes.partition_point(|node| node.upto <= place);
         self.nodes.get(index).or(self.nodes.last()).map(WeightedNode::hue)
+    }
+
+    /// Each wavelength with its probability.
+    pub fn hues(&self) -> impl Iterator<Item = (Hue<'_>, f64)> {
+        let before = std::iter::once(0.0).chain(self.nodes.iter().map(|node| node.upto));
+        let nodes = self.nodes.iter().zip(before);
+        nodes.map(|(node, before)| (node.hue(), node.upto - before))
     }
 }
 
@@ -92,6 +117,19 @@ impl WeightedNode {
             tracer: &self.node.tracer,
             channels: self.node.channels,
             band: Some(self.band),
+            ends: self.ends,
         }
     }
+}
+
+/// [`Hue::ends`] at one place among those of all wavelengths.
+fn ends(places: &[f64], place: f64) -> [f64; 2] {
+    let [first, .., last] = places else {
+        return [0.0; 2];
+    };
+    let middle = places[places.len() / 2];
+    [
+        (place - middle) * (place - last) / ((first - middle) * (first - last)),
+        (place - middle) * (place - first) / ((last - middle) * (last - first)),
+    ]
 }

@@ -59,6 +59,14 @@ const LEFT_BY_MANY_CUTS: (usize, f64) = (8, 0.5);
 /// visible, since few photons meet the light in dark places.
 const MIN_AUDITS: f64 = 16384.0;
 
+/// Audits know no smaller part of the light to arrive than this: of a receiver seen edge-on, they would never end.
+const LEAST_AUDITED: f64 = 0.01;
+
+/// Squares beside an edge are audited four times as often, and at least for this goal: the corner of a receiver may reach
+/// in between all their points, a thousandth of its light, or a caster may hide a sliver of itself. A few photons would
+/// miss it, both halves would agree, and no error would tell.
+const GOAL_BESIDE_EDGES: f64 = 0.02;
+
 /// Paths that photons compare themselves with, and that lead them.
 const MAX_BUNDLES: usize = 48;
 const MAX_GUIDES: usize = 64;
@@ -89,8 +97,6 @@ struct Residual {
     /// Of bundles that not all points have, if the square is cut, and if it is not.
     cut: f64,
     uncut: f64,
-    /// Of an edge in a neighbour, the end or bend of which may lie between the points here.
-    beside: f64,
     /// Light that bundles do not follow [W].
     lost_w: f64,
 }
@@ -139,6 +145,7 @@ pub(super) struct Square {
     traced: f64,
     pub(super) is_cut: bool,
     pub(super) is_finished: bool,
+    is_beside_edge: bool,
     pub(super) found: Found,
 }
 
@@ -158,7 +165,7 @@ pub(super) struct Plan {
     arriving_w: f64,
     /// Factor from squared errors [W²/m²] to squared relative errors of all maps.
     pub(super) relative: f64,
-    /// Part of the light that bundles follow to its end.
+    /// Part of the light that bundles follow to its end; 0 if photons alone found any.
     pub(super) bundled_part: f64,
     /// Goal that the photons of this plan reach: the one asked for, or a larger one if that would take too many.
     pub(super) goal: f64,
@@ -167,19 +174,33 @@ pub(super) struct Plan {
 impl Plan {
     /// Photons of a square, without audits.
     fn photons_for(&self, root: f64, square: &Square) -> f64 {
-        self.per_root * root / square.segments.sqrt()
+        if root > 0.0 {
+            self.per_root * root / square.segments.sqrt()
+        } else {
+            0.0
+        }
     }
 
     pub(super) fn photons_for_variance(&self, variance: f64, square: &Square) -> f64 {
         self.photons_for(variance.sqrt(), square)
     }
 
-    /// Photons of a square. Audits look everywhere: as many that a single one that contradicts its bundle adds at most
-    /// a quarter of the goal to the error, and enough for what is dim but seen.
+    /// Photons of a square. Audits look everywhere, enough for what is dim but seen. Where light is known to arrive, a
+    /// single one that contradicts its bundle adds at most a quarter of the goal to the error.
     pub(super) fn photons(&self, square: &Square) -> f64 {
-        let audits = (4.0 * self.texels.sqrt() / self.goal).max(MIN_AUDITS);
-        self.photons_for(square.root(self), square)
-            + audits * square.start_w / self.start_w.max(f64::MIN_POSITIVE)
+        let goal = if square.is_beside_edge {
+            (0.25 * self.goal).min(GOAL_BESIDE_EDGES)
+        } else {
+            self.goal
+        };
+        let audits = 4.0 * self.texels.sqrt() / goal;
+        let everywhere = audits.max(MIN_AUDITS) * square.start_w / self.start_w.max(f64::MIN_POSITIVE);
+        let lit = if square.arriving_w > 0.0 || square.is_beside_edge {
+            audits * square.start_w / self.arriving_w.max(LEAST_AUDITED * self.start_w)
+        } else {
+            0.0
+        };
+        self.photons_for(square.root(self), square) + everywhere.max(lit)
     }
 
     pub(super) fn is_worth_a_cut(&self, square: &Square) -> bool {
@@ -201,7 +222,6 @@ impl Square {
             displaced,
             cut,
             uncut,
-            beside,
             lost_w,
         } = self.residual;
         let edges = if self.is_cut || plan.is_worth_a_cut(self) {
@@ -209,7 +229,7 @@ impl Square {
         } else {
             uncut
         };
-        displaced + edges + beside + lost_w * plan.lost_weight
+        displaced + edges + lost_w * plan.lost_weight
     }
 
     /// Variance after photons were traced, which may be those of another half [W²/m²].
@@ -263,7 +283,6 @@ impl Surveyor<'_> {
                 .par_iter()
                 .map(|&place| self.square(place, points, None))
                 .collect();
-            look_beside_edges(&mut squares.squares);
         }
         for round in 0..=MAX_ROUNDS {
             squares.plan = self.plan(squares, goal);
@@ -315,6 +334,7 @@ impl Surveyor<'_> {
                 });
             squares.squares = after.collect();
         }
+        mark_beside_edges(&mut squares.squares);
     }
 
     /// Divides the first squares until small casters and openings are as large as the squares around them.
@@ -391,8 +411,14 @@ impl Surveyor<'_> {
             }
         }
         plan.goal = goal;
-        plan.bundled_part = if lost_w > 0.0 {
-            bundled_w / (bundled_w + lost_w)
+        let by_photons_w = if bundled_w > 0.0 {
+            0.0
+        } else {
+            squares.arrived_w.unwrap_or(0.0)
+        };
+        let not_bundled_w = lost_w + by_photons_w;
+        plan.bundled_part = if not_bundled_w > 0.0 {
+            bundled_w / (bundled_w + not_bundled_w)
         } else {
             1.0
         };
@@ -448,6 +474,7 @@ impl Surveyor<'_> {
             traced: points.iter().map(|point| f64::from(point.traced)).sum::<f64>() / 9.0,
             is_cut: false,
             is_finished: false,
+            is_beside_edge: parent.is_some_and(|parent| parent.is_beside_edge),
             found: parent.map_or_else(Found::default, inherited),
             points,
         };
@@ -468,9 +495,6 @@ impl Surveyor<'_> {
         let edges = routes.iter().filter(|route| is_partial(route)).count();
         for route in routes {
             self.add_bundle(&mut square, route, parent, edges);
-        }
-        if let Some(parent) = parent.filter(|_| edges == 0) {
-            square.residual.beside = 0.25 * parent.residual.beside;
         }
         square.bundles.sort_by(|a, b| b.flux_w.total_cmp(&a.flux_w));
         for bundle in square.bundles.drain(MAX_BUNDLES.min(square.bundles.len())..) {
@@ -559,31 +583,21 @@ fn displaced_square(texels: f64, is_smooth: bool) -> f64 {
     }
 }
 
-/// Squares without an edge beside squares with one: the corner of a receiver may reach in between all their points. Few
-/// photons would miss it, both halves would agree, and no error would tell.
-fn look_beside_edges(squares: &mut [Square]) {
-    let mut by_node: HashMap<DomainPoint, f64, PointHash> = HashMap::default();
+/// Marks squares that share a point with one that has an edge.
+fn mark_beside_edges(squares: &mut [Square]) {
+    let mut on_edges: HashSet<DomainPoint, PointHash> = HashSet::default();
     for square in squares.iter().filter(|square| square.residual.cut > 0.0) {
-        for node in 0..9 {
-            let cut = by_node.entry(square.place.node(node)).or_default();
-            *cut = cut.max(square.residual.cut);
-        }
+        on_edges.extend((0..9).map(|node| square.place.node(node)));
     }
     for square in squares.iter_mut().filter(|square| square.residual.cut == 0.0) {
-        let nodes = (0..9).filter_map(|node| by_node.get(&square.place.node(node)));
-        square.residual.beside = nodes.copied().fold(0.0, f64::max);
+        square.is_beside_edge |= (0..9).any(|node| on_edges.contains(&square.place.node(node)));
     }
 }
 
 /// What a quarter takes over of what its parent's photons found: nothing, unless that was a surprise.
 fn inherited(parent: &Square) -> Found {
-    let Residual {
-        displaced,
-        cut,
-        beside,
-        ..
-    } = parent.residual;
-    let planned = displaced + cut + beside;
+    let Residual { displaced, cut, .. } = parent.residual;
+    let planned = displaced + cut;
     if parent.found.variance() > SURPRISE * planned * planned {
         parent.found.of_quarter()
     } else {

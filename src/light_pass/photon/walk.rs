@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-use super::bundle::Bundle;
+use super::bundle::{Bundle, Origin};
 use super::launch::{LAMP_DIMENSION, Start};
 use super::paths::{Chain, ChainStep};
 use super::spectrum::{Hue, PhotonSpectrum};
@@ -66,8 +66,7 @@ pub(super) struct Followed<'a> {
     pub(super) within: DVec2,
     /// Unit squares of the launch domain that the photon stands for.
     pub(super) scale: f64,
-    /// Where it starts on the lamp, in half-axes from its centre.
-    pub(super) lamp: DVec2,
+    pub(super) origin: Origin,
 }
 
 /// What all photons of a light share.
@@ -93,6 +92,7 @@ impl<'a> PhotonRules<'a> {
                 tracer: self.tracer,
                 channels: ColourMatrix::IDENTITY,
                 band: None,
+                ends: [0.0; 2],
             },
         }
     }
@@ -110,6 +110,8 @@ pub struct PhotonWalk<'a> {
 /// The photon that is being traced.
 struct Photon<'a, 'b> {
     hue: Hue<'a>,
+    /// All wavelengths.
+    whole_hue: Hue<'a>,
     /// Its single wavelength, once the light is dispersed.
     own_hue: Option<Hue<'a>>,
     flux_w: LinearSrgb,
@@ -159,15 +161,19 @@ impl<'a> PhotonWalk<'a> {
         &mut self,
         index: u32,
         start: Option<Start>,
-        followed: Followed<'_>,
+        mut followed: Followed<'_>,
         mut arrive: impl FnMut(Hit),
     ) {
         let own_hue = self.rules.spectrum.and_then(|spectrum| {
             let place = even_point(index, WAVELENGTH_DIMENSION, self.rules.seed).x;
             spectrum.one(place)
         });
+        if let Some(hue) = own_hue {
+            followed.origin.ends = hue.ends;
+        }
         let mut photon = Photon {
             hue: self.rules.whole_hue(),
+            whole_hue: self.rules.whole_hue(),
             own_hue,
             flux_w: start.map_or(LinearSrgb::BLACK, |start| start.flux_w),
             choice: Choice::new(index, self.rules.seed),
@@ -380,7 +386,16 @@ impl Photon<'_, '_> {
                 continue;
             }
             self.followed.mask &= !bit;
-            let Some(predicted) = bundle.at(followed.within, followed.lamp) else {
+            // Light that no surface disperses stays whole.
+            let hue = self
+                .own_hue
+                .filter(|_| bundle.route.is_dispersed)
+                .unwrap_or(self.whole_hue);
+            let origin = Origin {
+                ends: hue.ends,
+                ..followed.origin
+            };
+            let Some(predicted) = bundle.at(followed.within, &origin) else {
                 continue;
             };
             let flux_w = predicted.flux_w * (-followed.scale / self.probability);
@@ -390,8 +405,12 @@ impl Photon<'_, '_> {
                     place: predicted.place,
                     bundle: number,
                 },
-                flux_w,
-                band: None,
+                flux_w: if self.own_hue.is_some() {
+                    hue.channels.apply(flux_w)
+                } else {
+                    flux_w
+                },
+                band: hue.band,
             });
         }
     }

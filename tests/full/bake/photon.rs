@@ -4,7 +4,7 @@ use nephroid::bake::Bake;
 use nephroid::illumination::IlluminationMap;
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::{parts, shapes};
-use nephroid::settings::BakeSettings;
+use nephroid::settings::{BakeSettings, Estimator};
 
 use support::hard_scenes::{cut_glass, roughened, under_square_lamp, under_the_suns_disc};
 use support::tools::{bake, brute, builtin_scene, caustic, energy_fault, map_of, photons};
@@ -72,6 +72,28 @@ fn photons_are_unbiased() {
         let count = outliers(&result, &reference, &scene, "floor");
         assert!(count <= 3, "{what}: {count} blocks");
     }
+}
+
+/// The same against photons alone, which the test above holds to brute force: that parts no wavelengths.
+#[test]
+fn bundles_of_a_spectrum_are_unbiased() {
+    let mut scene = builtin_scene("ball");
+    let glass = scene.materials.iter_mut().find(|it| it.surface.is_specular());
+    *glass.expect("glass") = parts::glass("N-SF11");
+    let few = photons(1e6, SIDE);
+    let bundled = BakeSettings {
+        estimator: Estimator::Auto,
+        max_error: Some(0.02),
+        seed: 1,
+        ..few.clone()
+    };
+    let [result, reference] = [bundled, few].map(|settings| bake(scene.clone(), &settings));
+    assert_eq!(energy_fault(&result), None);
+    let ledger = &result.ledgers[0];
+    let bundled_w = ledger.carried_w.bundles;
+    assert!(bundled_w > 0.5 * ledger.energy_w.deposited, "{bundled_w} W");
+    let count = outliers(&result, &reference, &scene, "floor");
+    assert!(count <= 3, "{count} blocks");
 }
 
 /// The target is met by the true error too, within a factor of two; and filtering reaches it with fewer photons.

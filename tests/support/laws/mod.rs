@@ -31,22 +31,6 @@ pub struct Baked {
     pub result: Bake,
 }
 
-impl Baked {
-    fn new(scene: &Scene, settings: &BakeSettings) -> Self {
-        Self {
-            scene: scene.clone(),
-            result: bake(scene.clone(), settings),
-        }
-    }
-}
-
-/// A bake by one of the ways to carry light.
-struct CarriedBake {
-    carrier: &'static str,
-    settings: BakeSettings,
-    baked: Baked,
-}
-
 /// Deviation from a law, given all bakes so far.
 type Measure = Box<dyn Fn(&[Baked]) -> f64 + Send>;
 
@@ -122,8 +106,7 @@ impl Case {
     }
 
     /// Adds a law about the last bake's scene, baked by photons and by the automatic estimator. The measure is
-    /// relative to what chance allows, so that its bound is 1. Of a bake that exceeds it, the median of three seeds
-    /// counts: where few photons decide, one of many bakes does by chance, but not most of one scene.
+    /// relative to what chance allows, so that its bound is 1.
     pub fn carried(&mut self, says: &str, of: impl Fn(&Baked) -> f64 + Send + 'static) -> &mut Self {
         let mut steps = self.steps.iter_mut().rev();
         if let Some(Step::Bake { is_carried, .. }) = steps.find(|step| matches!(step, Step::Bake { .. })) {
@@ -171,25 +154,15 @@ impl Case {
                     }
                     open = Some(energy_residual(&result).max(open.unwrap_or(0.0)));
                     carried = if is_carried { by_carriers(&scene, &settings) } else { Vec::new() };
-                    for one in carried.iter().filter(|_| !self.is_without_books) {
-                        open = Some(energy_residual(&one.baked.result).max(open.unwrap_or(0.0)));
+                    for (_, baked) in carried.iter().filter(|_| !self.is_without_books) {
+                        open = Some(energy_residual(&baked.result).max(open.unwrap_or(0.0)));
                     }
                     bakes.push(Baked { scene, result });
                 }
                 Step::Law(says, bound, of) => note(says, of(&bakes), bound, &first),
                 Step::Carried(says, of) => {
-                    for CarriedBake { carrier, settings, baked } in &carried {
-                        let mut measured = of(baked);
-                        if measured > 1.0 {
-                            let again = |seed: u64| {
-                                let settings = BakeSettings { seed: settings.seed + seed, ..settings.clone() };
-                                of(&Baked::new(&baked.scene, &settings))
-                            };
-                            let mut all = [measured, again(1), again(2)];
-                            all.sort_by(f64::total_cmp);
-                            measured = all[1];
-                        }
-                        note(format!("by {carrier}, over what chance allows: {says}"), measured, 1.0, &first);
+                    for (carrier, baked) in &carried {
+                        note(format!("by {carrier}, over what chance allows: {says}"), of(baked), 1.0, &first);
                     }
                 }
                 Step::Forget(after) => {
@@ -241,7 +214,7 @@ pub fn energy_residual(result: &Bake) -> f64 {
 }
 
 /// The scene baked by photons and by the automatic estimator.
-fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<CarriedBake> {
+fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<(&'static str, Baked)> {
     let plain = photons(settings.density_per_sr, 16);
     let photons = BakeSettings {
         estimator: Estimator::Photon,
@@ -265,12 +238,11 @@ fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<CarriedBake> {
         error_metric: ErrorMetric::Rmse,
         ..photons
     };
-    let by = |carrier, settings: BakeSettings| CarriedBake {
-        carrier,
-        baked: Baked::new(scene, &settings),
-        settings,
+    let baked = |settings: &BakeSettings| Baked {
+        result: bake(scene.clone(), settings),
+        scene: scene.clone(),
     };
-    vec![by("photons", many), by("auto", chosen)]
+    vec![("photons", baked(&many)), ("auto", baked(&chosen))]
 }
 
 /// All values of a map, including its errors.
