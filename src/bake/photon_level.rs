@@ -352,8 +352,10 @@ impl CausticLayer<'_> {
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
         let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
         let error = estimate.map(|mut estimate| {
-            let before = estimate.relative_rmse.powi(2);
-            estimate.raise_to(before * (1.0 + doubt) + bundle_square);
+            let square = estimate.relative_rmse.powi(2);
+            // More photons do not recover truncated light, and nothing about it is left to chance.
+            let noise = square - accuracy::truncated_share(&energy).powi(2);
+            estimate.raise_to(square + noise * doubt + bundle_square);
             KeptError {
                 predecessors: 0,
                 estimate,
