@@ -10,17 +10,31 @@ use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums
 use super::photon_level::{Layers, PART_OF_TIME};
 use crate::error::Result;
 use crate::illumination::Receiver;
+use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy;
+use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::pass_report::ProgressScope;
 use crate::light_pass::photon::domain::FIRST_LEVEL;
+use crate::light_pass::photon::footprints::FootprintPass;
+use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::HALVES;
 use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, TIMES};
+use crate::light_pass::photon::subcell_features::SubcellFeatures;
 use crate::light_pass::photon::walk::PhotonRules;
+use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::visibility::VisibleLight;
-use crate::light_pass::wavefront::edge_search::EdgeSearch;
-use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
 use crate::settings::Estimator;
 use crate::transport::EffectSet;
+
+/// Relative RMSE up to which automatic maps are as fine as in a preview.
+const USUAL_MAP_ERROR: f64 = 0.03;
+
+/// Density that these maps are made for [rays/sr].
+const PREVIEW_DENSITY_PER_SR: f64 = 25_000.0;
+
+/// Texels for the light of a cell of such a lattice: on the built-in scenes, 0.5 to 2 mm each, as fine as their caustics
+/// are seen to be.
+const TEXELS_PER_CELL: f64 = 64.0;
 
 /// Goal of the first level, which gives the first picture.
 const FIRST_GOAL: f64 = 0.2;
@@ -65,13 +79,60 @@ impl CausticLayer<'_> {
             && (!self.has_places(light) || self.with_launch(light, |launch| launch.has_offsets()))
     }
 
+    /// Footprints at the density that maps are made for. Rough surfaces count as smooth ones, a lamp as its centre.
+    pub(super) fn bundle_statistics(
+        &self,
+        light: &VisibleLight,
+        unit: FluxUnit,
+        context: &mut BakeContext,
+    ) -> FootprintStatistics {
+        let chart_for: &ChartFor = &|receiver: Receiver| {
+            self.sizes
+                .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
+        };
+        let (columns, rows) = light
+            .launch
+            .lattice_size(self.map_density_per_sr(), light.reach_m);
+        let pass = FootprintPass {
+            launch: &PhotonLaunch::of_cells(light),
+            rules: PhotonRules {
+                tracer: self.tracer,
+                spectrum: None,
+                effects: EffectSet {
+                    lobes: false,
+                    ..EffectSet::of(self.plan)
+                },
+                max_depth: self.settings.photon_depth(),
+                unit,
+                seed: self.settings.seed,
+            },
+            chart_for,
+            cells: TEXELS_PER_CELL * columns as f64 * rows as f64,
+        };
+        let report = pass.run(context.control);
+        context.outcome.count(&report, context.clock);
+        report.statistics
+    }
+
+    /// Density that automatic maps are made for [rays/sr]. With a target it does not depend on the lattice, and texels
+    /// are as long as the error allows.
+    pub(super) fn map_density_per_sr(&self) -> f64 {
+        match self.settings.max_error {
+            Some(target) => {
+                let coarser = (target / USUAL_MAP_ERROR).max(1.0);
+                PREVIEW_DENSITY_PER_SR / (coarser * coarser)
+            }
+            None => self.settings.density_per_sr,
+        }
+    }
+
     /// Goal of the level after `last`, towards a relative RMSE; `None` if nothing is left to do.
     pub(super) fn next_goal(&self, last: Option<&LightLevel>, target: f64) -> Option<f64> {
         let Some(last) = last else {
             return Some(FIRST_GOAL.max(AIM * target));
         };
         let before = last.goal;
-        let error = last.error.as_ref().map(|error| error.estimate.relative_rmse);
+        let error = last.error.as_ref().map(|error| error.relative_rmse);
         let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
             return (before > LEAST_WITHOUT_ERROR).then_some(STEPS.0 * before);
         };
@@ -158,15 +219,9 @@ impl CausticLayer<'_> {
         };
         let is_of_faces = !self.has_places(light.visible);
         let sought = (squares.is_empty() && is_of_faces).then(|| {
-            let cell = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
+            let square = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
             let visible = light.visible;
-            SubcellFeatures::find(
-                self.tracer,
-                &visible.launch,
-                visible.visible(),
-                cell,
-                EdgeSearch::ROUGH,
-            )
+            SubcellFeatures::find(self.tracer, &visible.launch, visible.visible(), square)
         });
         let report = self.with_launch(light.visible, |launch| {
             let pass = ResidualPass {
@@ -201,7 +256,7 @@ impl CausticLayer<'_> {
             || self.level_of_layers(light.visible, (key, unit), layers, report.deposit_square),
         );
         Ok(BundleLevel::Made(Box::new(LightLevel {
-            work: (report.pass.segments, 0),
+            segments: report.pass.segments,
             goal: report.goal,
             ..level
         })))

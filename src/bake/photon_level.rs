@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::band_maps::BandMaps;
 use super::bundle_level::BundleLevel;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
+use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
@@ -90,7 +90,7 @@ impl CausticLayer<'_> {
             return Some(FIRST_PHOTONS);
         };
         let known = last.and_then(|level| {
-            let error = level.error.as_ref()?.estimate.relative_rmse;
+            let error = level.error.as_ref()?.relative_rmse;
             let truncated = accuracy::truncated_share(&level.energy());
             (error.is_finite() && error > 0.0).then_some((error, truncated))
         });
@@ -272,7 +272,8 @@ impl CausticLayer<'_> {
             ledger: sums.report.ledger,
             halves: sums.maps,
         };
-        if let Some((earlier, so_far)) = earlier.and_then(|level| Some((level.photons.take()?, level.work.0)))
+        if let Some((earlier, so_far)) =
+            earlier.and_then(|level| Some((level.photons.take()?, level.segments)))
         {
             raw.add(&earlier);
             segments += so_far;
@@ -283,10 +284,7 @@ impl CausticLayer<'_> {
             |clock| &mut clock.deposit,
             || self.photon_level(light, (key, unit), raw, is_shard),
         );
-        Ok(Some(LightLevel {
-            work: (segments, 0),
-            ..level
-        }))
+        Ok(Some(LightLevel { segments, ..level }))
     }
 
     fn photon_level(
@@ -350,17 +348,13 @@ impl CausticLayer<'_> {
             band.add(more);
         }
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
-        let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
-        let error = estimate.map(|mut estimate| {
-            let square = estimate.relative_rmse.powi(2);
+        let mut error = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
+        if let Some(error) = &mut error {
+            let square = error.relative_rmse.powi(2);
             // More photons do not recover truncated light, and nothing about it is left to chance.
             let noise = square - accuracy::truncated_share(&energy).powi(2);
-            estimate.raise_to(square + noise * doubt + bundle_square);
-            KeptError {
-                predecessors: 0,
-                estimate,
-            }
-        });
+            error.raise_to(square + noise * doubt + bundle_square);
+        }
         LightLevel {
             error,
             ..self.level(light, (key, unit), (maps, bands), ledger)

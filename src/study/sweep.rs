@@ -180,7 +180,7 @@ pub const fn column(name: &'static str, value: fn(&Measured) -> Cell) -> Column 
 pub const RAYS: Column = column("rays", |m| m.result.counts.rays.into());
 /// Kernels deposited.
 pub const SPLATS: Column = column("splats", |m| m.result.counts.splats.into());
-/// Wavefront cells deposited.
+/// Squares whose bundles were deposited.
 pub const CELLS: Column = column("cells", |m| m.result.counts.cells.into());
 /// CPU time of item buffers, tracing and depositing: the light pass without the hierarchy.
 pub const CPU_S: Column = column("cpu_s", |m| m.cpu_s.into());
@@ -191,7 +191,7 @@ pub const WALL_S: Column = column("wall_s", |m| {
 });
 /// CPU time of the views, traced on the CPU.
 pub const EYE_PASS_CPU_S: Column = column("eye_pass_cpu_s", |m| number(m.eye_pass_cpu_s));
-/// Memory of maps, rays and patches.
+/// Memory of maps, rays and bundles.
 pub const MEMORY_MB: Column = column("memory_mb", |m| {
     number(m.result.course.last().map(|point| point.bytes as f64 / 1e6))
 });

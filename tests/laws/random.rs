@@ -11,7 +11,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use support::laws::law::*;
 use support::laws::{Baked, Table, is_long};
 use support::random_scenes::{MAX_LAMPS, scene};
-use support::tools::{at, set, settings, transformed};
+use support::tools::{set, settings, to, transformed};
 
 /// What may be done to a scene.
 const CHANGES: u64 = 8;
@@ -115,7 +115,7 @@ pub fn fill(t: &mut Table) {
 /// Half the scenes by each estimator. Glass boxes have branches without end.
 fn of(seed: u64) -> BakeSettings {
     let estimator = if (seed / CHANGES).is_multiple_of(2) {
-        at(1e3, 32)
+        to(0.03, 32)
     } else {
         settings(1e3, 32)
     };

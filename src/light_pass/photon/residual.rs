@@ -24,14 +24,14 @@ use super::paths::PathFinder;
 use super::receivers::{MeasuredChart, Receivers};
 use super::spectrum::Hue;
 use super::squares::{Found, Square, Squares, Surveyor};
+use super::subcell_features::SubcellFeatures;
 use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk, WAVELENGTH_DIMENSION};
 use crate::geometry::sampling::{GOLDEN_64, even_point, in_square, mix64};
 use crate::illumination::Receiver;
+use crate::light_pass::coverage::{FluxTriangle, deposit_triangles};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::light_pass::wavefront::coverage::{FluxTriangle, deposit_triangles};
-use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
 use crate::optics::LinearSrgb;
 use crate::progress::Stage;
 
@@ -155,6 +155,7 @@ impl ResidualPass<'_> {
         }
         edge::finish(&finder, squares, listener.control, &mut report.pass);
         report.pass.rays += (squares.points.len() - before) as u64;
+        report.pass.squares += squares.squares.len() as u64;
         report.deposit_square = plan_deposits(squares, goal, &receivers);
         report.pass.trace_s.add(watch.elapsed());
 
@@ -245,16 +246,16 @@ impl ResidualPass<'_> {
             let is_plain = self.rules.spectrum.is_none() && self.launch.lamp_offsets().is_none();
             if is_plain {
                 let triangles = triangles.entry((0, bundle.receiver())).or_default();
-                bundle.triangles(square.place.area(), |corners, flux_w| {
-                    let flux = self.rules.unit.count(flux_w * f64::from(TIMES));
+                bundle.triangles(square.place.area(), |corners, flux_w, area| {
+                    let flux = self.rules.unit.count(flux_w * (area * f64::from(TIMES)));
                     triangles.push(flux_triangle(bundle, corners, flux));
                 });
                 continue;
             }
-            bundle.triangles(square.place.area(), |corners, flux_w| {
+            bundle.triangles(square.place.area(), |corners, flux_w, area| {
                 drawn = drawn.wrapping_add(1);
                 for part in self.parts(bundle, drawn, sets) {
-                    let flux_w = part.hue.channels.apply(flux_w) * (f64::from(TIMES) * part.share);
+                    let flux_w = part.hue.channels.apply(flux_w) * (area * f64::from(TIMES) * part.share);
                     let moved = bundle.shift.at(&part.origin);
                     let corners = corners.map(|corner| corner + moved);
                     let triangle = flux_triangle(bundle, corners, self.rules.unit.count(flux_w));

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::bundle::{Bundle, Image, MEAN_WEIGHTS, Node, Shape, biquadratic};
 use super::domain::{DomainPoint, LAST_LEVEL, LitCells, PointHash, SquarePlace};
 use super::paths::{Chain, PathEnd, PathFinder, PointPaths, Route};
-use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
+use super::subcell_features::SubcellFeatures;
 use crate::progress::Control;
 
 /// The finest level of squares around small casters and openings, and how many squares there are at most until these
@@ -349,8 +349,7 @@ impl Surveyor<'_> {
             let is_divided = |place: &SquarePlace| {
                 let square = (place.at(DVec2::ZERO), place.at(DVec2::ONE));
                 let root = place.corner.root as usize;
-                place.level == level
-                    && sought.ask_for_finer(launch, root, square, level - first, f64::INFINITY)
+                place.level == level && sought.ask_for_finer(launch, root, square, level - first)
             };
             let before = places.len();
             let of_place = |place: SquarePlace| -> Vec<SquarePlace> {

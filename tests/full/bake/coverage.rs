@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::DVec2;
 use nephroid::illumination::accumulator::{FluxAccumulator, FluxCount};
 use nephroid::illumination::{Chart, Receiver, UvSet};
+use nephroid::light_pass::coverage::{CoverageReport, FluxTriangle, deposit_triangles};
 use nephroid::light_pass::receiver_maps::ReceiverMaps;
-use nephroid::light_pass::wavefront::coverage::{CoverageReport, FluxTriangle, deposit_triangles};
 use proptest::prelude::*;
 
 use crate::bake::tiles;

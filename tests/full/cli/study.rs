@@ -103,7 +103,7 @@ table1 | estimator=splat, as the paper | relative_rmse ~ rays | -9 -0.1
 table1 | | eye_pass_cpu_s | 1e-9 1e9
 rays | estimator=splat, as the paper | relative_rmse ~ rays | -2 -0.15
 rays | estimator=splat | relative_rmse ~ rays | -2 -0.15
-rays | estimator=wavefront | relative_rmse ~ rays | -2 -0.1
+rays | estimator=auto | relative_rmse ~ rays | -2 -0.1
 resolution | estimator=splat | relative_rmse ~ side_texels | 1e-9 9
 resolution | estimator=splat | spread rays | 1 1
 kernels | | paper_rms | 1e-9 1e9
@@ -177,7 +177,7 @@ fn built_in_studies_keep_their_laws() {
         kernels.0.len() == 42 && even.of("size", "neighbours").errors() < even.of("size", "fixed").errors()
     );
     let hits = &tables["connectivity"];
-    let areas = hits.of("estimate", "wavefront").errors()[0];
+    let areas = hits.of("estimate", "auto").errors()[0];
     assert!(
         hits.of("estimate", "nearest hits")
             .errors()
@@ -214,10 +214,7 @@ fn convergence_measures_what_compare_does() {
     const LINE: &str = "convergence builtin:mirror --map-resolution 32 --quick";
     let sandbox = Sandbox::new();
     let (shipped, _) = study(&sandbox, &format!("{LINE} -o out --densities 1e3,1e4"));
-    assert_eq!(
-        shipped.words("estimator"),
-        ["wavefront", "wavefront", "splat", "splat"]
-    );
+    assert_eq!(shipped.words("estimator"), ["photon", "photon", "splat", "splat"]);
     assert_eq!(shipped.words("reference"), ["analytic S5"; 4]);
     for (column, range) in [
         ("rays", 1.0..1e6),

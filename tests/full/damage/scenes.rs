@@ -15,7 +15,7 @@ use serde_json::json;
 use super::mutate::{Damage, Tally, Way, alone, attack, effort};
 use support::glb::{Glb, load_bytes, load_path};
 use support::sound::scene_fault;
-use support::tools::{at, energy_fault, photons};
+use support::tools::{energy_fault, photons, to};
 use support::{or_skip, shared_or_skip};
 
 /// Most memory that loading may take by itself [bytes].
@@ -67,7 +67,7 @@ fn bake(scene: Scene) -> Result<Bake> {
         };
         session.bake(&settings, &(), &Control::default())
     };
-    by(at(20.0, 8)).or_else(|error| {
+    by(to(0.05, 8)).or_else(|error| {
         if error.remedy.contains("--estimator auto") {
             by(photons(1e3, 8))
         } else {

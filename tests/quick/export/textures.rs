@@ -16,7 +16,7 @@ use nephroid::export::{Quantity, textures};
 use super::{Baked, LUMENS_PER_WATT, as_it_is, linear_of_srgb, names, two_lamps};
 use crate::prelude::*;
 use support::program::read_json;
-use support::tools::at;
+use support::tools::to;
 
 const FLOAT: Encoding = Encoding::Float;
 
@@ -29,7 +29,7 @@ fn boxes_by_light() -> Baked {
     let settings = BakeSettings {
         layers: vec![LayerKind::Caustic, LayerKind::Direct],
         per_light: true,
-        ..at(1e3, 64)
+        ..to(0.03, 64)
     };
     Baked::new(two_lamps().scene(), &settings)
 }
@@ -415,7 +415,7 @@ fn baked(scene: &str, (width, height): (usize, usize)) -> Baked {
     let settings = BakeSettings {
         map_resolution: MapResolution::Fixed { width, height },
         layers: vec![LayerKind::Caustic],
-        ..at(1e3, 1)
+        ..to(0.01, 1)
     };
     Baked::new(built_in(scene), &settings)
 }

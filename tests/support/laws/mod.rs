@@ -12,7 +12,7 @@ use nephroid::scene::Scene;
 use nephroid::bake::Bake;
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
 
-use crate::tools::{at, bake, photons, settings};
+use crate::tools::{bake, photons, settings, to};
 
 /// Largest relative error of the energy balance of ledgers and maps.
 const BOOKS_BOUND: f64 = 1e-6;
@@ -74,9 +74,9 @@ pub struct Case {
 }
 
 impl Case {
-    /// Bakes by wavefronts at a density [rays/sr], with maps of side² texels.
-    pub fn bake(&mut self, scene: Scene, density_per_sr: f64, side: usize) -> &mut Self {
-        self.bake_with(scene, at(density_per_sr, side))
+    /// Bakes by bundles to a relative RMSE, with maps of side² texels.
+    pub fn bake(&mut self, scene: Scene, target: f64, side: usize) -> &mut Self {
+        self.bake_with(scene, to(target, side))
     }
 
     /// Bakes by splats at a density [rays/sr], with maps of side² texels.

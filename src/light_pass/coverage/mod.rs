@@ -17,13 +17,13 @@ mod tiles;
 
 use glam::DVec2;
 
-use super::super::receiver_maps::Coverage;
-use super::super::receiver_maps::ReceiverMap;
+use super::receiver_maps::Coverage;
+use super::receiver_maps::ReceiverMap;
 use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 
 pub use report::CoverageReport;
 
-/// A piece of the wavefront on a map.
+/// A piece of a bundle on a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxTriangle {
     /// Texel coordinates: x across, y down; texel (i, j) covers [i, i + 1] × [j, j + 1]. May lie partly or wholly
