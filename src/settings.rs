@@ -148,7 +148,7 @@ pub enum MapResolution {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Wavelengths {
-    /// The whole spectrum without bands. The wavefront is interpolated between wavelengths; splats use
+    /// The whole spectrum without bands. Bundles interpolate between three wavelengths; splats use
     /// [`CONTINUOUS_BANDS`] bands.
     #[default]
     Continuous,
@@ -280,7 +280,7 @@ const USUAL_DEPTH: u32 = 16;
 const USUAL_PHOTON_DEPTH: u32 = 256;
 
 /// Branch threshold relative to the target error. A larger one would save segments, but cost more rays than that: where
-/// branches end only because they are weak, borders appear that the wavefront refines.
+/// branches end only because they are weak, borders appear that squares are divided at.
 const THRESHOLD_PER_ERROR: f64 = 0.003;
 
 /// Minimum target for the error [1].

@@ -249,11 +249,13 @@ impl CausticLayer<'_> {
         let layers = Layers {
             bundles: rules.spectrum.is_none().then_some(&bundles),
             photons: &photons,
+            photon_square: report.photon_square,
+            bundle_square: report.deposit_square,
         };
         let unit = unit.per(u64::from(TIMES) * HALVES as u64);
         let level = context.clock.time(
             |clock| &mut clock.deposit,
-            || self.level_of_layers(light.visible, (key, unit), layers, report.deposit_square),
+            || self.level_of_layers(light.visible, (key, unit), layers),
         );
         Ok(BundleLevel::Made(Box::new(LightLevel {
             segments: report.pass.segments,

@@ -62,12 +62,25 @@ fn in_time(photons: u32, before: u32, state: &LightState, context: &BakeContext)
     (affordable.max(least) as u32).min(photons)
 }
 
+/// Squared relative error of so many photons of equal flux in each half: that of T texels in which n photons arrive is T/n.
+fn square_by_count(sums: &PhotonSums, unit: FluxUnit, photons: u32) -> f64 {
+    let maps = sums.halves.iter().filter_map(|half| half.sets().first());
+    let texels = maps.map(|maps| maps.iter().map(|(_, map)| map.chart.texel_count()).sum::<usize>());
+    let watts = |account| sums.ledger.watts_of_largest(account, unit);
+    let arriving = f64::from(photons) * HALVES as f64 * watts(Account::Deposited) / watts(Account::Emitted);
+    texels.max().unwrap_or(0) as f64 / arriving
+}
+
 /// What a level consists of.
 #[derive(Clone, Copy)]
 pub(super) struct Layers<'a> {
     /// Light that bundles carry.
     pub(super) bundles: Option<&'a ReceiverMaps>,
     pub(super) photons: &'a PhotonSums,
+    /// Squared relative error that the flux of single photons tells.
+    pub(super) photon_square: f64,
+    /// Squared relative error of bundles that photons do not correct.
+    pub(super) bundle_square: f64,
 }
 
 impl CausticLayer<'_> {
@@ -294,15 +307,14 @@ impl CausticLayer<'_> {
         raw: PhotonSums,
         is_shard: bool,
     ) -> LightLevel {
-        let level = self.level_of_layers(
-            light,
-            (key, unit),
-            Layers {
-                bundles: None,
-                photons: &raw,
-            },
-            0.0,
-        );
+        let photons = key.photons.and_then(PhotonAim::count).unwrap_or(0);
+        let layers = Layers {
+            bundles: None,
+            photons: &raw,
+            photon_square: square_by_count(&raw, unit, photons),
+            bundle_square: 0.0,
+        };
+        let level = self.level_of_layers(light, (key, unit), layers);
         LightLevel {
             error: level.error.filter(|_| !is_shard),
             photons: Some(raw),
@@ -310,14 +322,12 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// A level from its bundles and the photons of both halves. `bundle_square`: squared relative error of bundles that
-    /// photons do not correct.
+    /// A level from its bundles and the photons of both halves.
     pub(super) fn level_of_layers(
         &self,
         light: &VisibleLight,
         (key, unit): (LevelKey, FluxUnit),
         layers: Layers,
-        bundle_square: f64,
     ) -> LightLevel {
         let mut ledger = layers.photons.ledger;
         self.spectra
@@ -333,7 +343,6 @@ impl CausticLayer<'_> {
         }
         let mut left = [0; 3];
         let [one, other] = [&first, &second].map(|half| accuracy::images(half, unit));
-        let doubt = accuracy::doubt_of_halves(&one, &other);
         let noise = if self.settings.filters() {
             let halves = [&first, &second].map(|half| &**half);
             filter::filter(&mut maps, halves, bundles, (unit, is_signed), &mut left)
@@ -352,8 +361,9 @@ impl CausticLayer<'_> {
         if let Some(error) = &mut error {
             let square = error.relative_rmse.powi(2);
             // More photons do not recover truncated light, and nothing about it is left to chance.
-            let noise = square - accuracy::truncated_share(&energy).powi(2);
-            error.raise_to(square + noise * doubt + bundle_square);
+            let truncated = accuracy::truncated_share(&energy).powi(2);
+            let noise = accuracy::expected_noise(square - truncated, [&one, &other], layers.photon_square);
+            error.raise_to(noise + truncated + layers.bundle_square);
         }
         LightLevel {
             error,

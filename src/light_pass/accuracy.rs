@@ -54,8 +54,12 @@ pub struct LightError {
 }
 
 impl LightError {
-    /// Scales all errors up to a larger relative squared error.
+    /// Scales all errors up to a larger relative squared error; that of all maps alone if none of them shows any.
     pub fn raise_to(&mut self, relative_square: f64) {
+        if self.relative_rmse == 0.0 {
+            self.relative_rmse = relative_square.sqrt();
+            return;
+        }
         let factor = relative_square.sqrt() / self.relative_rmse;
         if !(factor > 1.0 && factor.is_finite()) {
             return;
@@ -197,24 +201,35 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
     noise
 }
 
-/// How much larger the squared noise may be than half sets show, by two standard deviations: few texels, or few photons
-/// in them, tell little, and of levels that differ by chance, one that looks good ends the bake. The squares d² of
-/// differences have the variance 2v² if d is normal, and then d⁴ is 3v² in the mean.
-pub fn doubt_of_halves(a: &Images, b: &Images) -> f64 {
-    let (mut squares, mut fourths) = (0.0, 0.0);
-    for (&receiver, image) in a {
-        let differences = image.squared_difference(b.get(&receiver));
+/// Squared relative error to be expected from noise, where `shown` is what half sets show, perhaps after a filter.
+///
+/// Few texels, or few photons in them, tell little: the halves of a single texel may agree by chance. So `by_photons`, the
+/// squared relative error that the flux of single photons tells, counts as one more texel. And two standard deviations
+/// are added, since of levels that differ by chance, one that looks good ends the bake: the squares d² of differences
+/// have the variance 2v² if d is normal, and then d⁴ is 3v² in the mean.
+pub fn expected_noise(shown: f64, [a, b]: [&Images; 2], by_photons: f64) -> f64 {
+    let (mut squares, mut fourths, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0, 0.0);
+    for (receiver, image) in a {
+        let other = b.get(receiver);
+        let differences = image.squared_difference(other);
         for (texel, square) in differences.iter().enumerate() {
             let by_area = square * image.area_m2(texel);
             squares += by_area;
             fourths += by_area * by_area;
         }
+        let (map_w, map_m2) = image.sums();
+        flux_w += map_w + other.map_or(0.0, |other| other.sums().0);
+        area_m2 += map_m2;
     }
-    if squares > 0.0 {
-        2.0 * (2.0 / 3.0 * fourths).sqrt() / squares
-    } else {
-        0.0
+    if squares <= 0.0 || flux_w <= 0.0 {
+        return shown.max(by_photons);
     }
+
+    let of_halves = squares * area_m2 / (flux_w * flux_w);
+    let texels = squares * squares / fourths;
+    let with_photons = (texels * of_halves + by_photons) / ((texels + 1.0) * of_halves);
+    let deviation = (2.0 / 3.0 * fourths).sqrt() / squares;
+    shown * (with_photons.max(1.0) + 2.0 * deviation)
 }
 
 /// Noise of a map's difference from the map of every fourth ray, relative to the map's own noise.

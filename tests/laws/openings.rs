@@ -12,8 +12,8 @@ use support::laws::Table;
 use support::laws::law::*;
 use support::laws::scenes::*;
 
-/// Width of a cell of a lattice of 25,000 rays/sr, 1 m away [m].
-const CELL_M: f64 = 0.006_324_555;
+/// The widest openings are 1.5 times, the narrowest 0.005 times as wide [m].
+const OPENING_M: f64 = 0.0063;
 const LAMP: DVec3 = DVec3::new(0.013, -0.021, 0.034);
 
 pub fn fill(t: &mut Table) {
@@ -98,7 +98,7 @@ fn around_the_lamp(mirrors: Vec<Mesh>) -> Scene {
 /// A mirror below a plate whose opening is a convex polygon, its width a share of a lattice cell, tilted; with the
 /// opening's border. The plate's shadow covers the mirror whole.
 fn plate_with_an_opening(random: &mut impl FnMut() -> f64) -> (Scene, Vec<DVec3>) {
-    let width_m = CELL_M * 0.005 * 300.0_f64.powf(random());
+    let width_m = OPENING_M * 0.005 * 300.0_f64.powf(random());
     let length_m = width_m
         * if random() < 0.5 {
             1.0

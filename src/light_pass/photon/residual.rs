@@ -106,6 +106,8 @@ pub struct ResidualReport {
     pub pass: PassReport,
     /// Squared relative error that the deposit of bundles leaves, as planned.
     pub deposit_square: f64,
+    /// Squared relative error that the flux of single photons tells.
+    pub photon_square: f64,
     /// Whether rough surfaces scatter nearly all of the light.
     pub is_left_to_photons: bool,
     /// The goal that was aimed at: larger than the one asked for if that would take too many photons at once.
@@ -181,6 +183,7 @@ impl ResidualPass<'_> {
         let mut traced = 0.0;
         for (square, found) in squares.squares.iter_mut().zip(found) {
             traced += found.photons;
+            report.photon_square += squares.plan.relative * found.variance() / found.photons.max(1.0);
             square.found.photons += found.photons;
             square.found.squares += found.squares;
         }

@@ -59,7 +59,8 @@ const LEFT_BY_MANY_CUTS: (usize, f64) = (8, 0.5);
 /// visible, since few photons meet the light in dark places.
 const MIN_AUDITS: f64 = 16384.0;
 
-/// Audits know no smaller part of the light to arrive than this: of a receiver seen edge-on, they would never end.
+/// Audits know no smaller part to arrive of the light that is looked at closely than this: of a receiver seen edge-on,
+/// they would never end.
 const LEAST_AUDITED: f64 = 0.01;
 
 /// Squares beside an edge are audited four times as often, and at least for this goal: the corner of a receiver may reach
@@ -110,7 +111,7 @@ pub(super) struct Found {
 }
 
 impl Found {
-    fn variance(&self) -> f64 {
+    pub(super) fn variance(&self) -> f64 {
         if self.photons > 0.0 {
             self.squares / self.photons
         } else {
@@ -158,8 +159,9 @@ pub(super) struct Plan {
     lost_weight: f64,
     /// Number of texels of all receivers.
     texels: f64,
-    /// All emitted flux [W].
+    /// All emitted flux, and that of squares that are looked at closely [W].
     start_w: f64,
+    close_start_w: f64,
     /// Flux that arrives on maps [W, largest channel]: as photons found or, before any were traced, all that bundles
     /// carry or leave.
     arriving_w: f64,
@@ -195,8 +197,8 @@ impl Plan {
         };
         let audits = 4.0 * self.texels.sqrt() / goal;
         let everywhere = audits.max(MIN_AUDITS) * square.start_w / self.start_w.max(f64::MIN_POSITIVE);
-        let lit = if square.arriving_w > 0.0 || square.is_beside_edge {
-            audits * square.start_w / self.arriving_w.max(LEAST_AUDITED * self.start_w)
+        let lit = if square.is_looked_at_closely() {
+            audits * square.start_w / self.arriving_w.max(LEAST_AUDITED * self.close_start_w)
         } else {
             0.0
         };
@@ -236,6 +238,11 @@ impl Square {
     pub(super) fn variance_with(&self, found: Found, plan: &Plan) -> f64 {
         let before = self.root(plan);
         (PLAN_PHOTONS * before * before + found.squares) / (PLAN_PHOTONS + found.photons)
+    }
+
+    /// Whether light is known to arrive, or may be overlooked.
+    fn is_looked_at_closely(&self) -> bool {
+        self.arriving_w > 0.0 || self.is_beside_edge
     }
 
     /// Leaves a bundle to photons.
@@ -335,6 +342,8 @@ impl Surveyor<'_> {
             squares.squares = after.collect();
         }
         mark_beside_edges(&mut squares.squares);
+        let close = squares.squares.iter().filter(|square| square.is_looked_at_closely());
+        squares.plan.close_start_w = close.map(|square| square.start_w).sum();
     }
 
     /// Divides the first squares until small casters and openings are as large as the squares around them.

@@ -50,7 +50,7 @@ fn lit_by(scene: &Scene, lamp: usize) -> Scene {
     scene
 }
 
-/// Of patches, photons, splats, and patches towards an error.
+/// Of photons, splats, and bundles towards two errors.
 fn all_ways() -> [BakeSettings; 4] {
     [to(0.01, 48), photons(4e4, 48), settings(2e4, 48), to(0.08, 48)]
 }

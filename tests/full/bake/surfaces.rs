@@ -588,8 +588,8 @@ fn an_image_of_normals_bends_light() {
         assert!(off < 0.05 && alike > 0.99, "mirrored {mirrored}: {off} {alike}");
         assert!((flux - 1.0).abs() < 2e-3, "mirrored {mirrored}: {flux}");
     }
-    let [patches, splats] =
+    let [bundles, splats] =
         [to(0.01, 32), settings(2e5, 32)].map(|settings| floor_of(by_image(false), &settings));
-    let off = rmse(&patches, &splats);
+    let off = rmse(&bundles, &splats);
     assert!(off < 0.05, "{off}");
 }
