@@ -5,8 +5,9 @@ use std::time::Instant;
 
 use glam::DVec2;
 
+use super::band_maps::BandMaps;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums};
+use super::light_level::{KeptSquares, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums};
 use super::photon_level::{Layers, PART_OF_TIME};
 use crate::error::Result;
 use crate::illumination::Receiver;
@@ -18,10 +19,10 @@ use crate::light_pass::photon::domain::FIRST_LEVEL;
 use crate::light_pass::photon::footprints::FootprintPass;
 use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::HALVES;
-use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, TIMES};
+use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, ResidualReport, TIMES};
 use crate::light_pass::photon::subcell_features::SubcellFeatures;
 use crate::light_pass::photon::walk::PhotonRules;
-use crate::light_pass::receiver_maps::ChartFor;
+use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::visibility::VisibleLight;
 use crate::settings::Estimator;
 use crate::transport::EffectSet;
@@ -46,6 +47,9 @@ const AIM: f64 = 0.85;
 /// Minimum and maximum of a goal relative to the one before.
 const STEPS: (f64, f64) = (0.08, 0.8);
 
+/// Goals differ by at least so many parts of an octave.
+const GOALS_PER_OCTAVE: f64 = 8.0;
+
 /// A goal so much larger than the target tells little about it.
 const FAR: f64 = 2.5;
 
@@ -67,6 +71,13 @@ pub(super) enum BundleLevel {
     Stopped,
     /// Bundles can carry next to nothing of the light.
     LeftToPhotons,
+}
+
+/// What squares and their photons carried.
+struct Carried {
+    report: ResidualReport,
+    bundles: ReceiverMaps,
+    halves: Vec<BandMaps>,
 }
 
 impl CausticLayer<'_> {
@@ -154,7 +165,9 @@ impl CausticLayer<'_> {
         } else {
             scaled.clamp(STEPS.0 * before, STEPS.1 * before)
         };
-        (noise2 > wanted2).then_some(next)
+        // Rounded, so that what changes other lights a little leaves the goals of this one as they were.
+        let rounded = ((GOALS_PER_OCTAVE * next.log2()).round() / GOALS_PER_OCTAVE).exp2();
+        (noise2 > wanted2).then_some(rounded)
     }
 
     /// The level of a light with a goal.
@@ -165,17 +178,19 @@ impl CausticLayer<'_> {
         &self,
         light: &mut LightProgress,
         last: Option<&LightLevel>,
-        goal: f64,
+        mut goals: Vec<f64>,
         context: &mut BakeContext,
     ) -> Result<BundleLevel> {
         let before = last.map(|last| last.goal).filter(|goal| *goal > 0.0);
-        let goal = in_time(goal, before, &light.state, context);
-        let key = self.key(light, Some(PhotonAim::Goal(goal)), context);
+        if let Some(goal) = goals.last_mut() {
+            *goal = in_time(*goal, before, &light.state, context);
+        }
+        let key = self.key(light, Some(PhotonAim::Goals(goals.clone())), context);
         if let Some(level) = light.state.take(&key) {
             return Ok(BundleLevel::Made(Box::new(level)));
         }
         let began = Instant::now();
-        let made = self.make_bundles(light, key, goal, context)?;
+        let made = self.make_bundles(light, key, &goals, context)?;
         let is_made = matches!(made, BundleLevel::Made(_));
         light.state.goal_s = is_made.then(|| began.elapsed().as_secs_f64());
         Ok(made)
@@ -185,69 +200,45 @@ impl CausticLayer<'_> {
         &self,
         light: &mut LightProgress,
         key: LevelKey,
-        goal: f64,
+        goals: &[f64],
         context: &mut BakeContext,
     ) -> Result<BundleLevel> {
         let unit = self.photon_unit(light.visible)?;
-        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
-        let mut squares = match light.state.squares.take() {
-            Some((trace, sizes, squares)) if trace == key.trace && sizes == key.sizes => squares,
-            _ => LightSquares::default(),
+        let is_of_before = |kept: &KeptSquares| {
+            let is_like_these = kept.trace == key.trace && kept.sizes == key.sizes;
+            is_like_these && kept.goals.len() < goals.len() && goals.starts_with(&kept.goals)
         };
-        let mut bundles = self.no_maps();
-        let mut halves = vec![self.part_maps(), self.part_maps()];
-        let listener = ProgressScope {
-            progress: self.progress,
-            control: context.control,
-            done: context.outcome.counts.rays,
-            total: 0,
-        };
-        let rules = PhotonRules {
-            tracer: self.tracer,
-            spectrum: self.spectra.photons(light.visible.light),
-            effects: EffectSet::of(self.plan),
-            max_depth: self.settings.photon_depth(),
-            unit,
-            seed: self.settings.seed,
-        };
-        let [first, second] = &mut halves[..] else {
-            unreachable!("there are two halves");
-        };
-        let mut maps = ResidualMaps {
-            bundles: &mut bundles,
-            halves: [first.sets_mut(), second.sets_mut()],
-        };
-        let is_of_faces = !self.has_places(light.visible);
-        let sought = (squares.is_empty() && is_of_faces).then(|| {
-            let square = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
-            let visible = light.visible;
-            SubcellFeatures::find(self.tracer, &visible.launch, visible.visible(), square)
+        let kept = light.state.squares.take().filter(is_of_before);
+        let mut kept = kept.unwrap_or_else(|| KeptSquares {
+            trace: key.trace.clone(),
+            sizes: key.sizes.clone(),
+            goals: Vec::new(),
+            squares: LightSquares::default(),
         });
-        let report = self.with_launch(light.visible, |launch| {
-            let pass = ResidualPass {
-                launch,
-                rules,
-                chart_for: &chart_for,
-                sought: sought.as_ref(),
-                is_rough: self.rough_object(light.visible).is_some(),
-            };
-            pass.run(goal, &mut squares, &mut maps, &listener)
-        });
-        context.outcome.count(&report.pass, context.clock);
-        if report.pass.cancelled {
-            return Ok(BundleLevel::Stopped);
+
+        // A level depends on nothing but the goals so far: where the squares of those before it are gone, or were refined
+        // otherwise by another bake, they are made anew.
+        let mut last = None;
+        for &goal in &goals[kept.goals.len()..] {
+            kept.goals.push(goal);
+            let carried = self.carry(light.visible, (&key, unit), goal, &mut kept.squares, context);
+            if carried.report.pass.cancelled {
+                return Ok(BundleLevel::Stopped);
+            }
+            last = Some(carried);
         }
-        light.state.squares = Some((key.trace.clone(), key.sizes.clone(), squares));
+        light.state.squares = Some(kept);
         light.state.fit_squares(self.squares_bytes(context));
-        if report.is_left_to_photons {
+        let Some(Carried { report, bundles, halves }) = last.filter(|last| !last.report.is_left_to_photons) else {
             return Ok(BundleLevel::LeftToPhotons);
-        }
+        };
+
         let photons = PhotonSums {
             ledger: report.pass.ledger,
             halves,
         };
         let layers = Layers {
-            bundles: rules.spectrum.is_none().then_some(&bundles),
+            bundles: (!self.spectra.has(light.visible.light)).then_some(&bundles),
             photons: &photons,
             photon_square: report.photon_square,
             bundle_square: report.deposit_square,
@@ -262,6 +253,58 @@ impl CausticLayer<'_> {
             goal: report.goal,
             ..level
         })))
+    }
+
+    /// Refines the squares for a goal, and carries the light by them.
+    fn carry(
+        &self,
+        light: &VisibleLight,
+        (key, unit): (&LevelKey, FluxUnit),
+        goal: f64,
+        squares: &mut LightSquares,
+        context: &mut BakeContext,
+    ) -> Carried {
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
+        let mut bundles = self.no_maps();
+        let mut halves = vec![self.part_maps(), self.part_maps()];
+        let listener = ProgressScope {
+            progress: self.progress,
+            control: context.control,
+            done: context.outcome.counts.rays,
+            total: 0,
+        };
+        let rules = PhotonRules {
+            tracer: self.tracer,
+            spectrum: self.spectra.photons(light.light),
+            effects: EffectSet::of(self.plan),
+            max_depth: self.settings.photon_depth(),
+            unit,
+            seed: self.settings.seed,
+        };
+        let [first, second] = &mut halves[..] else {
+            unreachable!("there are two halves");
+        };
+        let mut maps = ResidualMaps {
+            bundles: &mut bundles,
+            halves: [first.sets_mut(), second.sets_mut()],
+        };
+        let is_of_faces = !self.has_places(light);
+        let sought = (squares.is_empty() && is_of_faces).then(|| {
+            let square = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
+            SubcellFeatures::find(self.tracer, &light.launch, light.visible(), square)
+        });
+        let report = self.with_launch(light, |launch| {
+            let pass = ResidualPass {
+                launch,
+                rules,
+                chart_for: &chart_for,
+                sought: sought.as_ref(),
+                is_rough: self.rough_object(light).is_some(),
+            };
+            pass.run(goal, squares, &mut maps, &listener)
+        });
+        context.outcome.count(&report.pass, context.clock);
+        Carried { report, bundles, halves }
     }
 }
 

@@ -314,7 +314,7 @@ impl CausticLayer<'_> {
             error,
             is_by_photons: lights
                 .iter()
-                .filter_map(|light| light.levels.last()?.key.photons?.count())
+                .filter_map(|light| light.levels.last()?.key.photons.as_ref()?.count())
                 .next()
                 .is_some(),
         };

@@ -36,13 +36,13 @@ impl CausticLayer<'_> {
                 is_negligible: !light.is_underrated && self.is_negligible(light.visible),
                 ..self.trace_key(light.visible)
             },
-            photons,
             sizes: context.sizes.clone(),
             kernels: self.kernels(),
-            stride: match photons {
+            stride: match &photons {
                 Some(_) => 1,
                 None => LEVEL_STRIDES[light.levels.len().min(LEVEL_STRIDES.len() - 1)],
             },
+            photons,
         }
     }
 

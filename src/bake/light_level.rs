@@ -56,20 +56,21 @@ pub(super) struct LevelKey {
 }
 
 /// What a level of photons aims at.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum PhotonAim {
     /// So many photons in each half, and no bundles.
     Count(u32),
-    /// A relative RMSE, by bundles and residual photons.
-    Goal(f64),
+    /// Relative RMSEs, by bundles and residual photons: that of the level, after those of the levels before it, on whose
+    /// squares it builds.
+    Goals(Vec<f64>),
 }
 
 impl PhotonAim {
     /// Photons in each half, if that is the aim.
-    pub(super) fn count(self) -> Option<u32> {
+    pub(super) fn count(&self) -> Option<u32> {
         match self {
-            Self::Count(photons) => Some(photons),
-            Self::Goal(_) => None,
+            Self::Count(photons) => Some(*photons),
+            Self::Goals(_) => None,
         }
     }
 }
@@ -162,6 +163,16 @@ impl LightStates {
     }
 }
 
+/// Squares of a light's launch domain, and what they depend on.
+#[derive(Debug)]
+pub(super) struct KeptSquares {
+    pub(super) trace: TraceKey,
+    pub(super) sizes: Sizes,
+    /// Goals that they were refined for, one after the other.
+    pub(super) goals: Vec<f64>,
+    pub(super) squares: LightSquares,
+}
+
 /// What is kept of one light between bakes.
 #[derive(Debug, Default)]
 pub(super) struct LightState {
@@ -173,8 +184,7 @@ pub(super) struct LightState {
     pub(super) levels: Vec<LightLevel>,
     /// Wall-clock time per photon of each half in the last level of photons [s].
     pub(super) photon_s: Option<f64>,
-    /// Squares of its launch domain, and what they depend on.
-    pub(super) squares: Option<(TraceKey, Sizes, LightSquares)>,
+    pub(super) squares: Option<KeptSquares>,
     /// Wall-clock time of the last level with a goal [s].
     pub(super) goal_s: Option<f64>,
     /// Arrivals that splats were made of.
@@ -215,7 +225,7 @@ impl LightLevel {
             .ledger
             .watts(Account::Bundled, self.unit, self.strength(light));
         let nothing = CarriedFlux::default();
-        match self.key.photons {
+        match &self.key.photons {
             Some(_) => CarriedFlux {
                 bundles,
                 photons: deposited - bundles,
@@ -244,7 +254,7 @@ impl LightState {
     pub(super) fn bytes(&self) -> u64 {
         self.levels.iter().map(LightLevel::bytes).sum::<u64>()
             + self.arrivals.as_ref().map_or(0, |(_, arrivals)| arrivals.bytes())
-            + self.squares.as_ref().map_or(0, |(.., squares)| squares.bytes())
+            + self.squares.as_ref().map_or(0, |kept| kept.squares.bytes())
     }
 
     /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes. From then on their ways
@@ -292,9 +302,9 @@ impl LightState {
         self.arrivals = None;
     }
 
-    /// Drops squares that take more than so many bytes. They are made anew when needed, without what photons found.
+    /// Drops squares that take more than so many bytes. They are made anew when needed.
     pub(super) fn fit_squares(&mut self, most_bytes: u64) {
-        self.squares.take_if(|(.., squares)| squares.bytes() > most_bytes);
+        self.squares.take_if(|kept| kept.squares.bytes() > most_bytes);
     }
 
     /// Removes and returns the level with a key, if there is one.

@@ -91,7 +91,7 @@ impl CausticLayer<'_> {
         last: Option<&LightLevel>,
         target_rmse: Option<f64>,
     ) -> Option<u32> {
-        let before = last.and_then(|level| level.key.photons?.count());
+        let before = last.and_then(|level| level.key.photons.as_ref()?.count());
         let Some(target) = self.settings.max_error else {
             let wanted = self.photons_at_density(light);
             return match before {
@@ -145,11 +145,16 @@ impl CausticLayer<'_> {
         last: Option<&LightLevel>,
         target_rmse: Option<f64>,
     ) -> Option<PhotonAim> {
-        let is_left_to_photons = matches!(last.and_then(|last| last.key.photons), Some(PhotonAim::Count(_)));
+        let before = last.and_then(|last| last.key.photons.as_ref());
+        let is_left_to_photons = matches!(before, Some(PhotonAim::Count(_)));
         match self.settings.max_error {
             Some(target) if !is_left_to_photons && self.has_bundles(light) => {
-                let goal = self.next_goal(last, target_rmse.unwrap_or(target));
-                goal.map(PhotonAim::Goal)
+                let mut goals = match before {
+                    Some(PhotonAim::Goals(goals)) => goals.clone(),
+                    _ => Vec::new(),
+                };
+                goals.push(self.next_goal(last, target_rmse.unwrap_or(target))?);
+                Some(PhotonAim::Goals(goals))
             }
             _ => self.next_photons(light, last, target_rmse).map(PhotonAim::Count),
         }
@@ -205,7 +210,7 @@ impl CausticLayer<'_> {
             return Ok(None);
         };
         let photons = match aim {
-            PhotonAim::Goal(goal) => match self.next_bundles(light, last.as_deref(), goal, context)? {
+            PhotonAim::Goals(goals) => match self.next_bundles(light, last.as_deref(), goals, context)? {
                 BundleLevel::Made(level) => return Ok(Some(*level)),
                 BundleLevel::Stopped => return Ok(None),
                 BundleLevel::LeftToPhotons => FIRST_PHOTONS,
@@ -214,7 +219,7 @@ impl CausticLayer<'_> {
         };
         let before = last
             .as_ref()
-            .and_then(|last| last.key.photons?.count())
+            .and_then(|last| last.key.photons.as_ref()?.count())
             .unwrap_or(0);
         let photons = in_time(photons, before, &light.state, context);
         let key = self.key(light, Some(PhotonAim::Count(photons)), context);
@@ -239,12 +244,12 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         let unit = self.photon_unit(light)?;
-        let photons = key.photons.and_then(PhotonAim::count).unwrap_or(FIRST_PHOTONS);
+        let photons = key.photons.as_ref().and_then(PhotonAim::count).unwrap_or(FIRST_PHOTONS);
         let alike = |level: &&mut LightLevel| level.key.trace == key.trace && level.key.sizes == key.sizes;
         let earlier = before.filter(|level| alike(level) && level.photons.is_some());
         let first = earlier
             .as_ref()
-            .and_then(|level| level.key.photons?.count())
+            .and_then(|level| level.key.photons.as_ref()?.count())
             .unwrap_or(0);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
@@ -307,7 +312,7 @@ impl CausticLayer<'_> {
         raw: PhotonSums,
         is_shard: bool,
     ) -> LightLevel {
-        let photons = key.photons.and_then(PhotonAim::count).unwrap_or(0);
+        let photons = key.photons.as_ref().and_then(PhotonAim::count).unwrap_or(0);
         let layers = Layers {
             bundles: None,
             photons: &raw,

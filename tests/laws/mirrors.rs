@@ -101,7 +101,7 @@ pub fn fill(t: &mut Table) {
         });
     // A mirror ball sends a sun's light evenly into all directions, those parallel to the floor among them.
     let wide = shapes::floor([-30.0, 30.0], [-30.0, 30.0], -3.0);
-    let ball = shapes::sphere(DVec3::ZERO, 0.02, 5);
+    let ball = shapes::sphere(DVec3::ZERO, 0.05, 5);
     t.case("rays-parallel-to-the-receiver")
         .bake(
             Scene::default().diffuse("floor", wide).mirror(ball).sun(DVec3::X),

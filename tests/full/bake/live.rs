@@ -482,7 +482,7 @@ fn what_the_light_decides_is_refused() {
         ("--memory", |settings| settings.memory_bytes = 1 << 20),
     ];
     for (option, change) in cases {
-        let mut settings = to(0.03, 512);
+        let mut settings = photons(1e3, 512);
         change(&mut settings);
         let share = ShardIndex::new(1, 2).expect("a share");
         let refused = session(&scene).bake_shard(&settings, share, &(), &Control::default());

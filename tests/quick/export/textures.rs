@@ -488,14 +488,15 @@ fn sizes_go_down_to_one_texel() {
     let baked = baked("ring", (50, 36));
     let mean = |values: &[[f32; 3]]| values.iter().map(|value| value[1]).sum::<f32>() / values.len() as f32;
     let whole = mean(&baked.light(""));
-    for packing in [Packing::Rgb9e5, Packing::Bc6h] {
+    // A block of BC6H puts 16 texels on a line between two colours.
+    for (packing, bound) in [(Packing::Rgb9e5, 0.01), (Packing::Bc6h, 0.03)] {
         let (texture, entry) = first_of(&baked, packed(packing, true));
         let sizes: Vec<_> = texture.levels.iter().map(|(size, _)| *size).collect();
         assert_eq!(sizes, [(50, 36), (25, 18), (12, 9), (6, 4), (3, 2), (1, 1)]);
         assert_eq!(entry.levels, sizes.len());
         for ((width, _), values) in &texture.levels {
             let share = mean(values) / whole;
-            assert!((share - 1.0).abs() < 0.02, "{packing:?}, {width} texels: {share}");
+            assert!((share - 1.0).abs() < bound, "{packing:?}, {width} texels: {share}");
         }
     }
 }
