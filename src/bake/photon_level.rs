@@ -362,13 +362,15 @@ impl CausticLayer<'_> {
             band.add(more);
         }
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
-        let mut error = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
+        let light_of_maps = accuracy::images(&maps, unit);
+        let mut error = accuracy::by_noise(&light_of_maps, noise, &energy);
         if let Some(error) = &mut error {
             let square = error.relative_rmse.powi(2);
             // More photons do not recover truncated light, and nothing about it is left to chance.
             let truncated = accuracy::truncated_share(&energy).powi(2);
             let noise = accuracy::expected_noise(square - truncated, [&one, &other], layers.photon_square);
-            error.raise_to(noise + truncated + layers.bundle_square);
+            error.raise_to(noise + truncated);
+            error.add_to(noise + truncated + layers.bundle_square, &light_of_maps);
         }
         LightLevel {
             error,

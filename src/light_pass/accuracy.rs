@@ -54,12 +54,8 @@ pub struct LightError {
 }
 
 impl LightError {
-    /// Scales all errors up to a larger relative squared error; that of all maps alone if none of them shows any.
+    /// Scales all errors up to a larger relative squared error.
     pub fn raise_to(&mut self, relative_square: f64) {
-        if self.relative_rmse == 0.0 {
-            self.relative_rmse = relative_square.sqrt();
-            return;
-        }
         let factor = relative_square.sqrt() / self.relative_rmse;
         if !(factor > 1.0 && factor.is_finite()) {
             return;
@@ -68,6 +64,29 @@ impl LightError {
         for map in self.maps.values_mut() {
             let raise = |error: &mut f32| *error = single(f64::from(*error) * factor);
             map.texels.iter_mut().for_each(raise);
+        }
+    }
+
+    /// Adds errors that are a part of the light everywhere, up to a larger relative squared error.
+    pub fn add_to(&mut self, relative_square: f64, light: &Images) {
+        let added = relative_square - self.relative_rmse * self.relative_rmse;
+        let (mut flux_w, mut area_m2, mut squares) = (0.0, 0.0, 0.0);
+        for image in light.values() {
+            let (map_w, map_m2) = image.sums();
+            (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
+            let of_texels = image.luminance.iter().enumerate();
+            squares += of_texels.map(|(texel, value)| value * value * image.area_m2(texel)).sum::<f64>();
+        }
+        let part = added * flux_w * flux_w / (area_m2 * squares);
+        if !(part > 0.0 && part.is_finite()) {
+            return;
+        }
+        self.relative_rmse = relative_square.sqrt();
+        for (receiver, map) in &mut self.maps {
+            let Some(image) = light.get(receiver) else { continue };
+            for (error, value) in map.texels.iter_mut().zip(&image.luminance) {
+                *error = single((f64::from(*error) * f64::from(*error) + part * value * value).sqrt());
+            }
         }
     }
 }

@@ -12,7 +12,7 @@ use nephroid::units::{Flux, RadiantIntensity};
 
 use crate::bake::common::{all_bits, caustic_like, floor, rmse, same_map};
 use support::random_scenes;
-use support::tools::{bake, builtin_scene, settings, to};
+use support::tools::{bake, builtin_scene, photons, settings, to};
 
 fn add_matte(scene: &mut Scene, name: &str, mesh: Mesh) {
     parts::add(scene, name, mesh, parts::matte("matte", LinearSrgb::grey(0.5)));
@@ -286,8 +286,8 @@ fn assert_plan_changes_nothing(base: &BakeSettings, seeds: impl Iterator<Item = 
 }
 
 #[test]
-fn the_plan_changes_no_map_of_bundles() {
-    assert_plan_changes_nothing(&to(0.03, 32), (0..200).step_by(4));
+fn the_plan_changes_no_map_of_photons() {
+    assert_plan_changes_nothing(&photons(2_000.0, 32), (0..200).step_by(4));
 }
 
 #[test]
