@@ -213,7 +213,7 @@ pub(super) fn sigma(bench: &Bench) -> Result<Sweep> {
 
 pub(super) fn resolution(bench: &Bench) -> Result<Sweep> {
     let scene = scene("ring")?;
-    let finer = auto(if bench.quick { 0.02 } else { 0.002 });
+    let finer = auto(if bench.quick { 0.005 } else { 0.002 });
     let groups = bench.some(&[30, 100, 300], 2).iter().map(|&side| {
         let ways = [("splat", splat(DENSITY_PER_SR)), ("auto", auto(0.01))];
         let variants = ways.map(|(name, settings)| {

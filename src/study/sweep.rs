@@ -16,9 +16,6 @@ use crate::progress::{Control, Progress};
 use crate::scene::{Camera, Scene};
 use crate::settings::{BakeSettings, MapResolution};
 
-/// Maximum error of a bake that serves as a reference.
-const TRUSTED: f64 = 0.01;
-
 /// Errors whose costs are tabulated.
 const TARGETS: [(&str, f64); 3] = [("5 %", 0.05), ("2 %", 0.02), ("1 %", 0.01)];
 
@@ -263,8 +260,8 @@ impl Against {
             Self::Known(reference) => Ok(Some(reference.clone())),
             Self::Bake(scene, settings) => {
                 let result = bench.bake(scene, settings)?;
-                let is_known = |error: f64| error <= TRUSTED;
-                if settings.max_error.is_some() && !result.estimated_relative_rmse.is_some_and(is_known) {
+                let is_met = |target| result.estimated_relative_rmse.is_some_and(|error| error <= target);
+                if !settings.max_error.is_none_or(is_met) {
                     return Ok(None);
                 }
                 let estimator: &str = settings.estimator.into();

@@ -26,7 +26,7 @@ use super::mutate::{Damage, Tally, Way, alone, attack, effort};
 use support::glb::{Glb, load_bytes};
 use support::program::{Run, Sandbox};
 use support::sound::scene_fault;
-use support::tools::{bake, builtin_scene, set, to};
+use support::tools::{bake, builtin_scene, photons, set, to};
 
 const MIB: usize = 1 << 20;
 
@@ -329,7 +329,7 @@ struct Shards {
 
 impl Shards {
     fn bake() -> Self {
-        let (scene, settings) = (Arc::new(builtin_scene("mirror")), to(0.03, 16));
+        let (scene, settings) = (Arc::new(builtin_scene("mirror")), photons(1e4, 16));
         let shard = |number| {
             let share = ShardIndex::new(number, 2).expect("one of two");
             let mut session = Baker::new(scene.clone()).expect("a session");
