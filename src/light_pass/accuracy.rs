@@ -67,25 +67,23 @@ impl LightError {
         }
     }
 
-    /// Adds errors that are a part of the light everywhere, up to a larger relative squared error.
+    /// Adds errors whose squares are proportional to the light, as those of single photons, up to a larger relative
+    /// squared error.
     pub fn add_to(&mut self, relative_square: f64, light: &Images) {
         let added = relative_square - self.relative_rmse * self.relative_rmse;
-        let (mut flux_w, mut area_m2, mut squares) = (0.0, 0.0, 0.0);
-        for image in light.values() {
+        let (flux_w, area_m2) = light.values().fold((0.0, 0.0), |(flux_w, area_m2), image| {
             let (map_w, map_m2) = image.sums();
-            (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
-            let of_texels = image.luminance.iter().enumerate();
-            squares += of_texels.map(|(texel, value)| value * value * image.area_m2(texel)).sum::<f64>();
-        }
-        let part = added * flux_w * flux_w / (area_m2 * squares);
-        if !(part > 0.0 && part.is_finite()) {
+            (flux_w + map_w, area_m2 + map_m2)
+        });
+        if !(added > 0.0 && flux_w > 0.0) {
             return;
         }
         self.relative_rmse = relative_square.sqrt();
+        let per_light = added * flux_w / area_m2;
         for (receiver, map) in &mut self.maps {
             let Some(image) = light.get(receiver) else { continue };
             for (error, value) in map.texels.iter_mut().zip(&image.luminance) {
-                *error = single((f64::from(*error) * f64::from(*error) + part * value * value).sqrt());
+                *error = single((f64::from(*error).powi(2) + per_light * value.max(0.0)).sqrt());
             }
         }
     }
