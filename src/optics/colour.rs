@@ -231,14 +231,6 @@ impl std::ops::Add for ColourMatrix {
     }
 }
 
-impl ColourMatrix {
-    /// Entry by entry.
-    #[must_use]
-    pub fn minus(self, other: Self) -> Self {
-        self + other.scaled(-1.0)
-    }
-}
-
 impl std::iter::Sum for ColourMatrix {
     fn sum<I: Iterator<Item = Self>>(parts: I) -> Self {
         parts.fold(Self::ZERO, |sum, part| sum + part)

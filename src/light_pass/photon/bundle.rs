@@ -108,7 +108,7 @@ pub(super) struct OriginShift {
 }
 
 /// Point on the lamp and wavelength.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Origin {
     /// In half-axes from the lamp's centre.
     pub(super) lamp: DVec2,
@@ -139,8 +139,7 @@ impl OriginShift {
     /// Whether lamp and wavelengths spread the light over several texels.
     pub(super) fn is_smooth(&self) -> bool {
         let [x, y] = self.lamp.map(|moved| 2.0 * moved.abs().max_element());
-        let hues = (self.hues[0] - self.hues[1]).abs().max_element();
-        f64::from(hues.max(x.min(y))) >= SMOOTH_TEXELS
+        self.hues_across().max(f64::from(x.min(y))) >= SMOOTH_TEXELS
     }
 
     pub(super) fn at(&self, origin: &Origin) -> DVec2 {

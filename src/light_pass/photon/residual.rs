@@ -32,7 +32,7 @@ use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::wavefront::coverage::{FluxTriangle, deposit_triangles};
 use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
-use crate::optics::LinearSrgb;
+use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::progress::Stage;
 
 /// All flux is counted so many times, in bundles and in each half: enough that rounding to counts does not matter.
@@ -278,8 +278,9 @@ impl ResidualPass<'_> {
                 }
                 // The few hues of a triangle have another colour than all: what is missing is spread over them.
                 if sets == 1 {
-                    let of_parts = hues.iter().map(|(hue, share)| hue.channels.scaled(*share)).sum();
-                    let missing = self.rules.whole_hue().channels.minus(of_parts);
+                    let of_parts: ColourMatrix =
+                        hues.iter().map(|(hue, share)| hue.channels.scaled(*share)).sum();
+                    let missing = self.rules.whole_hue().channels + of_parts.scaled(-1.0);
                     for (hue, _) in &mut hues {
                         hue.channels = hue.channels + missing;
                     }
@@ -542,10 +543,7 @@ impl ResidualPhotons<'_> {
             guides: &square.guides,
             within,
             scale: unit_squares,
-            origin: Origin {
-                lamp: offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp)),
-                ..Origin::default()
-            },
+            lamp: offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp)),
         };
         let mut removals = std::mem::take(&mut draw.removals);
         let mut maps = Changes {

@@ -102,13 +102,6 @@ impl PhotonSpectrum {
         let index = self.nodes.partition_point(|node| node.upto <= place);
         self.nodes.get(index).or(self.nodes.last()).map(WeightedNode::hue)
     }
-
-    /// Each wavelength with its probability.
-    pub fn hues(&self) -> impl Iterator<Item = (Hue<'_>, f64)> {
-        let before = std::iter::once(0.0).chain(self.nodes.iter().map(|node| node.upto));
-        let nodes = self.nodes.iter().zip(before);
-        nodes.map(|(node, before)| (node.hue(), node.upto - before))
-    }
 }
 
 impl WeightedNode {

@@ -66,7 +66,8 @@ pub(super) struct Followed<'a> {
     pub(super) within: DVec2,
     /// Unit squares of the launch domain that the photon stands for.
     pub(super) scale: f64,
-    pub(super) origin: Origin,
+    /// Where it starts on the lamp, in half-axes from its centre.
+    pub(super) lamp: DVec2,
 }
 
 /// What all photons of a light share.
@@ -161,16 +162,13 @@ impl<'a> PhotonWalk<'a> {
         &mut self,
         index: u32,
         start: Option<Start>,
-        mut followed: Followed<'_>,
+        followed: Followed<'_>,
         mut arrive: impl FnMut(Hit),
     ) {
         let own_hue = self.rules.spectrum.and_then(|spectrum| {
             let place = even_point(index, WAVELENGTH_DIMENSION, self.rules.seed).x;
             spectrum.one(place)
         });
-        if let Some(hue) = own_hue {
-            followed.origin.ends = hue.ends;
-        }
         let mut photon = Photon {
             hue: self.rules.whole_hue(),
             whole_hue: self.rules.whole_hue(),
@@ -392,8 +390,8 @@ impl Photon<'_, '_> {
                 .filter(|_| bundle.route.is_dispersed)
                 .unwrap_or(self.whole_hue);
             let origin = Origin {
+                lamp: followed.lamp,
                 ends: hue.ends,
-                ..followed.origin
             };
             let Some(predicted) = bundle.at(followed.within, &origin) else {
                 continue;
