@@ -52,8 +52,6 @@ choices! {
         /// Bundles, with photons for what these cannot carry. Photons alone without a target, on rough surfaces, and for
         /// lamps that shine in all directions from a sphere or an environment.
         Auto,
-        /// Patches of the wavefront between neighbouring rays, spread exactly over the texels they cover.
-        Wavefront,
         /// Photons: random paths that follow one branch at every surface; each is counted in the texel it hits.
         Photon,
         /// A kernel of flux per ray, scaled to the wavefront (Collins 1994).
@@ -120,8 +118,8 @@ choices! {
     }
 }
 
-/// Width σ of the Gaussian exp(−r²/2σ), in squared footprint radii (eq. 4.4). The wavefront estimator deposits exactly
-/// and smooths afterwards, with each texel's own area as the footprint; 0 disables this.
+/// Width σ of the Gaussian exp(−r²/2σ), in squared footprint radii (eq. 4.4). The other
+/// estimators smooth afterwards, with each texel's own area as the footprint; 0 disables this.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sigma {
@@ -150,7 +148,7 @@ pub enum MapResolution {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Wavelengths {
-    /// The whole spectrum without bands. The wavefront is interpolated between wavelengths; splats use
+    /// The whole spectrum without bands. Bundles interpolate between three wavelengths; splats use
     /// [`CONTINUOUS_BANDS`] bands.
     #[default]
     Continuous,
@@ -282,7 +280,7 @@ const USUAL_DEPTH: u32 = 16;
 const USUAL_PHOTON_DEPTH: u32 = 256;
 
 /// Branch threshold relative to the target error. A larger one would save segments, but cost more rays than that: where
-/// branches end only because they are weak, borders appear that the wavefront refines.
+/// branches end only because they are weak, borders appear that squares are divided at.
 const THRESHOLD_PER_ERROR: f64 = 0.003;
 
 /// Minimum target for the error [1].
@@ -330,10 +328,10 @@ impl Default for BakeSettings {
 }
 
 impl Estimator {
-    /// Light rays per steradian of a preview [1/sr]; patches need fewer than splats.
+    /// Light rays per steradian of a preview [1/sr].
     pub fn preview_density_per_sr(self) -> f64 {
         match self {
-            Self::Auto | Self::Wavefront => 25_000.0,
+            Self::Auto => 25_000.0,
             Self::Photon => 1e6,
             Self::Splat => 100_000.0,
         }
@@ -344,10 +342,10 @@ impl Estimator {
         self != Self::Splat
     }
 
-    /// Patches are exact without smoothing; splats are one footprint wide.
+    /// Splats are one footprint wide; the others are sharp without smoothing.
     pub fn default_sigma(self) -> Sigma {
         match self {
-            Self::Auto | Self::Wavefront | Self::Photon => Sigma::Constant(0.0),
+            Self::Auto | Self::Photon => Sigma::Constant(0.0),
             Self::Splat => Sigma::Constant(1.0),
         }
     }

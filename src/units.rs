@@ -86,9 +86,4 @@ quantity!(
 product!(RadiantIntensity * SolidAngle = Flux);
 product!(Irradiance * Area = Flux);
 
-impl Irradiance {
-    /// Radiance of a diffuse surface with the given albedo [0, 1]: L = ρE/π.
-    pub fn diffuse_radiance(self, albedo: f64) -> Radiance {
-        Radiance(albedo * self.0 / std::f64::consts::PI)
-    }
-}
+impl Irradiance {}

@@ -5,22 +5,37 @@ use std::time::Instant;
 
 use glam::DVec2;
 
+use super::band_maps::BandMaps;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums};
+use super::light_level::{KeptSquares, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums};
 use super::photon_level::{Layers, PART_OF_TIME};
 use crate::error::Result;
 use crate::illumination::Receiver;
+use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy;
+use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::pass_report::ProgressScope;
 use crate::light_pass::photon::domain::FIRST_LEVEL;
+use crate::light_pass::photon::footprints::FootprintPass;
+use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::photon::pass::HALVES;
-use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, TIMES};
+use crate::light_pass::photon::residual::{LightSquares, ResidualMaps, ResidualPass, ResidualReport, TIMES};
+use crate::light_pass::photon::subcell_features::SubcellFeatures;
 use crate::light_pass::photon::walk::PhotonRules;
+use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::visibility::VisibleLight;
-use crate::light_pass::wavefront::edge_search::EdgeSearch;
-use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
 use crate::settings::Estimator;
 use crate::transport::EffectSet;
+
+/// Relative RMSE up to which automatic maps are as fine as in a preview.
+const USUAL_MAP_ERROR: f64 = 0.03;
+
+/// Density that these maps are made for [rays/sr].
+const PREVIEW_DENSITY_PER_SR: f64 = 25_000.0;
+
+/// Texels for the light of a cell of such a lattice: on the built-in scenes, 0.5 to 2 mm each, as fine as their caustics
+/// are seen to be.
+const TEXELS_PER_CELL: f64 = 64.0;
 
 /// Goal of the first level, which gives the first picture.
 const FIRST_GOAL: f64 = 0.2;
@@ -31,6 +46,9 @@ const AIM: f64 = 0.85;
 
 /// Minimum and maximum of a goal relative to the one before.
 const STEPS: (f64, f64) = (0.08, 0.8);
+
+/// Goals differ by at least so many parts of an octave.
+const GOALS_PER_OCTAVE: f64 = 8.0;
 
 /// A goal so much larger than the target tells little about it.
 const FAR: f64 = 2.5;
@@ -55,6 +73,13 @@ pub(super) enum BundleLevel {
     LeftToPhotons,
 }
 
+/// What squares and their photons carried.
+struct Carried {
+    report: ResidualReport,
+    bundles: ReceiverMaps,
+    halves: Vec<BandMaps>,
+}
+
 impl CausticLayer<'_> {
     /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way, and is of
     /// so many wavelengths that a parabola goes through them.
@@ -65,13 +90,60 @@ impl CausticLayer<'_> {
             && (!self.has_places(light) || self.with_launch(light, |launch| launch.has_offsets()))
     }
 
+    /// Footprints at the density that maps are made for. Rough surfaces count as smooth ones, a lamp as its centre.
+    pub(super) fn bundle_statistics(
+        &self,
+        light: &VisibleLight,
+        unit: FluxUnit,
+        context: &mut BakeContext,
+    ) -> FootprintStatistics {
+        let chart_for: &ChartFor = &|receiver: Receiver| {
+            self.sizes
+                .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
+        };
+        let (columns, rows) = light
+            .launch
+            .lattice_size(self.map_density_per_sr(), light.reach_m);
+        let pass = FootprintPass {
+            launch: &PhotonLaunch::of_cells(light),
+            rules: PhotonRules {
+                tracer: self.tracer,
+                spectrum: None,
+                effects: EffectSet {
+                    lobes: false,
+                    ..EffectSet::of(self.plan)
+                },
+                max_depth: self.settings.photon_depth(),
+                unit,
+                seed: self.settings.seed,
+            },
+            chart_for,
+            cells: TEXELS_PER_CELL * columns as f64 * rows as f64,
+        };
+        let report = pass.run(context.control);
+        context.outcome.count(&report, context.clock);
+        report.statistics
+    }
+
+    /// Density that automatic maps are made for [rays/sr]. With a target it does not depend on the lattice, and texels
+    /// are as long as the error allows.
+    pub(super) fn map_density_per_sr(&self) -> f64 {
+        match self.settings.max_error {
+            Some(target) => {
+                let coarser = (target / USUAL_MAP_ERROR).max(1.0);
+                PREVIEW_DENSITY_PER_SR / (coarser * coarser)
+            }
+            None => self.settings.density_per_sr,
+        }
+    }
+
     /// Goal of the level after `last`, towards a relative RMSE; `None` if nothing is left to do.
     pub(super) fn next_goal(&self, last: Option<&LightLevel>, target: f64) -> Option<f64> {
         let Some(last) = last else {
             return Some(FIRST_GOAL.max(AIM * target));
         };
         let before = last.goal;
-        let error = last.error.as_ref().map(|error| error.estimate.relative_rmse);
+        let error = last.error.as_ref().map(|error| error.relative_rmse);
         let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
             return (before > LEAST_WITHOUT_ERROR).then_some(STEPS.0 * before);
         };
@@ -93,7 +165,9 @@ impl CausticLayer<'_> {
         } else {
             scaled.clamp(STEPS.0 * before, STEPS.1 * before)
         };
-        (noise2 > wanted2).then_some(next)
+        // Rounded, so that what changes other lights a little leaves the goals of this one as they were.
+        let rounded = ((GOALS_PER_OCTAVE * next.log2()).round() / GOALS_PER_OCTAVE).exp2();
+        (noise2 > wanted2).then_some(rounded)
     }
 
     /// The level of a light with a goal.
@@ -104,17 +178,19 @@ impl CausticLayer<'_> {
         &self,
         light: &mut LightProgress,
         last: Option<&LightLevel>,
-        goal: f64,
+        mut goals: Vec<f64>,
         context: &mut BakeContext,
     ) -> Result<BundleLevel> {
         let before = last.map(|last| last.goal).filter(|goal| *goal > 0.0);
-        let goal = in_time(goal, before, &light.state, context);
-        let key = self.key(light, Some(PhotonAim::Goal(goal)), context);
+        if let Some(goal) = goals.last_mut() {
+            *goal = in_time(*goal, before, &light.state, context);
+        }
+        let key = self.key(light, Some(PhotonAim::Goals(goals.clone())), context);
         if let Some(level) = light.state.take(&key) {
             return Ok(BundleLevel::Made(Box::new(level)));
         }
         let began = Instant::now();
-        let made = self.make_bundles(light, key, goal, context)?;
+        let made = self.make_bundles(light, key, &goals, context)?;
         let is_made = matches!(made, BundleLevel::Made(_));
         light.state.goal_s = is_made.then(|| began.elapsed().as_secs_f64());
         Ok(made)
@@ -124,15 +200,76 @@ impl CausticLayer<'_> {
         &self,
         light: &mut LightProgress,
         key: LevelKey,
-        goal: f64,
+        goals: &[f64],
         context: &mut BakeContext,
     ) -> Result<BundleLevel> {
         let unit = self.photon_unit(light.visible)?;
-        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
-        let mut squares = match light.state.squares.take() {
-            Some((trace, sizes, squares)) if trace == key.trace && sizes == key.sizes => squares,
-            _ => LightSquares::default(),
+        let is_of_before = |kept: &KeptSquares| {
+            let is_like_these = kept.trace == key.trace && kept.sizes == key.sizes;
+            is_like_these && kept.goals.len() < goals.len() && goals.starts_with(&kept.goals)
         };
+        let kept = light.state.squares.take().filter(is_of_before);
+        let mut kept = kept.unwrap_or_else(|| KeptSquares {
+            trace: key.trace.clone(),
+            sizes: key.sizes.clone(),
+            goals: Vec::new(),
+            squares: LightSquares::default(),
+        });
+
+        // A level depends on nothing but the goals so far: where the squares of those before it are gone, or were refined
+        // otherwise by another bake, they are made anew.
+        let mut last = None;
+        for &goal in &goals[kept.goals.len()..] {
+            kept.goals.push(goal);
+            let carried = self.carry(light.visible, (&key, unit), goal, &mut kept.squares, context);
+            if carried.report.pass.cancelled {
+                return Ok(BundleLevel::Stopped);
+            }
+            last = Some(carried);
+        }
+        light.state.squares = Some(kept);
+        light.state.fit_squares(self.squares_bytes(context));
+        let Some(Carried {
+            report,
+            bundles,
+            halves,
+        }) = last.filter(|last| !last.report.is_left_to_photons)
+        else {
+            return Ok(BundleLevel::LeftToPhotons);
+        };
+
+        let photons = PhotonSums {
+            ledger: report.pass.ledger,
+            halves,
+        };
+        let layers = Layers {
+            bundles: (!self.spectra.has(light.visible.light)).then_some(&bundles),
+            photons: &photons,
+            photon_square: report.photon_square,
+            bundle_square: report.deposit_square,
+        };
+        let unit = unit.per(u64::from(TIMES) * HALVES as u64);
+        let level = context.clock.time(
+            |clock| &mut clock.deposit,
+            || self.level_of_layers(light.visible, (key, unit), layers),
+        );
+        Ok(BundleLevel::Made(Box::new(LightLevel {
+            segments: report.pass.segments,
+            goal: report.goal,
+            ..level
+        })))
+    }
+
+    /// Refines the squares for a goal, and carries the light by them.
+    fn carry(
+        &self,
+        light: &VisibleLight,
+        (key, unit): (&LevelKey, FluxUnit),
+        goal: f64,
+        squares: &mut LightSquares,
+        context: &mut BakeContext,
+    ) -> Carried {
+        let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let mut bundles = self.no_maps();
         let mut halves = vec![self.part_maps(), self.part_maps()];
         let listener = ProgressScope {
@@ -143,7 +280,7 @@ impl CausticLayer<'_> {
         };
         let rules = PhotonRules {
             tracer: self.tracer,
-            spectrum: self.spectra.photons(light.visible.light),
+            spectrum: self.spectra.photons(light.light),
             effects: EffectSet::of(self.plan),
             max_depth: self.settings.photon_depth(),
             unit,
@@ -156,55 +293,27 @@ impl CausticLayer<'_> {
             bundles: &mut bundles,
             halves: [first.sets_mut(), second.sets_mut()],
         };
-        let is_of_faces = !self.has_places(light.visible);
+        let is_of_faces = !self.has_places(light);
         let sought = (squares.is_empty() && is_of_faces).then(|| {
-            let cell = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
-            let visible = light.visible;
-            SubcellFeatures::find(
-                self.tracer,
-                &visible.launch,
-                visible.visible(),
-                cell,
-                EdgeSearch::ROUGH,
-            )
+            let square = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
+            SubcellFeatures::find(self.tracer, &light.launch, light.visible(), square)
         });
-        let report = self.with_launch(light.visible, |launch| {
+        let report = self.with_launch(light, |launch| {
             let pass = ResidualPass {
                 launch,
                 rules,
                 chart_for: &chart_for,
                 sought: sought.as_ref(),
-                is_rough: self.rough_object(light.visible).is_some(),
+                is_rough: self.rough_object(light).is_some(),
             };
-            pass.run(goal, &mut squares, &mut maps, &listener)
+            pass.run(goal, squares, &mut maps, &listener)
         });
         context.outcome.count(&report.pass, context.clock);
-        if report.pass.cancelled {
-            return Ok(BundleLevel::Stopped);
-        }
-        light.state.squares = Some((key.trace.clone(), key.sizes.clone(), squares));
-        light.state.fit_squares(self.squares_bytes(context));
-        if report.is_left_to_photons {
-            return Ok(BundleLevel::LeftToPhotons);
-        }
-        let photons = PhotonSums {
-            ledger: report.pass.ledger,
+        Carried {
+            report,
+            bundles,
             halves,
-        };
-        let layers = Layers {
-            bundles: rules.spectrum.is_none().then_some(&bundles),
-            photons: &photons,
-        };
-        let unit = unit.per(u64::from(TIMES) * HALVES as u64);
-        let level = context.clock.time(
-            |clock| &mut clock.deposit,
-            || self.level_of_layers(light.visible, (key, unit), layers, report.deposit_square),
-        );
-        Ok(BundleLevel::Made(Box::new(LightLevel {
-            work: (report.pass.segments, 0),
-            goal: report.goal,
-            ..level
-        })))
+        }
     }
 }
 

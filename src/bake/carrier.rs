@@ -6,11 +6,8 @@ use crate::light_pass::visibility::VisibleLight;
 use crate::plan::Effect;
 use crate::settings::Estimator;
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Carrier {
-    /// Patches of the wavefront.
-    #[default]
-    Patches,
     /// Photons, with bundles where these can carry the light.
     Photons,
     /// Kernel splats of the paper.
@@ -73,7 +70,6 @@ impl CausticLayer<'_> {
     pub(super) fn carrier(&self) -> Carrier {
         match self.settings.estimator {
             Estimator::Auto | Estimator::Photon => Carrier::Photons,
-            Estimator::Wavefront => Carrier::Patches,
             Estimator::Splat => Carrier::Splats,
         }
     }

@@ -10,39 +10,24 @@ use super::clock::Clock;
 use super::finish::CompletedLevel;
 use super::forecast::{CostPoint, Forecast, forecast};
 use super::goals::{Errors, Goal};
-use super::light_level::{KeptError, LevelKey, LightLevel, LightState, LightStates};
+use super::light_level::{LightLevel, LightState, LightStates};
 use super::map_size::Sizes;
-use super::metric::ErrorTerms;
 use super::shards::{PassSums, ShardRole};
 use super::showing::Showing;
 use super::sizes::ChartCache;
 use super::spectra::Spectra;
+use super::splat_level::LEVEL_STRIDES;
 use crate::error::{Error, Result, Warning};
-use crate::illumination::accumulator::FluxUnit;
-use crate::illumination::{Receiver, Side};
-use crate::light_pass::accuracy::{self, Images, LightError, PreviousRound};
+use crate::light_pass::accuracy::LightError;
 use crate::light_pass::footprint_statistics::FootprintStatistics;
-use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
+use crate::light_pass::pass_report::{PassReport, ProgressScope};
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::shard_index::ShardIndex;
 use crate::light_pass::visibility::{LightVisibility, VisibleLight};
-use crate::light_pass::wavefront::refine::Round;
 use crate::plan::{Effect, EffectPlan};
 use crate::progress::{Control, Progress};
-use crate::settings::{BakeSettings, Estimator};
+use crate::settings::BakeSettings;
 use crate::transport::Tracer;
-
-/// Levels needed for an error estimate; each lattice has half the step of the one before.
-pub(super) const ESTIMATED_LEVELS: usize = 3;
-
-/// A round of refinement aims at this fraction of the target, so that a near miss does not cost another round.
-const GOAL: f64 = 0.85;
-
-/// Lower bound of a round's goal, relative to the error before it.
-const ROUND_GAIN: f64 = 0.4;
-
-/// Maximum rounds of refinement; cells are then 2¹⁶ times smaller than the first ones.
-const MAX_ROUNDS: usize = 8;
 
 /// Fraction of the time limit for this layer if indirect light is still to be gathered.
 const PART_BEFORE_INDIRECT: f64 = 0.85;
@@ -99,9 +84,6 @@ pub(super) struct LightProgress<'a> {
     pub(super) carrier: Carrier,
     /// From coarse to fine.
     pub(super) levels: Vec<LightLevel>,
-    pub(super) rounds: Vec<Round>,
-    /// Relative RMSE that the last round aims at.
-    pub(super) goal: Option<f64>,
     /// Relative RMSE of this light's maps that the target of the whole bake asks for.
     pub(super) target_rmse: Option<f64>,
     pub(super) done: bool,
@@ -116,8 +98,6 @@ impl<'a> LightProgress<'a> {
             state,
             carrier,
             levels: Vec::new(),
-            rounds: Vec::new(),
-            goal: None,
             target_rmse: None,
             done: false,
             is_underrated: false,
@@ -134,7 +114,7 @@ impl<'a> LightProgress<'a> {
 
     /// Error of the last level, if known.
     pub(super) fn error(&self) -> Option<&LightError> {
-        Some(&self.levels.last()?.error.as_ref()?.estimate)
+        self.levels.last()?.error.as_ref()
     }
 }
 
@@ -268,7 +248,7 @@ impl CausticLayer<'_> {
                 terms = self.error_terms(&lights, showing.as_deref_mut());
                 errors = self.errors(&lights, &terms);
             }
-            self.decide(&mut lights, &errors, &terms);
+            self.decide(&mut lights, &errors);
             self.note_cost(states, &lights, &errors, &mut context);
             // The first picture ignores the time limit, the others respect it.
             context.control = &limited;
@@ -282,13 +262,8 @@ impl CausticLayer<'_> {
         let spare_bytes = context.spare_bytes;
         outcome.stopped = self.stopped(&lights, &errors, &limited);
         for mut light in lights {
-            if let Some(level) = light.levels.last() {
+            if !light.levels.is_empty() {
                 outcome.finished.push(light.visible.light);
-                let strays = level
-                    .strays
-                    .iter()
-                    .map(|&receiver| self.stray(light.visible, receiver));
-                outcome.warnings.extend(strays);
             }
             light.state.keep(light.levels, spare_bytes);
             states.put(light.visible.light, light.state);
@@ -303,10 +278,8 @@ impl CausticLayer<'_> {
         let moving = (lights.len() > 1 && scene.is_animated()).then_some(&**scene);
         let begin = |light: &'b VisibleLight| {
             let mut state = states.take(light.light);
-            let has_bumps = self.plan.is_on(Effect::Bumps);
-            let spectrum = self.spectra.key(light.light);
             let bytes = self.kept_light_bytes();
-            state.begin(light, (has_bumps, spectrum), bytes, moving);
+            state.begin(light, self.spectra.has(light.light), bytes, moving);
             LightProgress::new(light, state, self.carrier())
         };
         lights.into_iter().map(begin).collect()
@@ -339,16 +312,9 @@ impl CausticLayer<'_> {
             wall_s: clock.plan.wall + clock.trace.wall + clock.deposit.wall,
             bytes: states.bytes() + kept.sum::<u64>() + held.sum::<u64>(),
             error,
-            is_coarse: lights.iter().any(|light| {
-                let begins = match light.carrier {
-                    Carrier::Photons => 1,
-                    _ => self.lattices(light.visible).len(),
-                };
-                !light.done && light.levels.len() < begins
-            }),
             is_by_photons: lights
                 .iter()
-                .filter_map(|light| light.levels.last()?.key.photons?.count())
+                .filter_map(|light| light.levels.last()?.key.photons.as_ref()?.count())
                 .next()
                 .is_some(),
         };
@@ -360,24 +326,6 @@ impl CausticLayer<'_> {
             self.progress.expect(&expected.in_words());
             context.outcome.forecast.get_or_insert((point, expected));
         }
-    }
-
-    /// The warning about a map that was dropped.
-    fn stray(&self, light: &VisibleLight, receiver: Receiver) -> Warning {
-        let scene = self.tracer.scene();
-        Warning::new(
-            &scene.objects[receiver.object()].name,
-            format!(
-                "light of `{}` on its {} side is less than a millionth as bright as on the other maps, and is left out",
-                scene.lights[light.light].name,
-                if receiver.side() == Side::Front {
-                    "front"
-                } else {
-                    "back"
-                }
-            ),
-            "bake with more --density if it should be there",
-        )
     }
 
     /// Why no finer level follows.
@@ -424,58 +372,28 @@ impl CausticLayer<'_> {
         let key = self.key(light, None, context);
         let made = match light.state.take(&key) {
             Some(level) => Some(level),
-            None => self.make(light, key, unit, context)?,
+            None => self.make_splats(light, key, unit, context)?,
         };
-        let Some(mut level) = made else {
-            return Ok(());
-        };
-        if level.key.trace.is_negligible {
-            // No better estimate is worth its cost: all of its light counts as error.
-            let whole = accuracy::images(&level.maps, level.unit);
-            let estimate = accuracy::by_difference(&whole, &Images::new(), 1.0, &level.energy());
-            level.error = estimate.map(|estimate| KeptError {
-                predecessors: 0,
-                estimate,
-            });
+        if let Some(mut level) = made {
+            if level.error.is_none() && !context.control.is_cancelled() {
+                level.error = self.error_of_splats(light, &level, context)?;
+            }
             light.levels.push(level);
-            light.done = true;
-            return Ok(());
         }
-        self.push_judged(light, level, context)
-    }
-
-    /// Adds a level with its estimated error.
-    pub(super) fn push_judged(
-        &self,
-        light: &mut LightProgress,
-        mut level: LightLevel,
-        context: &mut BakeContext,
-    ) -> Result<()> {
-        let predecessors = light.levels.len().min(ESTIMATED_LEVELS - 1);
-        let is_known = |error: &KeptError| error.predecessors == predecessors;
-        if !level.error.as_ref().is_some_and(is_known) && !context.control.is_cancelled() {
-            let estimate = self.error_of(light, &level, context)?;
-            level.error = estimate.map(|estimate| KeptError {
-                predecessors,
-                estimate,
-            });
-        }
-        light.levels.push(level);
         Ok(())
     }
 
-    /// Decides which lights continue, and towards which goal.
-    fn decide(&self, lights: &mut [LightProgress], errors: &Errors, terms: &ErrorTerms) {
+    /// Decides which lights continue.
+    fn decide(&self, lights: &mut [LightProgress], errors: &Errors) {
         let goals = self.goals(lights, errors);
         for (light, goal) in lights.iter_mut().zip(goals).filter(|(light, _)| !light.done) {
             light.done = match goal {
                 Goal::Converged => true,
                 Goal::NextLevel => !self.has_next_level(light),
-                Goal::Refine(target) if light.carrier == Carrier::Photons => {
+                Goal::Refine(target) => {
                     let is_good = light.error().is_some_and(|error| error.relative_rmse <= target);
                     is_good || !self.has_next_level(light)
                 }
-                Goal::Refine(target) => !self.refine(light, target, terms),
             };
         }
     }
@@ -485,83 +403,8 @@ impl CausticLayer<'_> {
             Carrier::Photons => self
                 .next_aim(light.visible, light.levels.last(), light.target_rmse)
                 .is_some(),
-            _ => light.levels.len() < self.lattices(light.visible).len(),
+            Carrier::Splats => light.levels.len() < LEVEL_STRIDES.len(),
         }
-    }
-
-    fn make(
-        &self,
-        light: &mut LightProgress,
-        key: LevelKey,
-        unit: FluxUnit,
-        context: &mut BakeContext,
-    ) -> Result<Option<LightLevel>> {
-        match self.settings.estimator {
-            estimator if estimator.refines() => self.make_wavefront(light, key, unit, context),
-            _ => self.make_splats(light, key, unit, context),
-        }
-    }
-
-    /// Error of a level, estimated from the levels before it; `None` while unknown, and for a shard's part.
-    fn error_of(
-        &self,
-        light: &LightProgress,
-        level: &LightLevel,
-        context: &mut BakeContext,
-    ) -> Result<Option<LightError>> {
-        let is_shard = context.role.is_shard();
-        let energy = level.energy();
-        Ok(match self.settings.estimator {
-            estimator if estimator.refines() && is_shard => None,
-            estimator if estimator.refines() => {
-                let watch = Stopwatch::start();
-                let levels = light.levels.iter().rev().take(ESTIMATED_LEVELS - 1);
-                let coarser: Vec<Images> = levels
-                    .map(|level| accuracy::images(&level.maps, level.unit))
-                    .collect();
-                let before = light.rounds.last().zip(light.error()).map(|(round, error)| {
-                    let refined = &round.tiles;
-                    PreviousRound { error, refined }
-                });
-                let fine = accuracy::images(&level.maps, level.unit);
-                let estimate = accuracy::estimate(&fine, [coarser.first(), coarser.get(1)], before, &energy);
-                context.clock.deposit.add(watch.elapsed());
-                estimate
-            }
-            _ => {
-                let thinner = self.thinned_images(light, level, context)?;
-                match (thinner, &level.noise) {
-                    (Some(thinner), Some(noise)) if !is_shard => {
-                        let fine = accuracy::images(&level.maps, level.unit);
-                        accuracy::estimate_splats(&fine, &thinner, noise, &energy)
-                    }
-                    _ => None,
-                }
-            }
-        })
-    }
-
-    /// Plans another round of refinement towards a relative RMSE; false if nothing is left to refine.
-    fn refine(&self, light: &mut LightProgress, target: f64, terms: &ErrorTerms) -> bool {
-        let (Some(error), Some(level)) = (light.error(), light.levels.last()) else {
-            return false;
-        };
-        let is_spent = self.settings.estimator == Estimator::Splat || light.rounds.len() >= MAX_ROUNDS;
-        if error.relative_rmse <= target || is_spent {
-            return false;
-        }
-        // One round hardly gains more, and smaller steps leave a result to show if time runs out.
-        let goal = (GOAL * target).max(ROUND_GAIN * error.relative_rmse);
-        let counted = match terms {
-            ErrorTerms::Rmse => None,
-            ErrorTerms::Visible(counts) => Some(counts.of_tiles(level, error)),
-        };
-        let tiles = accuracy::rough_tiles(error, goal, counted.as_ref());
-        let is_any = !tiles.is_empty();
-        let round = Round::new(tiles, &level.overshoots[..]);
-        light.rounds.push(round);
-        light.goal = Some(goal);
-        is_any
     }
 }
 
@@ -571,8 +414,7 @@ impl CausticOutcome {
         self.counts.rays += report.rays;
         self.counts.segments += report.segments;
         self.counts.splats += report.splats;
-        self.counts.cells += report.cells;
-        self.counts.receiver_queries += report.receiver_queries;
+        self.counts.cells += report.squares;
         clock.trace.add(report.trace_s);
         clock.deposit.add(report.deposit_s);
     }

@@ -73,7 +73,7 @@ impl MapAssembler<'_> {
                 .ledger
                 .report(&light.name, level.unit, level.strength(light));
             LightLedger {
-                carried_w: level.carried_w(ledger.energy_w.deposited, light, self.settings.estimator),
+                carried_w: level.carried_w(ledger.energy_w.deposited, light),
                 ..ledger.with_radiant(level.radiant, level.deposited_radiant_w(light))
             }
         });
@@ -421,7 +421,7 @@ fn error_of(chart: &Chart, lit: &[LitMap]) -> Option<Vec<f32>> {
     let mut squares = vec![0.0; chart.texel_count()];
     for (light, level, _) in lit {
         let strength = light.strength().luminance();
-        let error = &level.error.as_ref()?.estimate;
+        let error = level.error.as_ref()?;
         for (square, texel) in squares.iter_mut().zip(&error.maps.get(&chart.receiver)?.texels) {
             *square += (f64::from(*texel) * strength).powi(2);
         }

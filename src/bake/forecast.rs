@@ -17,13 +17,11 @@ pub struct CostPoint {
     /// Wall-clock time of the same stages [s].
     #[serde(default)]
     pub wall_s: f64,
-    /// Memory held for maps, rays and patches [bytes].
+    /// Memory held for maps, rays and bundles [bytes].
     pub bytes: u64,
     /// Estimated error of all maps, in the metric of the bake.
     #[serde(alias = "relative_rmse")]
     pub error: f64,
-    /// Whether the lattice that refinement starts from is still to come; no bake ends before it.
-    pub is_coarse: bool,
     /// Whether photons carry some light without bundles; they then dominate the cost.
     #[serde(default)]
     pub is_by_photons: bool,
@@ -41,7 +39,7 @@ pub struct Forecast {
     /// Wall-clock time [s], if threads stay as busy as so far.
     #[serde(default)]
     pub wall_s: f64,
-    /// Memory for maps, rays and patches [bytes].
+    /// Memory for maps, rays and bundles [bytes].
     pub bytes: u64,
     /// The cost may be this many times higher or lower; 1 if it was measured.
     pub factor: f64,
@@ -58,40 +56,14 @@ pub struct ForecastReport {
     pub actual: CostPoint,
 }
 
-/// Growth of a cost in the course of a bake.
-#[derive(Clone, Copy, Debug)]
-struct Growth {
-    /// Typical exponent of 1/error.
-    usual_exponent: f64,
-    /// Factor at the lattice that refinement starts from.
-    beginning: f64,
-}
-
-/// Bundles, fitted to eight built-in scenes. `nephroid study accuracy`, targets of 5 to 1 %: forecast over actual rays is
-/// 0.46 to 1.45; at 0.5 % it is down to 0.19, as finer levels take more photons beside edges.
-const RAYS: Growth = Growth {
-    usual_exponent: 0.7,
-    beginning: 2.2,
-};
-/// The same; smaller, because the cost of texels does not depend on rays.
-const SECONDS: Growth = Growth {
-    usual_exponent: 0.55,
-    beginning: 2.0,
-};
+/// Typical exponents of 1/error in the growth of rays and seconds: those of bundles are fitted to eight built-in scenes.
+/// `nephroid study accuracy`, targets of 5 to 1 %: forecast over actual rays is 0.46 to 1.45. Seconds grow less, because
+/// the cost of texels does not depend on rays.
+const BUNDLES: [f64; 2] = [0.7, 0.55];
 /// Splats: every cost is proportional to rays, and the error falls about with their square root.
-const SPLATS: Growth = Growth {
-    usual_exponent: 1.8,
-    beginning: 1.0,
-};
-
+const SPLATS: [f64; 2] = [1.8; 2];
 /// Noise falls with the square root of the number of photons.
-const PHOTONS: Growth = Growth {
-    usual_exponent: 2.0,
-    beginning: 1.0,
-};
-
-/// Typical factor by which the error falls at the lattice that refinement starts from.
-const BEGINNING_GAIN: f64 = 3.0;
+const PHOTONS: [f64; 2] = [2.0; 2];
 
 /// Range of exponents.
 const EXPONENTS: (f64, f64) = (0.3, 4.0);
@@ -111,8 +83,7 @@ const MIN_FACTOR: f64 = 2.0;
 /// Predicted cost of `target` with an estimator; `None` while no error is known. Splats are not refined: for them it is
 /// the cost of another bake with more rays.
 pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Option<Forecast> {
-    let met =
-        |point: &&CostPoint| (!point.is_coarse || estimator == Estimator::Splat) && point.error <= target;
+    let met = |point: &&CostPoint| point.error <= target;
     let of_point = |point: &CostPoint, times: [f64; 2], factor: f64| Forecast {
         target,
         rays: (point.rays.max(1) as f64 * times[0]) as u64,
@@ -126,20 +97,18 @@ pub fn forecast(course: &[CostPoint], target: f64, estimator: Estimator) -> Opti
         return Some(of_point(point, [1.0, 1.0], 1.0));
     }
     let last = course.last()?;
-    let (growths, is_coarse, level) = match estimator {
-        Estimator::Splat => ([SPLATS, SPLATS], false, 1.0),
-        _ if last.is_by_photons => ([PHOTONS, PHOTONS], false, 1.0),
-        _ => ([RAYS, SECONDS], last.is_coarse, WHOLE_LEVEL),
+    let (exponents, level) = match estimator {
+        Estimator::Splat => (SPLATS, 1.0),
+        _ if last.is_by_photons => (PHOTONS, 1.0),
+        _ => (BUNDLES, WHOLE_LEVEL),
     };
-    let beginning = if is_coarse { BEGINNING_GAIN } else { 1.0 };
-    let gain = (last.error / beginning / target).max(1.0);
+    let gain = (last.error / target).max(1.0);
     let costs: [fn(&CostPoint) -> f64; 2] = [|point| point.rays as f64, |point| point.cpu_s];
     let times = [0, 1].map(|which| {
-        let begun = if is_coarse { growths[which].beginning } else { 1.0 };
-        let slope = Slope::of(course, costs[which], growths[which].usual_exponent);
-        begun * level * gain.powf(slope.exponent)
+        let slope = Slope::of(course, costs[which], exponents[which]);
+        level * gain.powf(slope.exponent)
     });
-    let doubt = Slope::of(course, costs[1], growths[1].usual_exponent).doubt;
+    let doubt = Slope::of(course, costs[1], exponents[1]).doubt;
     let factor = (doubt * gain.ln()).exp().max(1.0);
     Some(of_point(last, times, factor.max(MIN_FACTOR)))
 }
@@ -154,10 +123,10 @@ struct Slope {
 }
 
 impl Slope {
-    /// Least-squares fit through the levels since refinement started, drawn towards the usual exponent where it rests
+    /// Least-squares fit through the levels, drawn towards the usual exponent where it rests
     /// on little data.
     fn of(course: &[CostPoint], cost: fn(&CostPoint) -> f64, usual: f64) -> Self {
-        let is_measured = |point: &&CostPoint| !point.is_coarse && cost(point) > 0.0;
+        let is_measured = |point: &&CostPoint| cost(point) > 0.0;
         let logarithms = |point: &CostPoint| (-point.error.ln(), cost(point).ln());
         let points: Vec<(f64, f64)> = course.iter().filter(is_measured).map(logarithms).collect();
         let count = points.len().max(1) as f64;
@@ -235,13 +204,12 @@ mod tests {
             wall_s: 0.5 * cpu_s,
             bytes: 1000,
             error,
-            is_coarse: false,
             is_by_photons: false,
         }
     }
 
     fn to(course: &[CostPoint], target: f64) -> Forecast {
-        forecast(course, target, Estimator::Wavefront).expect("known")
+        forecast(course, target, Estimator::Auto).expect("known")
     }
 
     #[test]
@@ -263,17 +231,7 @@ mod tests {
         let course = [point(1_000, 0.1, 0.2), point(4_000, 0.3, 0.05)];
         let met = to(&course, 0.1);
         assert_eq!((met.rays, met.factor), (4_000, 1.0));
-        assert_eq!(forecast(&[], 0.1, Estimator::Wavefront), None);
-    }
-
-    #[test]
-    fn no_bake_ends_on_a_coarse_lattice() {
-        let coarse = CostPoint {
-            is_coarse: true,
-            ..point(1_000, 0.1, 0.01)
-        };
-        let next = to(&[coarse], 0.05);
-        assert!(next.rays > 1_200 && next.factor > 1.2, "{next:?}");
+        assert_eq!(forecast(&[], 0.1, Estimator::Auto), None);
     }
 
     #[test]
@@ -283,7 +241,7 @@ mod tests {
             vec![point(900, 0.1, 0.2), point(1_000, 0.1, 0.2)],
         ] {
             let next = to(&course, 0.02);
-            let usual = 0.1 * WHOLE_LEVEL * 10_f64.powf(SECONDS.usual_exponent);
+            let usual = 0.1 * WHOLE_LEVEL * 10_f64.powf(BUNDLES[1]);
             assert!((next.cpu_s / usual - 1.0).abs() < 1e-9, "{next:?}");
         }
     }

@@ -3,14 +3,12 @@
 
 use std::collections::BTreeMap;
 
-use super::carrier::Carrier;
 use super::caustic::{CausticLayer, LightProgress};
 use super::metric::ErrorTerms;
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::visibility::VisibleLight;
 
-/// A light whose share of the error is below this fraction of the limit skips its remaining lattices; one whose whole
-/// flux is below it is dim.
+/// A light whose whole flux is below this fraction of the limit is dim.
 const NEGLIGIBLE: f64 = 0.25;
 
 /// Fraction of the squared target that all dim lights together may contribute.
@@ -21,7 +19,7 @@ const DIM_SHARE: f64 = 0.5;
 pub(super) enum Goal {
     /// No further refinement.
     Converged,
-    /// The next lattice.
+    /// The next level.
     NextLevel,
     /// A relative RMSE of the light's own maps.
     Refine(f64),
@@ -124,7 +122,7 @@ impl CausticLayer<'_> {
         };
         let of = |(index, light): (usize, &LightProgress)| {
             let level = light.levels.last()?;
-            let error = &level.error.as_ref()?.estimate;
+            let error = level.error.as_ref()?;
             let strength = level.strength(&self.tracer.scene().lights[light.visible.light]);
             Some(ErrorOfLight {
                 index,
@@ -152,7 +150,7 @@ impl CausticLayer<'_> {
                 .collect();
             areas_m2.extend(of_light.iter().copied());
             let area_m2: f64 = of_light.iter().map(|(_, m2)| m2).sum();
-            let error = &level.error.as_ref()?.estimate;
+            let error = level.error.as_ref()?;
             Some((index, error.relative_rmse, flux_w, area_m2))
         };
         let known: Vec<(usize, f64, f64, f64)> = lights.iter().enumerate().filter_map(of).collect();
@@ -174,42 +172,16 @@ impl CausticLayer<'_> {
 
     /// The next goal of each light. Also updates its target.
     pub(super) fn goals(&self, lights: &mut [LightProgress], errors: &Errors) -> Vec<Goal> {
-        let has_ladder = |light: &LightProgress| {
-            light.carrier != Carrier::Photons && light.levels.len() < self.lattices(light.visible).len()
-        };
+        let mut goals = vec![Goal::NextLevel; lights.len()];
         let Some(target) = self.settings.max_error else {
-            return vec![Goal::NextLevel; lights.len()];
+            return goals;
         };
-        let all_known = errors.are_of_all(lights);
-        let has_others = lights.len() > 1;
         let level = errors.level(target);
-        // Without an error there is nothing to aim at after the last lattice.
-        let without_error = |light: &LightProgress| {
-            if has_ladder(light) || light.carrier == Carrier::Photons {
-                Goal::NextLevel
-            } else {
-                Goal::Converged
-            }
-        };
-        let mut goals: Vec<Goal> = lights.iter().map(without_error).collect();
-        for &ErrorOfLight {
-            index,
-            relative_rmse,
-            share,
-        } in &errors.lights
-        {
-            let light = &mut lights[index];
-            light.target_rmse = (share > 0.0 && level.is_finite()).then(|| relative_rmse * level / share);
-            goals[index] = if has_ladder(light) {
-                let is_negligible = all_known && has_others && share < NEGLIGIBLE * level;
-                if is_negligible && level.is_finite() {
-                    Goal::Converged
-                } else {
-                    Goal::NextLevel
-                }
-            } else {
-                light.target_rmse.map_or(Goal::Converged, Goal::Refine)
-            };
+        for error in &errors.lights {
+            let light = &mut lights[error.index];
+            let has_limit = error.share > 0.0 && level.is_finite();
+            light.target_rmse = has_limit.then(|| error.relative_rmse * level / error.share);
+            goals[error.index] = light.target_rmse.map_or(Goal::Converged, Goal::Refine);
         }
         goals
     }

@@ -1,4 +1,4 @@
-//! What a baker caches for one light: rays, and the maps of the last bake's levels.
+//! What a baker caches for one light: squares or arrivals, and the maps of the last bake's levels.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,7 +8,6 @@ use super::band_maps::BandMaps;
 use super::map_size::Sizes;
 use super::spectra::SpectralKey;
 use crate::geometry::enclosure::Bounds;
-use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy::{LightError, Noise};
 use crate::light_pass::footprint_statistics::FootprintStatistics;
@@ -18,14 +17,9 @@ use crate::light_pass::photon::residual::LightSquares;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::splat::arrival_cache::ArrivalCache;
 use crate::light_pass::visibility::VisibleLight;
-use crate::light_pass::wavefront::cell::SubdivisionLimits;
-use crate::light_pass::wavefront::kept_rays::RayCache;
-use crate::light_pass::wavefront::overshoot::PatchOvershoot;
-use crate::light_pass::wavefront::pass::TracedLight;
-use crate::light_pass::wavefront::refine::Round;
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, Scene};
-use crate::settings::{BakeSettings, Estimator};
+use crate::settings::BakeSettings;
 use crate::transport::{EffectSet, TraversedCells};
 
 /// Everything that a light's paths depend on besides the scene.
@@ -35,15 +29,8 @@ pub(super) struct TraceKey {
     pub(super) settings: BakeSettings,
     /// Effects that are on.
     pub(super) effects: EffectSet,
-    /// Cells across and down each face.
-    pub(super) size: (usize, usize),
-    /// How many lattices this one comes before the usual finest, if surfaces have bumps: cells may miss that much of
-    /// them.
-    pub(super) coarser: i32,
-    /// How often cells may be split.
-    pub(super) splits: SubdivisionLimits,
-    /// Where cells are subdivided further, round by round.
-    pub(super) rounds: Vec<Round>,
+    /// Cells across and down each face of the lattice of splats.
+    pub(super) lattice: Option<(usize, usize)>,
     /// What its wavelengths depend on, if it is traced by wavelength.
     pub(super) spectrum: Option<SpectralKey>,
     /// Whether the light is treated as hardly visible beside the others.
@@ -58,10 +45,8 @@ pub(super) type StatisticsKey = (BTreeMap<usize, TraceKey>, f64);
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct LevelKey {
     pub(super) trace: TraceKey,
-    /// Sizes of the maps, the same for all rounds.
+    /// Sizes of the maps.
     pub(super) sizes: Sizes,
-    /// Size of triangles relative to the usual.
-    pub(super) coarseness: f64,
     /// Kernels of splats; settings that do not matter to them are at their defaults.
     pub(super) kernels: BakeSettings,
     /// Only every `stride`-th ray across and down is traced (splats).
@@ -71,26 +56,24 @@ pub(super) struct LevelKey {
 }
 
 /// What a level of photons aims at.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum PhotonAim {
     /// So many photons in each half, and no bundles.
     Count(u32),
-    /// A relative RMSE, by bundles and residual photons.
-    Goal(f64),
+    /// Relative RMSEs, by bundles and residual photons: that of the level, after those of the levels before it, on whose
+    /// squares it builds.
+    Goals(Vec<f64>),
 }
 
 impl PhotonAim {
     /// Photons in each half, if that is the aim.
-    pub(super) fn count(self) -> Option<u32> {
+    pub(super) fn count(&self) -> Option<u32> {
         match self {
-            Self::Count(photons) => Some(photons),
-            Self::Goal(_) => None,
+            Self::Count(photons) => Some(*photons),
+            Self::Goals(_) => None,
         }
     }
 }
-
-/// Levels that are kept whatever their size, because an error estimate needs them.
-const LEVELS_TO_KEEP: usize = 3;
 
 /// Maps of one light at one level, as of a white light of unit strength.
 #[derive(Debug)]
@@ -107,23 +90,16 @@ pub(super) struct LightLevel {
     pub(super) reach_m: f64,
     /// Energy of all paths.
     pub(super) ledger: LedgerSum,
-    /// Maps that were dropped because next to no light reached them.
-    pub(super) strays: Vec<Receiver>,
-    /// Patches that reach farther than their rays.
-    pub(super) overshoots: Vec<PatchOvershoot>,
     /// Squared difference between the half sets of splats, by receiver.
     pub(super) noise: Option<Noise>,
     /// Relative RMSE that bundles and residual photons aimed at; 0 for other carriers.
     pub(super) goal: f64,
-    /// `None` if there are too few levels before it, or no light arrived.
-    pub(super) error: Option<KeptError>,
+    /// `None` for splats of a thinned lattice, or if no light arrived.
+    pub(super) error: Option<LightError>,
     /// Sums that the next level adds to; only the last level of a light by photons has them.
     pub(super) photons: Option<PhotonSums>,
-    /// Work of the level if nothing were cached: cells of patches and receiver queries, or closest-hit queries of
-    /// photons and 0.
-    pub(super) work: (u64, u64),
-    /// Paths that can be deposited again; `None` if they were too large to keep.
-    pub(super) traced: Option<TracedLight>,
+    /// Closest-hit queries of its photons if nothing were cached.
+    pub(super) segments: u64,
     /// Whether the maps include the light's colour.
     pub(super) has_own_colour: bool,
 }
@@ -143,14 +119,6 @@ impl PhotonSums {
             half.add(more);
         }
     }
-}
-
-/// An error estimate and its basis.
-#[derive(Clone, Debug)]
-pub(super) struct KeptError {
-    /// Number of coarser levels that it is based on.
-    pub(super) predecessors: usize,
-    pub(super) estimate: LightError,
 }
 
 /// What is kept of all lights of a scene between bakes.
@@ -195,6 +163,16 @@ impl LightStates {
     }
 }
 
+/// Squares of a light's launch domain, and what they depend on.
+#[derive(Debug)]
+pub(super) struct KeptSquares {
+    pub(super) trace: TraceKey,
+    pub(super) sizes: Sizes,
+    /// Goals that they were refined for, one after the other.
+    pub(super) goals: Vec<f64>,
+    pub(super) squares: LightSquares,
+}
+
 /// What is kept of one light between bakes.
 #[derive(Debug, Default)]
 pub(super) struct LightState {
@@ -202,18 +180,11 @@ pub(super) struct LightState {
     visible: Option<VisibleLight>,
     /// Where they went, of all that is kept.
     pub(super) traversed: Option<Arc<TraversedCells>>,
-    /// Whether bumps bent its rays.
-    has_bumps: bool,
-    /// What the wavelengths of its rays depended on.
-    spectrum: Option<SpectralKey>,
-    /// Hits of its rays.
-    pub(super) rays: RayCache,
     /// Levels of the last bake, from coarse to fine.
     pub(super) levels: Vec<LightLevel>,
     /// Wall-clock time per photon of each half in the last level of photons [s].
     pub(super) photon_s: Option<f64>,
-    /// Squares of its launch domain, and what they depend on.
-    pub(super) squares: Option<(TraceKey, Sizes, LightSquares)>,
+    pub(super) squares: Option<KeptSquares>,
     /// Wall-clock time of the last level with a goal [s].
     pub(super) goal_s: Option<f64>,
     /// Arrivals that splats were made of.
@@ -249,23 +220,19 @@ impl LightLevel {
     }
 
     /// Deposited flux by carrier [W].
-    pub(super) fn carried_w(&self, deposited: f64, light: &Light, estimator: Estimator) -> CarriedFlux {
+    pub(super) fn carried_w(&self, deposited: f64, light: &Light) -> CarriedFlux {
         let bundles = self
             .ledger
             .watts(Account::Bundled, self.unit, self.strength(light));
         let nothing = CarriedFlux::default();
-        match (self.key.photons, estimator) {
-            (Some(_), _) => CarriedFlux {
+        match &self.key.photons {
+            Some(_) => CarriedFlux {
                 bundles,
                 photons: deposited - bundles,
                 ..nothing
             },
-            (None, Estimator::Splat) => CarriedFlux {
+            None => CarriedFlux {
                 splats: deposited,
-                ..nothing
-            },
-            (None, _) => CarriedFlux {
-                patches: deposited,
                 ..nothing
             },
         }
@@ -277,20 +244,17 @@ impl LightLevel {
         let all = std::iter::once(&self.maps)
             .chain(self.bands.iter().map(|band| &band.maps))
             .chain(halves.flat_map(BandMaps::sets));
-        let error = self.error.iter().flat_map(|error| error.estimate.maps.values());
-        all.map(ReceiverMaps::bytes).sum::<u64>()
-            + error.map(|map| 4 * map.texels.len() as u64).sum::<u64>()
-            + self.traced.as_ref().map_or(0, TracedLight::bytes)
+        let error = self.error.iter().flat_map(|error| error.maps.values());
+        all.map(ReceiverMaps::bytes).sum::<u64>() + error.map(|map| 4 * map.texels.len() as u64).sum::<u64>()
     }
 }
 
 impl LightState {
     /// Memory of everything that is kept [bytes].
     pub(super) fn bytes(&self) -> u64 {
-        self.rays.bytes()
-            + self.levels.iter().map(LightLevel::bytes).sum::<u64>()
+        self.levels.iter().map(LightLevel::bytes).sum::<u64>()
             + self.arrivals.as_ref().map_or(0, |(_, arrivals)| arrivals.bytes())
-            + self.squares.as_ref().map_or(0, |(.., squares)| squares.bytes())
+            + self.squares.as_ref().map_or(0, |kept| kept.squares.bytes())
     }
 
     /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes. From then on their ways
@@ -298,7 +262,7 @@ impl LightState {
     pub(super) fn begin(
         &mut self,
         light: &VisibleLight,
-        (has_bumps, spectrum): (bool, Option<&SpectralKey>),
+        is_by_wavelength: bool,
         kept_bytes: u64,
         moving: Option<&Scene>,
     ) {
@@ -312,15 +276,10 @@ impl LightState {
         }
         self.visible = Some(light.clone());
         // Tracers of single wavelengths note nothing.
-        let noted = moving.filter(|_| spectrum.is_none()).and_then(Scene::bounds);
+        let noted = moving.filter(|_| !is_by_wavelength).and_then(Scene::bounds);
         self.traversed.take_if(|_| noted.is_none());
-        if self.rays.is_empty() && self.levels.is_empty() && self.traversed.is_none() {
+        if self.levels.is_empty() && self.traversed.is_none() {
             self.traversed = noted.map(|bounds| Arc::new(TraversedCells::within(bounds)));
-        }
-        let went_alike = self.has_bumps == has_bumps && self.spectrum.as_ref() == spectrum;
-        (self.has_bumps, self.spectrum) = (has_bumps, spectrum.cloned());
-        if self.rays.bytes() > kept_bytes || !went_alike {
-            self.rays = RayCache::default();
         }
         self.arrivals
             .take_if(|(_, arrivals)| arrivals.bytes() > kept_bytes);
@@ -336,16 +295,16 @@ impl LightState {
             .all(|&(object, bounds)| !traversed.meets(bounds) && !visible.is_aimed_at(object, bounds, scene))
     }
 
-    /// Drops maps whose paths changed. Rays stay, as their cache knows which of them are valid.
+    /// Drops maps whose paths changed.
     pub(super) fn forget_maps(&mut self) {
         self.levels.clear();
         self.squares = None;
         self.arrivals = None;
     }
 
-    /// Drops squares that take more than so many bytes. They are made anew when needed, without what photons found.
+    /// Drops squares that take more than so many bytes. They are made anew when needed.
     pub(super) fn fit_squares(&mut self, most_bytes: u64) {
-        self.squares.take_if(|(.., squares)| squares.bytes() > most_bytes);
+        self.squares.take_if(|kept| kept.squares.bytes() > most_bytes);
     }
 
     /// Removes and returns the level with a key, if there is one.
@@ -354,18 +313,10 @@ impl LightState {
         Some(self.levels.remove(place))
     }
 
-    /// Removes and returns the traced paths of a level that differs in its maps alone.
-    pub(super) fn take_traced(&mut self, key: &LevelKey) -> Option<TracedLight> {
-        self.levels
-            .iter_mut()
-            .find(|level| level.key.trace == key.trace && level.traced.is_some())
-            .and_then(|level| level.traced.take())
-    }
-
     /// Keeps the levels of a bake for the next one.
     pub(super) fn keep(&mut self, levels: Vec<LightLevel>, spare_bytes: u64) {
         self.levels = levels;
-        drop_coarse(&mut self.levels, LEVELS_TO_KEEP, spare_bytes);
+        drop_coarse(&mut self.levels, 1, spare_bytes);
     }
 }
 

@@ -47,7 +47,7 @@ impl CausticLayer<'_> {
         // Squares of lights that are done, and of the others.
         let squares = match settings.estimator {
             Estimator::Auto => 2 * settings.squares_bytes(),
-            Estimator::Photon | Estimator::Wavefront | Estimator::Splat => 0,
+            Estimator::Photon | Estimator::Splat => 0,
         };
         (
             settings.map_memory_bytes().saturating_sub(direct + squares),

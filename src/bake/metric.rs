@@ -119,16 +119,6 @@ impl Counts {
         squares.sum::<f64>().sqrt()
     }
 
-    /// Weighted squared errors of tiles.
-    pub(super) fn of_tiles(&self, level: &LightLevel, error: &LightError) -> BTreeMap<Receiver, Vec<f64>> {
-        let images = accuracy::images(&level.maps, level.unit);
-        let tiles = images.iter().map(|(&receiver, image)| {
-            let squares = self.squares(receiver, image, error, 0.0);
-            (receiver, image.tile_sums(&squares))
-        });
-        tiles.collect()
-    }
-
     /// Weighted squared errors of texels, including the truncated share of their light.
     fn squares(&self, receiver: Receiver, image: &Image, error: &LightError, truncated: f64) -> Vec<f64> {
         let (Some(counts), Some(map)) = (self.0.get(&receiver), error.maps.get(&receiver)) else {

@@ -28,7 +28,6 @@ mod sizes;
 mod spectra;
 mod splat_level;
 pub mod survey;
-mod wavefront_level;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -71,7 +70,7 @@ use spectra::Spectra;
 const PART_OF_DIRECT: f64 = 0.5;
 
 /// Owns a scene and everything derived from it, and bakes it again whenever scene or settings change. What a change
-/// does not affect is kept: hierarchy, parametrisations, item buffers, hits of rays, patches, maps and their errors.
+/// does not affect is kept: hierarchy, parametrisations, item buffers, squares and bundles, maps and their errors.
 #[derive(Debug)]
 pub struct Baker {
     scene: Arc<Scene>,
@@ -183,17 +182,6 @@ impl Baker {
             let is_beyond = |changed: &Vec<_>| state.is_beyond(changed, &self.scene);
             if is_other && !changed.as_ref().is_some_and(is_beyond) {
                 state.forget_maps();
-            }
-            if change.moves_paths() {
-                state.rays.begin_edit();
-            }
-            for &object in &change.shapes {
-                let nowhere = (glam::DVec3::INFINITY, glam::DVec3::NEG_INFINITY);
-                let bounds = scene.objects[object].bounds().unwrap_or(nowhere);
-                state.rays.shape_changed(object, bounds);
-            }
-            for &object in &change.directions {
-                state.rays.material_changed(object);
             }
         }
         for &light in &change.lights {

@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::band_maps::BandMaps;
 use super::bundle_level::BundleLevel;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{KeptError, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
+use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
@@ -62,12 +62,25 @@ fn in_time(photons: u32, before: u32, state: &LightState, context: &BakeContext)
     (affordable.max(least) as u32).min(photons)
 }
 
+/// Squared relative error of so many photons of equal flux in each half: that of T texels in which n photons arrive is T/n.
+fn square_by_count(sums: &PhotonSums, unit: FluxUnit, photons: u32) -> f64 {
+    let maps = sums.halves.iter().filter_map(|half| half.sets().first());
+    let texels = maps.map(|maps| maps.iter().map(|(_, map)| map.chart.texel_count()).sum::<usize>());
+    let watts = |account| sums.ledger.watts_of_largest(account, unit);
+    let arriving = f64::from(photons) * HALVES as f64 * watts(Account::Deposited) / watts(Account::Emitted);
+    texels.max().unwrap_or(0) as f64 / arriving
+}
+
 /// What a level consists of.
 #[derive(Clone, Copy)]
 pub(super) struct Layers<'a> {
     /// Light that bundles carry.
     pub(super) bundles: Option<&'a ReceiverMaps>,
     pub(super) photons: &'a PhotonSums,
+    /// Squared relative error that the flux of single photons tells.
+    pub(super) photon_square: f64,
+    /// Squared relative error of bundles that photons do not correct.
+    pub(super) bundle_square: f64,
 }
 
 impl CausticLayer<'_> {
@@ -78,7 +91,7 @@ impl CausticLayer<'_> {
         last: Option<&LightLevel>,
         target_rmse: Option<f64>,
     ) -> Option<u32> {
-        let before = last.and_then(|level| level.key.photons?.count());
+        let before = last.and_then(|level| level.key.photons.as_ref()?.count());
         let Some(target) = self.settings.max_error else {
             let wanted = self.photons_at_density(light);
             return match before {
@@ -90,7 +103,7 @@ impl CausticLayer<'_> {
             return Some(FIRST_PHOTONS);
         };
         let known = last.and_then(|level| {
-            let error = level.error.as_ref()?.estimate.relative_rmse;
+            let error = level.error.as_ref()?.relative_rmse;
             let truncated = accuracy::truncated_share(&level.energy());
             (error.is_finite() && error > 0.0).then_some((error, truncated))
         });
@@ -132,11 +145,16 @@ impl CausticLayer<'_> {
         last: Option<&LightLevel>,
         target_rmse: Option<f64>,
     ) -> Option<PhotonAim> {
-        let is_left_to_photons = matches!(last.and_then(|last| last.key.photons), Some(PhotonAim::Count(_)));
+        let before = last.and_then(|last| last.key.photons.as_ref());
+        let is_left_to_photons = matches!(before, Some(PhotonAim::Count(_)));
         match self.settings.max_error {
             Some(target) if !is_left_to_photons && self.has_bundles(light) => {
-                let goal = self.next_goal(last, target_rmse.unwrap_or(target));
-                goal.map(PhotonAim::Goal)
+                let mut goals = match before {
+                    Some(PhotonAim::Goals(goals)) => goals.clone(),
+                    _ => Vec::new(),
+                };
+                goals.push(self.next_goal(last, target_rmse.unwrap_or(target))?);
+                Some(PhotonAim::Goals(goals))
             }
             _ => self.next_photons(light, last, target_rmse).map(PhotonAim::Count),
         }
@@ -192,7 +210,7 @@ impl CausticLayer<'_> {
             return Ok(None);
         };
         let photons = match aim {
-            PhotonAim::Goal(goal) => match self.next_bundles(light, last.as_deref(), goal, context)? {
+            PhotonAim::Goals(goals) => match self.next_bundles(light, last.as_deref(), goals, context)? {
                 BundleLevel::Made(level) => return Ok(Some(*level)),
                 BundleLevel::Stopped => return Ok(None),
                 BundleLevel::LeftToPhotons => FIRST_PHOTONS,
@@ -201,7 +219,7 @@ impl CausticLayer<'_> {
         };
         let before = last
             .as_ref()
-            .and_then(|last| last.key.photons?.count())
+            .and_then(|last| last.key.photons.as_ref()?.count())
             .unwrap_or(0);
         let photons = in_time(photons, before, &light.state, context);
         let key = self.key(light, Some(PhotonAim::Count(photons)), context);
@@ -226,12 +244,16 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
         let unit = self.photon_unit(light)?;
-        let photons = key.photons.and_then(PhotonAim::count).unwrap_or(FIRST_PHOTONS);
+        let photons = key
+            .photons
+            .as_ref()
+            .and_then(PhotonAim::count)
+            .unwrap_or(FIRST_PHOTONS);
         let alike = |level: &&mut LightLevel| level.key.trace == key.trace && level.key.sizes == key.sizes;
         let earlier = before.filter(|level| alike(level) && level.photons.is_some());
         let first = earlier
             .as_ref()
-            .and_then(|level| level.key.photons?.count())
+            .and_then(|level| level.key.photons.as_ref()?.count())
             .unwrap_or(0);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
@@ -272,7 +294,8 @@ impl CausticLayer<'_> {
             ledger: sums.report.ledger,
             halves: sums.maps,
         };
-        if let Some((earlier, so_far)) = earlier.and_then(|level| Some((level.photons.take()?, level.work.0)))
+        if let Some((earlier, so_far)) =
+            earlier.and_then(|level| Some((level.photons.take()?, level.segments)))
         {
             raw.add(&earlier);
             segments += so_far;
@@ -283,10 +306,7 @@ impl CausticLayer<'_> {
             |clock| &mut clock.deposit,
             || self.photon_level(light, (key, unit), raw, is_shard),
         );
-        Ok(Some(LightLevel {
-            work: (segments, 0),
-            ..level
-        }))
+        Ok(Some(LightLevel { segments, ..level }))
     }
 
     fn photon_level(
@@ -296,15 +316,14 @@ impl CausticLayer<'_> {
         raw: PhotonSums,
         is_shard: bool,
     ) -> LightLevel {
-        let level = self.level_of_layers(
-            light,
-            (key, unit),
-            Layers {
-                bundles: None,
-                photons: &raw,
-            },
-            0.0,
-        );
+        let photons = key.photons.as_ref().and_then(PhotonAim::count).unwrap_or(0);
+        let layers = Layers {
+            bundles: None,
+            photons: &raw,
+            photon_square: square_by_count(&raw, unit, photons),
+            bundle_square: 0.0,
+        };
+        let level = self.level_of_layers(light, (key, unit), layers);
         LightLevel {
             error: level.error.filter(|_| !is_shard),
             photons: Some(raw),
@@ -312,14 +331,12 @@ impl CausticLayer<'_> {
         }
     }
 
-    /// A level from its bundles and the photons of both halves. `bundle_square`: squared relative error of bundles that
-    /// photons do not correct.
+    /// A level from its bundles and the photons of both halves.
     pub(super) fn level_of_layers(
         &self,
         light: &VisibleLight,
         (key, unit): (LevelKey, FluxUnit),
         layers: Layers,
-        bundle_square: f64,
     ) -> LightLevel {
         let mut ledger = layers.photons.ledger;
         self.spectra
@@ -335,7 +352,6 @@ impl CausticLayer<'_> {
         }
         let mut left = [0; 3];
         let [one, other] = [&first, &second].map(|half| accuracy::images(half, unit));
-        let doubt = accuracy::doubt_of_halves(&one, &other);
         let noise = if self.settings.filters() {
             let halves = [&first, &second].map(|half| &**half);
             filter::filter(&mut maps, halves, bundles, (unit, is_signed), &mut left)
@@ -350,17 +366,16 @@ impl CausticLayer<'_> {
             band.add(more);
         }
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
-        let estimate = accuracy::by_noise(&accuracy::images(&maps, unit), noise, &energy);
-        let error = estimate.map(|mut estimate| {
-            let square = estimate.relative_rmse.powi(2);
+        let light_of_maps = accuracy::images(&maps, unit);
+        let mut error = accuracy::by_noise(&light_of_maps, noise, &energy);
+        if let Some(error) = &mut error {
+            let square = error.relative_rmse.powi(2);
             // More photons do not recover truncated light, and nothing about it is left to chance.
-            let noise = square - accuracy::truncated_share(&energy).powi(2);
-            estimate.raise_to(square + noise * doubt + bundle_square);
-            KeptError {
-                predecessors: 0,
-                estimate,
-            }
-        });
+            let truncated = accuracy::truncated_share(&energy).powi(2);
+            let noise = accuracy::expected_noise(square - truncated, [&one, &other], layers.photon_square);
+            error.raise_to(noise + truncated);
+            error.add_to(noise + truncated + layers.bundle_square, &light_of_maps);
+        }
         LightLevel {
             error,
             ..self.level(light, (key, unit), (maps, bands), ledger)

@@ -50,11 +50,11 @@ pub struct BakeCounts {
     /// Bounces of indirect light until it converged.
     #[serde(default)]
     pub bounces: u32,
-    /// Interpolated rays tested against candidate receivers.
+    /// Interpolated rays tested against candidate receivers: none, as bundles interpolate where light arrives.
     pub receiver_queries: u64,
     /// Kernels deposited.
     pub splats: u64,
-    /// Wavefront cells deposited.
+    /// Squares of the launch domain whose bundles were deposited, level by level.
     pub cells: u64,
 }
 

@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use glam::DVec3;
 
-use super::caustic::ESTIMATED_LEVELS;
 use super::map_size::{self, Borders, MapSize, SizeRequest, Sizes, TileDemand};
 use crate::illumination::parametrisation::{Parametrisation, parametrise};
 use crate::illumination::tiles::{TileLayout, tile_counts};
@@ -41,7 +40,7 @@ const BYTES_PER_PHOTON_TEXEL: u64 = 2 * 24;
 /// photons, or about as much for finished maps and the weights of their errors.
 const BYTES_PER_TRACED_TEXEL: u64 = 2 * 24 + BYTES_PER_PHOTON_TEXEL;
 
-/// The same by patches and splats: finished maps and the weights of their errors; estimates from differences between
+/// The same by splats: finished maps and the weights of their errors; estimates from differences between
 /// maps take less.
 const BYTES_PER_ESTIMATED_TEXEL: u64 = BYTES_PER_TEXEL + 8;
 
@@ -82,10 +81,10 @@ impl MapMemory {
                 per_texel_of_largest: BYTES_PER_FILTERED_TEXEL,
                 lights,
             },
-            Estimator::Wavefront | Estimator::Splat => Self {
+            Estimator::Splat => Self {
                 per_texel: BYTES_PER_ESTIMATED_TEXEL,
-                // The levels that an error estimate needs.
-                per_lit_texel: ESTIMATED_LEVELS as u64 * BYTES_PER_LIT_TEXEL,
+                // Both halves, and the level of the first picture.
+                per_lit_texel: 3 * BYTES_PER_LIT_TEXEL,
                 per_texel_of_largest: 0,
                 lights,
             },

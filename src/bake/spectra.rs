@@ -14,8 +14,7 @@ use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::photon::spectrum::PhotonSpectrum;
 use crate::light_pass::receiver_maps::ReceiverMaps;
 use crate::light_pass::spectral_node::{SpectralNode, channels_within, to_linear_srgb};
-use crate::light_pass::visibility::{LightVisibility, VisibleLight};
-use crate::light_pass::wavefront::spectrum::{LightPart, LightSpectrum};
+use crate::light_pass::visibility::LightVisibility;
 use crate::optics::Nanometres;
 use crate::optics::spectrum::{Emission, Spectrum, WavelengthSampler, illuminant, xyz_bar};
 use crate::plan::{Effect, EffectPlan};
@@ -59,7 +58,7 @@ impl SpectralBand {
 #[derive(Debug, Default)]
 pub(super) struct Spectra {
     of_lights: BTreeMap<usize, SpectralLight>,
-    /// Bands, the same for every light; empty if wavelengths are interpolated.
+    /// Bands, the same for every light; empty if photons sample the whole spectrum.
     bands: Vec<SpectralBand>,
     /// Number of lattice rays that the wavelengths are distributed over; 1 if every ray is split into all of them.
     rays_per_split: f64,
@@ -70,16 +69,10 @@ pub(super) struct Spectra {
 #[derive(Debug)]
 struct SpectralLight {
     key: SpectralKey,
-    traced: Traced,
+    /// One node for each band in which the lamp emits.
+    bands: Vec<(usize, SpectralNode)>,
     /// `None` if photons cannot carry the light.
     photons: Option<PhotonSpectrum>,
-}
-
-#[derive(Debug)]
-enum Traced {
-    Whole(Box<LightSpectrum>),
-    /// One node for each band in which the lamp emits.
-    Bands(Vec<(usize, SpectralNode)>),
 }
 
 impl Spectra {
@@ -119,47 +112,41 @@ impl Spectra {
                     sampling: settings.ray_sampling(),
                     estimator: settings.estimator,
                 };
-                let traced = spectra.traced(tracer, &key.lamp);
+                let bands = nodes(tracer, &key.lamp, &spectra.bands);
                 let photons = matches!(settings.estimator, Estimator::Auto | Estimator::Photon).then(|| {
-                    let bands = nodes(tracer, &key.lamp, &photon_bands(settings));
-                    PhotonSpectrum::new(tracer.with_metals_under(&key.lamp), bands, settings.keep_spectrum)
+                    let sampled = nodes(tracer, &key.lamp, &photon_bands(settings));
+                    PhotonSpectrum::new(
+                        tracer.with_metals_under(&key.lamp),
+                        sampled,
+                        settings.keep_spectrum,
+                    )
                 });
-                let light = SpectralLight { key, traced, photons };
+                let light = SpectralLight { key, bands, photons };
                 spectra.of_lights.insert(visible_light.light, light);
             }
         }
         Ok(spectra)
     }
 
-    fn traced(&self, tracer: &Tracer, lamp: &Spectrum) -> Traced {
-        if self.bands.is_empty() {
-            return Traced::Whole(Box::new(LightSpectrum::new(tracer, lamp)));
-        }
-        Traced::Bands(nodes(tracer, lamp, &self.bands))
-    }
-
-    /// The parts of a light that are traced on lattices of their own, each with its band if there are bands.
-    pub(super) fn parts(&self, light: usize) -> Vec<(Option<usize>, LightPart<'_>)> {
-        match self.of_lights.get(&light).map(|light| &light.traced) {
-            None => vec![(None, LightPart::White)],
-            Some(Traced::Whole(spectrum)) => vec![(None, LightPart::Spectrum(spectrum))],
-            Some(Traced::Bands(bands)) => bands
-                .iter()
-                .map(|(band, node)| (Some(*band), LightPart::Band(node)))
-                .collect(),
+    /// The bands of a light that splats trace on lattices of their own; a single part without a node for light in RGB.
+    pub(super) fn parts(&self, light: usize) -> Vec<(Option<usize>, Option<&SpectralNode>)> {
+        match self.of_lights.get(&light) {
+            None => vec![(None, None)],
+            Some(light) => {
+                let bands = light.bands.iter();
+                bands.map(|(band, node)| (Some(*band), Some(node))).collect()
+            }
         }
     }
 
     /// Cells across and down of each part's lattice, given those of the light's lattice.
     pub(super) fn part_size(&self, light: usize, (columns, rows): (usize, usize)) -> (usize, usize) {
-        match self.of_lights.get(&light).map(|light| &light.traced) {
-            Some(Traced::Bands(_)) => {
-                let thinner = self.rays_per_split.sqrt();
-                let side = |cells: usize| ((cells as f64 / thinner).round() as usize).max(1);
-                (side(columns), side(rows))
-            }
-            Some(Traced::Whole(_)) | None => (columns, rows),
+        if !self.has(light) {
+            return (columns, rows);
         }
+        let thinner = self.rays_per_split.sqrt();
+        let side = |cells: usize| ((cells as f64 / thinner).round() as usize).max(1);
+        (side(columns), side(rows))
     }
 
     /// The spectrum of a light for photons.
@@ -204,9 +191,7 @@ impl Spectra {
     /// Maps of a light's bands with what they mean; empty if the light has no bands.
     pub(super) fn level_bands(&self, light: usize, maps: Vec<ReceiverMaps>) -> Vec<LevelBand> {
         let Some(SpectralLight {
-            key,
-            traced: Traced::Bands(nodes),
-            ..
+            key, bands: nodes, ..
         }) = self.of_lights.get(&light)
         else {
             return Vec::new();
@@ -243,12 +228,6 @@ impl Spectra {
             let xyz = light.key.lamp.xyz();
             xyz.x.max(xyz.y).max(xyz.z) * CHANNEL_MARGIN
         })
-    }
-
-    /// Whether the bands of a light have lattices of their own.
-    pub(super) fn has_bands(&self, light: &VisibleLight) -> bool {
-        let light = self.of_lights.get(&light.light);
-        light.is_some_and(|light| matches!(light.traced, Traced::Bands(_)))
     }
 }
 

@@ -7,7 +7,7 @@ use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::accuracy::{self, Images};
+use crate::light_pass::accuracy::{self, Images, LightError};
 use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::LedgerSum;
 use crate::light_pass::pass_report::{PassReport, ProgressScope};
@@ -116,7 +116,7 @@ impl CausticLayer<'_> {
                 second: second.first_mut().map(|second| second.of(band)),
             };
             let lattice = Lattice {
-                band: part.node(0),
+                band: part,
                 size: self.spectra.part_size(light.light, lattice.size),
                 centre: self.spectra.ray_place(light.light, band),
                 ..lattice
@@ -173,8 +173,23 @@ impl CausticLayer<'_> {
         }
     }
 
+    /// Error of a level, estimated from a thinner one; `None` for a level that is thinned itself, and for a shard's part.
+    pub(super) fn error_of_splats(
+        &self,
+        light: &LightProgress,
+        level: &LightLevel,
+        context: &mut BakeContext,
+    ) -> Result<Option<LightError>> {
+        let thinner = self.thinned_images(light, level, context)?;
+        let (Some(thinner), Some(noise), false) = (thinner, &level.noise, context.role.is_shard()) else {
+            return Ok(None);
+        };
+        let fine = accuracy::images(&level.maps, level.unit);
+        Ok(accuracy::estimate_splats(&fine, &thinner, noise, &level.energy()))
+    }
+
     /// Maps from every second ray across and down, which stands for four; `None` for a level that is thinned itself.
-    pub(super) fn thinned_images(
+    fn thinned_images(
         &self,
         progress: &LightProgress,
         level: &LightLevel,
@@ -202,6 +217,31 @@ impl CausticLayer<'_> {
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         context.outcome.count(&report, context.clock);
         Ok(Some(accuracy::images(&maps, level.unit)))
+    }
+
+    /// A level with these maps; what only photons have is empty.
+    pub(super) fn level(
+        &self,
+        light: &VisibleLight,
+        (key, unit): (LevelKey, FluxUnit),
+        (maps, bands): (ReceiverMaps, Vec<ReceiverMaps>),
+        ledger: LedgerSum,
+    ) -> LightLevel {
+        LightLevel {
+            key,
+            maps: maps.packed(),
+            bands: self.spectra.level_bands(light.light, bands),
+            radiant: self.spectra.radiant(light.light),
+            unit,
+            reach_m: light.reach_m,
+            ledger,
+            noise: None,
+            goal: 0.0,
+            error: None,
+            photons: None,
+            segments: 0,
+            has_own_colour: self.spectra.has(light.light),
+        }
     }
 
     /// Maps without light, per band if bands are kept.
@@ -243,7 +283,7 @@ impl CausticLayer<'_> {
             first: &mut maps,
             second: None,
         };
-        let source = source_of(state, &self.trace_key(light, lattice.size, 0, &[]));
+        let source = source_of(state, &self.trace_key(light));
         let (mut report, _) = pass::run(&depositor, source, &mut all, &chart_for, &listener);
         // Kernels of the coarse run are on no map.
         report.splats = 0;

@@ -210,7 +210,7 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
     let counts = &manifest.counts;
     let pieces = match result.counts.cells {
         0 => format!("{} splats", counts.splats),
-        cells => format!("{cells} cells, {} splats", counts.splats),
+        squares => format!("{squares} squares, {} splats", counts.splats),
     };
     line("rays", format!("{}, {pieces}", counts.rays));
     let (visible, rmse) = (result.estimated_visible, result.estimated_relative_rmse);

@@ -94,7 +94,7 @@ struct ConvergenceArguments {
     /// .glb, .gltf or builtin:NAME
     #[arg(default_value = "builtin:ring")]
     scene: String,
-    /// Estimators to measure [default: wavefront,splat]
+    /// Estimators to measure [default: photon,splat]
     #[arg(long, value_parser = values::one_of::<Estimator>(), value_delimiter = ',', value_name = "ESTIMATOR,...")]
     estimators: Option<Vec<Estimator>>,
     /// Ray densities, ascending [default: 1e2 to 1e6]
@@ -336,7 +336,7 @@ impl StudyRun<'_> {
         };
         let densities = study.densities.as_deref().unwrap_or(&DENSITIES[..few]);
         check_ladder(densities, &settings)?;
-        let usual = || vec![Estimator::Wavefront, Estimator::Splat];
+        let usual = || vec![Estimator::Photon, Estimator::Splat];
         let mut estimators = study.estimators.clone().unwrap_or_else(usual);
         estimators.dedup();
         let scene = self.load(&study.scene, &study.scene_options)?;

@@ -1,12 +1,7 @@
-//! Error estimates without a reference, from the differences between maps of nested lattices.
+//! Error estimates without a reference, from half sets of photons or rays.
 //!
-//! Let I be the map of a lattice, I₂ that of the lattice with twice the step, I₄ the next. The errors of successive
-//! levels turn out to be independent (they depend on where cuts and cells happen to lie), so that
-//! ⟨(I − I₂)²⟩ = e²(1 + R²) with R = e₂/e. Light that is cut off along lines converges at first order, R = 2. R is also
-//! measured as √(⟨(I₂ − I₄)²⟩/⟨(I − I₂)²⟩). A single measurement is noisy, so R is the geometric mean of both.
-//!
-//! A difference does not show what all levels miss: truncated light (threshold, depth, unresolved) is added by its
-//! watts.
+//! Two half sets differ by their noise. What both miss alike is added where it is known: the blur of splats, from a map of
+//! fewer rays, and truncated light (threshold, depth, unresolved), by its watts.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,22 +10,12 @@ use rayon::prelude::*;
 
 use super::ledger::EnergyLedger;
 use super::receiver_maps::{ReceiverMap, ReceiverMaps};
-use super::wavefront::refine::{RoughTiles, TILE_SIDE, TileSet, tile_counts};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::tiles::TileLayout;
 use crate::illumination::{Chart, Receiver};
 
-/// Error ratio of successive levels before it is measured: first order.
-const PRIOR_RATIO: f64 = 2.0;
-
-/// Measured ratios are clamped to this range.
-const RATIO_RANGE: (f64, f64) = (1.5, 6.0);
-
-/// Lower bound on a level's squared error, relative to that of the level before.
-const MIN_GAIN: f64 = 1.0 / (RATIO_RANGE.1 * RATIO_RANGE.1);
-
-/// Lower bound on a tile's squared error, relative to the mean of the tiles around it.
-const MIN_SHARE_OF_NEIGHBOURS: f64 = 0.25;
+/// Error of splats of every fourth ray relative to those of all: first order.
+const RATIO_OF_THINNED: f64 = 2.0;
 
 /// Squared errors of texels are averaged up to this many texels away.
 const WINDOW_TEXELS: usize = 2;
@@ -55,13 +40,9 @@ pub type Images = BTreeMap<Receiver, Image>;
 /// Error estimate of one map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MapError {
-    /// Size of the map [texels].
-    pub size: (usize, usize),
     /// Expected error of each texel's luminance, the root of variance and squared bias [W/m², for a light of unit
     /// strength].
     pub texels: Vec<f32>,
-    /// Squared error times area, summed over each tile [W²/m²].
-    pub tiles: Vec<f64>,
 }
 
 /// Error estimate of all maps of one light.
@@ -70,8 +51,6 @@ pub struct LightError {
     pub maps: BTreeMap<Receiver, MapError>,
     /// Root mean square error over all texels, weighted by area, relative to the mean irradiance.
     pub relative_rmse: f64,
-    /// Error of the level before over that of the last level.
-    pub ratio: f64,
 }
 
 impl LightError {
@@ -85,7 +64,29 @@ impl LightError {
         for map in self.maps.values_mut() {
             let raise = |error: &mut f32| *error = single(f64::from(*error) * factor);
             map.texels.iter_mut().for_each(raise);
-            map.tiles.iter_mut().for_each(|square| *square *= factor * factor);
+        }
+    }
+
+    /// Adds errors whose squares are proportional to the light, as those of single photons, up to a larger relative
+    /// squared error.
+    pub fn add_to(&mut self, relative_square: f64, light: &Images) {
+        let added = relative_square - self.relative_rmse * self.relative_rmse;
+        let (flux_w, area_m2) = light.values().fold((0.0, 0.0), |(flux_w, area_m2), image| {
+            let (map_w, map_m2) = image.sums();
+            (flux_w + map_w, area_m2 + map_m2)
+        });
+        if !(added > 0.0 && flux_w > 0.0) {
+            return;
+        }
+        self.relative_rmse = relative_square.sqrt();
+        let per_light = added * flux_w / area_m2;
+        for (receiver, map) in &mut self.maps {
+            let Some(image) = light.get(receiver) else {
+                continue;
+            };
+            for (error, value) in map.texels.iter_mut().zip(&image.luminance) {
+                *error = single((f64::from(*error).powi(2) + per_light * value.max(0.0)).sqrt());
+            }
         }
     }
 }
@@ -136,17 +137,6 @@ impl Image {
         }
     }
 
-    /// The tile of [`TILE_SIDE`] in which each texel lies, or the first of several.
-    fn tiles(&self) -> TileOf {
-        match &self.layout {
-            Some(layout) => TileOf::Listed(layout.blocks(TILE_SIDE)),
-            None => TileOf::Counted {
-                width: self.width,
-                columns: tile_counts(self.width, self.height).0,
-            },
-        }
-    }
-
     /// Flux [W] and area [m²] of all texels.
     fn sums(&self) -> (f64, f64) {
         (0..self.luminance.len()).fold((0.0, 0.0), |(flux, area), texel| {
@@ -164,45 +154,10 @@ impl Image {
         self.luminance.par_iter().enumerate().map(square).collect()
     }
 
-    /// Sums over tiles, weighted by texel area.
-    pub fn tile_sums(&self, squares: &[f64]) -> Vec<f64> {
-        let (columns, rows) = tile_counts(self.width, self.height);
-        let mut sums = vec![0.0; columns * rows];
-        let tiles = self.tiles();
-        let Some(layout) = &self.layout else {
-            for (texel, square) in squares.iter().enumerate() {
-                sums[tiles.of(texel)] += square * self.area_m2(texel);
-            }
-            return sums;
-        };
-        for tile in layout.tiles() {
-            // A large texel covers several tiles.
-            let side = (1_usize << tile.level).div_ceil(TILE_SIDE);
-            let share = 1.0 / (side * side) as f64;
-            for texel in tile.texels {
-                let part = squares[texel] * self.area_m2(texel) * share;
-                let first = tiles.of(texel);
-                for row in 0..side {
-                    let begin = first + row * columns;
-                    sums[begin..begin + side].iter_mut().for_each(|sum| *sum += part);
-                }
-            }
-        }
-        sums
-    }
-
-    /// Raises each tile to at least a part of the mean around it: two levels may agree in a tile by chance.
-    fn pooled(&self, tiles: &[f64]) -> Vec<f64> {
-        let (columns, rows) = tile_counts(self.width, self.height);
-        let around = |tile: usize| {
-            let (column, row) = (tile % columns, tile / columns);
-            let near = |index: usize, count: usize| index.saturating_sub(1)..=(index + 1).min(count - 1);
-            let cells = near(row, rows).flat_map(|row| near(column, columns).map(move |c| row * columns + c));
-            let (sum, count) = cells.fold((0.0, 0), |(sum, count), tile| (sum + tiles[tile], count + 1));
-            sum / f64::from(count)
-        };
-        let least = |(tile, own): (usize, &f64)| own.max(MIN_SHARE_OF_NEIGHBOURS * around(tile));
-        tiles.iter().enumerate().map(least).collect()
+    /// The sum of these values of texels, weighted by their areas.
+    fn integral(&self, values: &[f64]) -> f64 {
+        let by_area = values.iter().enumerate();
+        by_area.map(|(texel, value)| value * self.area_m2(texel)).sum()
     }
 
     /// Means over a square window around each texel, clipped to the map or to the texel's tile.
@@ -250,108 +205,6 @@ fn window(squares: &[f64], (width, height): (usize, usize), row: usize, line: &m
     }
 }
 
-/// Maps texels to tiles.
-enum TileOf {
-    /// An untiled map.
-    Counted { width: usize, columns: usize },
-    /// A tiled map: the tile of each texel.
-    Listed(Vec<u32>),
-}
-
-impl TileOf {
-    fn of(&self, texel: usize) -> usize {
-        match self {
-            Self::Counted { width, columns } => {
-                texel / width / TILE_SIDE * columns + texel % width / TILE_SIDE
-            }
-            Self::Listed(tiles) => tiles[texel] as usize,
-        }
-    }
-}
-
-/// The estimate of the round before this one, which refined only some tiles.
-#[derive(Clone, Copy, Debug)]
-pub struct PreviousRound<'a> {
-    pub error: &'a LightError,
-    /// Tiles that this round refined.
-    pub refined: &'a RoughTiles,
-}
-
-/// The error of `fine`, from the two levels before it (`coarser[0]` is the finer one; the other may be missing). Tiles
-/// that were not refined keep their former error. `None` without `coarser[0]`, or if no light arrived.
-pub fn estimate(
-    fine: &Images,
-    coarser: [Option<&Images>; 2],
-    before: Option<PreviousRound>,
-    ledger: &EnergyLedger,
-) -> Option<LightError> {
-    let middle = coarser[0]?;
-    let is_refined = |receiver: Receiver, tile: usize| {
-        before.is_none_or(|before| {
-            let tiles = before.refined.get(&receiver);
-            tiles.is_some_and(|tiles| tiles.is_chosen(tile))
-        })
-    };
-    let differences: BTreeMap<Receiver, (Vec<f64>, Vec<f64>)> = fine
-        .iter()
-        .map(|(&receiver, image)| {
-            let squares = image.squared_difference(middle.get(&receiver));
-            let tiles = image.pooled(&image.tile_sums(&squares));
-            (receiver, (squares, tiles))
-        })
-        .collect();
-    let ratio = match (coarser[1], before) {
-        (Some(coarse), None) => measured_ratio(middle, coarse, &differences),
-        // Later rounds keep the ratio of the first ones, since each refines different tiles.
-        (_, Some(before)) => before.error.ratio,
-        (None, None) => PRIOR_RATIO,
-    };
-    let share = 1.0 / (1.0 + ratio * ratio);
-    let mut error = LightError {
-        ratio,
-        ..LightError::default()
-    };
-    let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
-    for (&receiver, image) in fine {
-        let (squares, tile_sums) = &differences[&receiver];
-        let old = before.and_then(|before| before.error.maps.get(&receiver));
-        let older_tiles = older_differences(receiver, middle, coarser[1]);
-        let windowed = image.windowed(squares);
-        let tiles_of = image.tiles();
-        let texels = (0..windowed.len()).map(|texel| match old {
-            Some(old) if !is_refined(receiver, tiles_of.of(texel)) => old.texels[texel],
-            _ => single((windowed[texel] * share).sqrt()),
-        });
-        let tiles: Vec<f64> = (0..tile_sums.len())
-            .map(|tile| match old {
-                Some(old) if !is_refined(receiver, tile) => old.tiles[tile],
-                // A difference may vanish by chance, or because both levels miss the same light.
-                Some(old) => (tile_sums[tile] * share).max(old.tiles[tile] * MIN_GAIN),
-                None => {
-                    let older = older_tiles.as_ref().map_or(0.0, |tiles| tiles[tile]);
-                    tile_sums[tile].max(older * MIN_GAIN) * share
-                }
-            })
-            .collect();
-        squares_sum += tiles.iter().sum::<f64>();
-        let (map_w, map_m2) = image.sums();
-        (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
-        let texels = texels.collect();
-        let size = (image.width, image.height);
-        error.maps.insert(receiver, MapError { size, texels, tiles });
-    }
-    let truncated = truncated_share(ledger);
-    let mean = flux_w / area_m2;
-    error.relative_rmse = (squares_sum / area_m2 / (mean * mean) + truncated * truncated).sqrt();
-    (flux_w > 0.0).then_some(error)
-}
-
-/// Squared differences between the two coarser levels, by tile.
-fn older_differences(receiver: Receiver, middle: &Images, coarse: Option<&Images>) -> Option<Vec<f64>> {
-    let image = middle.get(&receiver)?;
-    Some(image.tile_sums(&image.squared_difference(coarse?.get(&receiver))))
-}
-
 /// Squared difference between half sets of rays, around each texel, by receiver [W²/m⁴, for a light of unit strength].
 pub type Noise = BTreeMap<Receiver, Vec<f64>>;
 
@@ -367,24 +220,35 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
     noise
 }
 
-/// How much larger the squared noise may be than half sets show, by two standard deviations: few texels, or few photons
-/// in them, tell little, and of levels that differ by chance, one that looks good ends the bake. The squares d² of
-/// differences have the variance 2v² if d is normal, and then d⁴ is 3v² in the mean.
-pub fn doubt_of_halves(a: &Images, b: &Images) -> f64 {
-    let (mut squares, mut fourths) = (0.0, 0.0);
-    for (&receiver, image) in a {
-        let differences = image.squared_difference(b.get(&receiver));
+/// Squared relative error to be expected from noise, where `shown` is what half sets show, perhaps after a filter.
+///
+/// Few texels, or few photons in them, tell little: the halves of a single texel may agree by chance. So `by_photons`, the
+/// squared relative error that the flux of single photons tells, counts as one more texel. And two standard deviations
+/// are added, since of levels that differ by chance, one that looks good ends the bake: the squares d² of differences
+/// have the variance 2v² if d is normal, and then d⁴ is 3v² in the mean.
+pub fn expected_noise(shown: f64, [a, b]: [&Images; 2], by_photons: f64) -> f64 {
+    let (mut squares, mut fourths, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0, 0.0);
+    for (receiver, image) in a {
+        let other = b.get(receiver);
+        let differences = image.squared_difference(other);
         for (texel, square) in differences.iter().enumerate() {
             let by_area = square * image.area_m2(texel);
             squares += by_area;
             fourths += by_area * by_area;
         }
+        let (map_w, map_m2) = image.sums();
+        flux_w += map_w + other.map_or(0.0, |other| other.sums().0);
+        area_m2 += map_m2;
     }
-    if squares > 0.0 {
-        2.0 * (2.0 / 3.0 * fourths).sqrt() / squares
-    } else {
-        0.0
+    if squares <= 0.0 || flux_w <= 0.0 {
+        return shown.max(by_photons);
     }
+
+    let of_halves = squares * area_m2 / (flux_w * flux_w);
+    let texels = squares * squares / fourths;
+    let with_photons = (texels * of_halves + by_photons) / ((texels + 1.0) * of_halves);
+    let deviation = (2.0 / 3.0 * fourths).sqrt() / squares;
+    shown * (with_photons.max(1.0) + 2.0 * deviation)
 }
 
 /// Noise of a map's difference from the map of every fourth ray, relative to the map's own noise.
@@ -399,8 +263,8 @@ pub fn estimate_splats(
     noise: &Noise,
     ledger: &EnergyLedger,
 ) -> Option<LightError> {
-    let blur = 1.0 / ((PRIOR_RATIO - 1.0) * (PRIOR_RATIO - 1.0));
-    let share = 0.5 * (blur + 1.0 / (1.0 + PRIOR_RATIO * PRIOR_RATIO));
+    let blur = 1.0 / ((RATIO_OF_THINNED - 1.0) * (RATIO_OF_THINNED - 1.0));
+    let share = 0.5 * (blur + 1.0 / (1.0 + RATIO_OF_THINNED * RATIO_OF_THINNED));
     by_squares(fine, ledger, |receiver, image| {
         let differences = image.windowed(&image.squared_difference(thinner.get(&receiver)));
         let pairs = differences.iter().zip(noise.get(&receiver)?);
@@ -419,35 +283,21 @@ pub fn by_noise(fine: &Images, mut noise: Noise, ledger: &EnergyLedger) -> Optio
     })
 }
 
-/// The error of `fine`, whose square is a share of the squared difference from `other`. `None` if no light arrived.
-pub fn by_difference(fine: &Images, other: &Images, share: f64, ledger: &EnergyLedger) -> Option<LightError> {
-    by_squares(fine, ledger, |receiver, image| {
-        let squares = image.windowed(&image.squared_difference(other.get(&receiver)));
-        Some(squares.iter().map(|square| square * share).collect())
-    })
-}
-
 /// The error from its square around each texel, map by map.
 fn by_squares(
     fine: &Images,
     ledger: &EnergyLedger,
     mut squares: impl FnMut(Receiver, &Image) -> Option<Vec<f64>>,
 ) -> Option<LightError> {
-    let mut error = LightError {
-        ratio: PRIOR_RATIO,
-        ..LightError::default()
-    };
+    let mut error = LightError::default();
     let (mut squares_sum, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for (&receiver, image) in fine {
         let squares = squares(receiver, image)?;
-        let tiles = image.tile_sums(&squares);
-        squares_sum += tiles.iter().sum::<f64>();
+        squares_sum += image.integral(&squares);
         let (map_w, map_m2) = image.sums();
         (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
         let map = MapError {
-            size: (image.width, image.height),
             texels: squares.iter().map(|square| single(square.sqrt())).collect(),
-            tiles,
         };
         error.maps.insert(receiver, map);
     }
@@ -458,71 +308,16 @@ fn by_squares(
     (flux_w > 0.0).then_some(error)
 }
 
-/// R = e₂/e from three levels: the geometric mean of the measured and the first-order ratio.
-fn measured_ratio(middle: &Images, coarse: &Images, fine: &BTreeMap<Receiver, (Vec<f64>, Vec<f64>)>) -> f64 {
-    let newer: f64 = fine.values().flat_map(|(_, tiles)| tiles).sum();
-    let older: f64 = middle
-        .iter()
-        .map(|(receiver, image)| {
-            let squares = image.squared_difference(coarse.get(receiver));
-            image.tile_sums(&squares).iter().sum::<f64>()
-        })
-        .sum();
-    let measured = (older / newer).sqrt().clamp(RATIO_RANGE.0, RATIO_RANGE.1);
-    if measured.is_nan() {
-        PRIOR_RATIO
-    } else {
-        (measured * PRIOR_RATIO).sqrt()
-    }
-}
-
 /// Share of the light that is missing from the maps. Light that ended by depth or threshold is assumed to divide like
 /// the rest between maps, absorption and escape; all that could not be resolved, to be missing from the maps.
 pub fn truncated_share(ledger: &EnergyLedger) -> f64 {
     let truncated = &ledger.truncated;
     let arrived = ledger.deposited + ledger.absorbed + ledger.escaped;
     let ended = truncated.depth + truncated.threshold;
-    let lost = truncated.non_finite + truncated.unresolved + truncated.quadrature.abs();
+    let lost = truncated.non_finite + truncated.unresolved;
     if ledger.deposited > 0.0 {
         ended / arrived + lost / ledger.deposited
     } else {
         0.0
     }
-}
-
-/// The roughest tiles, as many as have to be refined for a relative RMSE of `goal`, if refinement divides their error
-/// by the ratio of the levels; all tiles with an error if that is not enough. `counted`: squared errors of tiles to be
-/// used instead, where tiles do not all count alike.
-pub fn rough_tiles(
-    error: &LightError,
-    goal: f64,
-    counted: Option<&BTreeMap<Receiver, Vec<f64>>>,
-) -> RoughTiles {
-    let mut tiles: Vec<(f64, Receiver, usize)> = Vec::new();
-    for (&receiver, map) in &error.maps {
-        let squares = counted
-            .and_then(|counted| counted.get(&receiver))
-            .unwrap_or(&map.tiles);
-        let with_error = squares.iter().enumerate().filter(|(_, square)| **square > 0.0);
-        tiles.extend(with_error.map(|(tile, &square)| (square, receiver, tile)));
-    }
-    // Roughest first, ties by position.
-    tiles.sort_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-    let total: f64 = tiles.iter().map(|(square, ..)| square).sum();
-    let wanted = total * (goal / error.relative_rmse) * (goal / error.relative_rmse);
-    let gain = 1.0 - 1.0 / (error.ratio * error.ratio);
-    let mut chosen = RoughTiles::new();
-    let mut left = total;
-    for (square, receiver, tile) in tiles {
-        if left <= wanted {
-            break;
-        }
-        left -= square * gain;
-        let (width, height) = error.maps[&receiver].size;
-        chosen
-            .entry(receiver)
-            .or_insert_with(|| TileSet::none(width, height))
-            .choose(tile);
-    }
-    chosen
 }

@@ -16,15 +16,13 @@ pub struct Truncated {
     pub non_finite: f64,
     /// Flux that no deposit could place.
     pub unresolved: f64,
-    /// Flux that surfaces passed on, less that of the separately refined paths; of either sign.
-    pub quadrature: f64,
     /// Flux of effects that the user switched off.
     pub switched_off: f64,
 }
 
 impl Truncated {
     pub fn total(&self) -> f64 {
-        self.depth + self.threshold + self.non_finite + self.unresolved + self.quadrature + self.switched_off
+        self.depth + self.threshold + self.non_finite + self.unresolved + self.switched_off
     }
 }
 
@@ -66,7 +64,6 @@ impl AddAssign for Truncated {
         self.threshold += other.threshold;
         self.non_finite += other.non_finite;
         self.unresolved += other.unresolved;
-        self.quadrature += other.quadrature;
         self.switched_off += other.switched_off;
     }
 }
@@ -105,8 +102,6 @@ impl EnergyLedger {
 /// Deposited flux, by what carried it [W].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct CarriedFlux {
-    /// Patches of the wavefront.
-    pub patches: f64,
     /// Bundles, before photons correct them.
     pub bundles: f64,
     /// Photons, less the flux of bundles that they removed; of either sign.
@@ -120,7 +115,6 @@ impl CarriedFlux {
     pub fn sum(ledgers: &[LightLedger]) -> Self {
         let sum = |part: fn(&Self) -> f64| ledgers.iter().map(|light| part(&light.carried_w)).sum();
         Self {
-            patches: sum(|carried| carried.patches),
             bundles: sum(|carried| carried.bundles),
             photons: sum(|carried| carried.photons),
             splats: sum(|carried| carried.splats),
@@ -130,7 +124,6 @@ impl CarriedFlux {
     /// Text such as "bundles 82.0 %, photons 18.0 %", of the deposited flux; `None` if nothing was carried.
     pub fn in_words(&self, deposited_w: f64) -> Option<String> {
         let parts = [
-            ("patches", self.patches),
             ("bundles", self.bundles),
             ("photons", self.photons),
             ("splats", self.splats),

@@ -25,8 +25,6 @@ pub enum Account {
     NonFinite,
     /// No deposit could place it.
     Unresolved,
-    /// Passed on by surfaces, less what the separately refined paths carry; of either sign.
-    Quadrature,
     /// Of an effect that is switched off.
     SwitchedOff,
     /// Conserved in expectation only: lost in random choices less gained, of either sign.
@@ -116,7 +114,6 @@ impl LedgerSum {
                     threshold: watts(Account::Threshold),
                     non_finite: watts(Account::NonFinite),
                     unresolved: watts(Account::Unresolved),
-                    quadrature: watts(Account::Quadrature),
                     switched_off: watts(Account::SwitchedOff),
                 },
                 sampling: watts(Account::Sampling),

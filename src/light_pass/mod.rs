@@ -1,6 +1,7 @@
 //! The light pass: from the lights through specular surfaces onto diffuse ones.
 
 pub mod accuracy;
+pub mod coverage;
 pub mod direct;
 pub mod explain;
 pub mod footprint_statistics;
@@ -18,6 +19,5 @@ pub mod sketch;
 pub mod spectral_node;
 pub mod splat;
 pub mod visibility;
-pub mod wavefront;
 
 pub use crate::scene::emitter;

@@ -6,7 +6,6 @@ use cpu_time::ProcessTime;
 
 use super::footprint_statistics::FootprintStatistics;
 use super::ledger_sum::LedgerSum;
-use super::wavefront::overshoot::PatchOvershoot;
 use crate::progress::{Control, Progress};
 
 /// Result of the pass of one light.
@@ -19,14 +18,10 @@ pub struct PassReport {
     pub segments: u64,
     /// Kernels deposited.
     pub splats: u64,
-    /// Wavefront cells.
-    pub cells: u64,
-    /// Interpolated rays that were intersected with receivers.
-    pub receiver_queries: u64,
+    /// Squares of the launch domain whose bundles were deposited.
+    pub squares: u64,
     /// Sizes of footprints.
     pub statistics: FootprintStatistics,
-    /// Patches that reach farther than their traced rays.
-    pub overshoots: Vec<PatchOvershoot>,
     /// Of tracing.
     pub trace_s: Seconds,
     /// Of depositing.
@@ -98,10 +93,8 @@ impl PassReport {
         self.rays += other.rays;
         self.segments += other.segments;
         self.splats += other.splats;
-        self.cells += other.cells;
-        self.receiver_queries += other.receiver_queries;
+        self.squares += other.squares;
         self.statistics.merge(&other.statistics);
-        self.overshoots.extend(other.overshoots);
         self.trace_s.add(other.trace_s);
         self.deposit_s.add(other.deposit_s);
         self.cancelled |= other.cancelled;

@@ -128,35 +128,6 @@ impl ReceiverMaps {
         }
     }
 
-    /// Removes maps less than a millionth as bright as all together: stray light between the traced rays. Returns their
-    /// receivers and the flux removed.
-    pub fn drop_negligible_maps(&mut self) -> (Vec<Receiver>, [i128; 3]) {
-        let fluxes: Vec<(Receiver, [i128; 3], f64)> = self
-            .iter()
-            .map(|(receiver, map)| (receiver, map.flux_counts(), map.chart.area_m2()))
-            .collect();
-        let brightness = |counts: &[i128; 3], area_m2: f64| counts.iter().sum::<i128>() as f64 / area_m2;
-        let all = fluxes
-            .iter()
-            .fold(([0; 3], 0.0), |(counts, area_m2), (_, more, more_m2)| {
-                (
-                    std::array::from_fn(|channel| counts[channel] + more[channel]),
-                    area_m2 + more_m2,
-                )
-            });
-        let least = STRAY_SHARE * brightness(&all.0, all.1);
-        let (mut receivers, mut taken) = (Vec::new(), [0; 3]);
-        for (receiver, counts, _) in fluxes
-            .iter()
-            .filter(|(_, counts, m2)| brightness(counts, *m2) < least)
-        {
-            self.slots[receiver.index()] = Slot::Untouched;
-            receivers.push(*receiver);
-            taken = std::array::from_fn(|channel| taken[channel] + counts[channel]);
-        }
-        (receivers, taken)
-    }
-
     /// All maps with their receivers, in order.
     pub fn iter(&self) -> impl Iterator<Item = (Receiver, &ReceiverMap)> {
         Receiver::all(self.slots.len() / 2).filter_map(|receiver| Some((receiver, self.get(receiver)?)))
@@ -177,9 +148,6 @@ impl ReceiverMaps {
         }
     }
 }
-
-/// Brightness of a map relative to that of all maps, below which its light is stray.
-const STRAY_SHARE: f64 = 1e-6;
 
 /// Minimum spread of a kernel at a level [texels of the level]: linear interpolation between texels then adds less than
 /// one per cent to its variance.

@@ -41,8 +41,3 @@ pub fn to_linear_srgb(channels: LinearSrgb) -> LinearSrgb {
 pub fn place_of(wavelength: Nanometres) -> f64 {
     wavelength.0.powi(-2)
 }
-
-/// The inverse of [`place_of`].
-pub fn wavelength_at(place: f64) -> Nanometres {
-    Nanometres(place.powf(-0.5))
-}

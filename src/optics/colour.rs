@@ -196,30 +196,6 @@ impl ColourMatrix {
     pub fn of_white(&self) -> LinearSrgb {
         self.apply(LinearSrgb::WHITE)
     }
-
-    /// For light of a colour: each column times the colour's channel.
-    #[must_use]
-    pub fn weighing(&self, colour: LinearSrgb) -> Self {
-        let colour = colour.to_array();
-        Self(
-            self.0
-                .map(|row| std::array::from_fn(|column| row[column] * colour[column])),
-        )
-    }
-
-    /// Rows normalised to a sum of 1: maps an RGB factor to the factor on each channel. A channel without light takes
-    /// the mean of red, green and blue.
-    #[must_use]
-    pub fn per_channel(&self) -> Self {
-        Self(self.0.map(|row| {
-            let sum: f64 = row.iter().sum();
-            if sum > 0.0 {
-                row.map(|part| part / sum)
-            } else {
-                [1.0 / 3.0; 3]
-            }
-        }))
-    }
 }
 
 impl std::ops::Add for ColourMatrix {

@@ -129,14 +129,6 @@ impl Waves {
         &self.waves
     }
 
-    /// Shortest wavelength of the waves of non-zero amplitude [m]; infinite if there is none.
-    pub fn shortest_m(&self) -> f64 {
-        let bending = self.waves.iter().filter(|wave| wave.amplitude_m > 0.0);
-        bending
-            .map(|wave| wave.wavelength_m)
-            .fold(f64::INFINITY, f64::min)
-    }
-
     /// Height h [m] at a point.
     pub fn height_m(&self, point: DVec3) -> f64 {
         let height = |wave: &Wave| wave.amplitude_m * wave_phase(wave, point).cos();
@@ -147,15 +139,6 @@ impl Waves {
     pub fn gradient(&self, point: DVec3) -> DVec3 {
         let slope = |wave: &Wave| wave.wave_vector() * (-wave.amplitude_m * wave_phase(wave, point).sin());
         self.waves.iter().map(slope).sum()
-    }
-
-    /// Change of ∇h [1] over a small step [m] from a point: the Hessian of h times the step.
-    pub fn gradient_change(&self, point: DVec3, step: DVec3) -> DVec3 {
-        let change = |wave: &Wave| {
-            let vector = wave.wave_vector();
-            vector * (-wave.amplitude_m * wave_phase(wave, point).cos() * vector.dot(step))
-        };
-        self.waves.iter().map(change).sum()
     }
 
     /// Whether any wave moves.

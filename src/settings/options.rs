@@ -103,12 +103,12 @@ pub const OPTIONS: &[OptionInfo] = &[
         ..choice::<Preset>("preset", "Preset", "PRESET")
     },
     OptionInfo {
-        brief: "auto, wavefront, photon or splat [default: auto]",
+        brief: "auto, photon or splat [default: auto]",
         what: "How light rays become irradiance",
         default: "auto",
-        accuracy: "wavefront needs some hundred times fewer rays than splats for the same error",
-        cost: "grows with the number of rays; a wavefront ray costs a few times more than a splat",
-        set: |s, text| named(text).map(|estimator| s.estimator = estimator),
+        accuracy: "auto needs some hundred times fewer rays than photons or splats for the same error",
+        cost: "grows with the number of rays; a ray of auto costs a few times more than a splat",
+        set: |s, text| estimator(text).map(|estimator| s.estimator = estimator),
         ..choice::<Estimator>("estimator", "Estimator", "ESTIMATOR")
     },
     OptionInfo {
@@ -177,7 +177,7 @@ pub const OPTIONS: &[OptionInfo] = &[
                 to the mean",
         range: "0 to 1e4, splat above 0",
         default: "0, none; splat 1",
-        accuracy: "small values show single rays (photon, splat) or are exact (wavefront), large ones blur the caustic",
+        accuracy: "small values show single rays (photon, splat) or change nothing (auto), large ones blur the caustic",
         cost: "splat: time per ray grows in proportion; others: no ray is traced",
         applies: |s| match s.kernel {
             Kernel::Gaussian => Ok(()),
@@ -461,6 +461,14 @@ pub fn named<T: VariantArray + Copy + Into<&'static str>>(name: &str) -> Read<T>
         let names: Vec<&str> = variants.map(Into::into).collect();
         format!("there is no {name}; there are {}", names.join(", "))
     })
+}
+
+/// An estimator by its name. Patches of the wavefront were one of them.
+fn estimator(name: &str) -> Read<Estimator> {
+    match name {
+        "wavefront" => Err("the bundles of auto took the place of wavefront: give auto".into()),
+        _ => named(name),
+    }
 }
 
 fn number<T: FromStr>(text: &str) -> Read<T> {

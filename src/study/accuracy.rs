@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::paper::{AUTO, Method, SPLAT, auto, over_a_floor, scene, splat};
+use super::paper::{auto, over_a_floor, scene, splat};
 use super::plot::Plot;
 use super::references::Reference;
 use super::sweep::{
@@ -17,7 +17,7 @@ use crate::bake::{CostPoint, Forecast, StopReason};
 use crate::error::Result;
 use crate::scene::builtin::{self, shapes};
 use crate::scene::{Light, Scene};
-use crate::settings::{BakeSettings, ErrorMetric};
+use crate::settings::BakeSettings;
 
 /// Forecast for a bake that reached its target, made when its error first was at most five times the target, and the
 /// state of the bake at that time.
@@ -80,10 +80,8 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
         Plot::new(file, [x, "relative_rmse"], &["scene"])
     }
     let towards = |target: f64, limit_s: f64| BakeSettings {
-        max_error: Some(target),
-        error_metric: ErrorMetric::Rmse,
         max_time_s: Some(limit_s),
-        ..bench.at(auto(BakeSettings::starting_density_per_sr(target)), bench.side())
+        ..bench.at(auto(target), bench.side())
     };
     let names = if bench.quick {
         &["mirror", "pool"][..]
@@ -101,24 +99,24 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
             Some(reference) => Against::Known(reference),
             None => Against::Bake(Arc::clone(&scene), Box::new(towards(0.002, 60.0))),
         };
-        let variant = |way: Method, target, settings: BakeSettings| {
+        let variant = |estimator: &str, target, settings: BakeSettings| {
             let labels = vec![
                 name.into(),
-                way.0.into(),
+                estimator.into(),
                 share(target),
                 settings.density_per_sr.into(),
             ];
             Variant::new(labels, &scene, settings)
         };
         let targets = bench.some(&TARGETS, 4).iter();
-        let targets = targets.map(|&target| variant(AUTO, Some(target), towards(target, 20.0)));
+        let targets = targets.map(|&target| variant("auto", Some(target), towards(target, 20.0)));
         let densities = bench.some(&DENSITIES, 2).iter();
         let splats = densities.map(|&density| {
             let settings = BakeSettings {
                 max_time_s: Some(20.0),
                 ..bench.at(splat(density), bench.side())
             };
-            variant(SPLAT, None, settings)
+            variant("splat", None, settings)
         });
         groups.push(Group {
             against,

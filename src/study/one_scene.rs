@@ -15,7 +15,7 @@ use crate::effect::{Effect, EffectSwitch};
 use crate::error::{Error, Result};
 use crate::optics::LinearSrgb;
 use crate::scene::{Light, LightKind, Scene};
-use crate::settings::{BakeSettings, Estimator, LayerKind, SpectralSampling, Wavelengths};
+use crate::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, SpectralSampling, Wavelengths};
 
 /// Name and description.
 pub const CONVERGENCE: (&str, &str) = (
@@ -141,11 +141,9 @@ const EFFECT_COLUMNS: &[Column] = &[
     CPU_S,
 ];
 
-/// Wavelengths of the reference.
-const REFERENCE_WAVELENGTHS: u32 = 300;
-
-/// Density of the reference's lattice relative to the others.
-const REFERENCE_DENSITY_FACTOR: f64 = 2.0;
+/// Relative RMSE of bakes by the default estimator, and of the reference.
+const TARGET: f64 = 0.05;
+const REFERENCE_TARGET: f64 = 0.02;
 
 /// Half-angle below which a spot counts as a thin beam [rad].
 const THIN_RAD: f64 = 0.05;
@@ -177,30 +175,34 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
         let labels = vec![name.into(), sampling.into(), wavelengths.into()];
         variants.push(Variant::new(labels, &scene, settings).in_sheet(SPECTRUM.0));
     };
-    for (estimator, all) in [
-        (Estimator::Splat, "stochastic"),
-        (Estimator::Wavefront, "interpolated"),
-    ] {
-        for (name, sampling) in [("split", split), ("stochastic", stochastic)] {
-            for &count in wavelengths {
-                let settings = with(estimator, Wavelengths::Fixed(count), Some(sampling));
-                add(name, count.to_string(), settings);
-            }
+    for (name, sampling) in [("split", split), ("stochastic", stochastic)] {
+        for &count in wavelengths {
+            let settings = with(Estimator::Splat, Wavelengths::Fixed(count), Some(sampling));
+            add(name, count.to_string(), settings);
         }
+    }
+    let all = with(Estimator::Splat, Wavelengths::Continuous, None);
+    add("stochastic", "continuous".into(), all);
+
+    // Bundles and photons.
+    let to = |target, wavelengths| BakeSettings {
+        max_error: Some(target),
+        error_metric: ErrorMetric::Rmse,
+        ..with(Estimator::Auto, wavelengths, None)
+    };
+    for &count in wavelengths {
         add(
-            all,
-            "continuous".into(),
-            with(estimator, Wavelengths::Continuous, None),
+            "sampled",
+            count.to_string(),
+            to(TARGET, Wavelengths::Fixed(count)),
         );
     }
-    let finest = BakeSettings {
-        density_per_sr: settings.density_per_sr * REFERENCE_DENSITY_FACTOR,
-        ..with(
-            Estimator::Wavefront,
-            Wavelengths::Fixed(REFERENCE_WAVELENGTHS),
-            Some(split),
-        )
-    };
+    add(
+        "sampled",
+        "continuous".into(),
+        to(TARGET, Wavelengths::Continuous),
+    );
+    let finest = to(REFERENCE_TARGET, Wavelengths::Continuous);
     if !Baker::new(Arc::clone(&scene))?
         .plan(&finest)?
         .is_on(Effect::Dispersion)
@@ -215,9 +217,9 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
         name: SPECTRUM.0,
         what: SPECTRUM.1,
         note: format!(
-            "`{}` against the wavefront split into {REFERENCE_WAVELENGTHS} wavelengths at {REFERENCE_DENSITY_FACTOR} times the density. \
-             Errors are the root of the squared differences over that of the reference's squares.",
-            scene.source
+            "`{}` against bundles of the whole spectrum to {} %. Errors are the root of the squared differences over that of the reference's squares.",
+            scene.source,
+            100.0 * REFERENCE_TARGET
         ),
         labels: &["estimator", "sampling", "wavelengths"],
         columns: SPECTRUM_COLUMNS,

@@ -21,7 +21,8 @@ use crate::optics::LinearSrgb;
 use crate::scene::builtin::{self, parts, pool, shapes};
 use crate::scene::{Camera, LightKind, Mesh, Scene};
 use crate::settings::{
-    BakeSettings, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement, Sigma,
+    BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement,
+    Sigma,
 };
 use crate::transport::{EffectSet, MediumStack, Tracer};
 use crate::units::Flux;
@@ -30,10 +31,12 @@ use crate::units::Flux;
 const DENSITY_PER_SR: f64 = 79_577.5;
 
 pub(super) type Method = (&'static str, fn(f64) -> BakeSettings);
+
+/// Targets of bakes by the default estimator beside those of the paper's densities.
+const AUTO_TARGETS: [f64; 3] = [0.02, 0.01, 0.005];
+
 const AS_PAPER: Method = ("splat, as the paper", paper);
 pub(super) const SPLAT: Method = ("splat", splat);
-pub(super) const WAVEFRONT: Method = ("wavefront", wavefront);
-pub(super) const AUTO: Method = ("auto", auto);
 
 /// Explains "as the paper".
 const AS_PAPER_NOTE: &str = "As the paper: jittered rays, a cube around the light, discs of the wavefront's area, point samples \
@@ -51,24 +54,23 @@ pub(super) fn paper(density_per_sr: f64) -> BakeSettings {
 }
 
 pub(super) fn splat(density_per_sr: f64) -> BakeSettings {
-    at_density(Estimator::Splat, density_per_sr)
-}
-
-/// Traces exactly one lattice.
-pub(super) fn wavefront(density_per_sr: f64) -> BakeSettings {
-    at_density(Estimator::Wavefront, density_per_sr)
-}
-
-/// The default estimator.
-pub(super) fn auto(density_per_sr: f64) -> BakeSettings {
-    at_density(Estimator::Auto, density_per_sr)
-}
-
-fn at_density(estimator: Estimator, density_per_sr: f64) -> BakeSettings {
     BakeSettings {
         density_per_sr,
-        ..BakeSettings::of(estimator)
+        ..BakeSettings::splat()
     }
+}
+
+/// The default estimator, to a relative RMSE.
+pub(super) fn auto(target: f64) -> BakeSettings {
+    BakeSettings {
+        max_error: Some(target),
+        error_metric: ErrorMetric::Rmse,
+        ..BakeSettings::of(Estimator::Auto)
+    }
+}
+
+fn auto_name(target: f64) -> String {
+    format!("auto to {} %", 100.0 * target)
 }
 
 /// A built-in scene, given its name on the command line.
@@ -108,14 +110,21 @@ pub(super) fn table1(bench: &Bench) -> Result<Sweep> {
     ];
     let (scene, against) = scene_and_truth("ring")?;
     let mut variants = Vec::new();
+    let mut add = |labels: Vec<Cell>, settings: BakeSettings| {
+        let file = format!("table1-{}", variants.len() + 1);
+        let settings = bench.at(settings, bench.side());
+        variants.push(Variant::new(labels, &scene, settings).seen(file, &scene.cameras[0]));
+    };
     for &(density, rays, light_pass_s, eye_pass_s) in bench.some(&TABLE, 2) {
-        for (name, settings) in [AS_PAPER, WAVEFRONT] {
-            let paper = [Cell::from(rays), light_pass_s.into(), eye_pass_s.into()];
-            let labels = [density.into(), name.into()].into_iter().chain(paper).collect();
-            let file = format!("table1-{}", variants.len() + 1);
-            let settings = bench.at(settings(density), bench.side());
-            variants.push(Variant::new(labels, &scene, settings).seen(file, &scene.cameras[0]));
-        }
+        let (name, settings) = AS_PAPER;
+        let paper = [Cell::from(rays), light_pass_s.into(), eye_pass_s.into()];
+        let labels = [density.into(), name.into()].into_iter().chain(paper);
+        add(labels.collect(), settings(density));
+    }
+    for &target in bench.some(&AUTO_TARGETS, 2) {
+        let name = auto_name(target).into();
+        let labels = vec![Cell::Empty, name, Cell::Empty, Cell::Empty, Cell::Empty];
+        add(labels, auto(target));
     }
     Ok(Sweep {
         note: format!(
@@ -137,22 +146,25 @@ pub(super) fn table1(bench: &Bench) -> Result<Sweep> {
 pub(super) fn rays(bench: &Bench) -> Result<Sweep> {
     const DENSITIES: [f64; 7] = [1e3, 3e3, 1e4, 3e4, 1e5, 3e5, 1e6];
     let (scene, against) = scene_and_truth("ring")?;
-    let variants = [AS_PAPER, SPLAT, WAVEFRONT]
-        .into_iter()
-        .flat_map(|(name, settings)| {
-            let densities = bench.some(&DENSITIES, 4).iter();
-            let scene = &scene;
-            densities.map(move |&density| {
-                let settings = bench.at(settings(density), bench.side());
-                Variant::new(vec![name.into(), density.into()], scene, settings)
-            })
-        });
+    let at_targets = bench.some(&AUTO_TARGETS, 2).iter().map(|&target| {
+        let labels = vec!["auto".into(), Cell::Empty];
+        Variant::new(labels, &scene, bench.at(auto(target), bench.side()))
+    });
+    let at_targets: Vec<Variant> = at_targets.collect();
+    let variants = [AS_PAPER, SPLAT].into_iter().flat_map(|(name, settings)| {
+        let densities = bench.some(&DENSITIES, 4).iter();
+        let scene = &scene;
+        densities.map(move |&density| {
+            let settings = bench.at(settings(density), bench.side());
+            Variant::new(vec![name.into(), density.into()], scene, settings)
+        })
+    });
     Ok(Sweep {
         note: format!("`ring`. {AS_PAPER_NOTE}"),
         labels: &["estimator", "density_per_sr"],
         columns: &[RAYS, CPU_S, RELATIVE_RMSE, ARD],
         groups: vec![Group {
-            variants: variants.collect(),
+            variants: variants.chain(at_targets).collect(),
             against,
         }],
         plots: const { &[error_against_rays("rays", &["estimator"])] },
@@ -201,11 +213,12 @@ pub(super) fn sigma(bench: &Bench) -> Result<Sweep> {
 
 pub(super) fn resolution(bench: &Bench) -> Result<Sweep> {
     let scene = scene("ring")?;
-    let finer = wavefront(if bench.quick { 8e3 } else { 4.0 * DENSITY_PER_SR });
+    let finer = auto(if bench.quick { 0.005 } else { 0.002 });
     let groups = bench.some(&[30, 100, 300], 2).iter().map(|&side| {
-        let variants = [SPLAT, WAVEFRONT].map(|(name, settings)| {
+        let ways = [("splat", splat(DENSITY_PER_SR)), ("auto", auto(0.01))];
+        let variants = ways.map(|(name, settings)| {
             let labels = vec![name.into(), (side as u64).into()];
-            Variant::new(labels, &scene, bench.at(settings(DENSITY_PER_SR), side))
+            Variant::new(labels, &scene, bench.at(settings, side))
                 .seen(format!("plate6-{side}-{name}"), &scene.cameras[0])
                 .in_sheet("plate6-maps")
         });
@@ -216,8 +229,8 @@ pub(super) fn resolution(bench: &Bench) -> Result<Sweep> {
     });
     Ok(Sweep {
         note: format!(
-            "`ring`, {DENSITY_PER_SR} rays/sr; each size against a wavefront of the same size with four times the rays, so that the \
-             error is what rays and kernels leave, not what texels average."
+            "`ring`, splats at {DENSITY_PER_SR} rays/sr and bundles to 1 %; each size against bundles to 0.2 % on a map of the same \
+             size, so that the error is what rays and kernels leave, not what texels average."
         ),
         labels: &["estimator", "side_texels"],
         columns: &[RAYS, CPU_S, EYE_PASS_CPU_S, RELATIVE_RMSE, ARD],
@@ -294,20 +307,21 @@ pub(super) fn kernels(bench: &Bench) -> Result<Sweep> {
 pub(super) fn connectivity(bench: &Bench) -> Result<Sweep> {
     let (scene, against) = scene_and_truth("ring")?;
     let density = if bench.quick { 8e3 } else { DENSITY_PER_SR };
-    let variant = |name: &str, hits: Option<u64>, (_, settings): Method| Variant {
+    let variant = |name: &str, hits: Option<u64>, settings: BakeSettings| Variant {
         estimate: hits.map(|_| nearest_hits as fn(&Variant, Bake) -> Bake),
         sheet: Some("connectivity".into()),
         ..Variant::new(
             vec![name.into(), hits.map_or(Cell::Empty, Cell::Count)],
             &scene,
-            bench.at(settings(density), bench.side() / 2),
+            bench.at(settings, bench.side() / 2),
         )
     };
-    let nearest = [4, 16, 64].map(|hits| variant("nearest hits", Some(hits), SPLAT));
-    let areas = [AS_PAPER, WAVEFRONT].map(|way| variant(way.0, None, way));
+    let nearest = [4, 16, 64].map(|hits| variant("nearest hits", Some(hits), splat(density)));
+    let areas = [(AS_PAPER.0, paper(density)), ("auto", auto(0.01))];
+    let areas = areas.map(|(name, settings)| variant(name, None, settings));
     Ok(Sweep {
         note: format!(
-            "`ring`, {density} rays/sr. A density estimate sums the flux of the hits nearest to a texel's centre and divides by the \
+            "`ring`, {density} rays/sr; bundles to 1 %. A density estimate sums the flux of the hits nearest to a texel's centre and divides by the \
              disc that holds them. {AS_PAPER_NOTE}"
         ),
         labels: &["estimate", "hits"],
@@ -440,11 +454,7 @@ pub(super) fn pool_plates(bench: &Bench) -> Result<Sweep> {
     let mut variants: Vec<Variant> = Vec::new();
     for (name, scene) in &waters {
         let labels = vec![name.clone().into(), Cell::Count(scene.triangle_count() as u64)];
-        variants.push(Variant::new(
-            labels,
-            scene,
-            bench.at(wavefront(4e4), bench.side()),
-        ));
+        variants.push(Variant::new(labels, scene, bench.at(auto(0.005), bench.side())));
     }
     let from = |file: &str, position: DVec3| {
         let target = DVec3::new(0.0, 0.1, 0.0);
@@ -458,7 +468,7 @@ pub(super) fn pool_plates(bench: &Bench) -> Result<Sweep> {
         from("plate8-below", DVec3::new(0.9, 0.7, 0.9)),
     ];
     Ok(Sweep {
-        note: "`pool`, wavefront, 40,000 rays/sr, against smooth displaced water.".into(),
+        note: "`pool`, bundles to 0.5 %, against smooth displaced water.".into(),
         labels: &["water", "triangles"],
         columns: &[RAYS, CPU_S, RELATIVE_RMSE, ARD],
         groups: vec![Group { against, variants }],
@@ -470,7 +480,7 @@ pub(super) fn complex(bench: &Bench) -> Result<Sweep> {
     /// Quads around and along the knot's tube; the second mesh has about as many triangles as the paper's object
     /// (3,958).
     const MESHES: [(u32, u32); 3] = [(11, 45), (22, 90), (44, 180)];
-    let settings = bench.at(wavefront(if bench.quick { 500.0 } else { 3e3 }), bench.side());
+    let settings = bench.at(auto(if bench.quick { 0.05 } else { 0.01 }), bench.side());
     let knot = |(around, along)| over_a_floor(1.0, ("knot", tube(around, along)), DVec3::new(0.4, 2.4, 0.3));
     let mut variants = Vec::new();
     for &mesh in bench.some(&MESHES, 2) {
@@ -484,7 +494,7 @@ pub(super) fn complex(bench: &Bench) -> Result<Sweep> {
     }
     let finest = knot(if bench.quick { MESHES[2] } else { (88, 360) });
     Ok(Sweep {
-        note: "A trefoil knot of glass over a floor, wavefront, against the finest mesh: the error is that of the mesh.".into(),
+        note: "A trefoil knot of glass over a floor, bundles to 1 %, against the finest mesh: the error is that of the mesh.".into(),
         labels: &["triangles"],
         columns: &[RAYS, CPU_S, RELATIVE_RMSE, ARD],
         groups: vec![Group {

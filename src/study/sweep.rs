@@ -16,9 +16,6 @@ use crate::progress::{Control, Progress};
 use crate::scene::{Camera, Scene};
 use crate::settings::{BakeSettings, MapResolution};
 
-/// Maximum error of a bake that serves as a reference.
-const TRUSTED: f64 = 0.01;
-
 /// Errors whose costs are tabulated.
 const TARGETS: [(&str, f64); 3] = [("5 %", 0.05), ("2 %", 0.02), ("1 %", 0.01)];
 
@@ -180,7 +177,7 @@ pub const fn column(name: &'static str, value: fn(&Measured) -> Cell) -> Column 
 pub const RAYS: Column = column("rays", |m| m.result.counts.rays.into());
 /// Kernels deposited.
 pub const SPLATS: Column = column("splats", |m| m.result.counts.splats.into());
-/// Wavefront cells deposited.
+/// Squares whose bundles were deposited.
 pub const CELLS: Column = column("cells", |m| m.result.counts.cells.into());
 /// CPU time of item buffers, tracing and depositing: the light pass without the hierarchy.
 pub const CPU_S: Column = column("cpu_s", |m| m.cpu_s.into());
@@ -191,7 +188,7 @@ pub const WALL_S: Column = column("wall_s", |m| {
 });
 /// CPU time of the views, traced on the CPU.
 pub const EYE_PASS_CPU_S: Column = column("eye_pass_cpu_s", |m| number(m.eye_pass_cpu_s));
-/// Memory of maps, rays and patches.
+/// Memory of maps, rays and bundles.
 pub const MEMORY_MB: Column = column("memory_mb", |m| {
     number(m.result.course.last().map(|point| point.bytes as f64 / 1e6))
 });
@@ -263,8 +260,12 @@ impl Against {
             Self::Known(reference) => Ok(Some(reference.clone())),
             Self::Bake(scene, settings) => {
                 let result = bench.bake(scene, settings)?;
-                let is_known = |error: f64| error <= TRUSTED;
-                if settings.max_error.is_some() && !result.estimated_relative_rmse.is_some_and(is_known) {
+                let is_met = |target| {
+                    result
+                        .estimated_relative_rmse
+                        .is_some_and(|error| error <= target)
+                };
+                if !settings.max_error.is_none_or(is_met) {
                     return Ok(None);
                 }
                 let estimator: &str = settings.estimator.into();

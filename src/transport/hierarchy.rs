@@ -10,7 +10,6 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::curvature::TrianglesAround;
 use super::smoothing::smoothing_groups;
 use super::tracer::RayHit;
 use crate::geometry::bvh::{self, Frame};
@@ -59,7 +58,6 @@ pub(super) struct Copied {
 pub(super) struct SharedMesh {
     mesh: Arc<Mesh>,
     pub(super) bvh: TriangleBvh,
-    pub(super) around: Arc<TrianglesAround>,
     /// Smoothing group of each triangle.
     pub(super) groups: Arc<Vec<u32>>,
 }
@@ -346,7 +344,6 @@ impl SharedMesh {
             .collect();
         Self {
             bvh: TriangleBvh::build(&corners),
-            around: Arc::new(TrianglesAround::of(mesh)),
             // Placing normalises the normals, which may have any length in a file.
             groups: Arc::new(smoothing_groups(&mesh.placed(&DAffine3::IDENTITY))),
             mesh: Arc::clone(mesh),
@@ -509,12 +506,6 @@ mod tests {
             let Some(hit) = was else { continue };
             hits += 1;
             let (object, triangle) = (hit.object, hit.triangle);
-            let turn = |tracer: &Tracer| {
-                let mesh = tracer.scene().objects[object].in_scene();
-                let field = tracer.normal_field(object)?;
-                Some(field.turn(mesh, triangle, hit.barycentric, ray.direction))
-            };
-            assert_eq!(turn(copied), turn(shared));
             let group = |tracer: &Tracer| tracer.smoothing_group(object, triangle);
             assert_eq!(group(copied), group(shared));
         }

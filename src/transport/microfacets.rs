@@ -92,32 +92,6 @@ impl Facet {
         };
         Some(out_of(direction, normal, side))
     }
-
-    /// Derivative of [`Self::scattered`] from those of the incident direction and the normal, by central differences:
-    /// accurate to some 1e-10 for smooth functions in double precision.
-    pub fn scattered_derivative(
-        &self,
-        (incident, incident_change): (DVec3, DVec3),
-        (normal, normal_change): (DVec3, DVec3),
-        event: MicrofacetEvent,
-    ) -> DVec3 {
-        let size = incident_change.length().max(normal_change.length());
-        // Catches NaN too.
-        if !(size > 0.0 && size.is_finite()) {
-            return DVec3::ZERO;
-        }
-        let step = 1e-6 / size;
-        let at = |step: f64| {
-            let incident = (incident + incident_change * step).normalize();
-            let normal = (normal + normal_change * step).normalize();
-            self.scattered(incident, normal, event)
-        };
-        match (at(step), at(-step)) {
-            (Some(after), Some(before)) => (after - before) / (2.0 * step),
-            // At the critical angle.
-            _ => DVec3::ZERO,
-        }
-    }
 }
 
 /// Mirror image of a direction in the plane perpendicular to a unit normal.

@@ -1,21 +1,18 @@
 //! Light transport at a surface, shared by the light pass, the direct layer and the CPU eye pass.
 
 pub mod bend;
-pub mod corners;
-pub mod curvature;
-pub mod differential;
 mod hierarchy;
 pub mod interaction;
 pub mod medium;
 pub mod microfacets;
 mod normal_texture;
 mod packed;
+pub mod sharp_edges;
 pub mod smoothing;
 pub mod tracer;
 mod traversed;
 
 pub use crate::plan::EffectSet;
-pub use differential::{RayDerivative, RayDifferential, SurfaceDetail, SurfaceScale};
 pub use hierarchy::SceneNode;
 pub use interaction::{Branch, DiffuseResponse, Event, Interaction, Meeting, NormalSource};
 pub use medium::{MediumStack, media_at};

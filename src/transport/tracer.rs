@@ -7,18 +7,17 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::bend;
-use super::corners::{sharp_corners, sharp_edges};
-use super::curvature::NormalField;
 use super::hierarchy::{self, Hierarchy, SceneNode};
 use super::interaction::DiffuseResponse;
-use super::normal_texture::{TextureBump, texel_m};
+use super::normal_texture;
+use super::sharp_edges::sharp_edges;
 use super::smoothing::smoothing_groups;
 use super::traversed::TraversedCells;
 use crate::geometry::{Ray, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
 use crate::scene::{
-    Adjacency, AlphaMask, Material, Mixture, NormalMap, Scene, SurfaceKind, TextureRef, Waves, instances,
+    Adjacency, AlphaMask, Material, Mixture, NormalMap, Scene, SurfaceKind, TextureRef, instances,
 };
 
 /// Number of the largest opaque triangles.
@@ -32,7 +31,7 @@ pub struct Tracer {
     /// By object.
     shapes: Vec<Arc<Shape>>,
     /// By object; `None` where it is not specular.
-    specular: Vec<Option<Arc<SpecularShape>>>,
+    groups: Vec<Option<Groups>>,
     /// Whether waves and textures perturb normals.
     has_bumps: bool,
     /// Whether any material has an alpha mask.
@@ -54,20 +53,11 @@ struct Shape {
     edges: OnceLock<Vec<[DVec3; 2]>>,
 }
 
-/// Shape data of a specular object.
-/// Shapes of an object, the second of a specular one.
-type KnownShape = (Arc<Shape>, Option<Arc<SpecularShape>>);
+/// Smoothing group of each triangle of a specular object.
+type Groups = Arc<Vec<u32>>;
 
-#[derive(Debug)]
-struct SpecularShape {
-    normals: NormalField,
-    /// Smoothing group of each triangle.
-    groups: Arc<Vec<u32>>,
-    /// Sharp corners [m].
-    corners: Vec<DVec3>,
-    /// Texel size of its normal texture [m].
-    texel_m: Option<f64>,
-}
+/// Shape of an object, and what is known of a specular one.
+type KnownShape = (Arc<Shape>, Option<Groups>);
 
 /// Where a ray hit a surface, without derived data: the compact form to store.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,22 +123,22 @@ impl Tracer {
         known: impl Fn(usize) -> Option<KnownShape> + Sync,
     ) -> Self {
         let shape = |object: usize| {
-            let (shape, specular) = known(object).unwrap_or_default();
+            let (shape, groups) = known(object).unwrap_or_default();
             let is_specular = scene.material_of(object).surface.is_specular();
-            let specular = specular.filter(|_| is_specular);
+            let groups = groups.filter(|_| is_specular);
             (
                 shape,
-                specular.or_else(|| Self::specular_shape(&scene, &hierarchy, object)),
+                groups.or_else(|| Self::groups_of(&scene, &hierarchy, object)),
             )
         };
-        let (shapes, specular) = (0..scene.objects.len()).into_par_iter().map(shape).unzip();
+        let (shapes, groups) = (0..scene.objects.len()).into_par_iter().map(shape).unzip();
         Self {
             has_masks: is_any(&scene, |material| material.alpha_mask.is_some()),
             has_partial: is_any(&scene, |material| material.coverage.is_some()),
             shapes,
             scene,
             hierarchy,
-            specular,
+            groups,
             has_bumps,
             largest_opaque: Arc::default(),
             wavelength: None,
@@ -173,7 +163,7 @@ impl Tracer {
         } else {
             Arc::new(self.hierarchy.edited(&self.scene, &scene))
         };
-        let known = |object: usize| (Arc::clone(&self.shapes[object]), self.specular[object].clone());
+        let known = |object: usize| (Arc::clone(&self.shapes[object]), self.groups[object].clone());
         Self::assemble(scene, hierarchy, self.has_bumps, |object| {
             is_known[object].then(|| known(object))
         })
@@ -194,13 +184,6 @@ impl Tracer {
         Self {
             traversed: Some(Arc::clone(traversed)),
             ..self.clone()
-        }
-    }
-
-    /// Notes that light lies somewhere in a box [m], whatever rays say.
-    pub fn note_box(&self, bounds: (DVec3, DVec3)) {
-        if let Some(traversed) = &self.traversed {
-            traversed.add_box(bounds);
         }
     }
 
@@ -291,38 +274,14 @@ impl Tracer {
         self.has_bumps && self.scene.material_of(object).has_bumps()
     }
 
-    fn specular_shape(scene: &Scene, hierarchy: &Hierarchy, object: usize) -> Option<Arc<SpecularShape>> {
+    fn groups_of(scene: &Scene, hierarchy: &Hierarchy, object: usize) -> Option<Groups> {
         if !scene.material_of(object).surface.is_specular() {
             return None;
         }
-        let shared = hierarchy.shared(object);
-        // A moved object stores its operators, which takes no more memory than its copy did.
-        let normals = match shared.filter(|_| !hierarchy.is_moved(object)) {
-            Some(shared) => NormalField::Found(Arc::clone(&shared.around)),
-            None => NormalField::new(scene.objects[object].mesh_in_scene()),
-        };
-        let groups = match shared {
+        Some(match hierarchy.shared(object) {
             Some(shared) => Arc::clone(&shared.groups),
             None => Arc::new(smoothing_groups(scene.objects[object].mesh_in_scene())),
-        };
-        let mesh = scene.objects[object].in_scene();
-        let bending_map = scene.material_of(object).bending_map();
-        Some(Arc::new(SpecularShape {
-            normals,
-            groups,
-            corners: sharp_corners(mesh),
-            texel_m: bending_map.and_then(|map| texel_m(scene, mesh, &map.image)),
-        }))
-    }
-
-    /// Shape operators of an object; `None` where it is not specular.
-    pub fn normal_field(&self, object: usize) -> Option<&NormalField> {
-        self.specular[object].as_ref().map(|shape| &shape.normals)
-    }
-
-    /// Sharp corners of an object [m]; empty where it is not specular.
-    pub fn sharp_corners(&self, object: usize) -> &[DVec3] {
-        self.specular[object].as_ref().map_or(&[], |shape| &shape.corners)
+        })
     }
 
     /// End points of each sharp edge of an object [m]; empty where there are too many.
@@ -333,10 +292,8 @@ impl Tracer {
 
     /// Smoothing group of a triangle within its object; 0 where the object is not specular.
     pub fn smoothing_group(&self, object: usize, triangle: usize) -> u32 {
-        self.specular[object]
-            .as_ref()
-            .and_then(|shape| shape.groups.get(triangle).copied())
-            .unwrap_or(0)
+        let groups = self.groups[object].as_ref();
+        groups.map_or(0, |groups| groups[triangle])
     }
 
     pub fn adjacency(&self, object: usize) -> &Adjacency {
@@ -420,20 +377,12 @@ impl Tracer {
         }
         let waves = self.scene.material_of(hit.object).bending_waves();
         let of_waves = waves.map(|waves| waves.gradient(hit.point));
-        let of_texture = self.texture_bump(hit).map(|bump| bump.gradient());
+        let of_texture = self.texture_gradient(hit);
         Some(of_waves.unwrap_or_default() + of_texture.unwrap_or_default())
     }
 
-    /// Change of the height gradient [1] for a step [m] along the surface.
-    pub(super) fn bump_gradient_change(&self, hit: &SurfaceHit, step: DVec3) -> DVec3 {
-        let waves = self.scene.material_of(hit.object).bending_waves();
-        let of_waves = waves.map(|waves| waves.gradient_change(hit.point, step));
-        let of_texture = self.texture_bump(hit).map(|bump| bump.gradient_change(step));
-        of_waves.unwrap_or_default() + of_texture.unwrap_or_default()
-    }
-
-    fn texture_bump(&self, hit: &SurfaceHit) -> Option<TextureBump> {
-        self.bump_of(self.scene.material_of(hit.object).bending_map()?, hit)
+    fn texture_gradient(&self, hit: &SurfaceHit) -> Option<DVec3> {
+        self.gradient_of(self.scene.material_of(hit.object).bending_map()?, hit)
     }
 
     /// Unit normal by which pictures shade diffuse light; `None` without a normal map.
@@ -443,31 +392,13 @@ impl Tracer {
         if material.surface.is_specular() {
             return Some(hit.shading_normal);
         }
-        let bump = self.bump_of(map, hit)?;
-        Some(bend::bent(hit.interpolated_normal, bump.gradient()))
+        Some(bend::bent(hit.interpolated_normal, self.gradient_of(map, hit)?))
     }
 
-    fn bump_of(&self, map: &NormalMap, hit: &SurfaceHit) -> Option<TextureBump> {
+    fn gradient_of(&self, map: &NormalMap, hit: &SurfaceHit) -> Option<DVec3> {
         let mesh = self.scene.objects[hit.object].in_scene();
         let place = (hit.triangle, hit.barycentric);
-        TextureBump::at((&self.scene, mesh), map, place, hit.interpolated_normal)
-    }
-
-    /// Finest length scale of a specular object's bumps, beyond its mesh [m]; infinite without bumps.
-    pub fn finest_bump_m(&self, object: usize) -> f64 {
-        match &self.specular[object] {
-            Some(_) if !self.is_bumpy(object) => f64::INFINITY,
-            Some(shape) => {
-                let material = self.scene.material_of(object);
-                let of_waves = material.bending_waves().map_or(f64::INFINITY, Waves::shortest_m);
-                let detail = material.bending_map().map(|map| map.detail_texels);
-                let of_texture = detail
-                    .zip(shape.texel_m)
-                    .map(|(texels, texel_m)| texels * texel_m);
-                of_waves.min(of_texture.unwrap_or(f64::INFINITY))
-            }
-            None => f64::INFINITY,
-        }
+        normal_texture::gradient((&self.scene, mesh), map, place, hit.interpolated_normal)
     }
 
     /// Whether any surface lies on the ray before `distance_m`.

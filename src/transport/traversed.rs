@@ -64,11 +64,6 @@ impl TraversedCells {
         }
     }
 
-    /// Light that lies somewhere in a box [m].
-    pub fn add_box(&self, (low, high): (DVec3, DVec3)) {
-        self.add_cells(self.in_cells(low), self.in_cells(high));
-    }
-
     /// Whether any of it may have come into a box [m]; nothing is known of what lies outside.
     pub fn meets(&self, (low, high): (DVec3, DVec3)) -> bool {
         if low.cmplt(self.bounds.0).any() || high.cmpgt(self.bounds.1).any() {

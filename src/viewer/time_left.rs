@@ -40,7 +40,7 @@ pub fn time_left_s(
     let by_course = own.and_then(|level| {
         let target = wanted.settings.max_error?;
         let course = &level.result.course;
-        let spent_cpu_s = course.last().filter(|point| !point.is_coarse)?.cpu_s;
+        let spent_cpu_s = course.last()?.cpu_s;
         let expected = forecast(course, target, wanted.settings.estimator)?;
         if expected.factor > MAX_FACTOR {
             return None;

@@ -10,14 +10,14 @@ use cpu_time::ProcessTime;
 use glam::{DVec2, DVec3};
 use nephroid::bake::{Bake, Baker};
 use nephroid::geometry::Ray;
+use nephroid::light_pass::coverage::{FluxTriangle, deposit_triangles};
 use nephroid::light_pass::receiver_maps::{ReceiverMap, ReceiverMaps};
-use nephroid::light_pass::wavefront::coverage::{FluxTriangle, deposit_triangles};
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::builtin::{self, parts, shapes};
 use nephroid::scene::edit::{Edit, LightEdit};
 use nephroid::scene::{LightKind, Scene};
-use nephroid::settings::{BakeSettings, Estimator, MapResolution, Sigma};
+use nephroid::settings::{BakeSettings, ErrorMetric, MapResolution, Sigma};
 use nephroid::transport::{MediumStack, Tracer};
 use nephroid::units::Flux;
 use rayon::prelude::*;
@@ -47,6 +47,17 @@ fn at(settings: BakeSettings, density_per_sr: f64, side: usize) -> BakeSettings 
         },
         ..settings
     }
+}
+
+/// Bundles and photons to a relative RMSE.
+fn to(target: f64, side: usize) -> BakeSettings {
+    let settings = BakeSettings {
+        max_error: Some(target),
+        error_metric: ErrorMetric::Rmse,
+        ..BakeSettings::default()
+    };
+    let density_per_sr = settings.density_per_sr;
+    at(settings, density_per_sr, side)
 }
 
 fn session(name: &str) -> Baker {
@@ -100,14 +111,14 @@ fn edits(what: &str, mut step: impl FnMut(f64) -> Bake) {
 }
 
 fn drags(name: &str) {
-    let base = at(BakeSettings::of(Estimator::Wavefront), 25_000.0, 512);
+    let base = to(0.02, 512);
     let mut session = session(name);
     run(&mut session, &base);
     let with_sigma = |settings: &BakeSettings, sigma| BakeSettings {
         sigma: Sigma::Constant(sigma),
         ..settings.clone()
     };
-    edits(&format!("{name}: sigma, wavefront, 512²"), |step| {
+    edits(&format!("{name}: sigma, auto, 512²"), |step| {
         run(&mut session, &with_sigma(&base, 0.1 * (step + 1.0)))
     });
     let mut edited = |edit: Edit| {
@@ -128,7 +139,7 @@ fn drags(name: &str) {
         edited(Edit::Light(0, LightEdit::Position(position)))
     });
     edits(&format!("{name}: map size, 500² to 540²"), |step| {
-        run(&mut session, &at(base.clone(), 25_000.0, 500 + step as usize))
+        run(&mut session, &to(0.02, 500 + step as usize))
     });
     let splats = at(BakeSettings::splat(), 100_000.0, 512);
     run(&mut session, &splats);
@@ -148,7 +159,7 @@ fn first_picture(name: &str) {
         let mut see = |level: Bake| {
             first.get_or_insert((1e3 * start.elapsed().as_secs_f64(), level.counts.rays));
         };
-        let settings = at(BakeSettings::of(Estimator::Wavefront), 25_000.0, 256);
+        let settings = to(0.02, 256);
         session
             .bake_levels(&settings, &(), &Control::default(), &mut see)
             .unwrap();
@@ -162,7 +173,7 @@ fn first_picture(name: &str) {
 
 /// From asking a bake to stop to its return.
 fn cancelling(name: &str) {
-    let settings = at(BakeSettings::of(Estimator::Wavefront), 400_000.0, 512);
+    let settings = to(0.002, 512);
     let late_ms = (0..TIMES).map(|index| {
         let mut session = session(name);
         session.tracer();
@@ -185,22 +196,22 @@ fn cancelling(name: &str) {
     );
 }
 
-/// CPU seconds of the light pass, and of depositing in it: first, and again at another size from what was kept, where
-/// nothing is traced.
+/// CPU seconds of the light pass, and of depositing in it: first, and again at another size.
 fn bake() {
     for (first, second) in [(256, 256), (256, 512), (512, 512)] {
-        for (name, density, settings) in [
-            ("ring", 1e4, BakeSettings::of(Estimator::Wavefront)),
-            ("pool", 1e3, BakeSettings::of(Estimator::Wavefront)),
-            ("ring", 1e6, BakeSettings::splat()),
-        ] {
-            let estimator: &str = settings.estimator.into();
+        type Sized = fn(usize) -> BakeSettings;
+        let ways: [(&str, &str, Sized); 3] = [
+            ("ring", "auto", |side| to(0.01, side)),
+            ("pool", "auto", |side| to(0.01, side)),
+            ("ring", "splat", |side| at(BakeSettings::splat(), 1e6, side)),
+        ];
+        for (name, estimator, settings) in ways {
             let mut seconds: [[Vec<f64>; 2]; 2] = Default::default();
             let mut rays = [0; 2];
             for _ in 0..5 {
                 let mut session = session(name);
                 for (index, side) in [first, second].into_iter().enumerate() {
-                    let result = run(&mut session, &at(settings.clone(), density, side));
+                    let result = run(&mut session, &settings(side));
                     let cpu_s = &result.cpu_s;
                     rays[index] = result.counts.rays;
                     seconds[index][0].push(cpu_s.plan + cpu_s.trace + cpu_s.deposit);
@@ -221,11 +232,7 @@ fn bake() {
 /// CPU time per triangle of the deposit with exact area coverage, by the triangles' area [texel²].
 fn deposit() {
     // The floor of the ring: a square.
-    let chart = run(
-        &mut session("ring"),
-        &at(BakeSettings::of(Estimator::Wavefront), 1e2, DEPOSIT_SIDE),
-    )
-    .maps[0]
+    let chart = run(&mut session("ring"), &to(0.1, DEPOSIT_SIDE)).maps[0]
         .chart
         .clone();
     let receiver = chart.receiver;
@@ -298,13 +305,13 @@ fn deposit_ns(triangles: &[FluxTriangle], map: &mut ReceiverMap) -> [f64; 2] {
 fn scale() {
     let mut ball = over_a_floor("a million triangles");
     add_ball(&mut ball, DVec3::new(0.0, 0.8, 0.0), 0.5, 8);
-    segments_per_s(ball, 200_000.0);
+    segments_per_s(ball, 0.005);
     let mut balls = over_a_floor("a thousand balls");
     for index in 0..1000 {
         let (column, row) = (f64::from(index % 40) - 19.5, f64::from(index / 40) - 12.0);
         add_ball(&mut balls, DVec3::new(column * 0.08, 0.4, row * 0.08), 0.03, 2);
     }
-    segments_per_s(balls, 1_000.0);
+    segments_per_s(balls, 0.05);
 }
 
 const LAMP: DVec3 = DVec3::new(0.0, 2.2, 0.0);
@@ -354,7 +361,7 @@ fn follow(tracer: &Tracer, ray: Ray, rays: &mut Vec<Ray>) {
     }
 }
 
-fn segments_per_s(scene: Scene, density_per_sr: f64) {
+fn segments_per_s(scene: Scene, target: f64) {
     let scene = Arc::new(scene);
     let tracer = Tracer::new(Arc::clone(&scene));
     let rays = paths(&tracer, 600);
@@ -366,10 +373,7 @@ fn segments_per_s(scene: Scene, density_per_sr: f64) {
     });
     let [bare, ..] = spread(bare.collect());
     let mut session = Baker::new(Arc::clone(&scene)).unwrap();
-    let result = run(
-        &mut session,
-        &at(BakeSettings::of(Estimator::Wavefront), density_per_sr, 256),
-    );
+    let result = run(&mut session, &to(target, 256));
     let traced = result.counts.segments as f64 / result.cpu_s.trace;
     let (counts, cpu_s) = (&result.counts, &result.cpu_s);
     println!(

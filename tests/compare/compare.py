@@ -57,7 +57,6 @@ class Program:
 
 
 PROGRAMS = [
-    Program("wavefront", "Nephroid, wavefront", "", ["wavefront"]),
     Program("photon", "Nephroid, photon", "", ["photon"]),
     Program("auto", "Nephroid, auto", "", ["auto"]),
     Program("splat", "Nephroid, splat", "", ["splat"]),

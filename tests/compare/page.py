@@ -6,8 +6,8 @@ from statistics import median
 from figures import CERTAIN
 
 TARGETS = [0.05, 0.02, 0.01]
-OURS = "wavefront"
-NEPHROID = ["wavefront", "photon", "auto", "splat"]
+OURS = "auto"
+NEPHROID = ["photon", "auto", "splat"]
 LEGEND = """*slope* is the exponent of error against CPU time, by least squares of logarithms through all steps. Seconds are
 interpolated between steps; `<` is the first step, which is better already; `~` goes on from the last one, with the square
 root of time where independent samples are averaged, else as measured; `never` is a bias. What two independent runs have in
@@ -189,20 +189,20 @@ def verdicts(scene, programs, names):
 
 
 def against(mine, rivals):
-    """One target, the wavefront and the best of the other programs: a sentence, and the figure that it has a place for."""
+    """One target, Nephroid's bundles and the best of the other programs: a sentence, and the figure that it has a place for."""
     rivals = {name: found for name, found in rivals.items() if not math.isnan(found.cpu_s)}
     if math.isnan(mine.cpu_s):
-        return "the wavefront does not come{}" if mine.sign == "never" else "it is not known when the wavefront comes{}", ""
+        return "bundles do not come{}" if mine.sign == "never" else "it is not known when bundles come{}", ""
     if not rivals:
         return "no other program comes{}", ""
     name, best = min(rivals.items(), key=lambda item: item[1].cpu_s)
     doubt = {"<": "more than ", "~": "about "}.get(mine.sign, "about " if best.sign == "~" else "")
     times = number(best.cpu_s / mine.cpu_s)
     if best.sign == "<":
-        return f"{name} takes {{}} times the CPU time of the wavefront", f"at most {times}"
+        return f"{name} takes {{}} times the CPU time of bundles", f"at most {times}"
     if mine.cpu_s <= best.cpu_s:
-        return f"the best of the others, {name}, takes {{}} times the CPU time of the wavefront", doubt + times
-    return f"**{name} is quicker**: {{}} of the CPU time of the wavefront", percent(best.cpu_s / mine.cpu_s)
+        return f"the best of the others, {name}, takes {{}} times the CPU time of bundles", doubt + times
+    return f"**{name} is quicker**: {{}} of the CPU time of bundles", percent(best.cpu_s / mine.cpu_s)
 
 
 def grouped(by_target):
@@ -218,13 +218,13 @@ def grouped(by_target):
 
 
 def quicker_splats(ours, splats):
-    """Targets that Nephroid's own splats reach before its wavefront."""
+    """Targets that Nephroid's own splats reach before its bundles."""
     said = []
     for target in TARGETS:
         mine, other = ours.cost(target), splats.cost(target)
         if not math.isnan(other.cpu_s) and not mine.cpu_s <= other.cpu_s:
             said.append(f"{percent(target)} ({cost(other)} CPU s against {cost(mine)})")
-    return f"Nephroid's own splats are quicker than its wavefront to {listed(said)}" if said else ""
+    return f"Nephroid's own splats are quicker than its bundles to {listed(said)}" if said else ""
 
 
 def stuck(courses, names):

@@ -15,11 +15,11 @@ mod bake {
     mod plan;
     mod probe;
     mod soft;
+    mod solver;
     mod sparse;
     mod spectral;
     mod surfaces;
     mod tiles;
-    mod wavefront;
 }
 
 mod cli {

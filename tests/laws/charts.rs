@@ -9,14 +9,14 @@ use nephroid::settings::LayerKind::{Direct, Indirect};
 use support::laws::Table;
 use support::laws::law::*;
 use support::laws::scenes::*;
-use support::tools::{at, set};
+use support::tools::{set, settings};
 
 pub fn fill(t: &mut Table) {
     for side in [64, 128, 256, 512] {
         t.case("room-of-boxes-without-coordinates")
             .bake_with(
                 room_of_boxes(),
-                set(at(1e3, side), |s| s.layers = vec![Direct, Indirect]),
+                set(settings(1e3, side), |s| s.layers = vec![Direct, Indirect]),
             )
             .without_books()
             .measure("lit texels without indirect light", 0.0, |bake| {

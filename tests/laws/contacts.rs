@@ -8,13 +8,13 @@ use nephroid::scene::{Mesh, Scene, contacts};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table};
-use support::tools::{at, set};
+use support::tools::{set, to};
 
 /// Gaps of a rounding error to single precision, one way and the other.
 const GAPS_M: [f64; 3] = [0.0, 6e-8, -6e-8];
 
 pub fn fill(t: &mut Table) {
-    let bright_branches = || set(at(1e3, 16), |s| s.branch_threshold = Some(1e-4));
+    let bright_branches = || set(to(0.01, 16), |s| s.branch_threshold = Some(1e-4));
     for gap_m in GAPS_M {
         t.case("touching-glass")
             .bake_with(slabs(&[[0.3, 0.7]], 1.5), bright_branches())
@@ -26,20 +26,20 @@ pub fn fill(t: &mut Table) {
             .as_first("map as where they overlap", 1e-2, 1.0);
         let rug = shapes::floor([-0.2, 0.2], [-0.2, 0.2], gap_m);
         t.case("rug-on-the-floor")
-            .bake(before(upright()), 1e3, 32)
-            .bake(apart(before(upright()).diffuse("rug", rug)), 1e3, 32)
+            .bake(before(upright()), 0.01, 32)
+            .bake(apart(before(upright()).diffuse("rug", rug)), 0.01, 32)
             .watts_as_first("watts as without it", 1e-3)
             .measure("the rug holds what falls on its place", 1e-2, on_the_rug);
         let mut back = shapes::floor([-0.5, 0.5], [-0.5, 0.5], gap_m);
         turn(&mut back);
         t.case("floor-of-two-nodes-back-to-back")
-            .bake(before(upright()), 1e3, 32)
-            .bake(apart(before(upright()).diffuse("back", back)), 1e3, 32)
+            .bake(before(upright()), 0.01, 32)
+            .bake(apart(before(upright()).diffuse("back", back)), 0.01, 32)
             .watts_as_first("watts as of a single floor", 1e-3);
     }
     t.case("floor-doubled-back-to-back")
-        .bake(before(upright()), 1e3, 32)
-        .bake(before(upright()).reshaped(0, back_to_back), 1e3, 32)
+        .bake(before(upright()), 0.01, 32)
+        .bake(before(upright()).reshaped(0, back_to_back), 0.01, 32)
         .watts_as_first("watts as of a single floor", 1e-3)
         .must("only the side that is met is lit", |bake| {
             let mut maps = bake.result.maps.iter();

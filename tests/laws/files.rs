@@ -47,7 +47,7 @@ pub fn fill(t: &mut Table) {
         attributes.remove("NORMAL");
         attributes.extend(normals.map(|normals| ("NORMAL".into(), json!(normals))));
         t.case("normals-missing-zero-or-opposite")
-            .bake(file.scene(), 1e3, 32)
+            .bake(file.scene(), 0.01, 32)
             .e_of_lamp("that of the mirrored lamp", 5e-3, MIRRORED_LAMP);
     }
     // A smaller mirror below a node that makes it larger, unevenly, or turns it inside out.
@@ -57,12 +57,12 @@ pub fn fill(t: &mut Table) {
         let mesh = rectangle(&mut file, corners, x(-scale[0].signum() as f32), 1);
         file.json["nodes"][1] = json!({ "name": "mirror", "mesh": mesh, "scale": scale });
         t.case("uneven-and-negative-scale")
-            .bake(upright().scene(), 1e3, 32)
-            .bake(file.scene(), 1e3, 32)
+            .bake(upright().scene(), 0.01, 32)
+            .bake(file.scene(), 0.01, 32)
             .as_first("map as of the mirror in its true size", 1e-6, 1.0);
     }
     t.case("attenuation-of-a-nanometre")
-        .bake(black_block().scene(), 1e3, 32)
+        .bake(black_block().scene(), 0.01, 32)
         .ledger("most of it is absorbed", 0.0, |energy| {
             no(energy.absorbed > 0.5 * energy.emitted)
         })
@@ -71,7 +71,7 @@ pub fn fill(t: &mut Table) {
         });
     for outer in [FRAC_PI_2, 1.6, 7.0] {
         t.case("spot-of-half-the-sky")
-            .bake(with_spot(0.0, outer).scene(), 1e3, 32)
+            .bake(with_spot(0.0, outer).scene(), 0.01, 32)
             .measure("half-angle, rad", FRAC_PI_2, |bake| {
                 match bake.scene.lights[0].kind {
                     LightKind::Spot { outer_cone_rad, .. } => outer_cone_rad,
@@ -85,8 +85,8 @@ pub fn fill(t: &mut Table) {
         let mut file = upright();
         file.json["extensions"]["KHR_lights_punctual"]["lights"][0]["range"] = json!(range);
         t.case("light-range-0")
-            .bake(upright().scene(), 1e3, 32)
-            .bake(file.scene(), 1e3, 32)
+            .bake(upright().scene(), 0.01, 32)
+            .bake(file.scene(), 0.01, 32)
             .warned("range")
             .bits_as_first("map as without it, bit for bit");
     }
@@ -97,13 +97,13 @@ pub fn fill(t: &mut Table) {
         file.json["scenes"][0]["nodes"] = json!([]);
         file.push_root(json!({ "translation": [distance, -distance, distance], "children": children }));
         t.case("moved-a-million-metres")
-            .bake(upright().scene(), 1e3, 32)
-            .bake(file.scene(), 1e3, 32)
+            .bake(upright().scene(), 0.01, 32)
+            .bake(file.scene(), 0.01, 32)
             .as_first("map as at the origin", 1e-5, 1.0);
     }
     t.case("vertices-a-million-metres-away")
-        .bake(upright().scene(), 1e3, 32)
-        .bake(far_vertices().scene(), 1e3, 32)
+        .bake(upright().scene(), 0.01, 32)
+        .bake(far_vertices().scene(), 0.01, 32)
         .warned("by up to 3.1e-2 m")
         .watts_as_first("watts as near by, as far as 0.03 m allow", 0.2);
 }

@@ -14,24 +14,24 @@ use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, values};
-use support::tools::{at, photons, set, settings};
+use support::tools::{photons, set, settings, to};
 
 pub fn fill(t: &mut Table) {
     // Powers from the smallest that single precision knows to the largest: the map is a scale of itself.
-    let any = t.case("candela-of-any-size").bake(glass_ball(3), 1e3, 32);
+    let any = t.case("candela-of-any-size").bake(glass_ball(3), 0.01, 32);
     for factor in [-100, -20, 20, 100].map(|power| 2.0_f64.powi(power)) {
-        any.bake(of_intensity(factor), 1e3, 32).as_first(
+        any.bake(of_intensity(factor), 0.01, 32).as_first(
             "powers of two scale the map exactly",
             1e-15,
             factor,
         );
     }
     for factor in [1e-30, 1e30] {
-        any.bake(of_intensity(factor), 1e3, 32)
+        any.bake(of_intensity(factor), 0.01, 32)
             .as_first("1e-30 and 1e30 W/sr scale the map", 1e-6, factor);
     }
     for watts in [1e-310, f64::MIN_POSITIVE] {
-        any.bake(of_intensity(watts), 1e3, 32).measure(
+        any.bake(of_intensity(watts), 0.01, 32).measure(
             "brightest texel of denormal powers, W/m²",
             1e-37,
             |bake| brightest(bake, LayerKind::Caustic),
@@ -40,7 +40,7 @@ pub fn fill(t: &mut Table) {
     for watts in [1e38, 1e45, 1e100] {
         t.case("light-beyond-single-precision")
             .without_books()
-            .bake(of_intensity(watts), 1e3, 32)
+            .bake(of_intensity(watts), 0.01, 32)
             .must("every value is finite", |bake| {
                 bake.result
                     .maps
@@ -65,11 +65,11 @@ pub fn fill(t: &mut Table) {
     });
     for scene in [&lit, &tinted, &filled] {
         t.case("a-colour-channel-of-0")
-            .bake(scene.clone(), 1e3, 32)
+            .bake(scene.clone(), 0.01, 32)
             .must("the channel that is there arrives", |bake| flux_w(bake).r > 0.0);
     }
     t.case("red-lamp")
-        .bake(lit, 1e3, 32)
+        .bake(lit, 0.01, 32)
         .measure("green and blue arrive, W", 0.0, |bake| {
             flux_w(bake).g + flux_w(bake).b
         });
@@ -202,7 +202,7 @@ fn sent_to_a_mirror(t: &mut Table) {
         ("sun", sun, 1.2 * -slanting.y),
     ] {
         for item_buffer in [ItemBufferKind::Equal, ItemBufferKind::Cube] {
-            for settings in [at(4e3, 16), settings(6.4e5, 16)] {
+            for settings in [to(0.01, 16), settings(6.4e5, 16)] {
                 t.case(format!("{name}-above-a-mirror"))
                     .bake_with(
                         over.clone().lit(light(kind)),
@@ -216,7 +216,7 @@ fn sent_to_a_mirror(t: &mut Table) {
     let plate = shapes::floor([-2.0, -0.5], [-1.0, 1.0], 0.5);
     let shaded = over.diffuse("plate", plate).sun(DVec3::new(1.0, -1.0, 0.0));
     t.case("plate-before-a-mirror")
-        .bake(shaded.clone(), 4e3, 16)
+        .bake(shaded.clone(), 0.01, 16)
         .sent(0.6 * 0.5_f64.sqrt(), 5e-3)
         .splat(shaded, 2.56e6, 16)
         .sent(0.6 * 0.5_f64.sqrt(), 5e-3);
@@ -228,7 +228,7 @@ fn direct(t: &mut Table) {
     let layer = || BakeSettings {
         max_error: None,
         layers: vec![LayerKind::Direct],
-        ..at(300.0, 16)
+        ..to(0.02, 16)
     };
     let sky = |pixels, radiance, scale| under_sky(below(), pixels, radiance, scale);
     let panel = |half_m: f64, radiance: f64| {

@@ -31,16 +31,16 @@ pub fn fill(t: &mut Table) {
     let long = is_long().then(|| ("ten-million-triangles", fine_mirror(2500, 2000)));
     for (name, mesh) in mirrors.into_iter().chain(long) {
         t.case(name)
-            .bake(before(mesh), 1e3, 32)
+            .bake(before(mesh), 0.01, 32)
             .e_of_lamp("that of the mirrored lamp", 5e-3, MIRRORED_LAMP);
     }
     t.case("triangles-without-area")
-        .bake(before(upright()), 1e3, 32)
-        .bake(with_flat_triangles(), 1e3, 32)
+        .bake(before(upright()), 0.01, 32)
+        .bake(with_flat_triangles(), 0.01, 32)
         .as_first("map as without them", 1e-6, 1.0);
     t.case("floor-of-doubled-triangles")
-        .bake(before(upright()), 1e3, 32)
-        .bake(before(upright()).reshaped(0, twice), 1e3, 32)
+        .bake(before(upright()), 0.01, 32)
+        .bake(before(upright()).reshaped(0, twice), 0.01, 32)
         .watts_as_first("watts as of single ones", 1e-3);
     let mut layered = before(upright());
     let layer = layered.objects[1].clone();
@@ -48,8 +48,8 @@ pub fn fill(t: &mut Table) {
         .objects
         .extend(vec![layer; if is_long() { 999 } else { 99 }]);
     t.case("coplanar-layers")
-        .bake(before(upright()), 1e3, 32)
-        .bake(layered, 1e3, 32)
+        .bake(before(upright()), 0.01, 32)
+        .bake(layered, 0.01, 32)
         .as_first_within_errors();
     // Either is met, never both: the mirror sends at most what falls on it.
     let place = DVec3::new(-0.2, 0.8, 0.1);
@@ -59,13 +59,13 @@ pub fn fill(t: &mut Table) {
     t.case("receiver-on-the-caster")
         .bake(
             floor(0.5).mirror(sheet).diffuse("wall", wall).lamp(place),
-            1e3,
+            0.03,
             32,
         )
         .arrives(falls_w);
     for tilt_rad in [0.0, 1e-9, 1e-4, 0.1] {
         t.case("receiver-edge-on")
-            .bake(tilted_receiver(tilt_rad), 1e3, 32)
+            .bake(tilted_receiver(tilt_rad), 0.01, 32)
             .share("arrives beside E sin of the tilt", 1e-4, move |energy| {
                 (energy.deposited - 0.64 * tilt_rad.sin()).abs()
             });
@@ -115,10 +115,10 @@ pub fn fill(t: &mut Table) {
         ),
     ] {
         t.case(name)
-            .bake(before(upright()), 1e3, 32)
+            .bake(before(upright()), 0.01, 32)
             .bake(
                 before(upright()).reshaped(0, |mesh| mesh.uv0 = Some(uvs.to_vec())),
-                1e3,
+                0.03,
                 32,
             )
             .watts_as_first("watts as with plain coordinates", 1e-6);
@@ -190,7 +190,7 @@ fn lone_mirror(t: &mut Table, name: &str, towards: DVec3, half_m: f64) {
     let mirror = shapes::rectangle(towards.normalize(), x * half_m, y * half_m);
     let seen_sr = solid_angle_sr(&mirror, DVec3::ZERO);
     t.case(name)
-        .bake(room(2.5).mirror(mirror).lamp(DVec3::ZERO), 4e3, 16)
+        .bake(room(2.5).mirror(mirror).lamp(DVec3::ZERO), 0.01, 16)
         .measure("I times the solid angle arrives", 0.01, move |bake| {
             off(deposited_w(bake), seen_sr)
         });

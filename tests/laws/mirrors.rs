@@ -11,40 +11,40 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table};
-use support::tools::{at, builtin_scene, photons, set, settings};
+use support::tools::{builtin_scene, photons, set, settings, to};
 
 pub fn fill(t: &mut Table) {
     t.case("focus-paraboloid")
-        .bake(paraboloid(), 400.0, 33)
+        .bake(paraboloid(), 0.02, 33)
         .watts(0.64, 1e-3)
         .measure("light beyond the texel of the focus", 1e-3, |bake| {
             beyond_the_middle(bake, 0.64)
         });
     t.case("focus-on-a-corner-of-texels")
-        .bake(paraboloid(), 1e3, 64)
+        .bake(paraboloid(), 0.01, 64)
         .watts(0.64, 1e-3);
     let place = DVec3::new(0.8, 0.5, 0.0);
     let seen_sr = solid_angle_sr(&ellipsoid(place), place);
     t.case("focus-ellipsoid")
-        .bake(floor(0.5).mirror(ellipsoid(place)).lamp(place), 2e3, 33)
+        .bake(floor(0.5).mirror(ellipsoid(place)).lamp(place), 0.01, 33)
         .watts(seen_sr, 1e-3)
         .measure("light beyond the texel of the focus", 1e-3, move |bake| {
             beyond_the_middle(bake, seen_sr)
         });
     t.case("fold-on-a-texel-border")
-        .bake(fold_on_a_texel_border(), 4e3, 64)
+        .bake(fold_on_a_texel_border(), 0.01, 64)
         .e("1/√x beside the fold", 0.03, beside_the_fold)
         .measure("light on the dark side, of all", 1e-3, dark_side)
-        .bake(fold_on_a_texel_border(), 4e3, 32)
+        .bake(fold_on_a_texel_border(), 0.01, 32)
         .averages_to_coarser();
     for name in ["nephroid", "ring"] {
         t.case(format!("fold-and-cusp-of-the-{name}"))
-            .bake(builtin_scene(name), 4e3, 64)
-            .bake(builtin_scene(name), 4e3, 32)
+            .bake(builtin_scene(name), 0.01, 64)
+            .bake(builtin_scene(name), 0.01, 32)
             .averages_to_coarser();
     }
     t.case("hall-of-mirrors")
-        .bake_with(hall().lamp(HALL_LAMP), depth(40, at(1e3, 32)))
+        .bake_with(hall().lamp(HALL_LAMP), depth(40, to(0.01, 32)))
         .e("that of all mirrored lamps", 0.01, all_mirrored);
     for (name, reflectance) in [("mirror-box", 1.0), ("dim-mirror-box", 0.9)] {
         let to_the_end = set(depth(10_000, settings(40.0, 16)), |s| {
@@ -59,8 +59,8 @@ pub fn fill(t: &mut Table) {
                     e.emitted - e.deposited
                 });
         }
-        t.case(format!("{name}-by-patches"))
-            .bake_with(box_of_mirrors(reflectance), depth(6, at(20.0, 16)))
+        t.case(format!("{name}-by-bundles"))
+            .bake_with(box_of_mirrors(reflectance), depth(6, to(0.2, 16)))
             .share("escapes", 1e-3, |energy| energy.escaped);
     }
     let above_a_thousandth = set(depth(1000, settings(20.0, 16)), |s| {
@@ -79,8 +79,8 @@ pub fn fill(t: &mut Table) {
         .measure("segments a ray, of depth over threshold", 1.0, |bake| {
             bake.result.counts.segments as f64 / bake.result.counts.rays as f64 / (1000.0 / 1e-3)
         });
-    t.case("mirror-box-with-glass-by-patches")
-        .bake_with(hall_with_a_ball(), depth(24, at(100.0, 64)))
+    t.case("mirror-box-with-glass-by-bundles")
+        .bake_with(hall_with_a_ball(), depth(24, to(0.2, 64)))
         .share("escapes", 1e-3, |energy| energy.escaped)
         .ledger("light arrives, and the rest is given up", 0.0, |energy| {
             no(energy.deposited > 0.0 && energy.truncated.depth + energy.truncated.threshold > 0.0)
@@ -92,7 +92,7 @@ pub fn fill(t: &mut Table) {
                 .mirror(ball(-1.0))
                 .mirror(ball(1.0))
                 .lamp(DVec3::new(0.0, 0.5, 0.01)),
-            1e3,
+            0.03,
             32,
         )
         .share("given up", 0.01, |energy| energy.truncated.total().abs())
@@ -105,7 +105,7 @@ pub fn fill(t: &mut Table) {
     t.case("rays-parallel-to-the-receiver")
         .bake(
             Scene::default().diffuse("floor", wide).mirror(ball).sun(DVec3::X),
-            4e5 * 1600.0,
+            0.005,
             32,
         )
         .sent(PI * 0.0025, 2e-3)
@@ -115,25 +115,25 @@ pub fn fill(t: &mut Table) {
     let unlit = || floor(0.5).mirror(upright());
     for height in [0.0, 1e-12, -1e-12] {
         t.case("light-in-the-receivers-plane")
-            .bake(unlit().lamp(DVec3::new(-0.4, height, 0.1)), 500.0, 32)
+            .bake(unlit().lamp(DVec3::new(-0.4, height, 0.1)), 0.02, 32)
             .arrives_of_sent(1e-9);
     }
     t.case("sun-parallel-to-the-receiver")
-        .bake(unlit().sun(DVec3::X), 500.0, 32)
+        .bake(unlit().sun(DVec3::X), 0.02, 32)
         .arrives(1e-12);
     // Rays towards the mirror have no way before them: they are met at no distance, or not at all.
     t.case("lamp-on-a-mirror")
-        .bake(unlit().lamp(DVec3::new(0.6, 0.75, 0.1)), 500.0, 32)
+        .bake(unlit().lamp(DVec3::new(0.6, 0.75, 0.1)), 0.02, 32)
         .arrives(2.0 * PI);
     let near = DVec3::new(0.6 - 1e-9, 0.75, 0.1);
     t.case("lamp-a-nanometre-before-a-mirror")
-        .bake(unlit().lamp(near), 2e3, 32)
+        .bake(unlit().lamp(near), 0.01, 32)
         .e_of_lamp("that of the lamp", 0.01, near);
     let closed = shapes::sphere(DVec3::Y, 0.3, 3);
     t.case("lamp-in-a-closed-mirror")
         .bake(
             floor(0.5).mirror(closed).lamp(DVec3::new(0.05, 1.0, 0.02)),
-            500.0,
+            0.05,
             32,
         )
         .arrives(0.0)
@@ -142,19 +142,19 @@ pub fn fill(t: &mut Table) {
         let block = shapes::cuboid(DVec3::new(0.1, 0.2, 0.1), DVec3::new(0.4, 0.6, 0.4));
         let scene = floor(0.5).with("block", block, material.clone());
         t.case(format!("lamp-at-a-corner-of-{}", material.name))
-            .bake(scene.lamp(DVec3::new(0.1, 0.6, 0.1)), 60.0, 16)
+            .bake(scene.lamp(DVec3::new(0.1, 0.6, 0.1)), 0.02, 16)
             .arrives(4.0 * PI);
         t.case(format!("normals-behind-facets-of-{}", material.name))
-            .bake(normals_behind_facets(material), 100.0, 16)
+            .bake(normals_behind_facets(material), 0.02, 16)
             .arrives_of_sent(1.0);
     }
     // Far thinner than a cell, a hair is found or it is missed: its shadow is right to its own width.
     t.case("hair-before-a-mirror")
-        .bake(blocked(&[]), 4e3, 32)
+        .bake(blocked(&[]), 0.01, 32)
         .watts(0.5_f64.sqrt(), 1e-6)
         .bake(
             blocked(&[shapes::floor([0.1001, 0.1002], [0.9, 2.1], 0.5)]),
-            4e3,
+            0.03,
             32,
         )
         .compare(
@@ -163,7 +163,7 @@ pub fn fill(t: &mut Table) {
             |shaded, open| ((deposited_w(open) - deposited_w(shaded)) / 0.5_f64.sqrt() - 1e-4).abs(),
         );
     t.case("pinhole-before-a-mirror")
-        .bake(blocked(&plates_around_a_hole()), 5e7, 32)
+        .bake(blocked(&plates_around_a_hole()), 0.005, 32)
         .watts(4e-6 * 0.5_f64.sqrt(), 0.15);
     t.case("rough-lobe-below-the-horizon")
         .bake_with(rough_at_grazing(), photons(1e4, 16))

@@ -11,7 +11,7 @@ use crate::mirrors::paraboloid;
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Table, is_long};
-use support::tools::{at, set, settings, transformed};
+use support::tools::{set, settings, to, transformed};
 
 pub fn fill(t: &mut Table) {
     t.case("units-of-flux")
@@ -19,26 +19,26 @@ pub fn fill(t: &mut Table) {
     t.case("coarse-map-on-a-finer-one")
         .check("every count is kept, and even light stays even", spread_map);
     let sized = |width, height| {
-        set(at(1e3, 1), |s| {
+        set(to(0.01, 1), |s| {
             s.map_resolution = MapResolution::Fixed { width, height }
         })
     };
     for (name, scene) in [("mirror", before(upright())), ("ball", glass_ball(3))] {
         let scaled = t
             .case(format!("{name}-scaled-1e-4-to-1e5"))
-            .bake(scene.clone(), 1e3, 32);
+            .bake(scene.clone(), 0.01, 32);
         for scale in [1e-4, 1e-2, 1e2, 1e5] {
             scaled
                 .bake(
                     transformed(scene.clone(), DMat3::IDENTITY, scale, DVec3::ZERO),
-                    1e3,
+                    0.01,
                     32,
                 )
                 .as_first("E goes as 1/s²", 1e-4, 1.0 / (scale * scale));
         }
         let resized = t
             .case(format!("{name}-on-maps-of-1-to-4000"))
-            .bake(scene.clone(), 1e3, 32);
+            .bake(scene.clone(), 0.01, 32);
         for (width, height) in [(1, 1), (1, 2), (3, 1), (1, 1000), (1000, 1), (4, 4000)] {
             resized
                 .bake_with(scene.clone(), sized(width, height))
@@ -66,15 +66,15 @@ pub fn fill(t: &mut Table) {
     // Spreads from a millionth of a footprint to ten thousand of them.
     let of_sigma = |sigma, settings| set(settings, |s| s.sigma = Sigma::Constant(sigma));
     for sigma in [1e-6, 1.0, 1e4] {
-        for settings in [settings(2e3, 32), at(1e3, 32)] {
+        for settings in [settings(2e3, 32), to(0.01, 32)] {
             t.case("sigma-from-nothing-to-huge")
                 .bake_with(glass_ball(3), of_sigma(sigma, settings))
                 .arrives_of_sent(1.0);
         }
     }
     t.case("hardly-any-sigma")
-        .bake(glass_ball(3), 1e3, 32)
-        .bake_with(glass_ball(3), of_sigma(1e-6, at(1e3, 32)))
+        .bake(glass_ball(3), 0.01, 32)
+        .bake_with(glass_ball(3), of_sigma(1e-6, to(0.01, 32)))
         .as_first("is hardly any blur", 0.02, 1.0);
 }
 

@@ -12,7 +12,8 @@ use support::laws::Table;
 use support::laws::law::*;
 use support::laws::scenes::*;
 
-const DENSITY_PER_SR: f64 = 25_000.0;
+/// The widest openings are 1.5 times, the narrowest 0.005 times as wide [m].
+const OPENING_M: f64 = 0.0063;
 const LAMP: DVec3 = DVec3::new(0.013, -0.021, 0.034);
 
 pub fn fill(t: &mut Table) {
@@ -25,14 +26,14 @@ pub fn fill(t: &mut Table) {
         let mirrors = tiny_mirrors(seed, (least, most));
         let seen_sr: f64 = mirrors.iter().map(|mirror| solid_angle_sr(mirror, LAMP)).sum();
         t.case(format!("1000-mirrors-of-{least}-to-{most}-cells"))
-            .bake(around_the_lamp(mirrors), DENSITY_PER_SR, 16)
+            .bake(around_the_lamp(mirrors), 0.02, 16)
             .watts(seen_sr, 0.05);
     }
     let mirrors = tiny_mirrors(11, (0.01, 1.0));
     for mirror in mirrors.iter().step_by(16) {
         let seen_sr = solid_angle_sr(mirror, LAMP);
         t.case("tiny-mirrors-one-by-one")
-            .bake(around_the_lamp(vec![mirror.clone()]), DENSITY_PER_SR, 16)
+            .bake(around_the_lamp(vec![mirror.clone()]), 0.02, 16)
             .measure("I times the solid angle arrives", 0.05, move |bake| {
                 off(deposited_w(bake), seen_sr)
             });
@@ -57,7 +58,7 @@ pub fn fill(t: &mut Table) {
                 } else {
                     scene.sun(sun)
                 },
-                DENSITY_PER_SR,
+                0.02,
                 32,
             )
             .measure("what the opening lets through is sent", 0.02, move |bake| {
@@ -97,7 +98,7 @@ fn around_the_lamp(mirrors: Vec<Mesh>) -> Scene {
 /// A mirror below a plate whose opening is a convex polygon, its width a share of a lattice cell, tilted; with the
 /// opening's border. The plate's shadow covers the mirror whole.
 fn plate_with_an_opening(random: &mut impl FnMut() -> f64) -> (Scene, Vec<DVec3>) {
-    let width_m = DENSITY_PER_SR.sqrt().recip() * 0.005 * 300.0_f64.powf(random());
+    let width_m = OPENING_M * 0.005 * 300.0_f64.powf(random());
     let length_m = width_m
         * if random() < 0.5 {
             1.0

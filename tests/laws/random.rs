@@ -11,7 +11,7 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use support::laws::law::*;
 use support::laws::{Baked, Table, is_long};
 use support::random_scenes::{MAX_LAMPS, scene};
-use support::tools::{at, set, settings, transformed};
+use support::tools::{photons, set, settings, to, transformed};
 
 /// What may be done to a scene.
 const CHANGES: u64 = 8;
@@ -49,6 +49,11 @@ pub fn fill(t: &mut Table) {
             .bits_as_first("three threads for one: the same bits");
     }
     for (plain, settings) in scenes(3) {
+        // A target would be shared out among the lights.
+        let settings = match settings.max_error {
+            Some(_) => limited(photons(1e3, 32)),
+            None => settings,
+        };
         let all = t
             .case("random-scenes-light-by-light")
             .bake_with(plain.clone(), settings.clone());
@@ -115,14 +120,18 @@ pub fn fill(t: &mut Table) {
 /// Half the scenes by each estimator. Glass boxes have branches without end.
 fn of(seed: u64) -> BakeSettings {
     let estimator = if (seed / CHANGES).is_multiple_of(2) {
-        at(1e3, 32)
+        to(0.1, 32)
     } else {
         settings(1e3, 32)
     };
+    limited(estimator)
+}
+
+fn limited(settings: BakeSettings) -> BakeSettings {
     BakeSettings {
         max_depth: Some(4),
         branch_threshold: Some(1e-2),
-        ..estimator
+        ..settings
     }
 }
 

@@ -224,7 +224,7 @@ pub fn by_image(mirrored: bool) -> Scene {
         [red, green, blue, 255]
     };
     let texture = image(SIDE, (0..SIDE * SIDE).map(texel).collect(), Wrap::Repeat);
-    scene.materials[1].normal_map = Some(NormalMap::new(texture_reference(), 1.0 / STEEPER, &texture));
+    scene.materials[1].normal_map = NormalMap::new(texture_reference(), 1.0 / STEEPER, &texture);
     scene.textures = vec![Arc::new(texture)];
     scene.name = if mirrored { "by mirrored image" } else { "by image" }.into();
     scene

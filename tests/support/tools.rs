@@ -40,9 +40,12 @@ pub fn settings(density_per_sr: f64, side: usize) -> BakeSettings {
     by(Estimator::Splat, density_per_sr, side)
 }
 
-/// Wavefronts at a density [rays/sr], with maps of side² texels.
-pub fn at(density_per_sr: f64, side: usize) -> BakeSettings {
-    by(Estimator::Wavefront, density_per_sr, side)
+/// Bundles and photons to a relative RMSE, with maps of side² texels.
+pub fn to(target: f64, side: usize) -> BakeSettings {
+    BakeSettings {
+        max_error: Some(target),
+        ..by(Estimator::Auto, BakeSettings::default().density_per_sr, side)
+    }
 }
 
 /// Photons at a density [rays/sr] without filtering, with maps of side² texels.

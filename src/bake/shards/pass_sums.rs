@@ -113,14 +113,8 @@ fn seconds(reader: &mut impl Read) -> io::Result<f64> {
 }
 
 /// Counters of a report, in the order of the file.
-fn counts_of(report: &mut PassReport) -> [&mut u64; 5] {
-    [
-        &mut report.rays,
-        &mut report.segments,
-        &mut report.splats,
-        &mut report.cells,
-        &mut report.receiver_queries,
-    ]
+fn counts_of(report: &mut PassReport) -> [&mut u64; 3] {
+    [&mut report.rays, &mut report.segments, &mut report.splats]
 }
 
 fn write_report(bytes: &mut Vec<u8>, report: &PassReport) {

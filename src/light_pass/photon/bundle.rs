@@ -8,7 +8,7 @@ use glam::{DVec2, Vec2};
 
 use super::paths::{PathEnd, PointPaths, Route};
 use crate::illumination::Receiver;
-use crate::light_pass::wavefront::coverage::FluxTriangle;
+use crate::light_pass::coverage::FluxTriangle;
 use crate::optics::LinearSrgb;
 
 /// Weights of the nine points in a mean over the square (Simpson's rule).
@@ -251,14 +251,14 @@ impl Bundle {
 
     /// Triangles of the map with the light of the square, whose area is `area` unit squares. `add` gets corners
     /// [texels] and flux [W].
-    pub(super) fn triangles(&self, area: f64, mut add: impl FnMut([DVec2; 3], LinearSrgb)) {
+    pub(super) fn triangles(&self, area: f64, mut add: impl FnMut([DVec2; 3], LinearSrgb, f64)) {
         match &self.shape {
             Shape::Nothing => {}
             Shape::Cut(pieces) => {
                 for piece in pieces {
                     let flux_w = mean(piece.nodes.map(|node| node.flux_w()));
                     let corners = piece.nodes.map(|node| node.place.as_dvec2());
-                    add(corners, flux_w * (f64::from(piece.area()) * area));
+                    add(corners, flux_w, f64::from(piece.area()) * area);
                 }
             }
             Shape::Whole(nodes) => {
@@ -280,7 +280,7 @@ impl Bundle {
                         let (c, d) = (below[column], below[column + 1]);
                         for corners in [[a, b, d], [a, d, c]] {
                             let flux_w = mean(corners.map(|corner| corner.flux_w));
-                            add(corners.map(|corner| corner.place), flux_w * triangle_area);
+                            add(corners.map(|corner| corner.place), flux_w, triangle_area);
                         }
                     }
                     above = below;
@@ -508,8 +508,8 @@ mod tests {
             ..Bundle::new(route(), 3.0)
         };
         let (mut flux, mut area) = (0.0, 0.0);
-        bundle.triangles(0.25, |[a, b, c], flux_w| {
-            flux += flux_w.g;
+        bundle.triangles(0.25, |[a, b, c], flux_w, of_square| {
+            flux += flux_w.g * of_square;
             area += 0.5 * (b - a).perp_dot(c - a).abs();
         });
         assert!((flux - 0.25 * 3.0).abs() < 1e-6, "{flux} W");

@@ -73,11 +73,23 @@ impl MeasuredChart {
         (self.chart.texel_area_m2(texel) > 0.0).then_some(texel as u32)
     }
 
+    /// The texel of a place where a bundle of an island deposits; `None` beside the map, and where others lie.
+    pub(super) fn texel_of_island(&self, place: DVec2, island: u32) -> Option<u32> {
+        let is_inside = place.cmpge(DVec2::ZERO).all() && place.cmplt(self.size()).all();
+        let is_ours = || {
+            let islands = self.chart.islands();
+            islands.is_none_or(|islands| islands.covers(place.x as usize, place.y as usize, island))
+        };
+        (is_inside && is_ours()).then(|| self.texel_at(place)).flatten()
+    }
+
     /// The four texels around a place with bilinear weights. Texels beyond the border or of other islands leave their
-    /// weight to the one that holds the place.
+    /// weight to the one that holds the place, and so do those with less than half of its surface: in a sliver, a little
+    /// flux would be much irradiance.
     pub(super) fn tent(&self, place: DVec2, island: u32) -> [(Option<u32>, f64); 4] {
         let own = self.texel_at(place);
-        let islands = self.chart.islands();
+        let area_m2 = |texel: u32| self.chart.texel_area_m2(texel as usize);
+        let least_m2 = own.map_or(0.0, |own| 0.5 * area_m2(own));
         let low = (place - 0.5).floor();
         let part = place - 0.5 - low;
         let mut tent = [(own, 0.0); 4];
@@ -85,12 +97,8 @@ impl MeasuredChart {
             let (right, down) = ((corner % 2) as f64, (corner / 2) as f64);
             let at = low + DVec2::new(right, down);
             *weight = (1.0 - (right - part.x).abs()) * (1.0 - (down - part.y).abs());
-            let is_inside = at.cmpge(DVec2::ZERO).all() && at.cmplt(self.size()).all();
-            let is_ours =
-                || islands.is_none_or(|islands| islands.covers(at.x as usize, at.y as usize, island));
-            if is_inside && is_ours() {
-                *texel = self.texel_at(at).or(own);
-            }
+            let around = self.texel_of_island(at, island);
+            *texel = around.filter(|around| area_m2(*around) >= least_m2).or(own);
         }
         tent
     }

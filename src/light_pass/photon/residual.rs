@@ -24,14 +24,14 @@ use super::paths::PathFinder;
 use super::receivers::{MeasuredChart, Receivers};
 use super::spectrum::Hue;
 use super::squares::{Found, Square, Squares, Surveyor};
+use super::subcell_features::SubcellFeatures;
 use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk, WAVELENGTH_DIMENSION};
 use crate::geometry::sampling::{GOLDEN_64, even_point, in_square, mix64};
 use crate::illumination::Receiver;
+use crate::light_pass::coverage::{FluxTriangle, deposit_triangles};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::light_pass::wavefront::coverage::{FluxTriangle, deposit_triangles};
-use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
 use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::progress::Stage;
 
@@ -106,6 +106,8 @@ pub struct ResidualReport {
     pub pass: PassReport,
     /// Squared relative error that the deposit of bundles leaves, as planned.
     pub deposit_square: f64,
+    /// Squared relative error that the flux of single photons tells.
+    pub photon_square: f64,
     /// Whether rough surfaces scatter nearly all of the light.
     pub is_left_to_photons: bool,
     /// The goal that was aimed at: larger than the one asked for if that would take too many photons at once.
@@ -155,6 +157,7 @@ impl ResidualPass<'_> {
         }
         edge::finish(&finder, squares, listener.control, &mut report.pass);
         report.pass.rays += (squares.points.len() - before) as u64;
+        report.pass.squares += squares.squares.len() as u64;
         report.deposit_square = plan_deposits(squares, goal, &receivers);
         report.pass.trace_s.add(watch.elapsed());
 
@@ -180,6 +183,7 @@ impl ResidualPass<'_> {
         let mut traced = 0.0;
         for (square, found) in squares.squares.iter_mut().zip(found) {
             traced += found.photons;
+            report.photon_square += squares.plan.relative * found.variance() / found.photons.max(1.0);
             square.found.photons += found.photons;
             square.found.squares += found.squares;
         }
@@ -245,16 +249,16 @@ impl ResidualPass<'_> {
             let is_plain = self.rules.spectrum.is_none() && self.launch.lamp_offsets().is_none();
             if is_plain {
                 let triangles = triangles.entry((0, bundle.receiver())).or_default();
-                bundle.triangles(square.place.area(), |corners, flux_w| {
-                    let flux = self.rules.unit.count(flux_w * f64::from(TIMES));
+                bundle.triangles(square.place.area(), |corners, flux_w, area| {
+                    let flux = self.rules.unit.count(flux_w * (area * f64::from(TIMES)));
                     triangles.push(flux_triangle(bundle, corners, flux));
                 });
                 continue;
             }
-            bundle.triangles(square.place.area(), |corners, flux_w| {
+            bundle.triangles(square.place.area(), |corners, flux_w, area| {
                 drawn = drawn.wrapping_add(1);
                 for part in self.parts(bundle, drawn, sets) {
-                    let flux_w = part.hue.channels.apply(flux_w) * (f64::from(TIMES) * part.share);
+                    let flux_w = part.hue.channels.apply(flux_w) * (area * f64::from(TIMES) * part.share);
                     let moved = bundle.shift.at(&part.origin);
                     let corners = corners.map(|corner| corner + moved);
                     let triangle = flux_triangle(bundle, corners, self.rules.unit.count(flux_w));
@@ -370,6 +374,7 @@ struct DrawOrder {
 struct Removal {
     hit: Hit,
     place: DVec2,
+    texel: u32,
     island: u32,
     is_smooth: bool,
 }
@@ -554,12 +559,18 @@ impl ResidualPhotons<'_> {
         walk.follow(index, start, followed, |hit| match hit.place {
             PhotonArrival::Map { place, bundle } => {
                 let bundle = &square.bundles[bundle];
-                removals.push(Removal {
-                    hit,
-                    place,
-                    island: bundle.route.island,
-                    is_smooth: bundle.is_smooth,
-                });
+                let island = bundle.route.island;
+                let chart = self.receivers.get(hit.receiver);
+                // Beside its island, a bundle deposits nothing.
+                if let Some(texel) = chart.and_then(|chart| chart.texel_of_island(place, island)) {
+                    removals.push(Removal {
+                        hit,
+                        place,
+                        texel,
+                        island,
+                        is_smooth: bundle.is_smooth,
+                    });
+                }
             }
             PhotonArrival::Surface {
                 triangle,
@@ -601,7 +612,7 @@ impl Changes<'_, '_> {
                 let removal = removals.swap_remove(number);
                 self.shift(chart, hit, place, &removal);
             }
-            Some((number, _)) if chart.texel_at(place) == chart.texel_at(removals[number].place) => {
+            Some((number, _)) if chart.texel_at(place) == Some(removals[number].texel) => {
                 let removal = removals.swap_remove(number);
                 self.book_removal(removal.hit.flux_w);
                 let both = Hit {
@@ -617,10 +628,7 @@ impl Changes<'_, '_> {
     /// Removes flux that did not arrive.
     fn remove(&mut self, removal: &Removal) {
         self.book_removal(removal.hit.flux_w);
-        match self.photons.receivers.get(removal.hit.receiver) {
-            Some(chart) => self.put(&removal.hit, chart.texel_at(removal.place)),
-            None => self.fail(removal.hit.flux_w),
-        }
+        self.put(&removal.hit, Some(removal.texel));
     }
 
     /// Moves flux from a prediction to where it arrived, by bilinear weights.

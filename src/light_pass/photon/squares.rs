@@ -12,7 +12,7 @@ use rayon::prelude::*;
 use super::bundle::{Bundle, Image, MEAN_WEIGHTS, Node, Shape, biquadratic};
 use super::domain::{DomainPoint, LAST_LEVEL, LitCells, PointHash, SquarePlace};
 use super::paths::{Chain, PathEnd, PathFinder, PointPaths, Route};
-use crate::light_pass::wavefront::subcell_features::SubcellFeatures;
+use super::subcell_features::SubcellFeatures;
 use crate::progress::Control;
 
 /// The finest level of squares around small casters and openings, and how many squares there are at most until these
@@ -59,7 +59,8 @@ const LEFT_BY_MANY_CUTS: (usize, f64) = (8, 0.5);
 /// visible, since few photons meet the light in dark places.
 const MIN_AUDITS: f64 = 16384.0;
 
-/// Audits know no smaller part of the light to arrive than this: of a receiver seen edge-on, they would never end.
+/// Audits know no smaller part to arrive of the light that is looked at closely than this: of a receiver seen edge-on,
+/// they would never end.
 const LEAST_AUDITED: f64 = 0.01;
 
 /// Squares beside an edge are audited four times as often, and at least for this goal: the corner of a receiver may reach
@@ -110,7 +111,7 @@ pub(super) struct Found {
 }
 
 impl Found {
-    fn variance(&self) -> f64 {
+    pub(super) fn variance(&self) -> f64 {
         if self.photons > 0.0 {
             self.squares / self.photons
         } else {
@@ -158,8 +159,9 @@ pub(super) struct Plan {
     lost_weight: f64,
     /// Number of texels of all receivers.
     texels: f64,
-    /// All emitted flux [W].
+    /// All emitted flux, and that of squares that are looked at closely [W].
     start_w: f64,
+    close_start_w: f64,
     /// Flux that arrives on maps [W, largest channel]: as photons found or, before any were traced, all that bundles
     /// carry or leave.
     arriving_w: f64,
@@ -185,9 +187,14 @@ impl Plan {
         self.photons_for(variance.sqrt(), square)
     }
 
-    /// Photons of a square. Audits look everywhere, enough for what is dim but seen. Where light is known to arrive, a
-    /// single one that contradicts its bundle adds at most a quarter of the goal to the error.
+    /// Photons of a square.
     pub(super) fn photons(&self, square: &Square) -> f64 {
+        self.photons_for(square.root(self), square) + self.audits(square)
+    }
+
+    /// Photons of a square that look everywhere, enough for what is dim but seen. Where light is known to arrive, a
+    /// single one that contradicts its bundle adds at most a quarter of the goal to the error.
+    fn audits(&self, square: &Square) -> f64 {
         let goal = if square.is_beside_edge {
             (0.25 * self.goal).min(GOAL_BESIDE_EDGES)
         } else {
@@ -195,12 +202,12 @@ impl Plan {
         };
         let audits = 4.0 * self.texels.sqrt() / goal;
         let everywhere = audits.max(MIN_AUDITS) * square.start_w / self.start_w.max(f64::MIN_POSITIVE);
-        let lit = if square.arriving_w > 0.0 || square.is_beside_edge {
-            audits * square.start_w / self.arriving_w.max(LEAST_AUDITED * self.start_w)
+        let lit = if square.is_looked_at_closely() {
+            audits * square.start_w / self.arriving_w.max(LEAST_AUDITED * self.close_start_w)
         } else {
             0.0
         };
-        self.photons_for(square.root(self), square) + everywhere.max(lit)
+        everywhere.max(lit)
     }
 
     pub(super) fn is_worth_a_cut(&self, square: &Square) -> bool {
@@ -236,6 +243,11 @@ impl Square {
     pub(super) fn variance_with(&self, found: Found, plan: &Plan) -> f64 {
         let before = self.root(plan);
         (PLAN_PHOTONS * before * before + found.squares) / (PLAN_PHOTONS + found.photons)
+    }
+
+    /// Whether light is known to arrive, or may be overlooked.
+    fn is_looked_at_closely(&self) -> bool {
+        self.arriving_w > 0.0 || self.is_beside_edge
     }
 
     /// Leaves a bundle to photons.
@@ -285,6 +297,7 @@ impl Surveyor<'_> {
                 .collect();
         }
         for round in 0..=MAX_ROUNDS {
+            mark_beside_edges(&mut squares.squares);
             squares.plan = self.plan(squares, goal);
             let plan = squares.plan;
             let is_last = round == MAX_ROUNDS || squares.squares.len() > MAX_SQUARES;
@@ -294,7 +307,13 @@ impl Surveyor<'_> {
 
             // Photons that finer squares would save are dearer than the points of these.
             let is_divided = |square: &Square| {
-                let segments = plan.photons_for(square.dividable_root(&plan), square) * square.segments;
+                let beside_edges = if square.is_beside_edge {
+                    plan.audits(square)
+                } else {
+                    0.0
+                };
+                let photons = plan.photons_for(square.dividable_root(&plan), square) + beside_edges;
+                let segments = photons * square.segments;
                 square.place.level < LAST_LEVEL && segments > DIVISION_COST * square.traced
             };
             let divided: Vec<bool> = squares.squares.iter().map(is_divided).collect();
@@ -334,7 +353,11 @@ impl Surveyor<'_> {
                 });
             squares.squares = after.collect();
         }
-        mark_beside_edges(&mut squares.squares);
+        let close = squares
+            .squares
+            .iter()
+            .filter(|square| square.is_looked_at_closely());
+        squares.plan.close_start_w = close.map(|square| square.start_w).sum();
     }
 
     /// Divides the first squares until small casters and openings are as large as the squares around them.
@@ -349,8 +372,7 @@ impl Surveyor<'_> {
             let is_divided = |place: &SquarePlace| {
                 let square = (place.at(DVec2::ZERO), place.at(DVec2::ONE));
                 let root = place.corner.root as usize;
-                place.level == level
-                    && sought.ask_for_finer(launch, root, square, level - first, f64::INFINITY)
+                place.level == level && sought.ask_for_finer(launch, root, square, level - first)
             };
             let before = places.len();
             let of_place = |place: SquarePlace| -> Vec<SquarePlace> {
@@ -474,7 +496,7 @@ impl Surveyor<'_> {
             traced: points.iter().map(|point| f64::from(point.traced)).sum::<f64>() / 9.0,
             is_cut: false,
             is_finished: false,
-            is_beside_edge: parent.is_some_and(|parent| parent.is_beside_edge),
+            is_beside_edge: false,
             found: parent.map_or_else(Found::default, inherited),
             points,
         };
@@ -587,10 +609,11 @@ fn displaced_square(texels: f64, is_smooth: bool) -> f64 {
 fn mark_beside_edges(squares: &mut [Square]) {
     let mut on_edges: HashSet<DomainPoint, PointHash> = HashSet::default();
     for square in squares.iter().filter(|square| square.residual.cut > 0.0) {
-        on_edges.extend((0..9).map(|node| square.place.node(node)));
+        on_edges.extend((0..25).map(|point| square.place.point(point % 5, point / 5, 4)));
     }
-    for square in squares.iter_mut().filter(|square| square.residual.cut == 0.0) {
-        square.is_beside_edge |= (0..9).any(|node| on_edges.contains(&square.place.node(node)));
+    for square in squares {
+        let is_beside = || (0..9).any(|node| on_edges.contains(&square.place.node(node)));
+        square.is_beside_edge = square.residual.cut == 0.0 && is_beside();
     }
 }
 

@@ -216,9 +216,8 @@ impl MaterialReader<'_, '_> {
             return Ok(None);
         };
         let texture = self.images.get(image.texture);
-        let map = NormalMap::new(image, scale, texture);
-        // The same everywhere, as what stands in for an image that could not be read: nothing is bent.
-        Ok((map.detail_texels < f64::INFINITY).then_some(map))
+        // An image that is the same everywhere, as what stands in for one that could not be read, bends nothing.
+        Ok(NormalMap::new(image, scale, texture))
     }
 
     pub(super) fn base_colour_texture(&mut self) -> Result<Option<TextureRef>> {

@@ -55,7 +55,7 @@ pub fn show_limits(ui: &mut Ui, settings: &mut BakeSettings) {
     let usual_share = settings.path_threshold();
     let usual_depth = match settings.estimator {
         Estimator::Auto | Estimator::Photon => settings.photon_depth(),
-        Estimator::Wavefront | Estimator::Splat => settings.depth(),
+        Estimator::Splat => settings.depth(),
     };
     let no_metric = no_caustic.or(settings.max_error.is_none().then_some(NO_TARGET));
     rows(ui, "limits", |ui| {

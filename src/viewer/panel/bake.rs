@@ -129,7 +129,7 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
         grouped(result.counts.rays),
         grouped(result.counts.cells.max(result.counts.splats)),
         if result.counts.cells > 0 {
-            "cells"
+            "squares"
         } else {
             "splats"
         },

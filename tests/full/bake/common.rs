@@ -11,7 +11,7 @@ use nephroid::scene::builtin::shapes;
 use nephroid::scene::{Edit, Mesh, Scene};
 use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
-use support::tools::{at, bake, bits, brute, caustic, map_of, set, settings};
+use support::tools::{bake, bits, brute, caustic, map_of, set, settings};
 
 pub fn session(scene: &Scene) -> Baker {
     Baker::new(Arc::new(scene.clone())).expect("a session")
@@ -25,13 +25,6 @@ pub fn run(session: &mut Baker, settings: &BakeSettings) -> Bake {
 pub fn edit(session: &mut Baker, edit: &Edit) {
     let scene = edit.apply(session.scene()).expect("a sound edit");
     session.set_scene(Arc::new(scene)).expect("a sound scene");
-}
-
-/// Settings of a bake that ends at an error, with maps of `side` texels each way.
-pub fn towards(target: f64, side: usize) -> BakeSettings {
-    set(at(BakeSettings::starting_density_per_sr(target), side), |s| {
-        s.max_error = Some(target)
-    })
 }
 
 pub fn sized(settings: BakeSettings, (width, height): (usize, usize)) -> BakeSettings {
@@ -69,6 +62,11 @@ pub fn caustic_like(result: &Bake, map: &IlluminationMap) -> Vec<f64> {
 /// Root mean square of the difference over the reference's mean, texels weighing alike.
 pub fn rmse(image: &[f64], reference: &[f64]) -> f64 {
     relative_rmse(image, reference).expect("a reference with light")
+}
+
+/// Relative RMSE of all maps that a result states.
+pub fn estimate(result: &Bake) -> f64 {
+    result.estimated_relative_rmse.expect("an estimate")
 }
 
 pub fn all_bits(result: &Bake) -> Vec<u32> {

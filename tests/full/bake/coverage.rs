@@ -5,8 +5,8 @@ use std::sync::Arc;
 use glam::DVec2;
 use nephroid::illumination::accumulator::{FluxAccumulator, FluxCount};
 use nephroid::illumination::{Chart, Receiver, UvSet};
+use nephroid::light_pass::coverage::{CoverageReport, FluxTriangle, deposit_triangles};
 use nephroid::light_pass::receiver_maps::ReceiverMaps;
-use nephroid::light_pass::wavefront::coverage::{CoverageReport, FluxTriangle, deposit_triangles};
 use proptest::prelude::*;
 
 use crate::bake::tiles;
@@ -83,21 +83,16 @@ pub(super) fn deposit_on(
     let CoverageReport {
         deposited,
         outside,
-        unplaced,
         non_finite,
     } = &report;
-    let all: [i128; 3] = std::array::from_fn(|channel| {
-        deposited[channel] + outside[channel] + unplaced[channel] + non_finite[channel]
-    });
+    let all: [i128; 3] =
+        std::array::from_fn(|channel| deposited[channel] + outside[channel] + non_finite[channel]);
     assert_eq!(
         sum(triangles.iter().map(|triangle| triangle.flux)),
         all,
         "{report:?}"
     );
-    assert!(
-        outside.iter().chain(unplaced).all(|&count| count >= 0),
-        "{report:?}"
-    );
+    assert!(outside.iter().all(|&count| count >= 0), "{report:?}");
     assert!(flux.texels().iter().flatten().all(|&count| count >= 0));
     (flux, report)
 }
@@ -316,29 +311,20 @@ fn on_gaps(triangle: FluxTriangle) -> (FluxAccumulator, CoverageReport) {
 }
 
 #[test]
-fn gutters_move_to_the_nearest_texel() {
+fn an_island_takes_what_falls_on_it() {
     // Columns 0..4 and 8..12 are covered; the islands' names are their smallest triangles.
-    let half = [[2.0, 3.0], [6.0, 3.0], [4.0, 9.0]];
-    let (flux, report) = on_gaps(grey(half));
-    assert_eq!(report.deposited[0], i128::from(FLUX));
+    let (flux, report) = on_gaps(grey([[2.0, 3.0], [6.0, 3.0], [4.0, 9.0]]));
     let sums = columns(&flux);
     assert!(sums[4..].iter().all(|&sum| sum == 0), "{sums:?}");
-    assert!(sums[3] > FLUX * 3 / 4 - 10, "{sums:?}");
+    assert!(
+        (report.deposited[0] - report.outside[0]).abs() <= 20,
+        "{report:?}"
+    );
 
-    // Not touching, but near; and too far.
-    let [near, far] = [5.2, 6.2].map(|x| [[x, 3.0], [x + 0.3, 3.5], [x, 4.5]]);
-    let (flux, report) = on_gaps(grey(near));
-    assert_eq!((columns(&flux)[3], report.unplaced[0]), (FLUX, 0));
-    let (_, report) = on_gaps(grey(far));
-    assert_eq!(report.unplaced, [i128::from(FLUX); 3]);
-}
-
-#[test]
-fn an_island_gets_nothing_of_another() {
     let mut on_other = grey([[1.0, 1.0], [11.0, 1.0], [10.0, 9.0]]);
     on_other.island = 2;
     let (flux, report) = on_gaps(on_other);
     let sums = columns(&flux);
     assert!(sums[..8].iter().all(|&sum| sum == 0), "{sums:?}");
-    assert_eq!(report.deposited[0], i128::from(FLUX));
+    assert!(report.deposited[0] > 0 && report.outside[0] > 0, "{report:?}");
 }

@@ -14,13 +14,13 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::transport::Tracer;
 use nephroid::units::Radiance;
 
-use crate::bake::common::{self, all_bits, run, towards, with_layers};
+use crate::bake::common::{self, all_bits, run, with_layers};
 use support::meshes::{cuboid, floor, quad, sphere};
 use support::scenes::{diffuse, light, point_light, scene, sun, surface};
-use support::tools::{bake, set};
+use support::tools::{bake, set, to};
 
 fn settings(layers: &[LayerKind], side: usize, max_error: f64) -> BakeSettings {
-    with_layers(layers, towards(max_error, side))
+    with_layers(layers, to(max_error, side))
 }
 
 const LIT: [LayerKind; 2] = [LayerKind::Direct, LayerKind::Indirect];

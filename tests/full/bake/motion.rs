@@ -10,8 +10,8 @@ use nephroid::scene::{Material, Motion, Scene, Wave, Waves};
 use nephroid::settings::BakeSettings;
 use nephroid::units::Flux;
 
-use crate::bake::common::{assert_fresh, floor, rmse, run, session, towards};
-use support::tools::{at, bake, builtin_scene, photons, set, settings};
+use crate::bake::common::{assert_fresh, floor, rmse, run, session};
+use support::tools::{bake, builtin_scene, photons, set, settings, to};
 
 /// Seconds from one moment to the next.
 const STEP_S: f64 = 0.04;
@@ -50,14 +50,9 @@ fn lit_by(scene: &Scene, lamp: usize) -> Scene {
     scene
 }
 
-/// Of patches, photons, splats, and patches towards an error.
+/// Of photons, splats, and bundles towards two errors.
 fn all_ways() -> [BakeSettings; 4] {
-    [
-        at(2e4, 48),
-        photons(4e4, 48),
-        settings(2e4, 48),
-        towards(0.08, 48),
-    ]
+    [to(0.01, 48), photons(4e4, 48), settings(2e4, 48), to(0.08, 48)]
 }
 
 #[test]
@@ -96,7 +91,7 @@ fn what_comes_into_the_light_of_a_lamp_is_seen() {
         (1.8, -0.35, 0.0),
     ];
     let mut kept = 0;
-    for settings in [at(3e3, 32), photons(6e3, 32), towards(0.2, 32)] {
+    for settings in [to(0.03, 32), photons(6e3, 32), to(0.2, 32)] {
         let mut session = session(&scene);
         run(&mut session, &settings);
         for (x, y, z) in places {

@@ -13,7 +13,7 @@ use nephroid::settings::LayerKind;
 use nephroid::transport::{Event, RayHit, Tracer};
 
 use crate::bake::common::{CAUSTIC_AND_DIRECT, floor, with_layers};
-use support::tools::{at, bake, builtin_scene, map_of, set};
+use support::tools::{bake, builtin_scene, map_of, to};
 
 const LIMITS: Limits = Limits {
     max_depth: 16,
@@ -102,11 +102,9 @@ fn fault(scene: &Scene, target: &Target, path: &LightPath) -> Option<String> {
 }
 
 /// Explains texels of the floor from the brightest to the darkest of a built-in scene, and checks every path and the sums.
-fn explained(name: &str, density_per_sr: f64) -> Vec<(f64, Explanation)> {
+fn explained(name: &str) -> Vec<(f64, Explanation)> {
     let scene = Arc::new(builtin_scene(name));
-    let settings = set(with_layers(&CAUSTIC_AND_DIRECT, at(density_per_sr, 64)), |s| {
-        s.max_error = Some(0.002)
-    });
+    let settings = with_layers(&CAUSTIC_AND_DIRECT, to(0.002, 64));
     let result = bake(Scene::clone(&scene), &settings);
     let map = map_of(&result, &scene, "floor");
     let tracer = Tracer::new(Arc::clone(&scene));
@@ -156,14 +154,14 @@ fn check_normals(found: &[(f64, Explanation)], normal: impl Fn(DVec3) -> DVec3, 
 
 #[test]
 fn paths_over_a_mirror_ring() {
-    let found = explained("ring", 2e4);
+    let found = explained("ring");
     assert!(found[0].0 > 0.0 && !found[0].1.paths.is_empty());
     check_normals(&found, |point| DVec3::new(point.x, 0.0, point.z), 1e-4);
 }
 
 #[test]
 fn paths_through_a_glass_ball() {
-    let found = explained("ball", 2e4);
+    let found = explained("ball");
     let first = &found[0].1.paths[0];
     let events: Vec<Event> = first.vertices.iter().map(|vertex| vertex.event).collect();
     assert_eq!(events, [Event::Refraction; 2], "in and out");
@@ -178,13 +176,13 @@ fn paths_through_a_glass_ball() {
 #[test]
 fn paths_through_the_waves_of_a_pool() {
     // Fine enough for its brightest line, which coarser bakes know less well than they say.
-    let found = explained("pool", 4e5);
+    let found = explained("pool");
     assert_eq!(found[0].1.paths[0].vertices.len(), 1, "once through the water");
 }
 
 #[test]
 fn a_plane_mirror_has_one_path() {
-    let found = explained("mirror", 2e4);
+    let found = explained("mirror");
     let reflected = |told: &Explanation| {
         let paths = told.paths.iter();
         paths.filter(|path| !path.vertices.is_empty()).count()
@@ -200,7 +198,7 @@ fn a_plane_mirror_has_one_path() {
 fn shares_add_up_to_the_solvers_texels() {
     for (name, file, tolerance) in [("ring", "S1", 0.02), ("ball", "S2", 0.03), ("pool", "S3", 0.04)] {
         let scene = Arc::new(builtin_scene(name));
-        let result = bake(Scene::clone(&scene), &at(1e3, 256));
+        let result = bake(Scene::clone(&scene), &to(0.03, 256));
         let map = map_of(&result, &scene, "floor");
         let expected = support::reference_map(file);
         let tracer = Tracer::new(scene.clone());

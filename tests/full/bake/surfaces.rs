@@ -20,11 +20,13 @@ use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::transport::Tracer;
 use nephroid::units::Flux;
 
-use crate::bake::common::{CAUSTIC_AND_DIRECT, all_bits, floor, rmse, run, session, sized, with_layers};
+use crate::bake::common::{
+    CAUSTIC_AND_DIRECT, all_bits, estimate, floor, rmse, run, session, sized, with_layers,
+};
 use support::effect_scenes::{by_image, by_waves};
 use support::floors::{image, texture_reference};
 use support::scenes::wave;
-use support::tools::{at, bake, builtin_scene, caustic, energy_fault, map_of, set, settings};
+use support::tools::{bake, builtin_scene, caustic, energy_fault, map_of, set, settings, to};
 
 /// 1 W/sr.
 const POWER: Flux = Flux(4.0 * PI);
@@ -229,7 +231,7 @@ fn check_bent(name: &str, mesh: Mesh) {
     };
     for (mesh, set, side) in [(mesh, UvSet::TexCoord0, 192), (bare, UvSet::Generated, 384)] {
         let scene = scene_with(mesh.clone());
-        let result = bake(scene.clone(), &at(8000.0, side));
+        let result = bake(scene.clone(), &to(0.005, side));
         assert_eq!(energy_fault(&result), None, "{name}, {set:?}");
         let map = map_of(&result, &scene, "receiver");
         assert_eq!(map.chart.uv_set, set);
@@ -245,7 +247,11 @@ fn check_bent(name: &str, mesh: Mesh) {
         bright.sort_by(f64::total_cmp);
         assert!(bright.len() > 30, "{name}, {set:?}: {} steps", bright.len());
         let [half, most] = [0.5, 0.9].map(|share| bright[(share * (bright.len() as f64 - 1.0)) as usize]);
-        assert!(half < 0.005 && most < 0.015, "{name}, {set:?}: {half} {most}");
+        let noise = estimate(&result);
+        assert!(
+            half < 0.005 && most < 0.015 + 3.0 * noise,
+            "{name}, {set:?}: {half} {most}, noise {noise}"
+        );
     }
 }
 
@@ -312,12 +318,13 @@ fn a_floor_in_pieces_is_as_a_whole_one() {
     let [whole_size, cut_size] = [size, PIECES.map(|count| count * CELL_TEXELS)].map(|[x, y]| (x, y));
     for name in ["ring", "pool"] {
         let scene = builtin_scene(name);
-        let whole = bake(scene.clone(), &sized(at(6000.0, 1), whole_size));
+        let whole = bake(scene.clone(), &sized(to(0.01, 1), whole_size));
         let in_pieces = with_floor_in_pieces(scene.clone());
-        let cut = bake(in_pieces.clone(), &sized(at(6000.0, 1), cut_size));
+        let cut = bake(in_pieces.clone(), &sized(to(0.01, 1), cut_size));
         assert_eq!(energy_fault(&cut), None, "{name}");
         let map = map_of(&cut, &in_pieces, "floor");
         assert_eq!(map.chart.uv_set, UvSet::TexCoord0, "{name}");
+        let noise = estimate(&whole).hypot(estimate(&cut));
         let (whole, cut) = (floor(&whole, &scene), caustic(map));
         // The whole floor's map has u towards +x and v towards +z.
         let in_cut = |texel: usize| {
@@ -332,7 +339,7 @@ fn a_floor_in_pieces_is_as_a_whole_one() {
         };
         let pieced: Vec<f64> = (0..whole.len()).map(in_cut).collect();
         let off = rmse(&pieced, &whole);
-        assert!(off <= 0.005, "{name}: {off}");
+        assert!(off <= 0.005 + noise, "{name}: {off}, noise {noise}");
     }
 }
 
@@ -383,29 +390,31 @@ fn flux_w(result: &Bake, scene: &Scene, side: Side, kind: LayerKind) -> f64 {
 fn a_mask_lets_light_through_where_it_cuts() {
     let ceiling = |sheet| {
         let scene = scene_under_a(sheet);
-        let result = bake(scene.clone(), &with_layers(&CAUSTIC_AND_DIRECT, at(8000.0, 96)));
+        let result = bake(scene.clone(), &with_layers(&CAUSTIC_AND_DIRECT, to(0.02, 96)));
         assert_eq!(energy_fault(&result), None);
         let sides = [Side::Front, Side::Back];
         let sheet_w: f64 = sides
             .map(|side| flux_w(&result, &scene, side, LayerKind::Caustic))
             .iter()
             .sum();
-        (map_of(&result, &scene, "receiver").clone(), sheet_w)
+        let noise = estimate(&result);
+        (map_of(&result, &scene, "receiver").clone(), sheet_w, noise)
     };
     let [
-        (half, half_w),
-        (masked, masked_w),
-        (nothing, _),
-        (invisible, stopped_w),
+        (half, half_w, noise),
+        (masked, masked_w, _),
+        (nothing, ..),
+        (invisible, stopped_w, _),
     ] = [Sheet::Half, Sheet::Masked, Sheet::None, Sheet::CutOutEverywhere].map(ceiling);
     let off = relative_rmse(&masked, &caustic(&half));
-    assert!(off < 0.01, "{off} from cut geometry");
+    let most = 0.01 + noise;
+    assert!(off < most, "{off} from cut geometry");
     assert!((masked_w / half_w - 1.0).abs() < 0.005, "{masked_w} for {half_w}");
     let shadow = relative_rmse(&half, &caustic(&nothing));
     assert!(shadow > 0.1, "the sheet casts a shadow");
     // What is nowhere still makes light be followed ray by ray where its box stands.
     let off = relative_rmse(&invisible, &caustic(&nothing));
-    assert!(off < 0.01, "{off}");
+    assert!(off < most, "{off}");
     assert_eq!(stopped_w, 0.0);
 }
 
@@ -416,7 +425,7 @@ fn sides_of_a_sheet_hold_their_own_light() {
     for material in &mut scene.materials {
         material.double_sided = true;
     }
-    let result = bake(scene.clone(), &with_layers(&CAUSTIC_AND_DIRECT, at(6000.0, 64)));
+    let result = bake(scene.clone(), &with_layers(&CAUSTIC_AND_DIRECT, to(0.02, 64)));
     let [above, below] = [Side::Front, Side::Back]
         .map(|side| [LayerKind::Direct, LayerKind::Caustic].map(|kind| flux_w(&result, &scene, side, kind)));
     assert!(above[0] > 0.05 && above[1] == 0.0, "{above:?}");
@@ -447,12 +456,14 @@ fn floor_of(scene: Scene, settings: &BakeSettings) -> Vec<f64> {
 /// order. So the maps' difference must halve, and quarter, with the amplitude.
 #[test]
 fn bumps_differ_from_a_shape_by_its_height() {
-    for (towards, law) in [(DVec3::new(0.3, -1.0, 0.2), 2.0), (DVec3::NEG_Y, 4.0)] {
+    let suns = [(DVec3::new(0.3, -1.0, 0.2), 2.0, 4e5), (DVec3::NEG_Y, 4.0, 4e6)];
+    for (towards, law, density_per_sr) in suns {
         let under_sun = |mut scene: Scene| {
             if let LightKind::Sun { direction, .. } = &mut scene.lights[0].kind {
                 *direction = towards.normalize();
             }
-            floor_of(scene, &at(4e4, 64))
+            // By rays that are the same for both.
+            floor_of(scene, &settings(density_per_sr, 64))
         };
         let found = [0.5, 0.25, 0.125].map(|part| {
             let amplitude_m = AMPLITUDE_M * part;
@@ -490,7 +501,7 @@ fn focal_lines_run_with_the_crests() {
     scene.materials[water].waves = Waves::new(vec![wave]).ok();
     for moment in 0..5 {
         let time_s = 0.13 * f64::from(moment);
-        let light = floor_of(scene.at(time_s), &at(4e4, SIDE));
+        let light = floor_of(scene.at(time_s), &to(0.01, SIDE));
         let brightest = (0..SIDE).max_by(|a, b| {
             let column = |column: usize| light.iter().skip(column).step_by(SIDE).sum::<f64>();
             column(*a).total_cmp(&column(*b))
@@ -525,21 +536,18 @@ fn rippled(wavelength_m: f64, slope: f64) -> Scene {
 #[test]
 fn waves_shorter_than_a_cell_are_resolved() {
     let scene = rippled(0.06, 0.02);
-    let coarse = bake(scene.clone(), &at(300.0, 96));
-    assert!(coarse.counts.splats == 0);
-    let off = rmse(&floor(&coarse, &scene), &floor_of(scene.clone(), &at(1e5, 96)));
-    assert!(off < 0.05, "{off}");
+    let coarse = bake(scene.clone(), &to(0.05, 96));
+    let off = rmse(&floor(&coarse, &scene), &floor_of(scene.clone(), &to(0.01, 96)));
+    let noise = estimate(&coarse);
+    assert!(off < 1.5 * noise, "{off}, noise {noise}");
 }
 
 #[test]
 fn waves_finer_than_any_cell_blur_light() {
     let side = 32;
     let scene = rippled(2e-4, 0.1);
-    let result = bake(scene.clone(), &at(1e4, side));
+    let result = bake(scene.clone(), &to(0.02, side));
     assert_eq!(energy_fault(&result), None);
-    let counts = &result.counts;
-    assert!(counts.splats > 0, "one small patch per ray");
-    assert!(counts.splats < 16 * counts.rays, "cells are not divided in vain");
     // Away from the border the floor is lit from everywhere alike.
     let inner = |map: Vec<f64>| -> Vec<f64> {
         let rows = (8..24).flat_map(|row| map[row * side + 8..row * side + 24].to_vec());
@@ -547,7 +555,7 @@ fn waves_finer_than_any_cell_blur_light() {
     };
     let (fine, flat) = (
         inner(floor(&result, &scene)),
-        inner(floor_of(bumped(0.0), &at(1e4, side))),
+        inner(floor_of(bumped(0.0), &to(0.02, side))),
     );
     let (off, flux) = (rmse(&fine, &flat), flux_ratio(&fine, &flat));
     assert!(off < 0.15 && (flux - 1.0).abs() < 5e-3, "{off} {flux}");
@@ -556,7 +564,7 @@ fn waves_finer_than_any_cell_blur_light() {
 #[test]
 fn bumps_off_bakes_the_mesh_itself() {
     let wavy = bumped(AMPLITUDE_M);
-    for settings in [at(1e3, 32), settings(1e4, 32)] {
+    for settings in [to(0.03, 32), settings(1e4, 32)] {
         let off = set(settings.clone(), |s| {
             s.effects = EffectSwitches::default().with(Effect::Bumps, EffectSwitch::Off)
         });
@@ -579,17 +587,17 @@ fn bumps_off_bakes_the_mesh_itself() {
 /// As the waves that it shows, whichever way round its coordinates run, and by both estimators.
 #[test]
 fn an_image_of_normals_bends_light() {
-    let waves = floor_of(by_waves(), &at(2e4, 64));
+    let waves = floor_of(by_waves(), &to(0.01, 64));
     for mirrored in [false, true] {
-        let image = floor_of(by_image(mirrored), &at(2e4, 64));
+        let image = floor_of(by_image(mirrored), &to(0.01, 64));
         let (off, alike) = (rmse(&image, &waves), correlation(&image, &waves));
         let flux = flux_ratio(&image, &waves);
         // Eight bits of a slope and straight lines between texels are left.
         assert!(off < 0.05 && alike > 0.99, "mirrored {mirrored}: {off} {alike}");
         assert!((flux - 1.0).abs() < 2e-3, "mirrored {mirrored}: {flux}");
     }
-    let [patches, splats] =
-        [at(2e4, 32), settings(2e5, 32)].map(|settings| floor_of(by_image(false), &settings));
-    let off = rmse(&patches, &splats);
+    let [bundles, splats] =
+        [to(0.01, 32), settings(2e5, 32)].map(|settings| floor_of(by_image(false), &settings));
+    let off = rmse(&bundles, &splats);
     assert!(off < 0.05, "{off}");
 }

@@ -8,7 +8,7 @@ use nephroid::illumination::lookup::{bilinear, in_chart};
 use nephroid::illumination::smoothing::smooth;
 use nephroid::illumination::tiles::{SIDE, TileLayout};
 use nephroid::illumination::{Chart, tiles};
-use nephroid::light_pass::wavefront::coverage::{CoverageReport, FluxTriangle};
+use nephroid::light_pass::coverage::{CoverageReport, FluxTriangle};
 
 use crate::bake::coverage::{deposit_on, full_chart, sum};
 

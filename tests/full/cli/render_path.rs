@@ -156,7 +156,7 @@ fn a_turntable_goes_around_in_equal_steps() {
     let sandbox = Sandbox::new();
     let turn = |frames: usize, folder: &str| {
         format!(
-            "render builtin:mirror --turntable {frames} -o {folder} {QUICK} --estimator wavefront --exposure 1 --tone-map neutral --json"
+            "render builtin:mirror --turntable {frames} -o {folder} {QUICK} --exposure 1 --tone-map neutral --json"
         )
     };
     let four = or_skip!(run(&sandbox, "turntable", &turn(4, "four")));

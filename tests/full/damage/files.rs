@@ -26,7 +26,7 @@ use super::mutate::{Damage, Tally, Way, alone, attack, effort};
 use support::glb::{Glb, load_bytes};
 use support::program::{Run, Sandbox};
 use support::sound::scene_fault;
-use support::tools::{at, bake, builtin_scene, set};
+use support::tools::{bake, builtin_scene, photons, set, to};
 
 const MIB: usize = 1 << 20;
 
@@ -283,7 +283,7 @@ fn maps() {
             let scene = builtin_scene(name);
             let folder = tempfile::tempdir().expect("temporary folder");
             let layers = vec![LayerKind::Caustic, LayerKind::Direct];
-            let settings = set(at(500.0, 16), |s| s.layers = layers);
+            let settings = set(to(0.05, 16), |s| s.layers = layers);
             let result = bake(scene.clone(), &settings);
             let written = MapFolder::open(folder.path(), false).expect("writable");
             written.write(&scene, &settings, &result).expect("writable");
@@ -329,7 +329,7 @@ struct Shards {
 
 impl Shards {
     fn bake() -> Self {
-        let (scene, settings) = (Arc::new(builtin_scene("mirror")), at(1000.0, 16));
+        let (scene, settings) = (Arc::new(builtin_scene("mirror")), photons(1e4, 16));
         let shard = |number| {
             let share = ShardIndex::new(number, 2).expect("one of two");
             let mut session = Baker::new(scene.clone()).expect("a session");

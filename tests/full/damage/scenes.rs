@@ -15,7 +15,7 @@ use serde_json::json;
 use super::mutate::{Damage, Tally, Way, alone, attack, effort};
 use support::glb::{Glb, load_bytes, load_path};
 use support::sound::scene_fault;
-use support::tools::{at, energy_fault, photons};
+use support::tools::{energy_fault, to};
 use support::{or_skip, shared_or_skip};
 
 /// Most memory that loading may take by itself [bytes].
@@ -54,26 +54,17 @@ fn files_below(folder: &Path) -> Vec<PathBuf> {
     paths.into_iter().flat_map(below).collect()
 }
 
-/// Bakes as little as can be asked for, by patches but where only photons will do.
+/// Bakes as little as can be asked for.
 fn bake(scene: Scene) -> Result<Bake> {
     let mut session = Baker::new(Arc::new(scene))?;
-    let mut by = |estimator: BakeSettings| {
-        let settings = BakeSettings {
-            max_depth: Some(3),
-            layers: vec![LayerKind::Caustic, LayerKind::Direct],
-            memory_bytes: 64 << 20,
-            threads: 2,
-            ..estimator
-        };
-        session.bake(&settings, &(), &Control::default())
+    let settings = BakeSettings {
+        max_depth: Some(3),
+        layers: vec![LayerKind::Caustic, LayerKind::Direct],
+        memory_bytes: 64 << 20,
+        threads: 2,
+        ..to(0.3, 8)
     };
-    by(at(20.0, 8)).or_else(|error| {
-        if error.remedy.contains("--estimator auto") {
-            by(photons(1e3, 8))
-        } else {
-            Err(error)
-        }
-    })
+    session.bake(&settings, &(), &Control::default())
 }
 
 /// The first number that is none, or an open ledger, if there is one.

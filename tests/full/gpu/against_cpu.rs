@@ -287,7 +287,7 @@ fn reliefs() -> Vec<Case> {
         scene.environment = sky.clone().map(Arc::new);
         scene.lights = lamps.map(light).to_vec();
         let normals = NormalMap::new(texture_reference(), 0.7, &image);
-        (scene.materials[0].surface, scene.materials[0].normal_map) = (surface, Some(normals));
+        (scene.materials[0].surface, scene.materials[0].normal_map) = (surface, normals);
         case.maps = even([6.0, 5.0, 7.0].map(|e| e * share));
         (case.tolerance, case.of_peak, case.few) = (0.004, 0.2, 0.01);
         case

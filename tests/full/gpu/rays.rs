@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use crate::gpu::rig::{AS_CPU, Rig, gpu, or_skip, unlike};
 use support::floors::{diffuse, floor_scene};
 use support::scenes::{light, view};
-use support::tools::{at, bake, builtin_scene, set};
+use support::tools::{bake, builtin_scene, set, to};
 
 /// Evenly spread numbers that are the same in every run (SplitMix64).
 pub struct Numbers(u64);
@@ -442,7 +442,7 @@ fn ahead() -> View {
 }
 
 fn by_layer(scene: &Scene) -> Picture {
-    let settings = set(at(500.0, 512), |s| s.layers = vec![LayerKind::Direct]);
+    let settings = set(to(0.05, 512), |s| s.layers = vec![LayerKind::Direct]);
     let maps = bake(scene.clone(), &settings).maps;
     let mut rig = Rig::at(AS_CPU, scene, &maps).expect("there is a device");
     rig.picture(&ahead())

@@ -209,7 +209,7 @@ const SCREENS: [((f32, f32), f32); 3] = [SCREEN, (SCREEN.0, 2.0), ((700.0, 400.0
 fn every_control_says_what_it_does() {
     for screen in SCREENS {
         let mut panel = Headless::opened(splats(), screen);
-        // Of the splats' panel all, and what only the wavefront estimator has.
+        // Of the splats' panel all, and what only refining estimators have.
         panel.choose("Bake until", "max time");
         panel.assert_names();
         for (role, name, _) in panel.controls() {

@@ -10,7 +10,8 @@ use support::or_skip;
 
 /// The caustic alone, refined until its error is small: several levels, and a bake of seconds, so that no window is so slow
 /// that it sees the last maps only.
-const REFINED: &str = "builtin:ring --estimator wavefront --error-metric rmse --max-error 0.05% --map-resolution 128 --layers caustic";
+const REFINED: &str =
+    "builtin:ring --error-metric rmse --max-error 0.05% --map-resolution 128 --layers caustic";
 
 /// Takes the last change back.
 fn undo(viewer: &mut Viewer<'_>) {
@@ -99,7 +100,7 @@ fn glass_ball_is_probed_and_bends_otherwise() {
     let screen = or_skip!(Screen::start());
     let mut viewer = Viewer::open(
         &screen,
-        "builtin:ball --estimator wavefront --density 20000 --map-resolution 128 --layers caustic,direct",
+        "builtin:ball --max-error 2% --map-resolution 128 --layers caustic,direct",
     );
     viewer.wait_for_bake();
     probe(&mut viewer);

@@ -20,7 +20,7 @@ use crate::damage::mutate::{Damage, effort};
 use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, position, wait_until};
 use support::file_drop::drop_file;
 use support::or_skip;
-use support::tools::{at, bake, builtin_scene, set};
+use support::tools::{bake, builtin_scene, set, to};
 
 /// Coarse enough to be baked in a second.
 const COARSE: &str = "--density 300 --map-resolution 32";
@@ -331,7 +331,6 @@ fn the_course_tells_what_is_left_of_it() {
         wall_s: cpu_s / 2.0,
         bytes: 0,
         error,
-        is_coarse: false,
         is_by_photons: false,
     };
     let mut level = BakedLevel {
@@ -339,7 +338,7 @@ fn the_course_tells_what_is_left_of_it() {
         request: wanted.clone(),
         level: 1,
         is_final: false,
-        result: bake(builtin_scene("ring"), &at(10.0, 8)),
+        result: bake(builtin_scene("ring"), &to(0.05, 8)),
         seconds: 3.0,
     };
     level.result.course = vec![point(2.0, 0.04), point(6.0, 0.02)];

@@ -5,7 +5,7 @@ use nephroid::scene::Object;
 use nephroid::scene::instances::{MAX_COPIED, find};
 
 use crate::prelude::*;
-use support::tools::{at, bake, caustic, energy_fault, map_of, photons};
+use support::tools::{bake, caustic, energy_fault, map_of, photons, to};
 
 /// Four glass balls over a floor: of one mesh, which is too large for copies, or each of its own.
 fn balls(is_shared: bool) -> Scene {
@@ -39,7 +39,7 @@ fn balls(is_shared: bool) -> Scene {
 
 #[test]
 fn instances_are_lit_as_copies_are() {
-    for settings in [at(2e3, 32), photons(1e5, 32)] {
+    for settings in [to(0.03, 32), photons(1e5, 32)] {
         let [copied, shared] = [false, true].map(|is_shared| {
             let scene = balls(is_shared);
             let result = bake(scene.clone(), &settings);

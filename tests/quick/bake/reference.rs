@@ -8,19 +8,17 @@ use nephroid::illumination::lookup::bilinear;
 use crate::prelude::*;
 use support::effect_scenes::{EffectScene, all};
 use support::references::references;
-use support::tools::{at, bake, bits, builtin_scene, energy_fault, map_of, photons, settings};
+use support::tools::{bake, bits, builtin_scene, energy_fault, map_of, photons, settings, to};
 
 #[test]
-fn wavefronts_agree_with_the_solver() {
+fn bundles_agree_with_the_solver() {
     let small = ["ring", "mirror", "slab", "nephroid"];
     let references = references();
     for reference in references
         .iter()
         .filter(|reference| small.contains(&reference.builtin))
     {
-        let scene = builtin_scene(reference.builtin);
-        let result = bake(scene.clone(), &at(reference.by_wavefronts.0, 256));
-        reference.check_wavefronts(&result, &scene);
+        reference.check_bundles();
     }
 }
 
@@ -38,7 +36,7 @@ fn splats_agree_with_the_solver() {
 
 #[test]
 fn threads_change_no_bit() {
-    for base in [at(3e3, 64), settings(2e4, 64)] {
+    for base in [to(0.03, 64), settings(2e4, 64)] {
         let [one, two, three] = [1, 2, 3].map(|threads| {
             let settings = BakeSettings {
                 threads,
@@ -73,7 +71,7 @@ fn with_room_around_the_floor() -> Scene {
 fn gutters_are_filled() {
     let side = 64_usize;
     let scene = with_room_around_the_floor();
-    for base in [at(2e4, side), settings(2e4, side)] {
+    for base in [to(0.01, side), settings(2e4, side)] {
         let settings = with(base, |it| it.layers = LayerKind::ALL.to_vec());
         let result = bake(scene.clone(), &settings);
         let map = map_of(&result, &scene, "floor");
@@ -202,7 +200,7 @@ fn only_what_is_called_for() {
         .iter()
         .find(|case| case.name == "no light")
         .expect("it is listed");
-    let result = bake(dark.scene.clone(), &at(3_000.0, 48));
+    let result = bake(dark.scene.clone(), &to(0.03, 48));
     assert!(result.maps.is_empty());
     assert_eq!(result.plan.effects[0].reason, "the scene has no light");
     for case in &scenes {
@@ -211,7 +209,7 @@ fn only_what_is_called_for() {
         if soft.iter().any(|effect| case.calls_for.contains(effect)) {
             continue;
         }
-        for settings in [at(3_000.0, 48), settings(6_000.0, 48)] {
+        for settings in [to(0.03, 48), settings(6_000.0, 48)] {
             check(case, &settings);
         }
     }

@@ -178,7 +178,7 @@ fn the_difference_picture_shows_where() {
 fn a_baked_map_meets_its_reference() {
     let sandbox = Sandbox::new();
     let reference = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/reference/S5.pfm");
-    sandbox.succeed("bake builtin:mirror -o out --estimator wavefront --density 1e5 --map-resolution 64");
+    sandbox.succeed("bake builtin:mirror -o out --max-error 1% --map-resolution 64");
     let map = "out/maps/0000_floor.exr";
     let run = sandbox.succeed(&format!("compare {map} {reference} --json --max-rmse 5"));
     assert_eq!(run.json()["layer"], json!("caustic"));

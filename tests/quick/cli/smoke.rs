@@ -89,7 +89,7 @@ fn programs_read_progress_line_by_line() {
 #[test]
 fn bake_prints_the_manifest_that_it_writes() {
     let sandbox = Sandbox::new();
-    let bake = "bake builtin:mirror -o out --estimator wavefront --density 1e4 --map-resolution 64x32 --layers direct,caustic";
+    let bake = "bake builtin:mirror -o out --density 1e6 --map-resolution 64x32 --layers direct,caustic";
     let run = sandbox.succeed(&format!("{bake} --json"));
     let manifest = sandbox.manifest("out");
     assert_eq!((run.json(), run.stderr.as_str()), (manifest.clone(), ""));
@@ -102,7 +102,7 @@ fn bake_prints_the_manifest_that_it_writes() {
     assert_eq!(manifest["program_version"], env!("CARGO_PKG_VERSION"));
     assert!(manifest["partial"] == false && manifest["stop_reason"] == "density");
     assert_eq!(manifest["scene"]["source"], "builtin:mirror");
-    assert_eq!(number(&manifest["settings"]["density_per_sr"]), 1e4);
+    assert_eq!(number(&manifest["settings"]["density_per_sr"]), 1e6);
     let stages = ["load", "build", "plan", "trace", "deposit"];
     for clock in ["timings_s", "cpu_s"] {
         assert_keys(&manifest[clock], &format!("{} total", stages.join(" ")));
@@ -326,7 +326,7 @@ fn stored_maps_look_as_those_baked_for_it() {
 #[test]
 fn a_png_shows_radiance_as_its_options_say() {
     let sandbox = Sandbox::new();
-    sandbox.succeed("bake builtin:mirror -o maps --estimator wavefront --density 1e3 --map-resolution 32 --layers caustic,direct");
+    sandbox.succeed("bake builtin:mirror -o maps --max-error 5% --map-resolution 32 --layers caustic,direct");
     let render = |file: &str, options: &str| {
         let line = "render builtin:mirror --size 40x30 --backend cpu --maps maps --json --camera 0";
         sandbox.succeed(&format!("{line} -o {file} {options}")).json()

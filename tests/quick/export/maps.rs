@@ -20,12 +20,12 @@ use nephroid::settings::Wavelengths;
 use super::{Baked, names, two_lamps};
 use crate::prelude::*;
 use support::program::{number, read_json};
-use support::tools::{at, bake, energy_fault};
+use support::tools::{bake, energy_fault, photons, to};
 
 #[test]
 fn files_hold_the_watts_of_their_ledgers() {
     for scene in ["mirror", "slab", "ball"] {
-        let settings = at(1e3, 32);
+        let settings = to(0.03, 32);
         let baked = Baked::new(built_in(scene), &settings);
         assert_eq!(energy_fault(&baked.result), None, "{scene}");
         let manifest = baked.manifest();
@@ -33,7 +33,7 @@ fn files_hold_the_watts_of_their_ledgers() {
         let sum = |names: &[&str]| names.iter().map(|name| number(&energy[name])).sum::<f64>();
         let emitted = sum(&["emitted"]);
         assert!(emitted > 0.1, "{scene}: {emitted} W");
-        let booked = sum(&["deposited", "absorbed", "escaped", "truncated"]);
+        let booked = sum(&["deposited", "absorbed", "escaped", "truncated", "sampling"]);
         assert_close(booked, emitted, 1e-6, scene);
         let ledgers = manifest["ledgers"].as_array().expect("ledgers").iter();
         let by_light: f64 = ledgers.map(|ledger| number(&ledger["energy_w"]["emitted"])).sum();
@@ -73,7 +73,7 @@ fn bands_of_the_spectrum_have_channels() {
     let settings = BakeSettings {
         wavelengths: Wavelengths::Rainbow,
         keep_spectrum: true,
-        ..at(3e3, 32)
+        ..photons(1e5, 32)
     };
     let mut scene = built_in("ball");
     let glass = Arc::new(Glass::parse("N-SF11").expect("a glass"));
@@ -105,7 +105,7 @@ fn files_are_as_large_as_asked_for() {
             height: 500,
         },
         memory_bytes: 1 << 20,
-        ..at(1e3, 1)
+        ..to(0.03, 1)
     };
     let baked = Baked::new(built_in("mirror"), &settings);
     let warnings = &baked.result.warnings;
@@ -325,7 +325,7 @@ fn maps_are_replaced_file_by_file() {
     std::fs::write(out.join("maps/other.exr"), "not ours").expect("writable");
     let first = names(&out.join("maps"));
     // Another scene: other surfaces receive light, with coordinates of their own.
-    let (scene, settings) = (two_lamps().scene(), at(1e3, 16));
+    let (scene, settings) = (two_lamps().scene(), to(0.03, 16));
     let result = bake(scene.clone(), &settings);
     let folder = MapFolder::open(&out, false).expect("it is ours");
     let manifest = folder.write(&scene, &settings, &result).expect("writable");
@@ -382,12 +382,12 @@ impl Shards {
 
 #[test]
 fn shards_of_different_bakes_are_refused() {
-    let (scene, settings) = (built_in("mirror"), at(1e3, 16));
+    let (scene, settings) = (built_in("mirror"), photons(1e3, 16));
     let shards = Shards::new();
     for (name, share) in [("two1", (1, 2)), ("two2", (2, 2)), ("three2", (2, 3))] {
         shards.bake(name, &scene, &settings, share);
     }
-    shards.bake("denser2", &scene, &at(5e3, 16), (2, 2));
+    shards.bake("denser2", &scene, &photons(5e3, 16), (2, 2));
     shards.bake("other2", &built_in("ring"), &settings, (2, 2));
     std::fs::create_dir(shards.path("newer")).expect("made");
     let mut newer = read_json(&shards.path("two2/shard.json"));
@@ -419,7 +419,7 @@ fn torn_shards_are_refused_by_name() {
     let shards = Shards::new();
     for number in [1, 2] {
         let name = format!("s{number}");
-        shards.bake(&name, &built_in("mirror"), &at(1e3, 16), (number, 2));
+        shards.bake(&name, &built_in("mirror"), &photons(1e3, 16), (number, 2));
     }
     let [sums, json] = ["s2/sums.bin", "s2/shard.json"].map(|file| shards.path(file));
     let whole = std::fs::read(&sums).expect("written");
@@ -456,7 +456,7 @@ fn torn_shards_are_refused_by_name() {
 #[test]
 fn shards_do_not_take_each_others_folders() {
     let shards = Shards::new();
-    let (scene, settings) = (built_in("mirror"), at(1e3, 16));
+    let (scene, settings) = (built_in("mirror"), photons(1e3, 16));
     shards.bake("a", &scene, &settings, (1, 2));
     let first = std::fs::read(shards.path("a/sums.bin")).expect("written");
     let open = |number, force| {

@@ -17,7 +17,7 @@ use nephroid::export::{FloatImage, Quantity};
 
 use crate::prelude::*;
 use support::program::{names, read_json};
-use support::tools::{at, bake};
+use support::tools::{bake, to};
 
 struct Baked {
     scene: Scene,
@@ -41,7 +41,7 @@ impl Baked {
 
     /// Maps of 64 texels each way, of a light pass of milliseconds.
     fn quick(scene: Scene, layers: &[LayerKind]) -> Self {
-        let mut settings = at(1e3, 64);
+        let mut settings = to(0.03, 64);
         settings.layers = layers.to_vec();
         Self::new(scene, &settings)
     }

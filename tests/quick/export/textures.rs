@@ -16,7 +16,7 @@ use nephroid::export::{Quantity, textures};
 use super::{Baked, LUMENS_PER_WATT, as_it_is, linear_of_srgb, names, two_lamps};
 use crate::prelude::*;
 use support::program::read_json;
-use support::tools::at;
+use support::tools::to;
 
 const FLOAT: Encoding = Encoding::Float;
 
@@ -29,7 +29,7 @@ fn boxes_by_light() -> Baked {
     let settings = BakeSettings {
         layers: vec![LayerKind::Caustic, LayerKind::Direct],
         per_light: true,
-        ..at(1e3, 64)
+        ..to(0.03, 64)
     };
     Baked::new(two_lamps().scene(), &settings)
 }
@@ -415,7 +415,7 @@ fn baked(scene: &str, (width, height): (usize, usize)) -> Baked {
     let settings = BakeSettings {
         map_resolution: MapResolution::Fixed { width, height },
         layers: vec![LayerKind::Caustic],
-        ..at(1e3, 1)
+        ..to(0.01, 1)
     };
     Baked::new(built_in(scene), &settings)
 }
@@ -488,14 +488,18 @@ fn sizes_go_down_to_one_texel() {
     let baked = baked("ring", (50, 36));
     let mean = |values: &[[f32; 3]]| values.iter().map(|value| value[1]).sum::<f32>() / values.len() as f32;
     let whole = mean(&baked.light(""));
-    for packing in [Packing::Rgb9e5, Packing::Bc6h] {
+    // A block of BC6H puts 16 texels on a line between two colours.
+    for (packing, bound) in [(Packing::Rgb9e5, 0.01), (Packing::Bc6h, 0.03)] {
         let (texture, entry) = first_of(&baked, packed(packing, true));
         let sizes: Vec<_> = texture.levels.iter().map(|(size, _)| *size).collect();
         assert_eq!(sizes, [(50, 36), (25, 18), (12, 9), (6, 4), (3, 2), (1, 1)]);
         assert_eq!(entry.levels, sizes.len());
         for ((width, _), values) in &texture.levels {
             let share = mean(values) / whole;
-            assert!((share - 1.0).abs() < 0.02, "{packing:?}, {width} texels: {share}");
+            assert!(
+                (share - 1.0).abs() < bound,
+                "{packing:?}, {width} texels: {share}"
+            );
         }
     }
 }

@@ -1,7 +1,6 @@
 //! The laws of optics, of lights and of units, tested as laws.
 
 mod colour;
-mod differentials;
 mod fresnel;
 mod glass;
 mod metal_paths;

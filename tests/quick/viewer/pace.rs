@@ -136,7 +136,6 @@ fn panel(settings: BakeSettings) -> Headless {
             wall_s: 0.1 * 3_f64.powi(level),
             bytes: 0,
             error: 0.2 * 0.5_f64.powi(level),
-            is_coarse: false,
             is_by_photons: false,
         };
         last.result.course = (0..3).map(point).collect();
@@ -155,7 +154,7 @@ fn target_stands_where_the_forecast_has_it() {
     let panel = panel(towards(0.01));
     let last = panel.model.last.as_deref().expect("a level");
     let curve = Curve::new(panel.settings(), last).expect("errors are known");
-    let expected = forecast(&last.result.course, 0.01, Estimator::Wavefront);
+    let expected = forecast(&last.result.course, 0.01, Estimator::Auto);
     assert!(expected.is_some() && curve.target == expected);
     assert_eq!(curve.past.len(), 3);
     assert_eq!(curve.presets.len(), 3, "draft, preview and final are marked");

@@ -20,10 +20,36 @@ fn chance(bake: &Baked) -> f64 {
     0.02 + 3.0 / (bake.result.counts.splats.max(1) as f64).sqrt()
 }
 
+/// Relative error of the flux on all maps that the estimated error allows: three standard errors, if texels err
+/// independently.
+pub fn flux_noise(bake: &Baked) -> f64 {
+    let texels: usize = bake.result.maps.iter().map(|map| map.chart.texel_count()).sum();
+    3.0 * bake.noise() / (texels.max(1) as f64).sqrt()
+}
+
+/// Relative RMSE of all maps that the estimated error allows.
+fn map_noise(bake: &Baked) -> f64 {
+    2.0 * bake.noise()
+}
+
+fn last(bakes: &[Baked]) -> &Baked {
+    bakes.last().expect("a bake before its law")
+}
+
 impl Case {
     /// Adds a measure of the last bake.
     pub fn measure(&mut self, says: &str, bound: f64, of: impl Fn(&Baked) -> f64 + Send + 'static) -> &mut Self {
-        self.law(says, bound, move |bakes| of(bakes.last().expect("a bake before its law")))
+        self.law(says, bound, move |bakes| of(last(bakes)))
+    }
+
+    /// Adds a measure of the last bake whose bound grows with the noise of that bake.
+    pub fn measure_within(
+        &mut self,
+        says: &str,
+        (bound, noise): (f64, fn(&Baked) -> f64),
+        of: impl Fn(&Baked) -> f64 + Send + 'static,
+    ) -> &mut Self {
+        self.law_within(says, move |bakes| bound + noise(last(bakes)), move |bakes| of(last(bakes)))
     }
 
     /// Adds a condition on the last bake.
@@ -43,7 +69,21 @@ impl Case {
 
     /// Adds a comparison of the last bake with the first.
     pub fn compare(&mut self, says: &str, bound: f64, of: impl Fn(&Baked, &Baked) -> f64 + Send + 'static) -> &mut Self {
-        self.law(says, bound, move |bakes| of(bakes.last().expect("a bake before its law"), &bakes[0]))
+        self.law(says, bound, move |bakes| of(last(bakes), &bakes[0]))
+    }
+
+    /// Adds a comparison of the last bake with the first, whose bound grows with the noise of both.
+    fn compare_within(
+        &mut self,
+        says: &str,
+        (bound, noise): (f64, fn(&Baked) -> f64),
+        of: impl Fn(&Baked, &Baked) -> f64 + Send + 'static,
+    ) -> &mut Self {
+        self.law_within(
+            says,
+            move |bakes| bound + noise(last(bakes)) + noise(&bakes[0]),
+            move |bakes| of(last(bakes), &bakes[0]),
+        )
     }
 
     /// Adds a measure that needs no bake.
@@ -62,7 +102,7 @@ impl Case {
     /// The deposited flux [W].
     pub fn watts(&mut self, expected_w: f64, bound: f64) -> &mut Self {
         let says = format!("{} W arrive", number(expected_w));
-        self.measure(&says, bound, move |bake| off(deposited_w(bake), expected_w))
+        self.measure_within(&says, (bound, flux_noise), move |bake| off(deposited_w(bake), expected_w))
             .carried(&says, move |bake| off(deposited_w(bake), expected_w) / (bound + chance(bake)))
     }
 
@@ -90,11 +130,8 @@ impl Case {
     pub fn e(&mut self, says: &str, bound: f64, theory: impl Fn(DVec3) -> f64 + Send + Sync + 'static) -> &mut Self {
         let (says, theory) = (format!("E is {says}"), Arc::new(theory));
         let same = Arc::clone(&theory);
-        self.measure(&says, bound, move |bake| against_theory(bake, &*theory))
-            .carried(&says, move |bake| {
-                let stated = bake.result.estimated_relative_rmse.unwrap_or(0.0);
-                against_theory(bake, &*same) / (bound + 2.0 * stated)
-            })
+        self.measure_within(&says, (bound, map_noise), move |bake| against_theory(bake, &*theory))
+            .carried(&says, move |bake| against_theory(bake, &*same) / (bound + map_noise(bake)))
     }
 
     /// E of a lamp of 1 W/sr at a point.
@@ -109,9 +146,10 @@ impl Case {
         })
     }
 
-    /// The maps equal those of the first bake times a factor: relative RMSE.
+    /// The maps equal those of the first bake times a factor: relative RMSE. Exactly, if the bound is 0.
     pub fn as_first(&mut self, says: &str, bound: f64, factor: f64) -> &mut Self {
-        self.compare(says, bound, move |bake, first| maps_apart(&bake.result.maps, &first.result.maps, factor))
+        let noise = if bound > 0.0 { map_noise } else { |_: &Baked| 0.0 };
+        self.compare_within(says, (bound, noise), move |bake, first| maps_apart(&bake.result.maps, &first.result.maps, factor))
     }
 
     /// The maps equal those of the first bake to within the estimated errors of both.
@@ -123,7 +161,7 @@ impl Case {
 
     /// The deposited flux equals that of the first bake.
     pub fn watts_as_first(&mut self, says: &str, bound: f64) -> &mut Self {
-        self.compare(says, bound, |bake, first| off(deposited_w(bake), deposited_w(first)))
+        self.compare_within(says, (bound, flux_noise), |bake, first| off(deposited_w(bake), deposited_w(first)))
     }
 
     /// The maps equal those of the first bake bit for bit.

@@ -12,7 +12,7 @@ use nephroid::scene::Scene;
 use nephroid::bake::Bake;
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
 
-use crate::tools::{at, bake, photons, settings};
+use crate::tools::{bake, photons, settings, to};
 
 /// Largest relative error of the energy balance of ledgers and maps.
 const BOOKS_BOUND: f64 = 1e-6;
@@ -29,9 +29,28 @@ pub fn is_long() -> bool {
 pub struct Baked {
     pub scene: Scene,
     pub result: Bake,
+    estimator: Estimator,
 }
 
-/// Deviation from a law, given all bakes so far.
+impl Baked {
+    fn new(scene: Scene, settings: &BakeSettings) -> Self {
+        Self {
+            result: bake(scene.clone(), settings),
+            scene,
+            estimator: settings.estimator,
+        }
+    }
+
+    /// Relative RMSE that chance causes, as estimated; 0 for splats, whose rays are not chosen by chance.
+    pub fn noise(&self) -> f64 {
+        match self.estimator {
+            Estimator::Splat => 0.0,
+            _ => self.result.estimated_relative_rmse.unwrap_or(0.0),
+        }
+    }
+}
+
+/// Deviation from a law, or the largest that it allows, given all bakes so far.
 type Measure = Box<dyn Fn(&[Baked]) -> f64 + Send>;
 
 /// Use of bakes before they are dropped.
@@ -43,7 +62,11 @@ enum Step {
         /// Whether the scene is also baked by photons and by the automatic estimator.
         is_carried: bool,
     },
-    Law(String, f64, Measure),
+    Law {
+        says: String,
+        bound: Measure,
+        of: Measure,
+    },
     /// A law about the last bake's scene, baked by photons and by the automatic estimator.
     Carried(String, Box<dyn Fn(&Baked) -> f64 + Send>),
     Forget(Look),
@@ -74,9 +97,9 @@ pub struct Case {
 }
 
 impl Case {
-    /// Bakes by wavefronts at a density [rays/sr], with maps of side² texels.
-    pub fn bake(&mut self, scene: Scene, density_per_sr: f64, side: usize) -> &mut Self {
-        self.bake_with(scene, at(density_per_sr, side))
+    /// Bakes by bundles to a relative RMSE, with maps of side² texels.
+    pub fn bake(&mut self, scene: Scene, target: f64, side: usize) -> &mut Self {
+        self.bake_with(scene, to(target, side))
     }
 
     /// Bakes by splats at a density [rays/sr], with maps of side² texels.
@@ -101,7 +124,21 @@ impl Case {
         bound: f64,
         of: impl Fn(&[Baked]) -> f64 + Send + 'static,
     ) -> &mut Self {
-        self.steps.push(Step::Law(says.into(), bound, Box::new(of)));
+        self.law_within(says, move |_| bound, of)
+    }
+
+    /// Adds a law whose bound depends on the bakes.
+    pub fn law_within(
+        &mut self,
+        says: impl Into<String>,
+        bound: impl Fn(&[Baked]) -> f64 + Send + 'static,
+        of: impl Fn(&[Baked]) -> f64 + Send + 'static,
+    ) -> &mut Self {
+        self.steps.push(Step::Law {
+            says: says.into(),
+            bound: Box::new(bound),
+            of: Box::new(of),
+        });
         self
     }
 
@@ -148,18 +185,18 @@ impl Case {
                     let (scene, mut settings) = *what;
                     // Cases run in parallel, so each uses one thread unless it asks for more.
                     settings.threads = settings.threads.max(1);
-                    let result = bake(scene.clone(), &settings);
                     if open.is_none() {
                         first = scene.name.clone();
                     }
-                    open = Some(energy_residual(&result).max(open.unwrap_or(0.0)));
+                    let baked = Baked::new(scene.clone(), &settings);
+                    open = Some(energy_residual(&baked.result).max(open.unwrap_or(0.0)));
                     carried = if is_carried { by_carriers(&scene, &settings) } else { Vec::new() };
                     for (_, baked) in carried.iter().filter(|_| !self.is_without_books) {
                         open = Some(energy_residual(&baked.result).max(open.unwrap_or(0.0)));
                     }
-                    bakes.push(Baked { scene, result });
+                    bakes.push(baked);
                 }
-                Step::Law(says, bound, of) => note(says, of(&bakes), bound, &first),
+                Step::Law { says, bound, of } => note(says, of(&bakes), bound(&bakes), &first),
                 Step::Carried(says, of) => {
                     for (carrier, baked) in &carried {
                         note(format!("by {carrier}, over what chance allows: {says}"), of(baked), 1.0, &first);
@@ -238,10 +275,7 @@ fn by_carriers(scene: &Scene, settings: &BakeSettings) -> Vec<(&'static str, Bak
         error_metric: ErrorMetric::Rmse,
         ..photons
     };
-    let baked = |settings: &BakeSettings| Baked {
-        result: bake(scene.clone(), settings),
-        scene: scene.clone(),
-    };
+    let baked = |settings: &BakeSettings| Baked::new(scene.clone(), settings);
     vec![("photons", baked(&many)), ("auto", baked(&chosen))]
 }
 

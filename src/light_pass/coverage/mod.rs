@@ -7,7 +7,6 @@
 mod area;
 mod bands;
 mod bins;
-mod gaps;
 mod line;
 mod report;
 mod row;
@@ -17,13 +16,12 @@ mod tiles;
 
 use glam::DVec2;
 
-use super::super::receiver_maps::Coverage;
-use super::super::receiver_maps::ReceiverMap;
+use super::receiver_maps::{Coverage, ReceiverMap};
 use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
 
 pub use report::CoverageReport;
 
-/// A piece of the wavefront on a map.
+/// A piece of a bundle on a map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FluxTriangle {
     /// Texel coordinates: x across, y down; texel (i, j) covers [i, i + 1] × [j, j + 1]. May lie partly or wholly
@@ -62,8 +60,8 @@ pub fn deposit_covered(
     let size = (flux.width(), flux.height());
     assert_eq!(size, coverage.size(), "one coverage for every texel");
     if coverage.is_full() {
-        bands::deposit(triangles, size, flux.texels_mut(), &bands::AllTexels).0
+        bands::deposit(triangles, size, flux.texels_mut(), &bands::AllTexels)
     } else {
-        gaps::deposit(triangles, coverage, flux.texels_mut())
+        bands::deposit(triangles, size, flux.texels_mut(), &bands::IslandTexels(coverage))
     }
 }

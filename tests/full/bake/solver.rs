@@ -1,4 +1,4 @@
-//! The wavefront estimator against an independent solver, and by its counters; and real files made by others
+//! Bundles against an independent solver, and by their counters; and real files made by others
 //! (`../shared/scenes`, where it is there), baked without a fault.
 
 use nephroid::effect::Effect;
@@ -8,7 +8,7 @@ use nephroid::scene::{LoadOptions, Scene};
 
 use crate::bake::common::floor;
 use support::references::references;
-use support::tools::{at, bake, builtin_scene, energy_fault, map_of, photons};
+use support::tools::{bake, energy_fault, map_of, photons};
 use support::{assert_close, or_skip, project_file, shared_or_skip};
 
 /// The others are in the quick tests.
@@ -20,9 +20,7 @@ fn few_rays_agree_with_the_solver() {
         .iter()
         .filter(|reference| large.contains(&reference.builtin))
     {
-        let scene = builtin_scene(reference.builtin);
-        let result = bake(scene.clone(), &at(reference.by_wavefronts.0, 256));
-        reference.check_wavefronts(&result, &scene);
+        let (scene, result) = reference.check_bundles();
         if reference.builtin == "ball" {
             let texel_m = map_of(&result, &scene, "floor").chart.texel_area_m2(0).sqrt();
             check_far_field(&floor(&result, &scene), texel_m);

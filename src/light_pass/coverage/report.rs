@@ -1,16 +1,14 @@
-//! Totals of a deposit: flux on texels, past the edge of the map, beyond the chart, and of invalid triangles.
+//! Totals of a deposit: flux on texels, beside the chart, and of invalid triangles.
 
 use crate::illumination::accumulator::FluxCount;
 
-/// What became of the flux of triangles. The four sums add up exactly to the flux of the triangles.
+/// What became of the flux of triangles. The three sums add up exactly to the flux of the triangles.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct CoverageReport {
     /// Counts on texels.
     pub deposited: [i128; 3],
-    /// Counts beside the map's rectangle: light past the receiver's edge.
+    /// Counts beside the map's rectangle, and on texels that the triangle's island does not cover.
     pub outside: [i128; 3],
-    /// Counts on texels that the chart does not cover, with no covered texel near enough.
-    pub unplaced: [i128; 3],
     /// Counts of triangles with a non-finite corner.
     pub non_finite: [i128; 3],
 }
@@ -21,7 +19,6 @@ impl CoverageReport {
         for channel in 0..3 {
             self.deposited[channel] += other.deposited[channel];
             self.outside[channel] += other.outside[channel];
-            self.unplaced[channel] += other.unplaced[channel];
             self.non_finite[channel] += other.non_finite[channel];
         }
     }

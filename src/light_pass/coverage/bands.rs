@@ -8,7 +8,7 @@ use super::bins::{Bins, split_rows};
 use super::report::book;
 use super::row::{PreparedTriangle, RowShares, Sink, Span};
 use super::shape::{Shape, is_finite};
-use super::{CoverageReport, FluxTriangle};
+use super::{Coverage, CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
 
 /// Triangles sorted by bands at a time.
@@ -22,8 +22,7 @@ const BANDS_PER_THREAD: usize = 4;
 
 /// Restricts which texels take flux.
 pub trait TexelAccess: Sync {
-    /// Adds a span of a triangle's flux to the texels of its row where allowed. Returns what was added, and whether
-    /// that was all.
+    /// Adds a span of a triangle's flux to the texels of its row where allowed. Returns what was added.
     fn add(
         &self,
         flux: &PreparedTriangle,
@@ -31,7 +30,7 @@ pub trait TexelAccess: Sync {
         row: usize,
         span: Span,
         texels: &mut [FluxCount],
-    ) -> (FluxCount, bool);
+    ) -> FluxCount;
 }
 
 /// All texels take flux.
@@ -46,40 +45,61 @@ impl TexelAccess for AllTexels {
         _: usize,
         span: Span,
         texels: &mut [FluxCount],
-    ) -> (FluxCount, bool) {
-        (flux.add(span, texels), true)
+    ) -> FluxCount {
+        flux.add(span, texels)
     }
 }
 
-/// Result of one task.
-#[derive(Debug, Default)]
-struct TaskOutput {
-    added: [i128; 3],
-    /// Triangles that were not added completely.
-    incomplete: Vec<usize>,
+/// Texels of the triangle's island take flux.
+pub struct IslandTexels<'a, C>(pub &'a C);
+
+impl<C: Coverage> TexelAccess for IslandTexels<'_, C> {
+    fn add(
+        &self,
+        flux: &PreparedTriangle,
+        island: u32,
+        row: usize,
+        span: Span,
+        texels: &mut [FluxCount],
+    ) -> FluxCount {
+        let covers = |column: usize| self.0.covers(column, row, island);
+        if (span.first..span.first + span.ends.len()).all(covers) {
+            return flux.add(span, texels);
+        }
+        let mut shares = vec![[0; 3]; span.ends.len()];
+        flux.add(Span { first: 0, ..span }, &mut shares);
+        let mut added = [0; 3];
+        for (offset, share) in shares.iter().enumerate() {
+            if covers(span.first + offset) {
+                for channel in 0..3 {
+                    texels[span.first + offset][channel] += share[channel];
+                    added[channel] += share[channel];
+                }
+            }
+        }
+        added
+    }
 }
 
 /// Adds triangles to the texels of a map of `size`. Returns what went where, with everything not added counted as
-/// outside, and the triangles that were not added completely, ascending.
+/// outside.
 pub fn deposit(
     triangles: &[FluxTriangle],
     size: (usize, usize),
     texels: &mut [FluxCount],
     ground: &impl TexelAccess,
-) -> (CoverageReport, Vec<usize>) {
+) -> CoverageReport {
     let mut report = CoverageReport::default();
-    let mut done = TaskOutput::default();
     if triangles.len() < MIN_TRIANGLES || rayon::current_num_threads() == 1 {
         book_outside(triangles, &mut report);
-        done = add(triangles.iter().enumerate(), size, 0..size.1, texels, ground);
+        report.deposited = add(triangles.iter(), size, 0..size.1, texels, ground);
     } else {
-        add_in_bands(triangles, size, texels, ground, &mut report, &mut done);
+        add_in_bands(triangles, size, texels, ground, &mut report);
     }
-    report.deposited = done.added;
     for (outside, deposited) in report.outside.iter_mut().zip(report.deposited) {
         *outside -= deposited;
     }
-    (report, done.incomplete)
+    report
 }
 
 /// Books all flux as outside, except that of non-finite triangles.
@@ -101,7 +121,6 @@ fn add_in_bands(
     texels: &mut [FluxCount],
     ground: &impl TexelAccess,
     report: &mut CoverageReport,
-    done: &mut TaskOutput,
 ) {
     let chunks: Vec<&[FluxTriangle]> = triangles.chunks(TRIANGLES_PER_CHUNK).collect();
     let prepare = |chunk: &&[FluxTriangle]| {
@@ -115,27 +134,25 @@ fn add_in_bands(
     bins.iter().for_each(|part| part.add_work(&mut work));
     let bands = split_rows(&work, BANDS_PER_THREAD * rayon::current_num_threads());
     bins.par_iter_mut().for_each(|part| part.sort(&bands));
-    let parts: Vec<TaskOutput> = split_texels(texels, size.0, &bands)
+    let parts: Vec<[i128; 3]> = split_texels(texels, size.0, &bands)
         .into_par_iter()
         .zip(bands)
         .enumerate()
         .map(|(band, (texels, rows))| {
             let ours = bins.iter().enumerate().flat_map(|(chunk, part)| {
                 let first = chunk * TRIANGLES_PER_CHUNK;
-                part.band(band).iter().map(move |&index| first + index as usize)
+                part.band(band)
+                    .iter()
+                    .map(move |&index| &triangles[first + index as usize])
             });
-            let ours = ours.map(|index| (index, &triangles[index]));
             add(ours, size, rows, texels, ground)
         })
         .collect();
     for part in parts {
-        for (sum, channel) in done.added.iter_mut().zip(part.added) {
+        for (sum, channel) in report.deposited.iter_mut().zip(part) {
             *sum += channel;
         }
-        done.incomplete.extend(part.incomplete);
     }
-    done.incomplete.sort_unstable();
-    done.incomplete.dedup();
 }
 
 /// The texels of each band.
@@ -153,17 +170,17 @@ fn split_texels<'a>(
     parts
 }
 
-/// Adds triangles, given with their indices, to the texels of some rows.
+/// Adds triangles to the texels of some rows. Returns what was added.
 fn add<'a>(
-    triangles: impl Iterator<Item = (usize, &'a FluxTriangle)>,
+    triangles: impl Iterator<Item = &'a FluxTriangle>,
     size: (usize, usize),
     rows: Range<usize>,
     texels: &mut [FluxCount],
     ground: &impl TexelAccess,
-) -> TaskOutput {
-    let mut done = TaskOutput::default();
+) -> [i128; 3] {
+    let mut added = [0; 3];
     let mut shares = RowShares::new(size.0);
-    for (index, triangle) in triangles {
+    for triangle in triangles {
         let shape = Shape::new(&triangle.corners, size);
         let reached = shape.rows();
         let ours = reached.start.max(rows.start)..reached.end.min(rows.end);
@@ -175,15 +192,11 @@ fn add<'a>(
             flux: PreparedTriangle::new(triangle.flux),
             island: triangle.island,
             added: [0; 3],
-            complete: true,
         };
         shape.for_each_row(ours, &mut shares, &mut target);
-        book(&mut done.added, target.added);
-        if !target.complete {
-            done.incomplete.push(index);
-        }
+        book(&mut added, target.added);
     }
-    done
+    added
 }
 
 /// Texels of some rows, to which one triangle is added.
@@ -196,7 +209,6 @@ struct Rows<'a, G> {
     flux: PreparedTriangle,
     island: u32,
     added: FluxCount,
-    complete: bool,
 }
 
 impl<G: TexelAccess> Sink for Rows<'_, G> {
@@ -204,10 +216,9 @@ impl<G: TexelAccess> Sink for Rows<'_, G> {
     fn add(&mut self, row: usize, span: Span) {
         let begin = (row - self.first) * self.width;
         let texels = &mut self.texels[begin..begin + self.width];
-        let (here, complete) = self.ground.add(&self.flux, self.island, row, span, texels);
+        let here = self.ground.add(&self.flux, self.island, row, span, texels);
         for (sum, part) in self.added.iter_mut().zip(here) {
             *sum += part;
         }
-        self.complete &= complete;
     }
 }
