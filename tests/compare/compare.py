@@ -29,17 +29,16 @@ SIDE = 256
 DEPTH = 256
 # Maps of a scene of glass that differ by their seeds alone.
 ALIKE = {"photon": 8, "aimed": 8, "brute": 6}
-# Reference maps whose noise is known, and the depth of their paths.
-KNOWN = {"wine": (0.0124, 15), "tumbler": (0.0117, 15), "lens": (0.0102, 15)}
+# Relative noise of reference maps where it is known.
+KNOWN = {"wine": 0.0167, "tumbler": 0.0139, "lens": 0.0101}
 
 
 @dataclass
 class SceneFile:
-    """Meshes that every program reads, their reference where it is known before, and what is asked of paths' depth."""
+    """Meshes that every program reads, and their reference where it is known before."""
 
     file: Path
     reference: figures.Reference | None
-    depth: int | None = None
 
 
 @dataclass
@@ -100,7 +99,7 @@ def measure(program, given, scene, folder):
     if not program.script:
         nephroid.take(given.nephroid, scene, folder, given.budget, SIDE, *program.last, alike)
         return
-    aimed = [scene.depth or DEPTH, alike] if program.script == "aimed.py" else []
+    aimed = [DEPTH, alike] if program.script == "aimed.py" else []
     command = [sys.executable, HERE / program.script, scene.file, folder, given.budget, SIDE, *aimed, *program.last]
     done = subprocess.run([str(part) for part in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     if done.returncode != 0:
@@ -116,8 +115,8 @@ def scene_files(given, folder):
         ) for name, key in SCENES.items()}
     found = {}
     for file in sorted(given.scenes.glob("*.glb")) if given.scenes else []:
-        noise, depth = KNOWN.get(file.stem, (0.0, None))
-        found[file.stem] = SceneFile(file, figures.read_pfm(file.with_suffix(".pfm"), noise), depth)
+        reference = figures.read_pfm(file.with_suffix(".pfm"), KNOWN.get(file.stem, 0.0))
+        found[file.stem] = SceneFile(file, reference)
     return found | {name: SceneFile(glass.write(name, folder), None) for name in glass.SCENES}
 
 

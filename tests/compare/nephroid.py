@@ -41,9 +41,8 @@ def export_scene(program, name, folder):
 
 def bake(program, scene, maps, side, estimator, quality, seed):
     """Bakes the floor's caustic: (map, manifest, CPU seconds of the light pass)."""
-    depth = ["--max-depth", scene.depth] if scene.depth else []
     unfiltered = ["--filter", "off"] if estimator == "photon" else []
-    run(program, "bake", scene.file, "-o", maps, "--estimator", estimator, *quality, *depth, *unfiltered, "--seed", seed,
+    run(program, "bake", scene.file, "-o", maps, "--estimator", estimator, *quality, *unfiltered, "--seed", seed,
         "--map-resolution", side, "--quiet", "--force", "--no-cache")
     manifest = json.loads((maps / "manifest.json").read_text())
     taken_s = sum(manifest["cpu_s"][part] for part in ["plan", "trace", "deposit"])
@@ -86,8 +85,6 @@ def take(program, scene, folder, budget_s, side, estimator, alike=0):
 
 def brute_force(program, scene, folder, budget_s, side, alike):
     """Maps by brute force, which differ by their seeds alone and take the budget together, or more where it is too short."""
-    if scene.depth:
-        raise RuntimeError("`study reference` has no --max-depth")
     is_dispersive = scenes.read(scene.file).is_dispersive
     found, rays, maps = [], LEAST_RAYS, folder / "maps"
     while len(found) < alike:
