@@ -8,8 +8,9 @@ use super::bins::{Bins, split_rows};
 use super::report::book;
 use super::row::{PreparedTriangle, RowShares, Sink, Span};
 use super::shape::{Shape, is_finite};
-use super::{Coverage, CoverageReport, FluxTriangle};
+use super::{CoverageReport, FluxTriangle};
 use crate::illumination::accumulator::FluxCount;
+use crate::light_pass::receiver_maps::Coverage;
 
 /// Triangles sorted by bands at a time.
 const TRIANGLES_PER_CHUNK: usize = 8192;
@@ -20,81 +21,20 @@ const MIN_TRIANGLES: usize = 1024;
 /// Bands per thread, for load balance.
 const BANDS_PER_THREAD: usize = 4;
 
-/// Restricts which texels take flux.
-pub trait TexelAccess: Sync {
-    /// Adds a span of a triangle's flux to the texels of its row where allowed. Returns what was added.
-    fn add(
-        &self,
-        flux: &PreparedTriangle,
-        island: u32,
-        row: usize,
-        span: Span,
-        texels: &mut [FluxCount],
-    ) -> FluxCount;
-}
-
-/// All texels take flux.
-pub struct AllTexels;
-
-impl TexelAccess for AllTexels {
-    #[inline(always)]
-    fn add(
-        &self,
-        flux: &PreparedTriangle,
-        _: u32,
-        _: usize,
-        span: Span,
-        texels: &mut [FluxCount],
-    ) -> FluxCount {
-        flux.add(span, texels)
-    }
-}
-
-/// Texels of the triangle's island take flux.
-pub struct IslandTexels<'a, C>(pub &'a C);
-
-impl<C: Coverage> TexelAccess for IslandTexels<'_, C> {
-    fn add(
-        &self,
-        flux: &PreparedTriangle,
-        island: u32,
-        row: usize,
-        span: Span,
-        texels: &mut [FluxCount],
-    ) -> FluxCount {
-        let covers = |column: usize| self.0.covers(column, row, island);
-        if (span.first..span.first + span.ends.len()).all(covers) {
-            return flux.add(span, texels);
-        }
-        let mut shares = vec![[0; 3]; span.ends.len()];
-        flux.add(Span { first: 0, ..span }, &mut shares);
-        let mut added = [0; 3];
-        for (offset, share) in shares.iter().enumerate() {
-            if covers(span.first + offset) {
-                for channel in 0..3 {
-                    texels[span.first + offset][channel] += share[channel];
-                    added[channel] += share[channel];
-                }
-            }
-        }
-        added
-    }
-}
-
 /// Adds triangles to the texels of a map of `size`. Returns what went where, with everything not added counted as
 /// outside.
 pub fn deposit(
     triangles: &[FluxTriangle],
     size: (usize, usize),
     texels: &mut [FluxCount],
-    ground: &impl TexelAccess,
+    coverage: &impl Coverage,
 ) -> CoverageReport {
     let mut report = CoverageReport::default();
     if triangles.len() < MIN_TRIANGLES || rayon::current_num_threads() == 1 {
         book_outside(triangles, &mut report);
-        report.deposited = add(triangles.iter(), size, 0..size.1, texels, ground);
+        report.deposited = add(triangles.iter(), size, 0..size.1, texels, coverage);
     } else {
-        add_in_bands(triangles, size, texels, ground, &mut report);
+        add_in_bands(triangles, size, texels, coverage, &mut report);
     }
     for (outside, deposited) in report.outside.iter_mut().zip(report.deposited) {
         *outside -= deposited;
@@ -119,7 +59,7 @@ fn add_in_bands(
     triangles: &[FluxTriangle],
     size: (usize, usize),
     texels: &mut [FluxCount],
-    ground: &impl TexelAccess,
+    coverage: &impl Coverage,
     report: &mut CoverageReport,
 ) {
     let chunks: Vec<&[FluxTriangle]> = triangles.chunks(TRIANGLES_PER_CHUNK).collect();
@@ -145,7 +85,7 @@ fn add_in_bands(
                     .iter()
                     .map(move |&index| &triangles[first + index as usize])
             });
-            add(ours, size, rows, texels, ground)
+            add(ours, size, rows, texels, coverage)
         })
         .collect();
     for part in parts {
@@ -176,7 +116,7 @@ fn add<'a>(
     size: (usize, usize),
     rows: Range<usize>,
     texels: &mut [FluxCount],
-    ground: &impl TexelAccess,
+    coverage: &impl Coverage,
 ) -> [i128; 3] {
     let mut added = [0; 3];
     let mut shares = RowShares::new(size.0);
@@ -188,7 +128,7 @@ fn add<'a>(
             width: size.0,
             first: rows.start,
             texels,
-            ground,
+            coverage,
             flux: PreparedTriangle::new(triangle.flux),
             island: triangle.island,
             added: [0; 3],
@@ -200,25 +140,42 @@ fn add<'a>(
 }
 
 /// Texels of some rows, to which one triangle is added.
-struct Rows<'a, G> {
+struct Rows<'a, C> {
     width: usize,
     /// The first of the rows.
     first: usize,
     texels: &'a mut [FluxCount],
-    ground: &'a G,
+    coverage: &'a C,
     flux: PreparedTriangle,
     island: u32,
     added: FluxCount,
 }
 
-impl<G: TexelAccess> Sink for Rows<'_, G> {
+impl<C: Coverage> Sink for Rows<'_, C> {
     #[inline(always)]
     fn add(&mut self, row: usize, span: Span) {
         let begin = (row - self.first) * self.width;
         let texels = &mut self.texels[begin..begin + self.width];
-        let here = self.ground.add(&self.flux, self.island, row, span, texels);
-        for (sum, part) in self.added.iter_mut().zip(here) {
-            *sum += part;
+        let covers = |column: usize| self.coverage.covers(column, row, self.island);
+        let is_covered = || self.coverage.is_full() || (span.first..span.first + span.ends.len()).all(covers);
+        if is_covered() {
+            let here = self.flux.add(span, texels);
+            for (sum, part) in self.added.iter_mut().zip(here) {
+                *sum += part;
+            }
+            return;
+        }
+
+        // Flux on texels that the island does not cover is left out.
+        let mut shares = vec![[0; 3]; span.ends.len()];
+        self.flux.add(Span { first: 0, ..span }, &mut shares);
+        for (column, share) in (span.first..).zip(&shares) {
+            if covers(column) {
+                for channel in 0..3 {
+                    texels[column][channel] += share[channel];
+                    self.added[channel] += share[channel];
+                }
+            }
         }
     }
 }

@@ -16,8 +16,8 @@ mod tiles;
 
 use glam::DVec2;
 
-use super::receiver_maps::{Coverage, ReceiverMap};
-use crate::illumination::accumulator::{FluxAccumulator, FluxCount};
+use super::receiver_maps::ReceiverMap;
+use crate::illumination::accumulator::FluxCount;
 
 pub use report::CoverageReport;
 
@@ -43,25 +43,7 @@ pub fn deposit_triangles(triangles: &[FluxTriangle], map: &mut ReceiverMap) -> C
     if let Some(layout) = map.chart.layout.clone() {
         return tiles::deposit(triangles, &layout, map.level(0).0.texels_mut());
     }
-    let (flux, covered) = map.level(0);
-    deposit_covered(triangles, flux, &covered)
-}
-
-/// [`deposit_triangles`] into counts, restricted to the texels that `coverage` allows.
-///
-/// # Panics
-///
-/// If `coverage` and `flux` differ in size.
-pub fn deposit_covered(
-    triangles: &[FluxTriangle],
-    flux: &mut FluxAccumulator,
-    coverage: &impl Coverage,
-) -> CoverageReport {
+    let (flux, coverage) = map.level(0);
     let size = (flux.width(), flux.height());
-    assert_eq!(size, coverage.size(), "one coverage for every texel");
-    if coverage.is_full() {
-        bands::deposit(triangles, size, flux.texels_mut(), &bands::AllTexels)
-    } else {
-        bands::deposit(triangles, size, flux.texels_mut(), &bands::IslandTexels(coverage))
-    }
+    bands::deposit(triangles, size, flux.texels_mut(), &coverage)
 }

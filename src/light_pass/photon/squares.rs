@@ -605,7 +605,8 @@ fn displaced_square(texels: f64, is_smooth: bool) -> f64 {
     }
 }
 
-/// Marks squares that share a point with one that has an edge.
+/// Marks squares beside one that has an edge, of which they may be a quarter as long: those that share one of its points
+/// or of the points half-way between.
 fn mark_beside_edges(squares: &mut [Square]) {
     let mut on_edges: HashSet<DomainPoint, PointHash> = HashSet::default();
     for square in squares.iter().filter(|square| square.residual.cut > 0.0) {
