@@ -235,10 +235,12 @@ fn last_of_many_requests_wins() {
     bench.ask(ENDLESS);
     bench.begun(1);
     for request in 0..500 {
-        for density in [ENDLESS, 10_000.0 + f64::from(request)] {
-            bench.ask(density);
-            assert!(bench.worker.state().is_baking());
-        }
+        bench.ask(ENDLESS);
+        assert!(bench.worker.state().is_baking());
+        bench.ask(10_000.0 + f64::from(request));
+        // It may have been answered already.
+        let state = bench.worker.state();
+        assert!(state.is_baking() || state == BakeState::Done, "{state:?}");
     }
     assert_eq!(bench.answer(77.0), Some(77));
     assert_eq!(bench.made.load(Ordering::SeqCst), 1, "one session serves all");
