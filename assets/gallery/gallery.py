@@ -223,7 +223,7 @@ def on_cloth(x, z):
     return A([x, CLOTH + 0.0003, z])
 
 
-WINE_GLASS, TUMBLER, BOOK, BALL = on_cloth(0.10, 0.47), on_cloth(-0.17, 0.57), on_cloth(0.00, 0.84), on_cloth(0.37, 0.63)
+WINE_GLASS, TUMBLER, BOOK, BALL = on_cloth(0.10, 0.47), on_cloth(-0.19, 0.55), on_cloth(-0.01, 0.79), on_cloth(0.37, 0.63)
 
 
 def add_wine_glass():
@@ -384,14 +384,14 @@ def add_sky():
 
 
 def add_cameras():
-    file.camera('overview', [-0.12, 1.00, 1.24], [0.17, 0.885, 0.3], 0.72)
+    file.camera('overview', [-0.11, 1.00, 1.25], [0.155, 0.845, 0.3], 0.72)
     file.camera('wine glass', [0.16, 1.00, 0.98], [0.19, 0.82, 0.50], 0.50)
     file.camera('tumbler', [-0.02, 0.98, 0.95], [-0.08, 0.77, 0.60], 0.42)
-    file.camera('ring', [0.06, 0.96, 1.05], [0.085, 0.765, 0.83], 0.42)
+    file.camera('ring', [0.05, 0.97, 1.01], [0.075, 0.765, 0.785], 0.42)
     file.camera('pool', [-1.15, 1.35, 0.05], [0.75, 0.25, -2.3], 1.0)
-    file.camera('ceiling', [-0.3, 1.2, -0.3], [1.7, 2.0, -1.7], 0.95)
-    file.camera('prism', [-0.6, 1.5, -0.9], [1.1, 1.55, -1.6], 0.95)
-    file.camera('butterfly', [-0.95, 1.45, 2.55], [-0.5, 1.15, 2.05], 0.75)
+    file.camera('ceiling', [-0.2, 1.0, -0.2], [1.75, 1.75, -1.5], 0.85)
+    file.camera('prism', [-1.55, 1.15, -3.05], [0.3, 1.02, -1.9], 0.76)
+    file.camera('butterfly', [-0.62, 1.45, 1.25], [-0.52, 1.13, 2.05], 0.72)
 
 
 add_materials()

@@ -8,14 +8,14 @@ import numpy as np
 
 from kit import join, sheet
 
-CELLS, ROUNDS, QUADS = 64, 60, 72
+CELLS, ROUNDS, QUADS = 64, 60, 48
 LINE, CONTRAST = 0.013, 12.0
 
 
 def butterfly():
     """Density of the picture, with mean 1: the curve of T. H. Fay (1989) as a bright line."""
     angle = np.linspace(0, 2 * np.pi, 900, endpoint=False)
-    radius = 0.1 * (np.exp(np.sin(angle)) - 2 * np.cos(4 * angle))
+    radius = 0.115 * (np.exp(np.sin(angle)) - 2 * np.cos(4 * angle))
     curve = np.stack([0.5 + radius * np.cos(angle), 0.42 + radius * np.sin(angle)], -1)
     middle = (np.arange(CELLS) + 0.5) / CELLS
     place = np.stack(np.meshgrid(middle, middle), -1)
@@ -68,8 +68,11 @@ def relief(centre, right, up, forward, side, thick, distance, index):
     u, v = np.meshgrid(at - 0.5, at - 0.5)
     back = centre + side * (u[..., None] * right + v[..., None] * up)
     front = back + relief_m[..., None] * forward
-    parts = [sheet(front, forward - slope_u[..., None] * right - slope_v[..., None] * up), sheet(back, np.broadcast_to(-forward, back.shape))]
+    parts = [sheet(front, forward - slope_u[..., None] * right - slope_v[..., None] * up)]
     for edge, outward in ((np.s_[0], -up), (np.s_[-1], up), (np.s_[:, 0], -right), (np.s_[:, -1], right)):
         wall = np.stack([back[edge], front[edge]])
         parts.append(sheet(wall, np.broadcast_to(outward, wall.shape)))
+        # The flat back in as few triangles as share its border.
+        fan = np.stack([back[edge], np.broadcast_to(centre, back[edge].shape)])
+        parts.append(sheet(fan, np.broadcast_to(-forward, fan.shape)))
     return join(*parts)
