@@ -83,7 +83,16 @@ fn every_scene_is_whole_and_its_meshes_sound() {
 fn gallery_has_an_exhibit_for_each_camera() {
     let scene = built_in("gallery");
     let cameras: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-    let expected = ["overview", "wine glass", "tumbler", "ring", "pool", "ceiling", "prism", "butterfly"];
+    let expected = [
+        "overview",
+        "wine glass",
+        "tumbler",
+        "ring",
+        "pool",
+        "ceiling",
+        "prism",
+        "butterfly",
+    ];
     assert_eq!(cameras, expected);
     let is_receiver = |object: &usize| !scene.material_of(*object).surface.is_specular();
     assert!((0..scene.objects.len()).filter(is_receiver).count() <= 40);
@@ -99,7 +108,10 @@ fn solids_are_closed() {
         ("prism", &["prism"]),
         ("spectrum", &["prism", "ball"]),
         ("bowl", &["bowl"]),
-        ("gallery", &["wine glass", "wine", "tumbler", "whisky", "ball", "prism", "lens"]),
+        (
+            "gallery",
+            &["wine glass", "wine", "tumbler", "whisky", "ball", "prism", "lens"],
+        ),
     ] {
         let scene = built_in(name);
         for solid in solids {
