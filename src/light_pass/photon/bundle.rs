@@ -24,6 +24,19 @@ pub(super) const MEAN_WEIGHTS: [f64; 9] = [
     1.0 / 36.0,
 ];
 
+/// The same of what only some of the points have, which changes abruptly: the area that is nearest to each.
+pub(super) const NEAREST_WEIGHTS: [f64; 9] = [
+    1.0 / 16.0,
+    2.0 / 16.0,
+    1.0 / 16.0,
+    2.0 / 16.0,
+    4.0 / 16.0,
+    2.0 / 16.0,
+    1.0 / 16.0,
+    2.0 / 16.0,
+    1.0 / 16.0,
+];
+
 /// Extent of the light from one part of a lamp, or of a spectrum, on the map [texels], unless that takes too many parts.
 const PART_TEXELS: f64 = 0.1;
 
@@ -143,9 +156,19 @@ impl OriginShift {
     }
 
     pub(super) fn at(&self, origin: &Origin) -> DVec2 {
+        self.of_lamp(origin.lamp) + self.of_hue(origin.ends)
+    }
+
+    /// For a point of the lamp, in half-axes from its centre.
+    pub(super) fn of_lamp(&self, at: DVec2) -> DVec2 {
         let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
+        x * at.x + y * at.y
+    }
+
+    /// For a wavelength, by its [`Hue::ends`](super::spectrum::Hue::ends).
+    pub(super) fn of_hue(&self, ends: [f64; 2]) -> DVec2 {
         let [first, last] = self.hues.map(|moved| moved.as_dvec2());
-        x * origin.lamp.x + y * origin.lamp.y + first * origin.ends[0] + last * origin.ends[1]
+        first * ends[0] + last * ends[1]
     }
 
     /// Parts of a lamp for which a bundle is deposited, along both axes.
@@ -153,6 +176,12 @@ impl OriginShift {
         let parts = |moved: Vec2| (2.0 * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
         let most = MAX_LAMP_PARTS[usize::from(is_dispersed)];
         DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(most))
+    }
+
+    /// Width of the lamp's image across its longer side [texels].
+    pub(super) fn lamp_width(&self) -> f64 {
+        let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
+        2.0 * x.perp_dot(y).abs() / x.length().max(y.length()).max(f64::MIN_POSITIVE)
     }
 
     /// Distance between the arrivals from neighbouring parts of a lamp [texels].
@@ -194,6 +223,8 @@ pub(super) struct Bundle {
     pub(super) displaced_texels: f64,
     /// Divisions of the square's sides for the deposit.
     pub(super) divisions: usize,
+    /// Index of its first triangle among those of its path in all squares.
+    pub(super) first_triangle: u32,
     /// Whether light varies little from texel to texel.
     pub(super) is_smooth: bool,
 }
@@ -208,6 +239,7 @@ impl Bundle {
             flux_w,
             displaced_texels: 0.0,
             divisions: 1,
+            first_triangle: 0,
             is_smooth: true,
         }
     }
@@ -246,6 +278,15 @@ impl Bundle {
             Shape::Whole(_) => true,
             Shape::Cut(pieces) => pieces.iter().any(|piece| piece.weights(within).is_some()),
             Shape::Nothing => false,
+        }
+    }
+
+    /// Number of triangles that it is deposited as.
+    pub(super) fn triangle_count(&self) -> usize {
+        match &self.shape {
+            Shape::Nothing => 0,
+            Shape::Cut(pieces) => pieces.len(),
+            Shape::Whole(_) => 2 * self.divisions * self.divisions,
         }
     }
 
