@@ -76,6 +76,15 @@ pub(super) fn load(path: &Path, options: &LoadOptions) -> Result<Scene> {
     Ok(scene)
 }
 
+/// Reads a file that is part of the program.
+///
+/// # Panics
+/// Where the file has a fault.
+pub(super) fn embedded(bytes: &[u8]) -> Scene {
+    let read = read_scene(bytes, Path::new(""), &LoadOptions::default());
+    read.unwrap_or_else(|error| panic!("{error}"))
+}
+
 /// The file, and all files that its text may refer to: every string in it that names an existing file beside it.
 pub(super) fn files_of(path: &Path, most_bytes: u64) -> Vec<PathBuf> {
     let mut found = vec![path.to_path_buf()];

@@ -1,0 +1,411 @@
+"""Writes gallery.glb, the scene `builtin:gallery`: a bath house by the sea in low sun. Lengths in metres, y up, z towards
+the first camera.
+
+    python3 gallery.py
+"""
+import os
+
+import numpy as np
+
+from kit import File, box, facets, join, lathe, mesh, moved, noise, rect, ring, rotation, sheet, unit
+from lens import relief
+
+A = np.array
+UP = A([0.0, 1.0, 0.0])
+
+# The sun stands 31 degrees high: lower, the glasses throw their light too far; higher, the pool leaves the wall dark.
+SUN = unit([0.76, -0.50, 0.36])
+SUN_W_PER_M2, SUN_COLOUR = 9.0, [1.0, 0.80, 0.52]
+SKY_W_PER_M2, SKY_COLOUR = 1.8, [0.90, 1.0, 1.12]
+
+ROOM_X, ROOM_Z, HEIGHT = (-1.7, 2.0), (-4.2, 2.8), 3.4
+WALL = 0.35
+POOL_X, POOL_Z, RIM, WATER, BOTTOM = (-0.9, 1.55), (-3.6, -0.55), 0.46, 0.40, -0.35
+TABLE_X, TABLE_Z, TABLE = (-0.85, 0.85), (0.10, 1.15), 0.75
+CLOTH = TABLE + 0.0015
+
+file = File()
+
+
+# ---- materials
+
+def tinted(value, colour):
+    return value[..., None] * A(colour)
+
+
+def plaster(colour, seed, n=256):
+    return tinted(1 + 0.035 * noise((n, n), (3, 3), seed, 6, 0.6), colour)
+
+
+def marble(n=512):
+    cloud = noise((n, n), (3, 3), 1, 6, 0.55)
+    out = tinted(0.78 + 0.05 * noise((n, n), (2, 2), 2, 5), (1, 0.985, 0.955))
+    for width, depth, seed in ((0.05, 0.30, 5), (0.03, 0.22, 6), (0.10, 0.14, 7)):
+        line = np.exp(-np.abs(noise((n, n), (2, 2), seed, 6, 0.55) + 0.25 * cloud) / width)
+        patchy = np.clip(0.5 + 0.9 * noise((n, n), (3, 3), seed + 20, 3), 0, 1)
+        out -= tinted(depth * line * patchy, (0.9, 0.95, 1.0))
+    return out
+
+
+def tiles(n, per_side, light, dark, joint, gap, seed):
+    y, x = np.mgrid[0:n, 0:n] / n * per_side
+    row, column = y.astype(int), x.astype(int)
+    tone = np.random.default_rng(seed).uniform(0, 1, (per_side, per_side))[row, column]
+    tone = np.clip(tone + 0.3 * noise((n, n), (8, 8), seed + 1, 4), 0, 1)[..., None]
+    edge = np.minimum.reduce([y - row, 1 - y + row, x - column, 1 - x + column])
+    return np.where((edge < gap)[..., None], A(joint), A(light) * tone + A(dark) * (1 - tone))
+
+
+def linen(n=256):
+    y, x = np.mgrid[0:n, 0:n]
+    weave = 0.02 * np.sin(x * np.pi / 2) * np.sin(y * np.pi / 2)
+    threads = 0.025 * (noise((n, n), (4, 128), 61, 2) + noise((n, n), (128, 4), 62, 2))
+    return tinted(0.84 + weave + threads, (1, 0.985, 0.955))
+
+
+def page(seed, width=384, height=576):
+    """Words as rows of dark strokes on warm paper."""
+    random = np.random.default_rng(seed)
+    ink = np.zeros((height, width))
+    for line, y in enumerate(range(int(0.12 * height), int(0.88 * height), 12)):
+        first, last = line % 9 == 0, line % 9 == 8
+        x, end = (0.19 if first else 0.14) * width, (random.uniform(0.3, 0.7) if last else 0.86) * width
+        while x < end - 8:
+            word = min(random.integers(8, 34), end - x)
+            stroke = x
+            while stroke < x + word:
+                thick, up, down = random.integers(2, 4), random.choice([0, 0, 0, 2]), random.choice([0, 0, 0, 2])
+                ink[y - up:y + 5 + down, int(stroke):int(stroke) + thick] = random.uniform(0.5, 0.95)
+                stroke += thick + 1
+            x += word + 6
+    return tinted(1 - 0.7 * ink, (0.84, 0.80, 0.72))
+
+
+def wave(amplitude_m, wavelength_m, degrees, phase_rad):
+    direction = [np.cos(np.radians(degrees)), np.sin(np.radians(degrees))]
+    return dict(amplitude_m=amplitude_m, wavelength_m=wavelength_m, direction=direction, phase_rad=phase_rad)
+
+
+def add_materials():
+    file.material('plaster', texture=plaster((0.86, 0.845, 0.81), 11), metres=2.4)
+    file.material('terracotta', texture=plaster((0.80, 0.56, 0.42), 12), metres=2.0)
+    file.material('stone', texture=plaster((0.62, 0.57, 0.49), 13), metres=0.9)
+    file.material('paving', texture=tiles(512, 4, (0.62, 0.54, 0.44), (0.50, 0.42, 0.33), (0.36, 0.32, 0.27), 0.02, 3), metres=2.4)
+    file.material('mosaic', texture=tiles(512, 16, (0.46, 0.74, 0.74), (0.20, 0.54, 0.60), (0.62, 0.70, 0.68), 0.05, 9), metres=0.8)
+    file.material('marble', texture=marble(), metres=1.3)
+    file.material('linen', texture=linen(), metres=0.10)
+    file.material('left page', texture=page(1))
+    file.material('right page', texture=page(2))
+    file.material('paper edge', (0.66, 0.60, 0.50))
+    file.material('cedar', (0.34, 0.19, 0.11))
+    file.material('black', (0.0, 0.0, 0.0))
+    file.material('gold', metal='gold')
+    file.material('glass', glass=1.52)
+    file.material('crystal', glass=1.60)
+    file.material('flint', glass='785258')
+    file.material('wine', glass=1.345, tint=(0.060, (0.86, 0.06, 0.12)))
+    file.material('whisky', glass=1.36, tint=(0.050, (0.90, 0.42, 0.06)))
+    file.material('water', glass=1.333, tint=(2.5, (0.55, 0.90, 0.92)), waves=[
+        wave(0.0034, 0.46, 20, 0.3), wave(0.0030, 0.39, 75, 1.9), wave(0.0022, 0.30, 130, 4.0), wave(0.0014, 0.23, 50, 2.2)])
+
+
+# ---- the room
+
+def arched_wall(name, material, place, span, height, arches):
+    """A wall along s with round arches (centre, half width, spring height); place(s, y, depth) is a point of it."""
+    steps, origin = 24, A(place(0, 0, 0))
+    cuts = set(span)
+    for centre, half, _ in arches:
+        cuts |= set(centre - half * np.cos(np.pi * np.arange(steps + 1) / steps))
+    cuts = sorted(cuts)
+
+    def foot(s, strip):
+        for centre, half, spring in arches:
+            if abs(strip - centre) < half:
+                return spring + np.sqrt(max(half**2 - (s - centre)**2, 0))
+        return 0.0
+    for depth, normal, owner in ((0.0, place(0, 0, -1), name), (WALL, place(0, 0, 1), 'outside')):
+        p = [corner for a, b in zip(cuts[:-1], cuts[1:]) if b - a > 1e-9 for strip in [(a + b) / 2]
+             for corner in ((a, foot(a, strip)), (b, foot(b, strip)), (b, height), (a, height))]
+        p, first = A(p), 4 * np.arange(len(p) // 4)[:, None]
+        i = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]])
+        uv1 = np.stack([(p[:, 0] - span[0]) / (span[1] - span[0]), 1 - p[:, 1] / height], 1)
+        world = A([place(s, y, depth) for s, y in p])
+        face = mesh(world, np.tile(A(normal) - origin, (len(p), 1)), i, p * [1, -1], uv1)
+        file.add_to(owner, face, material)
+    for centre, half, spring in arches:
+        a = np.pi * np.arange(steps + 1) / steps
+        line = np.vstack([[(centre - half, 0)], np.stack([centre - half * np.cos(a), spring + half * np.sin(a)], 1), [(centre + half, 0)]])
+        inward = np.vstack([[(1, 0)], np.stack([np.cos(a), -np.sin(a)], 1), [(-1, 0)]])
+        along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+        p = A([[place(s, y, 0), place(s, y, WALL)] for s, y in line])
+        n = A([[A(place(s, y, 0)) - origin] * 2 for s, y in inward])
+        uv0 = np.stack(np.broadcast_arrays(along[:, None], [0, WALL]), -1)
+        file.add_to('reveals', sheet(p, n, uv0), material)
+
+
+def flat(x, z, y, up=1):
+    return rect([sum(x) / 2, y, sum(z) / 2], [0, 0, up * (z[1] - z[0]) / 2], [(x[1] - x[0]) / 2, 0, 0])
+
+
+def sides(x, z, y, inwards):
+    """The four upright faces of a box."""
+    q = -1 if inwards else 1
+    middle, half = A([sum(x), sum(y), sum(z)]) / 2, A([x[1] - x[0], y[1] - y[0], z[1] - z[0]]) / 2
+    for axis in (A([1.0, 0, 0]), A([0, 0, 1.0])):
+        for sign in (1, -1):
+            along = np.cross(UP, axis * sign * q)
+            yield rect(middle + axis * sign * half, along * half, UP * half)
+
+
+def add_room():
+    outer_x, outer_z = (ROOM_X[0] - WALL, ROOM_X[1] + WALL), (ROOM_Z[0] - WALL, ROOM_Z[1] + WALL)
+    arched_wall('left wall', 'plaster', lambda s, y, d: (ROOM_X[0] - d, y, s), ROOM_Z, HEIGHT, [(z, 0.85, 2.20) for z in (-2.95, -0.75, 1.45)])
+    arched_wall('back wall', 'terracotta', lambda s, y, d: (s, y, ROOM_Z[0] - d), ROOM_X, HEIGHT, [(-0.62, 0.78, 1.30)])
+    # The right wall bends into a vault, which takes the net of the pool.
+    spring, width, turn = 1.3, 1.7, np.linspace(0, np.pi / 2, 33)
+    profile = np.vstack([[(ROOM_X[1], 0.0)], np.stack([ROOM_X[1] - width * (1 - np.cos(turn)), spring + (HEIGHT - spring) * np.sin(turn)], 1)])
+    normal = np.vstack([[(-1, 0)], np.stack([-np.cos(turn) / width, -np.sin(turn) / (HEIGHT - spring)], 1)])
+    along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(profile, axis=0), axis=1))])
+    p = A([[(x, y, z) for z in ROOM_Z] for x, y in profile])
+    n = A([[(x, y, 0)] * 2 for x, y in normal])
+    vault = sheet(p, n, np.stack(np.broadcast_arrays(along[:, None], ROOM_Z), -1))
+    vault['uv1'] = np.stack(np.broadcast_arrays(A([0.0, 1.0]), (along / along[-1])[:, None]), -1).reshape(-1, 2)
+    file.add('wall', vault, 'plaster')
+    file.add('ceiling', flat((ROOM_X[0], ROOM_X[1] - width), ROOM_Z, HEIGHT, -1), 'plaster')
+    middle_x, half_x = sum(ROOM_X) / 2, (ROOM_X[1] - ROOM_X[0]) / 2
+    file.add('front wall', rect([middle_x, HEIGHT / 2, ROOM_Z[1]], [-half_x, 0, 0], [0, HEIGHT / 2, 0]), 'plaster')
+    file.add_to('outside', flat(outer_x, outer_z, HEIGHT + 0.25), 'stone')
+    file.add_to('outside', flat((-6.0, outer_x[0]), (-8.0, 3.8), 0.0), 'stone')
+    file.add_to('outside', flat((outer_x[0], 6.0), (-8.0, outer_z[0]), 0.0), 'stone')
+
+
+def add_pool():
+    rim_x, rim_z = (POOL_X[0] - 0.16, POOL_X[1] + 0.16), (POOL_Z[0] - 0.16, POOL_Z[1] + 0.16)
+    for x, z in (((ROOM_X[0] - WALL, ROOM_X[1]), (rim_z[1], ROOM_Z[1])), ((ROOM_X[0] - WALL, rim_x[0]), (ROOM_Z[0] - WALL, rim_z[1])),
+                 ((rim_x[1], ROOM_X[1]), (ROOM_Z[0] - WALL, rim_z[1])), (rim_x, (ROOM_Z[0] - WALL, rim_z[0]))):
+        file.add_to('floor', flat(x, z, 0.0), 'paving')
+    for face in sides(POOL_X, POOL_Z, (BOTTOM, RIM), True):
+        file.add_to('pool sides', face, 'mosaic')
+    file.add('pool floor', flat(POOL_X, POOL_Z, BOTTOM), 'mosaic')
+    for face in sides(rim_x, rim_z, (0.0, RIM), False):
+        file.add_to('rim', face, 'stone')
+    for x, z in (((rim_x[0], POOL_X[0]), rim_z), ((POOL_X[1], rim_x[1]), rim_z), (POOL_X, (rim_z[0], POOL_Z[0])), (POOL_X, (POOL_Z[1], rim_z[1]))):
+        file.add_to('rim', flat(x, z, RIM), 'stone')
+    # A little into its walls, so that no light comes between.
+    file.add('water', flat((POOL_X[0] - 0.004, POOL_X[1] + 0.004), (POOL_Z[0] - 0.004, POOL_Z[1] + 0.004), WATER), 'water')
+
+
+def add_table():
+    """A slab with rounded edge on two blocks, and a cloth that receives the light of the glasses."""
+    bevel, thick, turn = 0.012, 0.045, np.linspace(0, np.pi / 2, 6)
+    (x0, x1), (z0, z1) = ((a + bevel, b - bevel) for a, b in (TABLE_X, TABLE_Z))
+    file.add_to('table', flat((x0, x1), (z0, z1), TABLE), 'marble')
+    # Profile of the edge: out, down, out of the normal, up of the normal.
+    upper = [(bevel * np.sin(t), bevel * np.cos(t) - bevel, np.sin(t), np.cos(t)) for t in turn]
+    lower = [(out, -thick - down, n_out, -n_up) for out, down, n_out, n_up in upper[::-1]]
+    corners = [A([x0, z0, -1, -1]), A([x1, z0, 1, -1]), A([x1, z1, 1, 1]), A([x0, z1, -1, 1])]
+    for k, (nx, nz) in enumerate([(0, -1), (1, 0), (0, 1), (-1, 0)]):
+        ends = (corners[k], corners[(k + 1) % 4])
+        p = A([[(c[0] + c[2] * out, TABLE + h, c[1] + c[3] * out) for c in ends] for out, h, _, _ in upper + lower])
+        n = A([[(nx * out, up, nz * out)] * 2 for _, _, out, up in upper + lower])
+        file.add_to('table', sheet(p, n, np.stack([p[..., 0] + p[..., 2], p[..., 1]], -1)), 'marble')
+    file.add_to('table', flat((x0, x1), (z0, z1), TABLE - thick, -1), 'marble')
+    for x in (TABLE_X[0] + 0.3, TABLE_X[1] - 0.3):
+        for face in sides((x - 0.11, x + 0.11), (TABLE_Z[0] + 0.2, TABLE_Z[1] - 0.2), (0.0, TABLE - thick), False):
+            file.add_to('rim', face, 'stone')
+    file.add('cloth', flat((-0.46, 0.66), (0.16, 1.06), TABLE + 0.0012), 'linen')
+
+
+# ---- exhibits
+
+def on_cloth(x, z):
+    return A([x, CLOTH + 0.0003, z])
+
+
+WINE_GLASS, TUMBLER, BOOK, BALL = on_cloth(0.10, 0.47), on_cloth(-0.19, 0.55), on_cloth(-0.01, 0.79), on_cloth(0.37, 0.63)
+
+
+def add_wine_glass():
+    outline = [[0, .001], [.022, .0010], [.036, .0008], [.0400, .0014], [.0412, .0026], [.0400, .0038], [.034, .0052], [.020, .0085],
+               [.0085, .0155], [.0055, .026], [.0052, .044], [.0072, .0585], [.0190, .0690], [.0385, .0870], [.0510, .1140], [.0535, .1380],
+               [.0500, .1680], [.0442, .1950], [.0440, .1958], [.0434, .1962], [.0428, .1958], [.0426, .1950], [.0485, .1680], [.0519, .1380],
+               [.0494, .1145], [.0368, .0882], [.0180, .0715], [.0090, .0678], [0, .0668]]
+    # Wider than the bowl by 0.7 mm, so that no air is between.
+    wine = [[0, .0660], [.0090, .0669], [.0184, .0705], [.0376, .0873], [.0503, .1142], [.0526, .1340]]
+    file.add('wine glass', moved(lathe([outline], 96, 4), WINE_GLASS), 'glass')
+    file.add('wine', moved(lathe([wine, [[.0526, .1340], [0, .1340]]], 96, 4), WINE_GLASS), 'wine')
+
+
+def add_tumbler(n=14, finer=8):
+    """Cut crystal: four bands of facets below a smooth rim, and a star in the foot."""
+    rings = [ring(n, .0385, .0008), ring(n, .0425, .013, .5), ring(n, .0438, .030), ring(n, .0446, .047, .5), ring(n, .0440, .060)]
+    edge = ring(n * finer, .0436, .0655)
+    sides, foot = [], []
+    for i in range(n):
+        j = (i + 1) % n
+        for level in range(4):
+            low, high = rings[level], rings[level + 1]
+            if level % 2 == 0:
+                sides += [[low[i], high[i], low[j]], [low[j], high[i], high[j]]]
+            else:
+                sides += [[high[i], low[i], high[j]], [high[j], low[i], low[j]]]
+        for m in range(finer):
+            sides.append([rings[4][i if m < finer // 2 else j], edge[i * finer + m], edge[(i * finer + m + 1) % len(edge)]])
+        sides.append([rings[4][i], edge[i * finer + finer // 2], rings[4][j]])
+        star = ring(n, .019, .0052, .5)
+        foot += [[rings[0][i], rings[0][j], star[i]], [star[i], rings[0][j], star[j]], [star[i], star[j], A([0, .0075, 0])]]
+    inside = lathe([[[.0436, .0655], [.0440, .080], [.0444, .0915], [.0442, .0930], [.0432, .0936], [.0422, .0930], [.0420, .0915], [.0410, .060],
+                     [.0396, .030], [.0380, .0220], [.0320, .0172], [.018, .0160], [0, .0158]]], n * finer, 4)
+    parts = [facets(sides, (0, .03, 0)), facets(foot, (0, .03, 0)), dict(inside, uv0=None, uv1=None)]
+    whisky = [[0, .0150], [.018, .0152], [.0325, .0166], [.0386, .0215], [.0401, .030], [.0407, .046]]
+    file.add('tumbler', moved(join(*parts), TUMBLER, rotation(UP, 11)), 'crystal')
+    file.add('whisky', moved(lathe([whisky, [[.0407, .046], [0, .046]]], 96, 3), TUMBLER), 'whisky')
+
+
+def add_ball(radius=0.05):
+    arc = [[radius * np.sin(t), radius - radius * np.cos(t)] for t in np.linspace(0, np.pi, 13)]
+    arc[0][0] = arc[-1][0] = 0.0
+    file.add('ball', moved(lathe([arc]), BALL), 'crystal')
+
+
+def add_book(half_width=0.155, half_height=0.115):
+    """An open book whose pages rise to the fold, and a bangle on the right one."""
+    turn, u = rotation(UP, 14), np.linspace(0, 1, 29)
+    x, y = half_width * u, 0.006 + 0.023 * (1 - np.exp(-u / 0.10)) * (1 - u)**0.75 + 0.004 * (1 - u)
+    y[0] = 0.008
+    z = A([-half_height, 0, half_height])
+    add_edge = lambda m: file.add_to('book', moved(m, BOOK, turn), 'paper edge')
+    for name, side in (('left page', -1), ('right page', 1)):
+        p = A([[(side * a, b, c) for c in z] for a, b in zip(x, y)])
+        n = A([[(-side * dy, dx, 0)] * 3 for dx, dy in zip(np.gradient(x), np.gradient(y))])
+        leaf = sheet(p, n)
+        across = p[..., 0].ravel() / half_width
+        uv = np.stack([across if side > 0 else 1 + across, (p[..., 2].ravel() / half_height + 1) / 2], 1)
+        file.add(name, moved(dict(leaf, uv0=uv, uv1=uv), BOOK, turn), name)
+        for end in (z[0], z[2]):
+            p = A([[(side * a, b, end), (side * a, 0.003, end)] for a, b in zip(x, y)])
+            add_edge(sheet(p, np.tile([0, 0, end], (len(x), 2, 1))))
+        add_edge(rect([side * half_width, (y[-1] + 0.003) / 2, 0], [0, 0, -side * half_height], [0, (y[-1] - 0.003) / 2, 0]))
+    add_edge(rect([0, 0.0025, 0], [0, 0, half_height + 0.005], [half_width + 0.005, 0, 0]))
+    inner, thick, high = 0.040, 0.0016, 0.022
+    profile = [(0, high), (0, 0), (.2, 0), (.5, -.0005), (1, .0006), (1.25, high * .3), (1.25, high * .7), (1, high - .0006), (.5, high + .0005), (.2, high), (0, high)]
+    profile = [[inner + out * thick, .001 + y] for out, y in profile]
+    place = BOOK + turn @ A([0.085, 0.0163, 0.01])
+    file.add('ring', moved(lathe(list(zip(profile[:-1], profile[1:])), 160), place, turn @ rotation([0, 0, 1], -8)), 'gold')
+
+
+def add_prism():
+    """A bar of dense flint on a post by the pool: edge down, it turns the sun upwards and throws a spectrum on the vault."""
+    apex_rad, side, half, centre = np.radians(42), 0.075, 0.14, A([-1.22, 1.00, -2.70])
+    ahead, along = unit(SUN * [1, 0, 1]), unit(np.cross(UP, SUN))
+    # At least deviation the light inside runs along the base; outside it comes from half the deviation above.
+    half_turn = np.arcsin(1.785 * np.sin(apex_rad / 2)) - apex_rad / 2
+    inside = rotation(along, -np.degrees(half_turn)) @ SUN
+    if inside[1] < SUN[1]:
+        inside = rotation(along, np.degrees(half_turn)) @ SUN
+    up = np.cross(inside, along) * np.sign(np.cross(inside, along)[1])
+    base = 2 * side * np.sin(apex_rad / 2)
+    tall = side * np.cos(apex_rad / 2)
+    outline = [centre - up * tall / 2, centre + up * tall / 2 + inside * base / 2, centre + up * tall / 2 - inside * base / 2]
+    a, b = ([p + along * end for p in outline] for end in (-half, half))
+    quads = [(a[i], a[j], b[j], b[i]) for i, j in ((0, 1), (1, 2), (2, 0))]
+    triangles = [a, b] + [[q[k] for k in pick] for q in quads for pick in ((0, 1, 2), (0, 2, 3))]
+    file.add('prism', facets(triangles, centre), 'flint')
+    frame = A([ahead, UP, along])
+    for low, high in (((-0.03, -1.02, -half - 0.03), (0.03, 0.06, -half - 0.005)), ((-0.03, -1.02, half + 0.005), (0.03, 0.06, half + 0.03))):
+        file.add_to('stands', box(low, high, frame, centre), 'cedar')
+
+
+def add_butterfly():
+    """A plate whose front is ground so that the sun behind it draws a butterfly on a slab."""
+    side, gap, index, thick = 0.24, 0.42, 1.52, 0.014
+    centre = A([-0.75, 1.30, 1.95])
+    right = unit(np.cross(SUN, UP))
+    up = np.cross(right, SUN)
+    file.add('lens', relief(centre, right, up, SUN, side, thick, gap, index), 'glass')
+    frame, inner, outer = A([right, up, SUN]), side / 2 - 0.001, side / 2 + 0.075
+    for low, high in (((-outer, inner), (outer, outer)), ((-outer, -outer), (outer, -inner)), ((-outer, -inner), (-inner, inner)), ((inner, -inner), (outer, inner))):
+        file.add_to('stands', box((*low, 0.0), (*high, 0.02), frame, centre), 'cedar')
+    ahead = unit(SUN * [1, 0, 1])
+    foot = centre - up * outer + SUN * 0.01
+    file.add_to('stands', box((-0.015, -foot[1] - 0.02, -0.25), (0.015, 0.01, -0.21), A([ahead, UP, right]), foot), 'cedar')
+    file.add_to('stands', box((-0.015, -foot[1] - 0.02, 0.21), (0.015, 0.01, 0.25), A([ahead, UP, right]), foot), 'cedar')
+    hit = centre + SUN * (gap / (SUN @ ahead))
+    file.add('slab', rect(hit, right * 0.20, UP * 0.22), 'plaster')
+    board = A([right, UP, ahead])
+    file.add_to('stands', box((-0.215, -0.235, 0.002), (0.215, 0.235, 0.03), board, hit), 'cedar')
+    file.add_to('stands', box((-0.02, -hit[1] - 0.02, 0.004), (0.02, -0.235, 0.028), board, hit), 'cedar')
+
+
+# ---- sky and sea
+
+DOME, EYE = 40.0, A([0.0, 1.15, 0.0])
+
+
+def sky(width=4096, height=512):
+    """Row by row from zenith to nadir, dense at the horizon."""
+    v, u = np.mgrid[0:height, 0:width]
+    q = 1 - 2 * (v + 0.5) / height
+    elevation, azimuth = np.sign(q) * q * q * np.pi / 2, (u + 0.5) / width * 2 * np.pi
+    direction = np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)], -1)
+    share = np.clip(np.sin(elevation), 0, 1)[..., None]**0.5
+    horizon = A([0.86, 0.80, 0.74])
+    out = horizon * (1 - share) + A([0.20, 0.38, 0.66]) * share
+    off_sun = np.arccos(np.clip(direction @ -SUN, -1, 1))[..., None]
+    out = out + A([0.50, 0.34, 0.16]) * np.exp(-off_sun / 0.2) + A([0.20, 0.12, 0.05]) * np.exp(-off_sun / 0.7)
+    streaks = np.clip(noise((height, width), (6, 24), 3, 5) * 1.5 + 0.1, 0, 1) * np.exp(-((elevation - 0.13) / 0.13)**2) * (elevation > 0)
+    out += (A([0.98, 0.90, 0.84]) - out) * (0.65 * streaks)[..., None]
+    for low, rise, tone, seed in ((0.022, 0.030, (0.50, 0.54, 0.64), 41), (0.008, 0.026, (0.30, 0.36, 0.46), 43)):
+        ridge = low + rise * noise((1, width), (1, 16), seed, 8, 0.5)[0]
+        cover = np.clip((ridge - elevation) / 0.0012, 0, 1) * (elevation > -0.001)
+        out += (A(tone) - out) * cover[..., None]
+    depth = np.exp(np.minimum(elevation, 0) / 0.07)[..., None]
+    sea = A([0.03, 0.17, 0.26]) * (1 - depth) + A([0.40, 0.54, 0.60]) * depth
+    ripples = noise((height, width), (128, 256), 78, 2)[..., None]
+    return np.where((elevation < 0)[..., None], sea * (1 + 0.16 * ripples), out)
+
+
+def add_sky():
+    """A painted dome that one lamp above the roof lights: all of its light comes as indirect light, without noise. It has an
+    opening for the sun, and a screen keeps the lamp out of the room."""
+    file.material('sky', texture=sky())
+    q = np.linspace(-1, 1, 33)
+    azimuth, elevation = np.meshgrid(np.linspace(0, 2 * np.pi, 65), np.sign(q) * q * q * np.pi / 2, indexing='ij')
+    p = EYE + DOME * np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)], -1)
+    dome = sheet(p, EYE - p, np.stack([azimuth / (2 * np.pi), np.broadcast_to(0.5 - q / 2, azimuth.shape)], -1))
+    middle = unit(dome['p'][dome['i']].mean(1) - EYE)
+    dome['i'] = dome['i'][middle @ -SUN < np.cos(np.radians(9))]
+    file.add('sky', dict(dome, uv1=dome['uv0']), 'sky')
+    lamp = A([0.15, HEIGHT + 7.0, -0.7])
+    file.add('screen', rect(lamp - UP * 1.2, [0.55, 0, 0], [0, 0, -0.75]), 'black')
+    file.lamp('sky', lamp, SKY_W_PER_M2 * DOME**2, SKY_COLOUR)
+    file.sun('sun', SUN, SUN_W_PER_M2, SUN_COLOUR, 0.53)
+
+
+def add_cameras():
+    file.camera('overview', [-0.11, 1.00, 1.25], [0.155, 0.872, 0.3], 0.72)
+    file.camera('wine glass', [0.16, 1.00, 0.98], [0.19, 0.82, 0.50], 0.50)
+    file.camera('tumbler', [-0.02, 0.98, 0.95], [-0.08, 0.77, 0.60], 0.42)
+    file.camera('ring', [0.05, 0.97, 1.01], [0.075, 0.765, 0.785], 0.42)
+    file.camera('pool', [-1.15, 1.35, 0.05], [0.75, 0.25, -2.3], 1.0)
+    file.camera('ceiling', [-0.2, 1.0, -0.2], [1.75, 1.75, -1.5], 0.85)
+    file.camera('prism', [-1.55, 1.15, -3.05], [0.3, 1.02, -1.9], 0.76)
+    file.camera('butterfly', [-0.62, 1.45, 1.25], [-0.52, 1.13, 2.05], 0.72)
+
+
+add_materials()
+add_room()
+add_pool()
+add_table()
+add_wine_glass()
+add_tumbler()
+add_ball()
+add_book()
+add_prism()
+add_butterfly()
+add_sky()
+add_cameras()
+path = os.path.join(os.path.dirname(os.path.abspath(__file__)), 'gallery.glb')
+file.save(path)
+print(f'{len(file.objects)} objects, {file.triangles} triangles, {os.path.getsize(path)} bytes, normals within {file.roundest:.4f}')
