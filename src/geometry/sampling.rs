@@ -17,21 +17,6 @@ pub fn mix64(mut bits: u64) -> u64 {
 /// Increment of SplitMix64: 2⁶⁴ divided by the golden ratio.
 pub const GOLDEN_64: u64 = 0x9e37_79b9_7f4a_7c15;
 
-/// Direction numbers of Sobol's second dimension; the first is bit reversal.
-const fn second_dimension() -> [u32; 32] {
-    let mut numbers = [0; 32];
-    let mut bit = 0;
-    let mut number = 1_u32 << 31;
-    while bit < 32 {
-        numbers[bit] = number;
-        number ^= number >> 1;
-        bit += 1;
-    }
-    numbers
-}
-
-static SECOND: [u32; 32] = second_dimension();
-
 /// Point of a sequence at an index, in [0, 1)². The points of different `pair`s of dimensions are independent for one
 /// `seed`.
 pub fn even_point(index: u32, pair: u32, seed: u64) -> DVec2 {
@@ -66,10 +51,15 @@ pub fn even_number(index: u32, seed: u64) -> f64 {
     (u64::from(high) << 21 | u64::from(low >> 11)) as f64 * (-53_f64).exp2()
 }
 
-/// Sobol's second dimension.
+/// Sobol's second dimension: with the index's bits as coefficients of a polynomial p(x), highest power last, those of
+/// p(x + 1) modulo 2. As (x + 1)ⁿ = xⁿ + 1 for powers of two n, each half adds its upper part to its lower one.
 fn second(index: u32) -> u32 {
-    let bits = (0..32).filter(|bit| index >> bit & 1 == 1);
-    bits.fold(0, |code, bit| code ^ SECOND[bit as usize])
+    let mut code = index.reverse_bits();
+    code ^= code << 16;
+    code ^= (code & 0x00ff_00ff) << 8;
+    code ^= (code & 0x0f0f_0f0f) << 4;
+    code ^= (code & 0x3333_3333) << 2;
+    code ^ (code & 0x5555_5555) << 1
 }
 
 /// Owen scrambling of reversed bits: each bit is flipped by a hash of the lower ones (Laine and Karras 2011, with

@@ -485,7 +485,7 @@ impl Tracer {
         };
         let (ior_near, ior_far) = if is_front {
             (media.ior(self.scene()), material.ior)
-        } else if beyond == *media {
+        } else if beyond.objects().len() == media.objects().len() {
             // Never entered: an open sheet, or a path that starts inside.
             (material.ior, media.ior(self.scene()))
         } else {

@@ -52,7 +52,9 @@ impl MediumStack {
     #[must_use]
     pub fn left(mut self, object: usize) -> Self {
         let depth = usize::from(self.depth);
-        if let Some(found) = self.objects[..depth]
+        if self.top() == Some(object) {
+            self.depth -= 1;
+        } else if let Some(found) = self.objects[..depth]
             .iter()
             .rposition(|&entry| entry as usize == object)
         {

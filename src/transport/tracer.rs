@@ -315,6 +315,7 @@ impl Tracer {
     }
 
     /// Closest surface in front of the ray's origin.
+    #[inline]
     pub fn closest_hit(&self, ray: &Ray) -> Option<SurfaceHit> {
         let (place, found) = self.closest(ray)?;
         Some(self.surface_with(&place, &self.hierarchy.corners(found)))

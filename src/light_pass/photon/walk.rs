@@ -198,7 +198,7 @@ impl<'a> PhotonWalk<'a> {
         };
         let (mut ray, mut media) = (start.ray, start.media);
         for depth in 0.. {
-            let Some(branch) = self.step(&mut photon, depth, &ray, &media, &mut arrive) else {
+            let Some(next) = self.step(&mut photon, depth, &ray, &media, &mut arrive) else {
                 return;
             };
             if depth >= self.rules.max_depth {
@@ -207,11 +207,12 @@ impl<'a> PhotonWalk<'a> {
             if !self.survives(&mut photon, roulette_below * brightest_w) {
                 return;
             }
-            (ray, media) = (branch.ray, branch.media);
+            (ray, media) = next;
         }
     }
 
-    /// Traces to the next surface and returns the branch that is followed from there; `None` at the end of the path.
+    /// Traces to the next surface and returns the ray that is followed from there, with its media; `None` at the end of
+    /// the path.
     fn step(
         &mut self,
         photon: &mut Photon<'a, '_>,
@@ -219,7 +220,7 @@ impl<'a> PhotonWalk<'a> {
         ray: &Ray,
         media: &MediumStack,
         arrive: &mut impl FnMut(Hit),
-    ) -> Option<Branch> {
+    ) -> Option<(Ray, MediumStack)> {
         self.segments += 1;
         let Some(hit) = photon.hue.tracer.closest_hit(ray) else {
             photon.leave_all(arrive);
@@ -306,7 +307,7 @@ impl<'a> PhotonWalk<'a> {
         photon: &mut Photon<'a, '_>,
         (depth, object): (usize, usize),
         meeting: &Meeting,
-    ) -> Option<Branch> {
+    ) -> Option<(Ray, MediumStack)> {
         let carried = |share: Option<LinearSrgb>| {
             let flux_w = share.map_or(LinearSrgb::BLACK, |share| photon.flux_w * share);
             (flux_w, flux_w.to_array().iter().sum::<f64>())
@@ -320,18 +321,22 @@ impl<'a> PhotonWalk<'a> {
         let share = photon.guided_share(depth, object, reflected / both);
         let is_reflected = share >= 1.0 || (share > 0.0 && photon.choice.falls_below(share));
         let probability = if is_reflected { share } else { 1.0 - share };
-        let (branch, flux_w) = if is_reflected {
-            (meeting.reflection()?, reflected_w * probability.recip())
+        let (share_w, branch) = if is_reflected {
+            (reflected_w, meeting.reflection()?)
         } else {
-            (meeting.transmission()?, transmitted_w * probability.recip())
+            (transmitted_w, meeting.transmission()?)
         };
+        let flux_w = share_w * probability.recip();
+        let Branch {
+            ray, media, event, ..
+        } = branch;
         if photon.followed.mask != 0 {
             photon.follow_only(depth, is_reflected, probability);
         }
         if photon.guided != 0 {
             photon.follow_guides(depth, object, is_reflected);
         }
-        if !(flux_w.is_finite() && branch.ray.direction.is_finite() && branch.ray.origin.is_finite()) {
+        if !(flux_w.is_finite() && ray.direction.is_finite() && ray.origin.is_finite()) {
             let lost_w = (reflected_w + transmitted_w).map(|w| if w.is_finite() { w } else { 0.0 });
             self.book(Account::NonFinite, &photon.hue.channels, lost_w);
             return None;
@@ -342,8 +347,8 @@ impl<'a> PhotonWalk<'a> {
             reflected_w + transmitted_w - flux_w,
         );
         photon.flux_w = flux_w;
-        photon.is_straight &= branch.event == Event::Passage;
-        Some(branch)
+        photon.is_straight &= event == Event::Passage;
+        Some((ray, media))
     }
 
     /// Russian roulette for photons of little flux.
