@@ -264,15 +264,17 @@ impl Bundle {
         }
     }
 
-    /// Chooses the divisions of the deposit, and how it is spread over the lamp, so that each errs no more than `allowed`,
-    /// the squared flux of the bundle with this weight [W²/m²]. Returns the squared errors that are left.
-    pub(super) fn plan_deposit(&mut self, weight: f64, allowed: f64) -> PlannedDeposit {
-        let flux = self.flux_w * weight;
+    /// Chooses the divisions of the deposit, and how it is spread over the lamp, so that each errs no more than `allowed`
+    /// [W²/m²] for its weighted flux [W/m]. Returns the squared errors that are left.
+    pub(super) fn plan_deposit(&mut self, flux: f64, allowed: f64) -> PlannedDeposit {
         let image = match &self.shape {
             Shape::Whole(nodes) => Some(Image::of(nodes)),
             _ => None,
         };
         let mut planned = PlannedDeposit::default();
+        if flux <= 0.0 {
+            return planned;
+        }
         if let Some(image) = &image {
             (self.divisions, planned.by_shape) = image.divisions(flux, allowed);
         }

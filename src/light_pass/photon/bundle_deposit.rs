@@ -180,15 +180,24 @@ type TrianglesByMap = BTreeMap<(usize, Receiver), Vec<FluxTriangle>>;
 /// leaves.
 pub(super) fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receivers) -> f64 {
     let relative = squares.plan.relative;
-    let bundles: usize = squares.squares.iter().map(|square| square.bundles.len()).sum();
-    if relative <= 0.0 {
+    let weighted = |bundle: &Bundle| bundle.flux_w * receivers.weight(bundle.receiver());
+    let all: f64 = squares
+        .squares
+        .iter()
+        .flat_map(|square| &square.bundles)
+        .map(weighted)
+        .sum();
+    if relative <= 0.0 || all <= 0.0 {
         return 0.0;
     }
-    let allowed = DEPOSIT_PART * goal * goal / (relative * bundles as f64);
+    // Error falls with the square of a bundle's divisions, or faster, and their cost rises with it: the least cost in
+    // all is had if each bundle may err in proportion to its flux.
+    let allowed = DEPOSIT_PART * goal * goal / (relative * all);
     let of_square = |square: &mut Square| -> PlannedDeposit {
         let mut left = PlannedDeposit::default();
         for bundle in &mut square.bundles {
-            let planned = bundle.plan_deposit(receivers.weight(bundle.receiver()), allowed);
+            let flux = weighted(bundle);
+            let planned = bundle.plan_deposit(flux, allowed * flux);
             left.by_shape += planned.by_shape;
             left.by_lamp += planned.by_lamp;
         }
