@@ -264,9 +264,9 @@ impl Bundle {
         }
     }
 
-    /// Chooses the divisions of the deposit, and how it is spread over the lamp, so that each errs no more than `allowed`
-    /// [W²/m²] for its weighted flux [W/m]. Returns the squared errors that are left.
-    pub(super) fn plan_deposit(&mut self, flux: f64, allowed: f64) -> PlannedDeposit {
+    /// Chooses the divisions of the deposit, and how it is spread over the lamp, so that both err no more than
+    /// `allowed` for the weighted flux of the bundle [W/m]. Returns the squared errors that are left.
+    pub(super) fn plan_deposit(&mut self, flux: f64, allowed: PlannedDeposit) -> PlannedDeposit {
         let image = match &self.shape {
             Shape::Whole(nodes) => Some(Image::of(nodes)),
             _ => None,
@@ -276,7 +276,7 @@ impl Bundle {
             return planned;
         }
         if let Some(image) = &image {
-            (self.divisions, planned.by_shape) = image.divisions(flux, allowed);
+            (self.divisions, planned.by_shape) = image.divisions(flux, allowed.by_shape);
         }
 
         // Small triangles take the lamp's image as a whole; others are copied.
@@ -286,7 +286,7 @@ impl Bundle {
             ERROR_PER_EXTENT * extent.min(1.0) * flux_square / self.triangle_count().max(1) as f64
         });
         let most = self.shift.lamp_parts(self.route.is_dispersed);
-        let parts = (DVec2::from(error) / allowed).map(|over| over.cbrt().ceil());
+        let parts = (DVec2::from(error) / allowed.by_lamp).map(|over| over.cbrt().ceil());
         let parts = parts.clamp(DVec2::ONE, most);
         let triangle_texels = image.map_or(f64::INFINITY, |image| image.length / self.divisions as f64);
         if parts != DVec2::ONE && !self.route.is_dispersed && triangle_texels < self.shift.lamp_width() {
@@ -437,7 +437,7 @@ pub(super) fn biquadratic(nodes: &[Node; 9], within: DVec2) -> Predicted {
     predicted
 }
 
-/// Squared errors that a deposit leaves, as planned [W²/m²].
+/// Squared errors of a deposit [W²/m²].
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct PlannedDeposit {
     /// Of chords and steps in the place of curves and slopes.
@@ -619,7 +619,11 @@ mod tests {
         };
         let mut before = 0;
         for allowed in [1e-3, 1e-5, 1e-6] {
-            let left = bundle.plan_deposit(1.0, allowed).by_shape;
+            let planned = PlannedDeposit {
+                by_shape: allowed,
+                by_lamp: allowed,
+            };
+            let left = bundle.plan_deposit(1.0, planned).by_shape;
             assert!(left <= allowed, "{left} of {allowed}");
             assert!(bundle.divisions > before, "{} divisions", bundle.divisions);
             before = bundle.divisions;

@@ -190,14 +190,19 @@ pub(super) fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receiv
     if relative <= 0.0 || all <= 0.0 {
         return 0.0;
     }
-    // Error falls with the square of a bundle's divisions, or faster, and their cost rises with it: the least cost in
-    // all is had if each bundle may err in proportion to its flux.
-    let allowed = DEPOSIT_PART * goal * goal / (relative * all);
+    // Errors of shape add up where bundles meet, and each may be equally large. Those of copies are random, and rise with
+    // the light that a copy carries: the fewest copies are made if each bundle may err in proportion to its flux.
+    let squared = DEPOSIT_PART * goal * goal / relative;
+    let bundles: usize = squares.squares.iter().map(|square| square.bundles.len()).sum();
     let of_square = |square: &mut Square| -> PlannedDeposit {
         let mut left = PlannedDeposit::default();
         for bundle in &mut square.bundles {
             let flux = weighted(bundle);
-            let planned = bundle.plan_deposit(flux, allowed * flux);
+            let allowed = PlannedDeposit {
+                by_shape: squared / bundles as f64,
+                by_lamp: squared * flux / all,
+            };
+            let planned = bundle.plan_deposit(flux, allowed);
             left.by_shape += planned.by_shape;
             left.by_lamp += planned.by_lamp;
         }
