@@ -59,15 +59,6 @@ const MAX_CHORD_TEXELS: f64 = 0.25;
 /// errors of the built-in scenes stay below by a factor of 2 to 10.
 const ERROR_PER_SHIFT: f64 = 4.65;
 
-/// Squared error of light that is deposited at a random place of a lamp's image instead of all over it, per extent of this
-/// image [1/texel]: it falls with the cube of the number of such places along an axis. As measured in the focus of a lens
-/// under a sun of half a degree.
-const ERROR_PER_EXTENT: f64 = 0.4;
-
-/// Sides of the polygon that stands for a disc, for each part of a lamp along an axis, and at least: with six, its second
-/// moment is 1 % too large.
-const DISC_SIDES: (u32, u32) = (4, 6);
-
 /// Images at least so wide are smooth enough to be moved by bilinear weights [texels].
 const SMOOTH_TEXELS: f64 = 1.5;
 
@@ -180,15 +171,15 @@ impl OriginShift {
         first * ends[0] + last * ends[1]
     }
 
-    /// Maximum number of parts of a lamp for which a bundle is deposited, along both axes.
-    fn lamp_parts(&self, is_dispersed: bool) -> DVec2 {
+    /// Parts of a lamp for which a bundle is deposited, along both axes.
+    pub(super) fn lamp_parts(&self, is_dispersed: bool) -> DVec2 {
         let parts = |moved: Vec2| (2.0 * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
         let most = MAX_LAMP_PARTS[usize::from(is_dispersed)];
         DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(most))
     }
 
     /// Width of the lamp's image across its longer side [texels].
-    fn lamp_width(&self) -> f64 {
+    pub(super) fn lamp_width(&self) -> f64 {
         let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
         2.0 * x.perp_dot(y).abs() / x.length().max(y.length()).max(f64::MIN_POSITIVE)
     }
@@ -219,15 +210,6 @@ impl OriginShift {
     }
 }
 
-/// How the triangles of a bundle are spread over the lamp's image.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum LampSpread {
-    /// Copies of the triangle, so many along each half-axis of the lamp, which is at least one.
-    Copies(DVec2),
-    /// The lamp's image around the middle of a triangle that is smaller; with so many sides, if it is a disc.
-    Image { sides: u32 },
-}
-
 /// The light of one path over a square.
 #[derive(Clone, Debug)]
 pub(super) struct Bundle {
@@ -241,7 +223,6 @@ pub(super) struct Bundle {
     pub(super) displaced_texels: f64,
     /// Divisions of the square's sides for the deposit.
     pub(super) divisions: usize,
-    pub(super) lamp_spread: LampSpread,
     /// Index of its first triangle among those of its path in all squares.
     pub(super) first_triangle: u32,
     /// Whether light varies little from texel to texel.
@@ -258,45 +239,20 @@ impl Bundle {
             flux_w,
             displaced_texels: 0.0,
             divisions: 1,
-            lamp_spread: LampSpread::Copies(DVec2::ONE),
             first_triangle: 0,
             is_smooth: true,
         }
     }
 
-    /// Chooses the divisions of the deposit, and how it is spread over the lamp, so that both err no more than
-    /// `allowed` for the weighted flux of the bundle [W/m]. Returns the squared errors that are left.
-    pub(super) fn plan_deposit(&mut self, flux: f64, allowed: PlannedDeposit) -> PlannedDeposit {
-        let image = match &self.shape {
-            Shape::Whole(nodes) => Some(Image::of(nodes)),
-            _ => None,
+    /// Chooses the divisions of the deposit so that it errs no more than `allowed`, the squared flux of the bundle with
+    /// this weight [W²/m²]. Returns the squared error that is left.
+    pub(super) fn plan_deposit(&mut self, weight: f64, allowed: f64) -> f64 {
+        let Shape::Whole(nodes) = &self.shape else {
+            return 0.0;
         };
-        let mut planned = PlannedDeposit::default();
-        if flux <= 0.0 {
-            return planned;
-        }
-        if let Some(image) = &image {
-            (self.divisions, planned.by_shape) = image.divisions(flux, allowed.by_shape);
-        }
-
-        // Small triangles take the lamp's image as a whole; others are copied.
-        let flux_square = flux * flux / image.as_ref().map_or(1.0, Image::spread_texels);
-        let error = self.shift.lamp.map(|moved| {
-            let extent = 2.0 * f64::from(moved.abs().max_element());
-            ERROR_PER_EXTENT * extent.min(1.0) * flux_square / self.triangle_count().max(1) as f64
-        });
-        let most = self.shift.lamp_parts(self.route.is_dispersed);
-        let parts = (DVec2::from(error) / allowed.by_lamp).map(|over| over.cbrt().ceil());
-        let parts = parts.clamp(DVec2::ONE, most);
-        let triangle_texels = image.map_or(f64::INFINITY, |image| image.length / self.divisions as f64);
-        if parts != DVec2::ONE && !self.route.is_dispersed && triangle_texels < self.shift.lamp_width() {
-            let sides = (DISC_SIDES.0 * parts.max_element() as u32).max(DISC_SIDES.1);
-            self.lamp_spread = LampSpread::Image { sides };
-        } else {
-            self.lamp_spread = LampSpread::Copies(parts);
-            planned.by_lamp = (DVec2::from(error) / (parts * parts * parts)).element_sum();
-        }
-        planned
+        let (divisions, left) = Image::of(nodes).divisions(self.flux_w * weight, allowed);
+        self.divisions = divisions;
+        left
     }
 
     pub(super) fn receiver(&self) -> Receiver {
@@ -435,15 +391,6 @@ pub(super) fn biquadratic(nodes: &[Node; 9], within: DVec2) -> Predicted {
     // Between points where light nearly vanishes, a parabola may fall below 0.
     predicted.flux_w = predicted.flux_w.map(|watts| watts.max(0.0));
     predicted
-}
-
-/// Squared errors of a deposit [W²/m²].
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PlannedDeposit {
-    /// Of chords and steps in the place of curves and slopes.
-    pub(super) by_shape: f64,
-    /// Of copies in the place of a lamp's whole image.
-    pub(super) by_lamp: f64,
 }
 
 /// The four quarters of a square, as nodes row by row.
@@ -619,11 +566,7 @@ mod tests {
         };
         let mut before = 0;
         for allowed in [1e-3, 1e-5, 1e-6] {
-            let planned = PlannedDeposit {
-                by_shape: allowed,
-                by_lamp: allowed,
-            };
-            let left = bundle.plan_deposit(1.0, planned).by_shape;
+            let left = bundle.plan_deposit(1.0, allowed);
             assert!(left <= allowed, "{left} of {allowed}");
             assert!(bundle.divisions > before, "{} divisions", bundle.divisions);
             before = bundle.divisions;

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::bundle::{Bundle, LampSpread, PlannedDeposit, flux_triangle};
+use super::bundle::{Bundle, OriginShift, flux_triangle};
 use super::launch::LAMP_DIMENSION;
 use super::pass::{half_seed, set_of};
 use super::receivers::Receivers;
@@ -94,7 +94,7 @@ impl ResidualPass<'_> {
                 index = index.wrapping_add(1);
                 let hues = self.hues(bundle, draw, sets);
                 let spread = match lamp {
-                    Some(lamp) => draw.spread(corners, lamp, bundle),
+                    Some(lamp) => draw.spread(corners, lamp, &bundle.shift, hues.len() > 1),
                     None => vec![corners],
                 };
                 for (hue, share) in hues {
@@ -146,30 +146,34 @@ struct BundleDraw {
 }
 
 impl BundleDraw {
-    /// A triangle of a bundle [texels], spread by the lamp's image into triangles that share its flux evenly.
-    fn spread(self, corners: [DVec2; 3], lamp: PanelShape, bundle: &Bundle) -> Vec<[DVec2; 3]> {
+    /// A triangle [texels], spread by the lamp's image into triangles that share its flux evenly.
+    fn spread(
+        self,
+        corners: [DVec2; 3],
+        lamp: PanelShape,
+        shift: &OriginShift,
+        is_dispersed: bool,
+    ) -> Vec<[DVec2; 3]> {
         let on_lamp = even_point(self.index, LAMP_DIMENSION, self.seed);
-        let shift = &bundle.shift;
-        match bundle.lamp_spread {
-            LampSpread::Copies(parts) => {
-                let count = parts.element_product() as u32;
-                let copies = (0..count).map(|part| {
-                    let part = f64::from(part);
-                    let part = DVec2::new(part % parts.x, (part / parts.x).floor());
-                    let moved = shift.of_lamp(lamp.at((part + on_lamp) / parts));
-                    corners.map(|corner| corner + moved)
-                });
-                copies.collect()
-            }
-            LampSpread::Image { sides } => {
-                let [a, b, c] = corners;
-                let middle = (a + b + c) / 3.0;
-                let outline = lamp.corners(sides, on_lamp.x);
-                let corners: Vec<DVec2> = outline.iter().map(|&at| middle + shift.of_lamp(at)).collect();
-                let next = corners.iter().cycle().skip(1);
-                corners.iter().zip(next).map(|(&a, &b)| [middle, a, b]).collect()
-            }
+        let parts = shift.lamp_parts(is_dispersed);
+        let [a, b, c] = corners;
+        let sides = (b - a).abs().max((c - a).abs()).max((c - b).abs());
+        if is_dispersed || sides.max_element() > shift.lamp_width() {
+            let count = (parts.x * parts.y) as u32;
+            let moved = (0..count).map(|part| {
+                let part = f64::from(part);
+                let part = DVec2::new(part % parts.x, (part / parts.x).floor());
+                shift.of_lamp(lamp.at((part + on_lamp) / parts))
+            });
+            return moved.map(|moved| corners.map(|corner| corner + moved)).collect();
         }
+
+        // A triangle smaller than the lamp's image: this image, around its middle.
+        let middle = (a + b + c) / 3.0;
+        let outline = lamp.corners(4 * parts.max_element() as u32, on_lamp.x);
+        let corners: Vec<DVec2> = outline.iter().map(|&at| middle + shift.of_lamp(at)).collect();
+        let next = corners.iter().cycle().skip(1);
+        corners.iter().zip(next).map(|(&a, &b)| [middle, a, b]).collect()
     }
 }
 
@@ -180,35 +184,19 @@ type TrianglesByMap = BTreeMap<(usize, Receiver), Vec<FluxTriangle>>;
 /// leaves.
 pub(super) fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receivers) -> f64 {
     let relative = squares.plan.relative;
-    let weighted = |bundle: &Bundle| bundle.flux_w * receivers.weight(bundle.receiver());
-    let all: f64 = squares
-        .squares
-        .iter()
-        .flat_map(|square| &square.bundles)
-        .map(weighted)
-        .sum();
-    if relative <= 0.0 || all <= 0.0 {
+    let bundles: usize = squares.squares.iter().map(|square| square.bundles.len()).sum();
+    if relative <= 0.0 {
         return 0.0;
     }
-    // Errors of shape add up where bundles meet, and each may be equally large. Those of copies are random, and rise with
-    // the light that a copy carries: the fewest copies are made if each bundle may err in proportion to its flux.
-    let squared = DEPOSIT_PART * goal * goal / relative;
-    let bundles: usize = squares.squares.iter().map(|square| square.bundles.len()).sum();
-    let of_square = |square: &mut Square| -> PlannedDeposit {
-        let mut left = PlannedDeposit::default();
+    let allowed = DEPOSIT_PART * goal * goal / (relative * bundles as f64);
+    let of_square = |square: &mut Square| -> f64 {
+        let mut left = 0.0;
         for bundle in &mut square.bundles {
-            let flux = weighted(bundle);
-            let allowed = PlannedDeposit {
-                by_shape: squared / bundles as f64,
-                by_lamp: squared * flux / all,
-            };
-            let planned = bundle.plan_deposit(flux, allowed);
-            left.by_shape += planned.by_shape;
-            left.by_lamp += planned.by_lamp;
+            left += bundle.plan_deposit(receivers.weight(bundle.receiver()), allowed);
         }
         left
     };
-    let left: Vec<PlannedDeposit> = squares.squares.par_iter_mut().map(of_square).collect();
+    let left: Vec<f64> = squares.squares.par_iter_mut().map(of_square).collect();
 
     let mut triangles: HashMap<PathSignature, u32> = HashMap::new();
     for bundle in squares.squares.iter_mut().flat_map(|square| &mut square.bundles) {
@@ -216,8 +204,5 @@ pub(super) fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receiv
         bundle.first_triangle = *count;
         *count = count.wrapping_add(bundle.triangle_count() as u32);
     }
-    let squares_left = left
-        .iter()
-        .map(|left| MEASURED_OVER_PLANNED * left.by_shape + left.by_lamp);
-    squares_left.sum::<f64>() * relative
+    left.iter().sum::<f64>() * relative * MEASURED_OVER_PLANNED
 }
