@@ -198,7 +198,7 @@ def add_pool():
 
 def add_table():
     """A slab with rounded edge on two blocks, and a cloth that receives the light of the glasses."""
-    bevel, thick, turn = 0.012, 0.045, np.linspace(0, np.pi / 2, 6)
+    bevel, thick, turn = 0.012, 0.045, np.linspace(0, np.pi / 2, 8)
     (x0, x1), (z0, z1) = ((a + bevel, b - bevel) for a, b in (TABLE_X, TABLE_Z))
     file.add_to('table', flat((x0, x1), (z0, z1), TABLE), 'marble')
     # Profile of the edge: out, down, out of the normal, up of the normal.
@@ -273,7 +273,6 @@ def add_book(half_width=0.155, half_height=0.115):
     """An open book whose pages rise to the fold, and a bangle on the right one."""
     turn, u = rotation(UP, 14), np.linspace(0, 1, 29)
     x, y = half_width * u, 0.006 + 0.023 * (1 - np.exp(-u / 0.10)) * (1 - u)**0.75 + 0.004 * (1 - u)
-    y[0] = 0.008
     z = A([-half_height, 0, half_height])
     add_edge = lambda m: file.add_to('book', moved(m, BOOK, turn), 'paper edge')
     for name, side in (('left page', -1), ('right page', 1)):

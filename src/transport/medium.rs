@@ -52,6 +52,7 @@ impl MediumStack {
     #[must_use]
     pub fn left(mut self, object: usize) -> Self {
         let depth = usize::from(self.depth);
+        // The usual case, without a search.
         if self.top() == Some(object) {
             self.depth -= 1;
         } else if let Some(found) = self.objects[..depth]
