@@ -179,7 +179,11 @@ fn by_gpu(
     let gpu = nephroid::gpu::Gpu::headless()?;
     if gpu.is_software() && !takes_software {
         let what = format!("{} is software, not a graphics card", gpu.adapter_name());
-        return Err(Error::failure("adapter", what, "choose --backend gpu to draw by it"));
+        return Err(Error::failure(
+            "adapter",
+            what,
+            "choose --backend gpu to draw by it",
+        ));
     }
     let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, effects)?;
     Ok((picture, gpu.adapter_name()))
