@@ -285,7 +285,7 @@ export class EyePass {
       if (isOutdated()) return false;
       // What is drawn for the first time is made ready then. The next band may hold more of mirrors and glass.
       const took = (performance.now() - began) / (width * (bottom - top));
-      if (!this.isFresh) this.msPerTraced = Math.min(Math.max(took, this.msPerTraced / 2, 1e-6), 1);
+      if (!this.isFresh) this.msPerTraced = Math.min(Math.max(took, 0.9 * this.msPerTraced, 1e-6), 1);
     }
     return true;
   }

@@ -4,8 +4,7 @@ import { along, dot, length, scaled } from "geometry";
 
 // As in the window: time in which the velocity has closed 1 − 1/e of its gap [s], speeds in scene radii per second and
 // [m/s], height of the eyes [m], turn of a look [rad per pixel].
-const SETTLING_S = 0.08, FLYING = 0.6, WALKING_M_PER_S = 1.4, EYES_M = 1.6, RUN = 4;
-const LOOK_RAD = 0.004;
+const SETTLING_S = 0.08, FLYING = 0.6, WALKING_M_PER_S = 1.4, EYES_M = 1.6, RUN = 4, LOOK_RAD = 0.004;
 // Nearest that walls and orbited points come [m, radii].
 const WALL_M = 0.25, NEAREST = 1e-3;
 const MODES = ["fly", "walk", "orbit"];
@@ -142,7 +141,8 @@ export class Navigation {
     const { element } = this;
     addEventListener("keydown", (event) => {
       if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest?.("input, select")) return;
-      if (AXES[event.code] || event.code.startsWith("Shift")) this.held.add(event.code);
+      // A key that is up again before the next picture moves, too.
+      if (AXES[event.code] || event.code.startsWith("Shift")) { this.held.add(event.code); this.advance(event.repeat ? 0 : 0.016); }
       else if (this.keys[event.code]) this.keys[event.code]();
       else return;
       event.preventDefault();

@@ -132,8 +132,8 @@ pub fn drawn(
     console.check("picture")?;
     let made = match backend {
         Some(Backend::Cpu) => by_cpu(scene, maps, view, effects, console)?,
-        Some(Backend::Gpu) => by_gpu(scene, maps, view, effects)?,
-        None => match by_gpu(scene, maps, view, effects) {
+        Some(Backend::Gpu) => by_gpu(scene, maps, view, effects, true)?,
+        None => match by_gpu(scene, maps, view, effects, false) {
             Ok(made) => made,
             Err(error) => {
                 console.note(&format!("{error}: the CPU makes the picture"));
@@ -165,22 +165,38 @@ fn by_cpu(
     Ok((picture, "cpu".into()))
 }
 
+/// `takes_software`: an adapter that is software, slower than `by_cpu`, also counts.
 #[cfg(feature = "gpu")]
 fn by_gpu(
     scene: &Scene,
     maps: &[IlluminationMap],
     view: &View,
     effects: &EffectSwitches,
+    takes_software: bool,
 ) -> Result<(Picture, String)> {
     use nephroid::eye_pass::renderer::render_counted;
 
     let gpu = nephroid::gpu::Gpu::headless()?;
+    if gpu.is_software() && !takes_software {
+        let what = format!("{} is software, not a graphics card", gpu.adapter_name());
+        return Err(Error::failure(
+            "adapter",
+            what,
+            "choose --backend gpu to draw by it",
+        ));
+    }
     let (picture, _) = render_counted(&gpu, scene, maps, view, SAMPLES_PER_SIDE, effects)?;
     Ok((picture, gpu.adapter_name()))
 }
 
 #[cfg(not(feature = "gpu"))]
-fn by_gpu(_: &Scene, _: &[IlluminationMap], _: &View, _: &EffectSwitches) -> Result<(Picture, String)> {
+fn by_gpu(
+    _: &Scene,
+    _: &[IlluminationMap],
+    _: &View,
+    _: &EffectSwitches,
+    _: bool,
+) -> Result<(Picture, String)> {
     Err(Error::failure(
         "--backend gpu",
         "this program was built without the gpu feature",

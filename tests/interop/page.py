@@ -10,7 +10,7 @@ import subprocess
 import tempfile
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -190,14 +190,13 @@ def served(folder):
 
 def check_still(browser, url, faults):
     """Without WebGPU, the page shows its picture and says why."""
-    tab = Browser(browser, [])
-    tab.open(url, SIZE)
-    told, is_there = tab.value("document.getElementById('told').innerText"), tab.value("still.naturalWidth > 0")
-    spread = float(tab.window().std())
+    with closing(Browser(browser, [])) as tab:
+        tab.open(url, SIZE)
+        told, is_there = tab.value("document.getElementById('told').innerText"), tab.value("still.naturalWidth > 0")
+        spread = float(tab.window().std())
     print(f"without WebGPU: {told}")
     if "WebGPU" not in told or not is_there or spread < 0.02:
         faults.append("the page without WebGPU")
-    tab.close()
 
 
 def check(nephroid, browser, scene, maps, folder, run, faults):
@@ -217,8 +216,8 @@ def check(nephroid, browser, scene, maps, folder, run, faults):
         run(nephroid, "render", scene, *size, "-o", picture, "--exposure", stops)
         wanted = [cv2.imread(str(picture))]
     wanted = [picture[:, :, ::-1].astype("float32") / 255 for picture in wanted]
-    tab = Browser(browser)
-    with served(site) as own:
+    # A browser that outlives a fault goes on drawing.
+    with served(site) as own, closing(Browser(browser)) as tab:
         for what, url, allowed in [("folder", own, own), ("one file", file.as_uri(), file.as_uri())]:
             asked = tab.open(url, SIZE)
             away = [url for url in asked if not url.startswith((allowed, "data:", "blob:"))]
@@ -248,7 +247,6 @@ def check(nephroid, browser, scene, maps, folder, run, faults):
         if wide > 0:
             faults.append(f"{scene}: wider than a phone by {wide} pixels")
         check_still(browser, own, faults)
-    tab.close()
     code = sum(entry.stat().st_size for entry in site.iterdir() if entry.suffix in {".js", ".html"})
     whole = sum(entry.stat().st_size for entry in site.iterdir())
     print(f"{scene}: folder {whole / 1e6:.2f} MB, {code / 1e3:.0f} kB of it code; one file {file.stat().st_size / 1e6:.2f} MB")
