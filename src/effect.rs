@@ -107,12 +107,12 @@ impl Effect {
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "lowercase")]
 pub enum EffectSwitch {
-    /// On if the scene needs it.
+    /// Default: on where the scene needs it; where not, it takes nothing.
     #[default]
     Auto,
-    /// Always on, even if the scene does not need it.
+    /// Always on: what the scene does not need is looked for all the same. More time and memory, the same light.
     On,
-    /// Always off: light that needs it is booked as switched off.
+    /// Always off: light that needs it is missing, and booked as switched off. Less time and memory.
     Off,
 }
 

@@ -192,6 +192,7 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
             format!("{} {}x{} of {}", map.file, map.width, map.height, map.surface),
         );
     }
+    // Memory, if tiles save some of it.
     let sum = |bytes: fn(&MapEntry) -> u64| manifest.maps.iter().map(bytes).sum::<u64>();
     let (taken, dense) = (sum(|map| map.memory_bytes), sum(|map| map.dense_bytes));
     if taken < dense {
@@ -207,6 +208,7 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
     if manifest.maps.is_empty() {
         line("maps", format!("none: {}", why_nothing(result)));
     }
+    // What was traced, and how exact that made the maps.
     let counts = &manifest.counts;
     let pieces = match result.counts.cells {
         0 => format!("{} splats", counts.splats),
@@ -233,6 +235,7 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
     if let Some(next) = next_target(result, manifest.settings.estimator) {
         line("next", next.in_words());
     }
+    // Where the light went, and what carried it.
     let energy = &manifest.energy_w;
     let mut watts = format!(
         "{:.6} emitted = {:.6} deposited + {:.6} absorbed + {:.6} escaped + {:.6} truncated",

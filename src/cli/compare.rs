@@ -59,6 +59,7 @@ impl CompareArguments {
             let what = "the reference is dark, so that nothing can be measured against it".into();
             return failed(&self.reference, what, "name a reference with light in it");
         };
+        // Report the agreement as text and JSON.
         let percent = |share: f64| format!("{:.4} %", 100.0 * share);
         let pair = |map: f64, reference: f64| format!("{map:.6} (reference {reference:.6})");
         let mut lines = vec![
@@ -78,6 +79,7 @@ impl CompareArguments {
             "height": map.height,
         });
         extend(&mut report, &measures);
+        // Draw the difference if a file is named for it.
         if let Some(path) = &self.difference {
             let full_colour_at = write_difference(path, &map, &reference)?;
             let file = path.display().to_string();

@@ -301,11 +301,13 @@ impl ExportArguments {
     #[cfg(feature = "gpu")]
     fn write_web(&self, console: &Console) -> Result<()> {
         let scene = Arc::new(self.load()?);
+        // Refuse a bad target before any work.
         let default = if self.single_file { "site.html" } else { "site" };
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(default));
         if self.single_file {
             check_target(&output, &scene)?;
         }
+        // Read the maps of each moment; the first is drawn.
         let frames = self.frames(&scene)?;
         let moments = self.moments(&scene, &frames)?;
         let shown = frames
@@ -320,6 +322,7 @@ impl ExportArguments {
             backend.set((made_by == "cpu").then_some(Backend::Cpu));
             Ok(picture)
         };
+        // Write the page with its pictures and report it.
         let site = Site::new(&scene, &moments, &eye, console.control())?;
         let report = if self.single_file {
             site.write_file(&output)?

@@ -101,6 +101,7 @@ nephroid study accuracy -o study",
 pub fn text(words: impl Iterator<Item = String>) -> String {
     let mut command = <Arguments as CommandFactory>::command();
     command.build();
+    // Descend to the subcommand that the words name.
     let mut is_long = false;
     for word in words {
         is_long |= word == "--help" || word == "help";
@@ -112,6 +113,7 @@ pub fn text(words: impl Iterator<Item = String>) -> String {
     }
     let name = command.get_name().to_string();
     let is_root = name == "nephroid";
+    // Examples come first, notes about bake options last.
     let has_bake_options = command
         .get_arguments()
         .any(|arg| arg.get_help_heading() == Some(HEADING));
@@ -129,6 +131,7 @@ pub fn text(words: impl Iterator<Item = String>) -> String {
         .before_help(examples)
         .after_help(note)
         .mut_args(|arg| {
+            // Hide the bake options that the command does not list, and rare options in short help.
             let id = arg.get_id().as_str();
             let is_of_bake = arg.get_help_heading() == Some(HEADING);
             let is_left_out = match name.as_str() {

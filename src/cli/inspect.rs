@@ -76,6 +76,7 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
             format!("{x:.4} x {y:.4} x {z:.4} m, {triangles} triangles"),
         ));
     }
+    // What the scene is made of; each report also adds its lines of text.
     let objects: Vec<Value> = (0..scene.objects.len())
         .map(|object| object_report(scene, object, &mut lines))
         .collect();
@@ -102,6 +103,7 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
         .collect();
     let cameras: Vec<&String> = scene.cameras.iter().map(|camera| &camera.name).collect();
     lines.extend(cameras.iter().map(|camera| ("camera", (*camera).clone())));
+    // The plan, with the reason for each switch.
     let switch = |on: bool| if on { "on" } else { "off" };
     for light in &plan.lights {
         lines.push((
@@ -115,6 +117,7 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
             format!("{}: {}, {}", line.effect.name(), switch(line.on), line.reason),
         ));
     }
+    // The pilot bake, and what it forecasts for each preset.
     let counts = &survey.pilot.counts;
     let taken = format!(
         "{} light rays, {} shadow rays, {} gather rays",
@@ -263,6 +266,7 @@ fn light_report(light: &Light, scene: &Scene, lines: &mut Lines) -> Value {
             "environment"
         }
     };
+    // State what the light has, in text and in JSON.
     let (radius_m, diameter_deg) = match light.size {
         LightSize::None => (None, None),
         LightSize::Radius { radius_m } => (Some(radius_m), None),

@@ -51,6 +51,7 @@ impl Film<'_> {
         let folder = self.output.map(FrameFolder::open).transpose()?;
         let maps = picture::maps(self.maps, settings, loaded, console)?;
         let (options, eye) = self.look;
+        // Cameras of the path, or of one turn around the scene.
         let (cameras, view) = match &self.path {
             Some(path) => {
                 let cameras = path.cameras(scene.origin_world);
@@ -70,10 +71,12 @@ impl Film<'_> {
             effects: &settings.effects,
             white_balance: eye.white_balance.unwrap_or_default().matrix(scene),
         };
+        // One exposure for all frames.
         walk.view.exposure_stops = match options.exposure {
             Some(Exposure::Stops(stops)) => stops,
             _ => frame_times::auto_exposure_stops(&gpu, &walk)?,
         };
+        // Report what is drawn, then draw and time it.
         let (view, source, adapter) = (&walk.view, &scene.source, gpu.adapter_name());
         let (width, height, stops) = (view.width, view.height, view.exposure_stops);
         let (frames, maps) = (cameras.len(), maps.len());

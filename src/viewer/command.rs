@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use serde::{Deserialize, Serialize};
+
 use super::exporting::Export;
 use super::filming::Film;
 use super::new_light::NewLight;
@@ -11,8 +13,8 @@ use crate::effect::Effect;
 use crate::scene::Edit;
 use crate::settings::BakeSettings;
 
-/// The user's present choices.
-#[derive(Clone, Debug, PartialEq)]
+/// The user's present choices. What is serialised can be undone.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Choices {
     /// Settings of the next bake.
     pub settings: BakeSettings,
@@ -22,12 +24,16 @@ pub struct Choices {
     pub display: Display,
     pub film: Film,
     /// What is edited in the panel and has handles in the picture.
+    #[serde(skip)]
     pub selection: Selection,
     /// Whether a click on the picture probes the surface.
+    #[serde(skip)]
     pub probes: bool,
     /// What the path preview draws.
+    #[serde(skip)]
     pub sketched: PreviewFlags,
     /// Whether the scene is reloaded when its files change.
+    #[serde(skip)]
     pub watches: bool,
 }
 

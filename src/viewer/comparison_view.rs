@@ -101,6 +101,7 @@ pub fn show(
     (beside, reference): (egui::TextureId, &SavedMaps),
 ) {
     let line = |share: f32| picture.left() + share * picture.width();
+    // The divider follows the drag and stays within the picture.
     let grip = Rect::from_center_size(
         pos2(line(*divider), picture.center().y),
         vec2(GRIP, picture.height() - 2.0 * BORDER),
@@ -113,12 +114,14 @@ pub fn show(
     if response.dragged() && picture.width() > 0.0 {
         *divider = (*divider + response.drag_delta().x / picture.width()).clamp(LEAST, 1.0 - LEAST);
     }
+    // The reference covers the part to the right of it.
     let x = line(*divider);
     let right = Rect::from_min_max(pos2(x, picture.top()), picture.max);
     let part = Rect::from_min_max(pos2(*divider, 0.0), pos2(1.0, 1.0));
     let painter = ui.painter().with_clip_rect(picture);
     painter.image(beside, right, part, Color32::WHITE);
     painter.vline(x, picture.y_range(), Stroke::new(2.0, Color32::from_gray(235)));
+    // Labels on both sides say which maps are which.
     let say = |at: egui::Pos2, align: Align2, text: &str| {
         let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), Color32::WHITE);
         let place = align.anchor_size(at, galley.size());

@@ -1,15 +1,13 @@
 //! Undo and redo: the user's changes of the scene and of the settings, step by step.
 
-use std::mem::discriminant;
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::Deserialize;
+use serde_json::Value;
 
-use super::filming::Film;
-use super::panel::Display;
+use super::command::Choices;
 use crate::error::Result;
 use crate::scene::{Edit, EditState, Scene};
-use crate::settings::BakeSettings;
 
 /// Limit of undo steps.
 const MAX_STEPS: usize = 1000;
@@ -24,36 +22,32 @@ pub struct EditedScene {
     history: History,
 }
 
-/// State of one of the things that a step changes, before or after the step.
+/// Parts of the choices whose changes are undone, each by steps of its own.
+const PARTS: [&str; 4] = ["settings", "display", "film", "automatic"];
+
+/// The thing that a step changes, as it was before or after the step.
 #[derive(Clone, Debug)]
-pub enum EditedItem {
+enum End {
     Scene(Arc<EditState>),
-    Settings(Box<BakeSettings>),
-    Film(Box<Film>),
-    /// Whether changes are baked automatically.
-    Automatic(bool),
-    Display(Display),
+    /// Fields of the choices by their JSON pointers.
+    Choices(Vec<(String, Value)>),
 }
 
 #[derive(Clone, Debug)]
 struct Step {
     /// What was changed, in the panel's words.
     text: String,
-    /// The edited part of the scene; `None` if the step changes none.
-    target: Option<String>,
-    before: EditedItem,
-    after: EditedItem,
+    /// The edited part of the scene, or the part of the choices.
+    target: String,
+    before: End,
+    after: End,
 }
 
 impl Step {
     /// Whether `next` continues the same drag.
     fn goes_on_in(&self, next: &Self) -> bool {
-        let is_of_same = discriminant(&self.after) == discriminant(&next.after)
-            && self.text == next.text
-            && self.target == next.target;
-        is_of_same
-            && !matches!(self.after, EditedItem::Automatic(_))
-            && self.target.as_deref() != Some("LightList")
+        let is_whole = ["LightList", "automatic"].contains(&self.target.as_str());
+        self.text == next.text && self.target == next.target && !is_whole
     }
 }
 
@@ -134,42 +128,34 @@ impl EditedScene {
         let before = std::mem::replace(&mut self.states[1], Arc::clone(&after));
         self.history.record(Step {
             text: edit.in_words(&self.scene),
-            target: Some(edit.target()),
-            before: EditedItem::Scene(before),
-            after: EditedItem::Scene(after),
+            target: edit.target(),
+            before: End::Scene(before),
+            after: End::Scene(after),
         });
         self.scene = Arc::new(scene);
         Ok(())
     }
 
-    /// Records a change of a part of the choices, if there is one; `text` names it.
-    pub fn note<T: Clone + PartialEq>(
-        &mut self,
-        [before, after]: [&T; 2],
-        text: impl FnOnce(&T, &T) -> String,
-        item: impl Fn(T) -> EditedItem,
-    ) {
-        if before != after {
+    /// Records what differs between two choices.
+    pub fn note(&mut self, before: &Choices, after: &Choices) {
+        let [before, after] = [before, after].map(to_json);
+        for part in PARTS.into_iter().filter(|part| before[part] != after[part]) {
+            let mut changed: Vec<String> = match &after[part] {
+                Value::Object(fields) => fields.keys().map(|name| format!("/{part}/{name}")).collect(),
+                _ => vec![format!("/{part}")],
+            };
+            changed.retain(|path| before.pointer(path) != after.pointer(path));
+            let end = |choices: &Value| {
+                let value = |path: &String| choices.pointer(path).cloned().unwrap_or_default();
+                End::Choices(changed.iter().map(|path| (path.clone(), value(path))).collect())
+            };
             self.history.record(Step {
-                text: text(before, after),
-                target: None,
-                before: item(before.clone()),
-                after: item(after.clone()),
+                text: in_words(part, &changed),
+                target: part.into(),
+                before: end(&before),
+                after: end(&after),
             });
         }
-    }
-
-    /// Records a change of the settings, if there is one.
-    pub fn note_settings(&mut self, before: &BakeSettings, after: &BakeSettings) {
-        self.note([before, after], changed, |settings| {
-            EditedItem::Settings(Box::new(settings))
-        });
-    }
-
-    /// Records a change of the camera path, if there is one.
-    pub fn note_film(&mut self, before: &Film, after: &Film) {
-        let text = |before: &Film, after: &Film| before.change_to(after).to_owned();
-        self.note([before, after], text, |film| EditedItem::Film(Box::new(film)));
     }
 
     /// Closes the newest step: the next change is a step of its own.
@@ -177,9 +163,9 @@ impl EditedScene {
         self.history.is_open = false;
     }
 
-    /// Undoes the newest step, or redoes the last undone one. Returns its name and the state before and after; a
-    /// change of the scene is already applied.
-    pub fn step(&mut self, is_back: bool) -> Option<(String, [EditedItem; 2])> {
+    /// Undoes the newest step, or redoes the last undone one, in the scene or in the choices. Fields of the choices that
+    /// the step did not change stay as they are. Returns its name.
+    pub fn step(&mut self, is_back: bool, choices: &mut Choices) -> Option<String> {
         let History {
             done,
             undone,
@@ -188,29 +174,58 @@ impl EditedScene {
         *is_open = false;
         let (from, to) = if is_back { (done, undone) } else { (undone, done) };
         let step = from.pop()?;
-        let mut parts = [step.before.clone(), step.after.clone()];
-        if is_back {
-            parts.reverse();
-        }
-        if let EditedItem::Scene(state) = &parts[1] {
-            self.scene = match Arc::ptr_eq(state, &self.states[0]) {
-                true => Arc::clone(&self.loaded),
-                false => Arc::new(state.set(&self.scene)),
-            };
-            self.states[1] = Arc::clone(state);
+        let end = if is_back { &step.before } else { &step.after };
+        match end {
+            End::Scene(state) => {
+                self.scene = match Arc::ptr_eq(state, &self.states[0]) {
+                    true => Arc::clone(&self.loaded),
+                    false => Arc::new(state.set(&self.scene)),
+                };
+                self.states[1] = Arc::clone(state);
+            }
+            End::Choices(fields) => set(choices, fields),
         }
         let text = step.text.clone();
         to.push(step);
-        Some((text, parts))
+        Some(text)
     }
 }
 
-/// Names of the fields that differ, without their units.
-pub fn changed<T: Serialize>(before: &T, after: &T) -> String {
-    let [before, after] = [before, after].map(|part| serde_json::to_value(part).unwrap_or_default());
-    let fields = after.as_object().into_iter().flatten();
-    let changed = fields.filter(|(name, value)| before.get(name) != Some(value));
-    let words = changed.map(|(name, _)| match name.as_str() {
+fn to_json(choices: &Choices) -> Value {
+    serde_json::to_value(choices).unwrap_or_default()
+}
+
+fn set(choices: &mut Choices, fields: &[(String, Value)]) {
+    let mut json = to_json(choices);
+    for (path, value) in fields {
+        if let Some(field) = json.pointer_mut(path) {
+            field.clone_from(value);
+        }
+    }
+    match Choices::deserialize(json) {
+        Ok(set) => {
+            *choices = Choices {
+                settings: set.settings,
+                display: set.display,
+                film: set.film,
+                automatic: set.automatic,
+                ..*choices
+            };
+        }
+        Err(error) => log::warn!("the history cannot be followed: {error}"),
+    }
+}
+
+/// Names of changed fields of a part, without their units.
+fn in_words(part: &str, changed: &[String]) -> String {
+    if part == "film" {
+        let has_keys = changed.iter().any(|path| path == "/film/keys");
+        return format!(
+            "{} of the camera's path",
+            if has_keys { "keys" } else { "frames" }
+        );
+    }
+    let name = |path: &String| match path.rsplit('/').next().unwrap_or_default() {
         "density_per_sr" => "ray density".into(),
         "max_time_s" => "max time".into(),
         "map_resolution" => "map size".into(),
@@ -218,7 +233,7 @@ pub fn changed<T: Serialize>(before: &T, after: &T) -> String {
         "exposure_stops" => "exposure".into(),
         "layer" => "light shown".into(),
         "quantity" => "map shown".into(),
-        _ => name.replace('_', " "),
-    });
-    words.collect::<Vec<String>>().join(", ")
+        name => name.replace('_', " "),
+    };
+    changed.iter().map(name).collect::<Vec<String>>().join(", ")
 }

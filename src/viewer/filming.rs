@@ -106,15 +106,6 @@ impl Film {
         Some(found.camera(format!("key {}", key + 1), origin_world, vertical_fov_rad))
     }
 
-    /// Names what has changed, for the undo list.
-    pub fn change_to(&self, other: &Self) -> &'static str {
-        if self.keys == other.keys {
-            "frames of the camera's path"
-        } else {
-            "keys of the camera's path"
-        }
-    }
-
     /// Takes over a path read from a file; the frame size stays.
     pub fn take(&mut self, plan: PathPlan) {
         self.frames = plan.frames;

@@ -16,7 +16,7 @@ use super::ViewerOptions;
 use super::background::Wake;
 use super::command::{Choices, Command};
 use super::comparison_view::SavedMaps;
-use super::edits::{EditedItem, EditedScene, changed};
+use super::edits::EditedScene;
 use super::event_log::{self, EventLog};
 use super::exporting::{Export, Exporter};
 use super::files::autosaver::Autosaver;
@@ -25,7 +25,7 @@ use super::filming::Player;
 use super::navigation::{NavigationMode, Navigator};
 use super::playback::Playback;
 use super::probe::{Probed, Prober};
-use super::sketching::PreviewTask;
+use super::sketching::{self, PreviewTask};
 use super::timing::FrameTimes;
 use super::views::MapSurvey;
 use super::walking::{Collider, CollisionScene};
@@ -145,7 +145,7 @@ impl Model {
             exporter: Exporter::new(wake),
             surroundings: CollisionScene::new(wake),
             prober: Prober::new(wake),
-            sketcher: PreviewTask::new(wake),
+            sketcher: PreviewTask::new("sketch", wake),
             reference: None,
             placing: picking::DraggedLight::default(),
             pending_tasks: pending_tasks::PendingTasks::default(),
@@ -249,7 +249,7 @@ impl Model {
 
     /// The path preview, if it is drawn.
     pub fn sketch(&self) -> Option<&Arc<PathPreview>> {
-        self.sketcher.shown()
+        self.sketcher.made().map(|(_, sketch)| sketch)
     }
 
     /// Traces the path preview of the present scene while it is drawn.
@@ -266,8 +266,8 @@ impl Model {
             branch_threshold: settings.path_threshold().max(SKETCHED_SHARE),
             cells: SKETCHED_CELLS,
         };
-        if self.sketcher.follow(&tracer, limits)
-            && let Some(sketch) = self.sketcher.shown()
+        if sketching::follow(&mut self.sketcher, &tracer, limits)
+            && let Some((_, sketch)) = self.sketcher.made()
         {
             let (landings, patches) = (sketch.landings.len(), sketch.patches.len());
             let more = json!({"rays": sketch.rays, "landings": landings, "patches": patches});
@@ -468,13 +468,8 @@ impl Model {
 
     fn choose(&mut self, choices: Choices) {
         let before = std::mem::replace(&mut self.choices, choices);
-        let (edits, now) = (&mut self.edits, &self.choices);
-        edits.note_settings(&before.settings, &now.settings);
-        edits.note([&before.display, &now.display], changed, EditedItem::Display);
-        edits.note_film(&before.film, &now.film);
-        let automatic = [&before.automatic, &now.automatic];
-        edits.note(automatic, |_, _| "automatic".into(), EditedItem::Automatic);
-        self.revision += u64::from(before.automatic != now.automatic);
+        self.edits.note(&before, &self.choices);
+        self.revision += u64::from(before.automatic != self.choices.automatic);
         self.note_settings_since(before.settings);
     }
 
@@ -500,28 +495,15 @@ impl Model {
     /// Undoes the last change, or redoes the last undone one.
     fn step_history(&mut self, is_back: bool) {
         self.refusal = None;
-        let Some((text, [from, to])) = self.edits.step(is_back) else {
+        let before = self.choices.settings.clone();
+        let Some(text) = self.edits.step(is_back, &mut self.choices) else {
             return;
         };
         let event = if is_back { "undone" } else { "redone" };
         self.log.write(event, json!({"what": text}));
-        match (from, to) {
-            (_, EditedItem::Settings(settings)) => {
-                let before = std::mem::replace(&mut self.choices.settings, *settings);
-                self.note_settings_since(before);
-            }
-            (EditedItem::Display(from), EditedItem::Display(to)) => self.choices.display.restore(&from, &to),
-            (_, EditedItem::Film(film)) => self.choices.film = *film,
-            (_, EditedItem::Automatic(automatic)) => {
-                self.choices.automatic = automatic;
-                self.revision += 1;
-            }
-            // The scene: `step` has already restored it.
-            _ => {
-                self.revision += 1;
-                self.stand_at_moment();
-            }
-        }
+        self.note_settings_since(before);
+        self.revision += 1;
+        self.stand_at_moment();
     }
 
     /// Bakes with the panel's settings unless one of them is out of range; the panel reports that.

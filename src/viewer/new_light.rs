@@ -91,6 +91,7 @@ impl NewLight {
         let distance_m = way.length();
         let direction = way / distance_m;
         let intensity = RadiantIntensity(irradiance_w_m2 * distance_m * distance_m);
+        // Whatever its kind, the light gives the target this irradiance.
         let kind = match self {
             Self::Lamp => LightKind::Point { position, intensity },
             Self::Spot => LightKind::Spot {

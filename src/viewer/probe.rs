@@ -289,6 +289,7 @@ const POINT: Color32 = Color32::from_rgb(255, 80, 80);
 /// Draws the paths over the picture; stronger paths are wider.
 pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
     let painter = painter.with_clip_rect(lens.picture);
+    // Each path from its light to the surface, with a dot on every glass or mirror and a ring around its start.
     let paths = probed
         .explanation
         .iter()
@@ -314,6 +315,7 @@ pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
             painter.circle_stroke(lens.project(path.start), 5.0, Stroke::new(1.5, colour));
         }
     }
+    // A cross hair on the probed point.
     if lens.is_before(probed.point) {
         let at = lens.project(probed.point);
         for (x, y) in [(6.0, 0.0), (0.0, 6.0)] {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use egui::{Color32, Painter, Stroke};
 
-use super::background::{Latest, Task, Wake};
+use super::background::Latest;
 use super::lens::Viewport;
 use crate::light_pass::sketch::{PathPreview, SketchLimits, sketch};
 use crate::transport::Tracer;
@@ -29,37 +29,18 @@ impl PreviewFlags {
     }
 }
 
-/// Traces the path preview and keeps the last one.
-#[derive(Debug)]
-pub struct PreviewTask(Latest<(Arc<Tracer>, SketchLimits), PathPreview>);
+/// The last path preview, by the surfaces and limits that it was traced with.
+pub type PreviewTask = Latest<(Arc<Tracer>, SketchLimits), PathPreview>;
 
-impl PreviewTask {
-    /// No preview yet. `wake` is called when one is ready.
-    pub fn new(wake: &Wake) -> Self {
-        Self(Latest::new("sketch", wake))
-    }
-
-    /// The last preview.
-    pub fn shown(&self) -> Option<&Arc<PathPreview>> {
-        self.0.made().map(|(_, sketch)| sketch)
-    }
-
-    /// Drops the preview and stops tracing.
-    pub fn forget(&mut self) {
-        self.0.forget();
-    }
-
-    /// Traces a preview of these surfaces unless the last one is of them; returns whether a new one is ready. One
-    /// preview is traced at a time: newer surfaces wait until it ends.
-    pub fn follow(&mut self, tracer: &Arc<Tracer>, limits: SketchLimits) -> bool {
-        let of = Arc::clone(tracer);
-        let is_same = |(a, with_a): &(Arc<Tracer>, SketchLimits),
-                       (b, with_b): &(Arc<Tracer>, SketchLimits)| {
-            Arc::ptr_eq(a, b) && with_a == with_b
-        };
-        let search = move |_, task: &Task| sketch(&of, limits, &task.control);
-        self.0.follow(&(Arc::clone(tracer), limits), is_same, search)
-    }
+/// Traces a preview of these surfaces unless the last one is of them; returns whether a new one is ready. One preview is
+/// traced at a time: newer surfaces wait until it ends.
+pub fn follow(task: &mut PreviewTask, tracer: &Arc<Tracer>, limits: SketchLimits) -> bool {
+    let of = Arc::clone(tracer);
+    task.follow(
+        &(Arc::clone(tracer), limits),
+        |(a, with_a), (b, with_b)| Arc::ptr_eq(a, b) && with_a == with_b,
+        move |_, task| sketch(&of, limits, &task.control),
+    )
 }
 
 /// Draws the preview over the picture, in front of everything.

@@ -57,10 +57,10 @@ impl Model {
 
     /// Carries out a command of the section *Camera path*.
     pub(super) fn film(&mut self, command: &FilmCommand) {
-        let before = self.choices.film.clone();
+        let before = self.choices.clone();
         let outcome = self.filmed(command);
-        if before != self.choices.film {
-            self.edits.note_film(&before, &self.choices.film);
+        if before.film != self.choices.film {
+            self.edits.note(&before, &self.choices);
             self.edits.release();
         }
         match outcome {

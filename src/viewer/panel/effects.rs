@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 
 use egui::{Button, Frame, RichText, Role, Ui, WidgetInfo, vec2};
+use strum::{EnumMessage, VariantArray};
 
 use super::bake::{FAILED, two_digits};
 use super::control::{about_button, grouped, reset_to, significant};
@@ -22,24 +23,6 @@ const SWITCH: egui::Vec2 = vec2(40.0, 18.0);
 
 /// Font size of the counters [points].
 pub const COUNTER: f32 = 11.5;
-
-const SWITCHES: [(EffectSwitch, &str, &str); 3] = [
-    (
-        EffectSwitch::Auto,
-        "auto",
-        "Default: simulated where the scene calls for it; where not, it takes nothing.",
-    ),
-    (
-        EffectSwitch::On,
-        "on",
-        "Always: what the scene does not call for is looked for all the same. More time and memory, the same light.",
-    ),
-    (
-        EffectSwitch::Off,
-        "off",
-        "Never: the light that would need it is missing, and booked as switched off. Less time and memory.",
-    ),
-];
 
 /// Shows every effect, then every light.
 pub fn show(ui: &mut Ui, switches: &mut EffectSwitches, model: &Model, commands: &mut Vec<Command>) {
@@ -131,8 +114,10 @@ fn segments(ui: &mut Ui, name: &str, switch: &mut EffectSwitch) {
     frame.show(ui, |ui| {
         ui.spacing_mut().item_spacing.x = 1.0;
         ui.spacing_mut().button_padding = vec2(2.0, 0.0);
-        for (candidate, label, hover) in SWITCHES {
-            let is_chosen = *switch == candidate;
+        for candidate in EffectSwitch::VARIANTS {
+            let label: &str = candidate.into();
+            let hover = candidate.get_documentation().unwrap_or_default();
+            let is_chosen = *switch == *candidate;
             let response = ui
                 .add(Button::selectable(is_chosen, label).min_size(SWITCH))
                 .on_hover_text(hover);
@@ -143,7 +128,7 @@ fn segments(ui: &mut Ui, name: &str, switch: &mut EffectSwitch) {
                 WidgetInfo::selected(Role::RadioButton, is_enabled, is_chosen, text)
             });
             if response.clicked() {
-                *switch = candidate;
+                *switch = *candidate;
             }
         }
     });

@@ -16,6 +16,7 @@ const SIDES: std::ops::RangeInclusive<u32> = 16..=8192;
 
 /// Shows the section; `file` is the typed path of the file.
 pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, commands: &mut Vec<Command>) {
+    // Recording and playing.
     let too_few = (film.keys.len() < 2).then_some(TOO_FEW);
     ui.horizontal(|ui| {
         ask(ui, "Add key", None, commands, FilmCommand::Record(None));
@@ -28,6 +29,7 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
         ask(ui, "Tour", few_cameras, commands, FilmCommand::Tour);
         ui.label(RichText::new(length(film)).weak());
     });
+    // The keys, and how they are filmed.
     keys(ui, film, commands);
     let default = Film::default();
     rows(ui, "film", |ui| {
@@ -38,6 +40,7 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
         setting(ui, "Frame size", None, (&mut film.size, &default.size), size);
     });
     ui.horizontal(|ui| {
+        // The path as a file, to and from disk.
         ask(ui, "Save path", too_few, commands, FilmCommand::Save);
         let field = TextEdit::singleline(file)
             .hint_text("path.json")
@@ -54,6 +57,7 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
             FilmCommand::Load(file.trim().into()),
         );
     });
+    // Frames on disk, and how that goes.
     let no_light = model.layers().is_empty().then_some("There are no maps yet.");
     let busy = model
         .exporter

@@ -9,15 +9,13 @@ mod export;
 mod file;
 mod film;
 pub mod frame_graph;
-mod glass;
-mod light_colour;
+mod light;
 mod light_pass;
-mod light_size;
 mod maps;
+mod material;
 mod motion;
 mod probe;
 mod scene;
-mod waves;
 
 use egui::{Align, CollapsingHeader, Color32, Frame, Grid, Margin, RichText, ScrollArea, Ui};
 use glam::DVec3;
@@ -61,23 +59,6 @@ pub struct Display {
     pub quantity: Quantity,
     /// Scale of irradiance in false colours.
     pub scale: ScaleChoice,
-}
-
-impl Display {
-    /// Sets the fields that differ between `from` and `to` to their value in `to`.
-    pub fn restore(&mut self, from: &Self, to: &Self) {
-        fn set<T: PartialEq + Copy>(value: &mut T, from: T, to: T) {
-            if from != to {
-                *value = to;
-            }
-        }
-        set(&mut self.exposure_stops, from.exposure_stops, to.exposure_stops);
-        set(&mut self.tone_map, from.tone_map, to.tone_map);
-        set(&mut self.white_balance, from.white_balance, to.white_balance);
-        set(&mut self.layer, from.layer, to.layer);
-        set(&mut self.quantity, from.quantity, to.quantity);
-        set(&mut self.scale, from.scale, to.scale);
-    }
 }
 
 /// State of the panel between frames.

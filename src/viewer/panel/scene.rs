@@ -1,24 +1,15 @@
 //! Section *Scene*: lights, materials, positions and rotations.
 
-use egui::{DragValue, Response, RichText, Slider, SliderClamping, Ui};
+use egui::{DragValue, Response, RichText, Ui};
 use glam::DVec3;
 use strum::EnumMessage;
 
-use super::control::{
-    CONTROL_WIDTH, about, about_button, counted, edited, pick_name, row, rows, setting, significant, slider,
-};
-use super::{Command, Model, bake, glass, light_colour, light_size, waves};
-use crate::optics::LinearSrgb;
-use crate::scene::{Edit, LightEdit, LightKind, MaterialEdit, Motion, Scene, SurfaceKind, why_light_stays};
+use super::control::{CONTROL_WIDTH, about, about_button, counted, pick_name, row, rows, setting};
+use super::{Command, Model, bake, light, material};
+use crate::scene::{Edit, Motion, Scene, why_light_stays};
 use crate::viewer::gizmo::GizmoTarget;
 use crate::viewer::new_light::NewLight;
 
-/// Range of the slider, as factors of the strength in the file.
-const POWER_FACTORS: (f64, f64) = (1e-2, 1e2);
-/// Largest elevation that can be set [°]: the vertical has no azimuth.
-const STEEPEST_DEG: f64 = 89.99;
-/// Unit vectors nearer than this count as equal.
-const SAME_DIRECTION: f64 = 1e-9;
 /// Distance per point of a drag, as a fraction of the scene's diagonal.
 const DRAG_SHARE: f64 = 1e-3;
 
@@ -102,6 +93,7 @@ impl Selection {
 /// Shows the section; pushes edits to `commands`.
 pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mut Vec<Command>) {
     let scene = model.scene();
+    // What the scene holds, in one line.
     let inventory = format!(
         "{}, {}, {}",
         counted(scene.objects.len(), "object"),
@@ -111,6 +103,7 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mu
     ui.label(RichText::new(inventory).weak())
         .on_hover_text(format!("{}, drawn by {}.", scene.source, model.picture.adapter));
     rows(ui, "scene", |ui| {
+        // Lights: to add, to remove, to edit, to pull in the picture.
         if scene.lights.is_empty() {
             ui.label("");
             ui.colored_label(bake::ATTENTION, "No light: add one.");
@@ -132,15 +125,17 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mu
                 })
                 .inner
             });
-            light(ui, selection.light, model, commands);
+            light::show(ui, selection.light, model, commands);
             light_tools(ui, selection, model);
         }
+        // Objects: their material, place and handles.
         if !scene.objects.is_empty() {
             let names = scene.objects.iter().map(|object| object.name.as_str());
             row(ui, "Object", None, |ui| {
                 one_of(ui, ("object", CONTROL_WIDTH), &mut selection.object, names)
             });
-            material(ui, selection.object, model, commands);
+            let material = scene.objects[selection.object].material;
+            material::show(ui, material, model, commands);
             place_of_object(ui, selection.object, model, commands);
             row(ui, "Handles", None, |ui| {
                 let (what, present) = (about("Handles").what, &mut selection.tool);
@@ -199,52 +194,8 @@ fn one_of<'a>(
     response
 }
 
-fn light(ui: &mut Ui, light: usize, model: &Model, commands: &mut Vec<Command>) {
-    let shown = &model.scene().lights[light];
-    let of_file = model.scene().original_light(light, model.loaded());
-    let kind = shown.kind;
-    power(ui, light, (&kind, &of_file.kind), commands);
-    light_size::show(ui, light, (shown, of_file), commands);
-    if matches!(
-        kind,
-        LightKind::Point { .. } | LightKind::Spot { .. } | LightKind::Sun { .. }
-    ) {
-        light_colour::show(ui, light, (shown, of_file), commands);
-    }
-    let edit = |edit: LightEdit| Command::Edit(Edit::Light(light, edit));
-    if let (Some(position), Some(default)) = (kind.position(), of_file.kind.position()) {
-        let moved = edited(ui, "Position [m]", None, (&position, &default), |ui, moved| {
-            coordinates(ui, "Position [m]", moved, model.scene())
-        });
-        commands.extend(moved.map(LightEdit::Position).map(edit));
-    }
-    if let (Some(present), Some(default)) = (kind.direction(), of_file.kind.direction()) {
-        let rotated = edited(ui, "Direction [°]", None, (&present, &default), angles);
-        commands.extend(rotated.map(LightEdit::Direction).map(edit));
-    }
-}
-
-fn power(ui: &mut Ui, light: usize, (kind, of_file): (&LightKind, &LightKind), commands: &mut Vec<Command>) {
-    let about = match kind {
-        LightKind::Sun { .. } => "Irradiance [W/m²]",
-        LightKind::Point { .. } | LightKind::Spot { .. } => "Intensity [W/sr]",
-        LightKind::Panel { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => "Brightness",
-    };
-    let (present, default) = (kind.strength(), of_file.strength());
-    let strength = edited(ui, about, None, (&present, &default), |ui, value| {
-        ui.add(
-            Slider::new(value, default * POWER_FACTORS.0..=default * POWER_FACTORS.1)
-                .logarithmic(true)
-                .clamping(SliderClamping::Never)
-                .custom_formatter(|value, _| significant(value)),
-        )
-    });
-    let edit = |strength| Command::Edit(Edit::Light(light, LightEdit::Strength(strength)));
-    commands.extend(strength.map(edit));
-}
-
 /// A row of three coordinates [m].
-fn coordinates(ui: &mut Ui, name: &str, point: &mut DVec3, scene: &Scene) -> Response {
+pub fn coordinates(ui: &mut Ui, name: &str, point: &mut DVec3, scene: &Scene) -> Response {
     let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
     let speed = DRAG_SHARE * (high - low).length().max(1e-6);
     ui.horizontal(|ui| {
@@ -264,65 +215,6 @@ fn coordinates(ui: &mut Ui, name: &str, point: &mut DVec3, scene: &Scene) -> Res
     })
     .inner
     .expect("there are three axes")
-}
-
-/// A row with the azimuth and elevation of a direction.
-fn angles(ui: &mut Ui, direction: &mut DVec3) -> Response {
-    let mut azimuth_deg = direction.x.atan2(-direction.z).to_degrees();
-    let mut elevation_deg = direction.y.clamp(-1.0, 1.0).asin().to_degrees();
-    let before = (azimuth_deg, elevation_deg);
-    let response = ui
-        .horizontal(|ui| {
-            let angle = |value, range| DragValue::new(value).speed(0.5).range(range).max_decimals(1);
-            let azimuth = ui.add(angle(&mut azimuth_deg, -360.0..=360.0).prefix("azimuth: "));
-            let elevation = ui.add(angle(&mut elevation_deg, -90.0..=90.0).prefix("elev.: "));
-            azimuth.union(elevation.accessible_name("Direction [°]: elevation"))
-        })
-        .inner;
-    if (azimuth_deg, elevation_deg) != before {
-        let azimuth = azimuth_deg.to_radians();
-        let (sine, cosine) = elevation_deg
-            .clamp(-STEEPEST_DEG, STEEPEST_DEG)
-            .to_radians()
-            .sin_cos();
-        let rotated = DVec3::new(azimuth.sin() * cosine, sine, -azimuth.cos() * cosine);
-        // Ignores the rounding error of the conversion to angles and back.
-        if rotated.distance(*direction) > SAME_DIRECTION {
-            *direction = rotated;
-        }
-    }
-    response
-}
-
-fn material(ui: &mut Ui, object: usize, model: &Model, commands: &mut Vec<Command>) {
-    let material = model.scene().objects[object].material;
-    let (shown, of_file) = (
-        &model.scene().materials[material],
-        &model.loaded().materials[material],
-    );
-    let no_ior = matches!(shown.surface, SurfaceKind::Diffuse | SurfaceKind::Mirror)
-        .then_some("Only glass, water and coats have one; this surface is matte or a mirror.");
-    let edit = |edit: MaterialEdit| Command::Edit(Edit::Material(material, edit));
-    let ior = (&shown.ior, &of_file.ior);
-    let ior = edited(ui, "Refractive index", no_ior, ior, slider(1.0..=3.0, 3));
-    commands.extend(ior.map(MaterialEdit::Ior).map(edit));
-    glass::show(ui, material, (shown, of_file), no_ior, commands);
-    let roughness = (&shown.roughness, &of_file.roughness);
-    let roughness = edited(ui, "Roughness", None, roughness, slider(0.0..=1.0, 2));
-    commands.extend(roughness.map(MaterialEdit::Roughness).map(edit));
-    if let Some(waves) = shown.bending_waves() {
-        waves::show(ui, material, (waves, of_file.bending_waves()), commands);
-    }
-    let base_colour = (&shown.base_colour, &of_file.base_colour);
-    let base_colour = edited(ui, "Base colour", None, base_colour, |ui, base_colour| {
-        let mut colour = base_colour.to_array().map(|channel| channel as f32);
-        let response = ui.color_edit_button_rgb(&mut colour);
-        if response.changed() {
-            *base_colour = LinearSrgb::from(colour.map(|channel| f64::from(channel.clamp(0.0, 1.0))));
-        }
-        response
-    });
-    commands.extend(base_colour.map(MaterialEdit::BaseColour).map(edit));
 }
 
 /// A toggle for what the mouse does in the picture. Of the names "Move light" and the like, the row shows the verb.

@@ -31,6 +31,7 @@ fn edits() -> Vec<Edit> {
 fn each_change_of_lights_is_one_step() {
     let loaded = Arc::new(fixtures::scene());
     let mut edits_of = EditedScene::new(Arc::clone(&loaded));
+    let choices = &mut Choices::new(BakeSettings::default());
     let state = |of: &EditedScene| (of.scene().lights.clone(), of.scene().light_list.clone());
     let mut states = vec![state(&edits_of)];
     for edit in edits() {
@@ -47,16 +48,16 @@ fn each_change_of_lights_is_one_step() {
     // As it came, and not as it is now.
     assert_eq!(scene.original_light(2, &loaded), &lamp("newer"));
     for before in states.iter().rev().skip(1) {
-        edits_of.step(true).expect("it is taken back");
+        edits_of.step(true, choices).expect("it is taken back");
         assert_eq!(state(&edits_of), *before);
     }
     for after in &states[1..] {
-        edits_of.step(false).expect("it is done again");
+        edits_of.step(false, choices).expect("it is done again");
         assert_eq!(state(&edits_of), *after);
     }
     for what in ["position of `newer`", "removal of `new`"] {
         assert_eq!(edits_of.history().next_undo(), Some(what));
-        edits_of.step(true).expect("it is taken back");
+        edits_of.step(true, choices).expect("it is taken back");
     }
 }
 

@@ -364,9 +364,9 @@ fn a_drag_is_one_step() {
 
     // A thousand steps are kept.
     let mut edits = EditedScene::new(options("ring").scene);
-    let of_seed = |seed| with(BakeSettings::default(), |it| it.seed = seed);
+    let of_seed = |seed| Choices::new(with(BakeSettings::default(), |it| it.seed = seed));
     for seed in 0..1100 {
-        edits.note_settings(&of_seed(seed), &of_seed(seed + 1));
+        edits.note(&of_seed(seed), &of_seed(seed + 1));
         edits.release();
     }
     assert_eq!(edits.history().undoable(), 1000);
