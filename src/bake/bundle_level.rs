@@ -246,6 +246,7 @@ impl CausticLayer<'_> {
             bundles: (!self.spectra.has(light.visible.light)).then_some(&bundles),
             photons: &photons,
             photon_square: report.photon_square,
+            rays: report.pass.rays as f64,
             bundle_square: report.deposit_square,
         };
         let unit = unit.per(u64::from(TIMES) * HALVES as u64);

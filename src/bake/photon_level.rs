@@ -50,10 +50,11 @@ pub(super) const PART_OF_TIME: f64 = 0.85;
 /// Minimum growth that is worth another level.
 const MIN_GROWTH: f64 = 1.2;
 
-/// Largest factor by which a filter is taken to reduce the squared error that single photons tell. It reduces that of
-/// glass by up to 4, and of the even light around `ball` by up to 40. Where it seems to remove more, it may have removed
-/// light that few photons have found yet: the first level of `ball` left 1.6 times the error that was stated so.
-const MOST_FILTERED: f64 = 20.0;
+/// Largest factor by which a filter is taken to reduce the squared error that 1e5 photons tell; it grows with the root
+/// of their number. Where it seems to remove more, it may have removed light that few photons have found yet: the first
+/// level of `ball` left 1.6 times the error that was stated so. Of many photons it reduces the squared error of `ball` by
+/// up to 40, and of glass by up to 4.
+const MOST_FILTERED: f64 = 10.0;
 
 /// Limits the photons of a level to what the remaining time allows, because an interrupted level is lost. The
 /// first level is not limited.
@@ -84,6 +85,7 @@ pub(super) struct Layers<'a> {
     pub(super) photons: &'a PhotonSums,
     /// Squared relative error that the flux of single photons tells.
     pub(super) photon_square: f64,
+    pub(super) rays: f64,
     /// Squared relative error of bundles that photons do not correct.
     pub(super) bundle_square: f64,
 }
@@ -326,6 +328,7 @@ impl CausticLayer<'_> {
             bundles: None,
             photons: &raw,
             photon_square: square_by_count(&raw, unit, photons),
+            rays: f64::from(photons) * HALVES as f64,
             bundle_square: 0.0,
         };
         let level = self.level_of_layers(light, (key, unit), layers);
@@ -378,7 +381,7 @@ impl CausticLayer<'_> {
             // More photons do not recover truncated light, and nothing about it is left to chance.
             let truncated = accuracy::truncated_share(&energy).powi(2);
             let noise = accuracy::expected_noise(square - truncated, [&one, &other], layers.photon_square)
-                .max(layers.photon_square / MOST_FILTERED);
+                .max(layers.photon_square / (MOST_FILTERED * (layers.rays / 1e5).max(1.0).sqrt()));
             error.raise_to(noise + truncated);
             error.add_to(noise + truncated + layers.bundle_square, &light_of_maps);
         }

@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use nephroid::illumination::Side;
+use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::scene::builtin::shapes;
 use nephroid::scene::{Mesh, Scene, contacts};
 
@@ -24,6 +25,13 @@ pub fn fill(t: &mut Table) {
             .bake_with(slabs(&[[0.5, 0.7], [0.3, 0.501]], 1.33), bright_branches())
             .bake_with(slabs(&[[0.5, 0.7], [0.3, 0.5 + gap_m]], 1.33), bright_branches())
             .as_first("map as where they overlap", 1e-2, 1.0);
+        // Glass that rests on something has no surface below.
+        t.case("glass-on-the-floor")
+            .bake_with(
+                apart(floor(0.5).sun(DVec3::NEG_Y).glass(1.5, slab(gap_m, 0.2))),
+                thoroughly(to(0.01, 16)),
+            )
+            .e("1 − R", 1e-6, |_| 1.0 - dielectric_reflectance(1.0, 1.5));
         let rug = shapes::floor([-0.2, 0.2], [-0.2, 0.2], gap_m);
         t.case("rug-on-the-floor")
             .bake(before(upright()), 0.01, 32)

@@ -84,17 +84,18 @@ impl ResidualPass<'_> {
                 continue;
             }
             // The triangles of a path draw from one sequence, so that lamp and spectrum are sampled evenly even where
-            // a single texel holds the light of many squares.
+            // a single texel holds the light of many squares. Those of a bundle share their wavelengths: at each of these
+            // they meet without a gap.
             let mut index = bundle.first_triangle;
+            let hues = self.hues(bundle, BundleDraw { index, seed }, sets);
             bundle.triangles(square.place.area(), |corners, flux_w, area| {
                 let draw = BundleDraw { index, seed };
                 index = index.wrapping_add(1);
-                let hues = self.hues(bundle, draw, sets);
                 let spread = match lamp {
                     Some(lamp) => draw.spread(corners, lamp, &bundle.shift, hues.len() > 1),
                     None => vec![corners],
                 };
-                for (hue, share) in hues {
+                for (hue, share) in &hues {
                     let share = share / spread.len() as f64;
                     let flux_w = hue.channels.apply(flux_w) * (area * f64::from(TIMES) * share);
                     let flux = self.rules.unit.count(flux_w);
@@ -110,7 +111,7 @@ impl ResidualPass<'_> {
         }
     }
 
-    /// Wavelengths for a triangle of a bundle, each with its part of the flux.
+    /// Wavelengths for a bundle, each with its part of the flux.
     fn hues(&self, bundle: &Bundle, draw: BundleDraw, sets: usize) -> Vec<(Hue<'_>, f64)> {
         let spectrum = self.rules.spectrum.filter(|_| bundle.route.is_dispersed);
         let Some(spectrum) = spectrum.filter(|_| sets > 1 || bundle.shift.parts_hues()) else {
@@ -123,7 +124,7 @@ impl ResidualPass<'_> {
             let hue = spectrum.one((f64::from(part) + within) / parts);
             hues.extend(hue.map(|hue| (hue, parts.recip())));
         }
-        // The few hues of a triangle have another colour than all: what is missing is spread over them.
+        // The few hues of a bundle have another colour than all: what is missing is spread over them.
         if sets == 1 {
             let of_parts: ColourMatrix = hues.iter().map(|(hue, share)| hue.channels.scaled(*share)).sum();
             let missing = self.rules.whole_hue().channels + of_parts.scaled(-1.0);
@@ -135,7 +136,7 @@ impl ResidualPass<'_> {
     }
 }
 
-/// Random numbers of a triangle of a bundle.
+/// Random numbers of a triangle of a bundle, or of a bundle by its first.
 #[derive(Clone, Copy)]
 struct BundleDraw {
     index: u32,

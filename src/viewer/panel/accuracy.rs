@@ -3,6 +3,7 @@
 pub mod course;
 pub mod target;
 
+use egui::emath::Numeric;
 use egui::{Response, Slider, SliderClamping, Ui};
 
 use super::control::{choice, listed, rows, setting, significant};
@@ -75,7 +76,7 @@ pub fn show_limits(ui: &mut Ui, settings: &mut BakeSettings) {
 }
 
 /// A slider that shows the automatic value until the user changes it.
-fn automatic<T: Copy>(
+fn automatic<T: Numeric>(
     ui: &mut Ui,
     value: &mut Option<T>,
     usual: T,
@@ -84,7 +85,8 @@ fn automatic<T: Copy>(
     let mut shown = value.unwrap_or(usual);
     let slider = slider(&mut shown).logarithmic(true);
     let response = ui.add(slider.clamping(SliderClamping::Never));
-    if response.changed() {
+    // The history holds numbers as JSON, which knows no infinity.
+    if response.changed() && shown.to_f64().is_finite() {
         *value = Some(shown);
     }
     response
