@@ -38,7 +38,6 @@ use crate::light_pass::explain::Limits;
 use crate::light_pass::sketch::{PathPreview, SketchLimits};
 use crate::plan::EffectLine;
 use crate::scene::{Edit, Scene};
-use crate::settings::BakeSettings;
 use crate::transport::Tracer;
 use serde_json::{Value, json};
 
@@ -469,14 +468,14 @@ impl Model {
     fn choose(&mut self, choices: Choices) {
         let before = std::mem::replace(&mut self.choices, choices);
         self.edits.note(&before, &self.choices);
-        self.revision += u64::from(before.automatic != self.choices.automatic);
-        self.note_settings_since(before.settings);
+        self.note_choices_since(before);
     }
 
-    /// Schedules a bake if it depends on settings that differ from `before`.
-    fn note_settings_since(&mut self, before: BakeSettings) {
+    /// Schedules a bake if it depends on choices that differ from `before`.
+    fn note_choices_since(&mut self, before: Choices) {
+        self.revision += u64::from(before.automatic != self.choices.automatic);
         let wanted = self.wanted();
-        if wanted.settings != BakeRequest::new(Arc::clone(&wanted.scene), before).settings {
+        if wanted.settings != BakeRequest::new(Arc::clone(&wanted.scene), before.settings).settings {
             self.log.write("settings", json!({"settings": wanted.settings}));
             self.revision += 1;
         }
@@ -495,15 +494,17 @@ impl Model {
     /// Undoes the last change, or redoes the last undone one.
     fn step_history(&mut self, is_back: bool) {
         self.refusal = None;
-        let before = self.choices.settings.clone();
+        let (before, scene) = (self.choices.clone(), Arc::clone(self.edits.scene()));
         let Some(text) = self.edits.step(is_back, &mut self.choices) else {
             return;
         };
         let event = if is_back { "undone" } else { "redone" };
         self.log.write(event, json!({"what": text}));
-        self.note_settings_since(before);
-        self.revision += 1;
-        self.stand_at_moment();
+        self.note_choices_since(before);
+        if !Arc::ptr_eq(&scene, self.edits.scene()) {
+            self.revision += 1;
+            self.stand_at_moment();
+        }
     }
 
     /// Bakes with the panel's settings unless one of them is out of range; the panel reports that.
