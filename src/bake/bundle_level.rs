@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::band_maps::BandMaps;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::{KeptSquares, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums};
-use super::photon_level::{Layers, PART_OF_TIME};
+use super::photon_level::{Layers, PART_OF_TIME, PlannedNoise};
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
@@ -246,6 +246,10 @@ impl CausticLayer<'_> {
             bundles: (!self.spectra.has(light.visible.light)).then_some(&bundles),
             photons: &photons,
             photon_square: report.photon_square,
+            planned: Some(PlannedNoise {
+                square: report.goal * report.goal,
+                rays: report.pass.rays as f64,
+            }),
             bundle_square: report.deposit_square,
         };
         let unit = unit.per(u64::from(TIMES) * HALVES as u64);

@@ -220,25 +220,28 @@ pub fn half_set_noise(a: &Images, b: &Images) -> Noise {
     noise
 }
 
-/// Squared relative error to be expected from noise, where `shown` is what half sets show, perhaps after a filter.
+/// Squared relative error of `light` to be expected from noise, where `shown` is what half sets show, perhaps after a
+/// filter.
 ///
 /// Few texels, or few photons in them, tell little: the halves of a single texel may agree by chance. So `by_photons`, the
 /// squared relative error that the flux of single photons tells, counts as one more texel. And two standard deviations
 /// are added, since of levels that differ by chance, one that looks good ends the bake: the squares d² of differences
 /// have the variance 2v² if d is normal, and then d⁴ is 3v² in the mean.
-pub fn expected_noise(shown: f64, [a, b]: [&Images; 2], by_photons: f64) -> f64 {
+pub fn expected_noise(shown: f64, [a, b]: [&Images; 2], light: &Images, by_photons: f64) -> f64 {
     let (mut squares, mut fourths, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0, 0.0);
-    for (receiver, image) in a {
-        let other = b.get(receiver);
-        let differences = image.squared_difference(other);
+    for (receiver, image) in light {
+        let (map_w, map_m2) = image.sums();
+        (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
+        let differences = match (a.get(receiver), b.get(receiver)) {
+            (Some(first), second) => first.squared_difference(second),
+            (None, Some(second)) => second.squared_difference(None),
+            (None, None) => continue,
+        };
         for (texel, square) in differences.iter().enumerate() {
             let by_area = square * image.area_m2(texel);
             squares += by_area;
             fourths += by_area * by_area;
         }
-        let (map_w, map_m2) = image.sums();
-        flux_w += map_w + other.map_or(0.0, |other| other.sums().0);
-        area_m2 += map_m2;
     }
     if squares <= 0.0 || flux_w <= 0.0 {
         return shown.max(by_photons);

@@ -165,15 +165,11 @@ impl<'a> EmitterSampler<'a> {
         self.at(Some(square))
     }
 
-    /// Maps the unit square to a light that faces one way: [−1, 1]², in half-axes from its centre. `None` for other
-    /// lights.
-    pub fn offsets(&self) -> Option<fn(DVec2) -> DVec2> {
+    /// Outline of a light that faces one way; `None` for other lights.
+    pub fn outline(&self) -> Option<PanelShape> {
         match self.light.kind {
-            LightKind::Sun { .. } | LightKind::Spot { .. } => Some(on_disc),
-            LightKind::Panel { shape, .. } => Some(match shape {
-                PanelShape::Rectangle => in_rectangle,
-                PanelShape::Disc => on_disc,
-            }),
+            LightKind::Sun { .. } | LightKind::Spot { .. } => Some(PanelShape::Disc),
+            LightKind::Panel { shape, .. } => Some(shape),
             LightKind::Point { .. } | LightKind::Surface { .. } | LightKind::Environment { .. } => None,
         }
     }
@@ -283,6 +279,33 @@ impl<'a> EmitterSampler<'a> {
                     },
                     strength: strength * sample.irradiance,
                 })
+            }
+        }
+    }
+}
+
+impl PanelShape {
+    /// Maps the unit square to the shape, uniformly: [−1, 1]², in half-axes from its centre.
+    pub fn at(self, square: DVec2) -> DVec2 {
+        match self {
+            Self::Rectangle => in_rectangle(square),
+            Self::Disc => on_disc(square),
+        }
+    }
+
+    /// Corners of the shape, in half-axes from its centre. For a disc, those of a regular polygon of the same area,
+    /// turned by a part of a side.
+    pub fn corners(self, sides: u32, turn: f64) -> Vec<DVec2> {
+        match self {
+            Self::Rectangle => [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
+                .map(DVec2::from)
+                .to_vec(),
+            Self::Disc => {
+                let side_rad = std::f64::consts::TAU / f64::from(sides);
+                let radius = (side_rad / side_rad.sin()).sqrt();
+                (0..sides)
+                    .map(|corner| DVec2::from_angle((f64::from(corner) + turn) * side_rad) * radius)
+                    .collect()
             }
         }
     }

@@ -15,7 +15,7 @@ use crate::light_pass::launch::Launch;
 use crate::light_pass::visibility::VisibleLight;
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, EmitterSampler};
-use crate::scene::{Light, Scene};
+use crate::scene::{Light, PanelShape, Scene};
 use crate::transport::{MediumStack, Tracer, media_at};
 
 /// Points of a lamp that are probed to tell whether all of it lies within one medium.
@@ -243,14 +243,14 @@ impl<'a> PhotonLaunch<'a> {
 
     /// Whether the lamp, if it has a size, faces one way.
     pub fn has_offsets(&self) -> bool {
-        matches!(self.domain, Domain::Cells { .. }) || self.lamp_offsets().is_some()
+        matches!(self.domain, Domain::Cells { .. }) || self.lamp_outline().is_some()
     }
 
     /// Maps the unit square of a lamp that faces one way to half-axes from its centre; `None` for other lights.
-    pub(super) fn lamp_offsets(&self) -> Option<fn(DVec2) -> DVec2> {
+    pub(super) fn lamp_outline(&self) -> Option<PanelShape> {
         match &self.domain {
             Domain::Cells { .. } => None,
-            Domain::Spheres(lamp) => lamp.places.offsets(),
+            Domain::Spheres(lamp) => lamp.places.outline(),
         }
     }
 

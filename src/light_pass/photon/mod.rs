@@ -9,6 +9,7 @@
 //! carry all of the light.
 
 mod bundle;
+mod bundle_deposit;
 mod cells;
 pub mod domain;
 mod edge;

@@ -141,7 +141,7 @@ impl PathFinder<'_> {
 
     /// Light from half-way out along both axes of an extended light; `None` for light from one point or direction.
     pub(super) fn at_lamp_sides(&self, root: usize, square: DVec2) -> Option<[PointPaths; 2]> {
-        self.launch.lamp_offsets()?;
+        self.launch.lamp_outline()?;
         let half_way = [DVec2::new(0.75, 0.5), DVec2::new(0.5, 0.75)];
         Some(half_way.map(|lamp| self.trace(self.middle_tracer(), root, square, lamp)))
     }

@@ -10,40 +10,28 @@
 //! difference is proportional to its length. Bundles are deposited once, and halves hold photons alone; but of dispersed
 //! bundles each half samples the wavelengths anew, so that their noise is seen.
 
-use std::collections::BTreeMap;
-
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::bundle::{Bundle, Origin, flux_triangle};
+use super::bundle_deposit::plan_deposits;
 use super::domain::LitCells;
 use super::edge;
 use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE, PhotonLaunch, Start};
-use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed, set_of};
+use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed};
 use super::paths::PathFinder;
 use super::receivers::{MeasuredChart, Receivers};
-use super::spectrum::Hue;
 use super::squares::{Found, Square, Squares, Surveyor};
 use super::subcell_features::SubcellFeatures;
-use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk, WAVELENGTH_DIMENSION};
+use super::walk::{Followed, Hit, PhotonArrival, PhotonRules, PhotonWalk};
 use crate::geometry::sampling::{GOLDEN_64, even_point, in_square, mix64};
-use crate::illumination::Receiver;
-use crate::light_pass::coverage::{FluxTriangle, deposit_triangles};
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
-use crate::optics::{ColourMatrix, LinearSrgb};
+use crate::optics::LinearSrgb;
 use crate::progress::Stage;
 
 /// All flux is counted so many times, in bundles and in each half: enough that rounding to counts does not matter.
 pub const TIMES: u32 = 1 << 20;
-
-/// Part of the squared goal that the deposit of bundles may err by its plan: curves laid down as chords, slopes as
-/// steps.
-const DEPOSIT_PART: f64 = 0.5;
-
-/// Squared error that deposits have over the planned one: at most, on the scenes with a reference.
-const MEASURED_OVER_PLANNED: f64 = 0.25;
 
 /// Photons in a block, at least.
 const BLOCK_PHOTONS: u64 = 1 << 12;
@@ -51,10 +39,6 @@ const BLOCK_PHOTONS: u64 = 1 << 12;
 /// Where surfaces are rough, bundles have to carry this part of the light, or photons are better off without them;
 /// elsewhere any part.
 const MIN_BUNDLED: f64 = 0.1;
-
-/// Squares whose triangles are made before they are deposited: of light of one hue, and of a spectrum, which takes many
-/// times the triangles.
-const SQUARES_AT_ONCE: [usize; 2] = [1 << 12, 1 << 7];
 
 /// Memory of a square with its points and bundles, roughly [bytes].
 const BYTES_PER_SQUARE: u64 = 4 << 10;
@@ -183,7 +167,7 @@ impl ResidualPass<'_> {
         let mut traced = 0.0;
         for (square, found) in squares.squares.iter_mut().zip(found) {
             traced += found.photons;
-            report.photon_square += squares.plan.relative * found.variance() / found.photons.max(1.0);
+            report.photon_square += squares.plan.relative * found.of_mean;
             square.found.photons += found.photons;
             square.found.squares += found.squares;
         }
@@ -193,153 +177,13 @@ impl ResidualPass<'_> {
 
         // What the next level needs to know.
         squares.photons = traced;
+        squares.surprise = report.photon_square / (report.goal * report.goal);
         let counted = f64::from(TIMES) * HALVES as f64;
         let deposited = self.rules.unit.per(counted as u64);
         let arrived_w = report.pass.ledger.watts_of_largest(Account::Deposited, deposited);
         squares.arrived_w = Some(arrived_w).filter(|watts| *watts > 0.0);
         report
     }
-
-    /// Deposits all bundles into a set of maps for each band, and books them so many times.
-    fn deposit_bundles(
-        &self,
-        squares: &Squares,
-        maps: &mut [ReceiverMaps],
-        sample: u32,
-        times: usize,
-        ledger: &mut LedgerSum,
-    ) {
-        let at_once = SQUARES_AT_ONCE[usize::from(self.rules.spectrum.is_some())];
-        for squares in squares.squares.chunks(at_once) {
-            let made: Vec<TrianglesByMap> = squares
-                .par_chunks(at_once / 32)
-                .map(|squares| {
-                    let mut triangles = TrianglesByMap::new();
-                    squares
-                        .iter()
-                        .for_each(|square| self.triangles(square, (sample, maps.len()), &mut triangles));
-                    triangles
-                })
-                .collect();
-            let mut by_map = TrianglesByMap::new();
-            for (map, mut triangles) in made.into_iter().flatten() {
-                by_map.entry(map).or_default().append(&mut triangles);
-            }
-            for ((set, receiver), triangles) in by_map {
-                maps[set].touch(receiver, self.chart_for);
-                if let Some(map) = maps[set].get_mut(receiver) {
-                    let placed = deposit_triangles(&triangles, map)
-                        .deposited
-                        .map(|count| times as i128 * count);
-                    ledger.book_sum(Account::Deposited, placed);
-                    ledger.book_sum(Account::Bundled, placed);
-                    ledger.book_sum(Account::Sampling, placed.map(|count| -count));
-                }
-            }
-        }
-    }
-
-    /// Adds the triangles of a square.
-    fn triangles(&self, square: &Square, (sample, sets): (u32, usize), triangles: &mut TrianglesByMap) {
-        // Neighbouring triangles sample lamp and spectrum at different points, and so does each half.
-        let place = square.place.corner;
-        let mut drawn = (place.x >> 10).wrapping_mul(0x9e37_79b1) ^ (place.y >> 10).wrapping_mul(0x85eb_ca6b);
-        drawn ^= sample.wrapping_mul(0x2c1b_3c6d);
-        for bundle in &square.bundles {
-            let is_plain = self.rules.spectrum.is_none() && self.launch.lamp_offsets().is_none();
-            if is_plain {
-                let triangles = triangles.entry((0, bundle.receiver())).or_default();
-                bundle.triangles(square.place.area(), |corners, flux_w, area| {
-                    let flux = self.rules.unit.count(flux_w * (area * f64::from(TIMES)));
-                    triangles.push(flux_triangle(bundle, corners, flux));
-                });
-                continue;
-            }
-            bundle.triangles(square.place.area(), |corners, flux_w, area| {
-                drawn = drawn.wrapping_add(1);
-                for part in self.parts(bundle, drawn, sets) {
-                    let flux_w = part.hue.channels.apply(flux_w) * (area * f64::from(TIMES) * part.share);
-                    let moved = bundle.shift.at(&part.origin);
-                    let corners = corners.map(|corner| corner + moved);
-                    let triangle = flux_triangle(bundle, corners, self.rules.unit.count(flux_w));
-                    let map = (set_of(part.hue.band, sets), bundle.receiver());
-                    triangles.entry(map).or_default().push(triangle);
-                }
-            });
-        }
-    }
-
-    /// Samples of lamp and wavelength for a triangle of a bundle.
-    fn parts(&self, bundle: &Bundle, number: u32, sets: usize) -> Vec<Part<'_>> {
-        let mut hues: Vec<(Hue, f64)> = Vec::new();
-        match self.rules.spectrum {
-            Some(spectrum) if bundle.route.is_dispersed && (sets > 1 || bundle.shift.parts_hues()) => {
-                let within = even_point(number, WAVELENGTH_DIMENSION, self.rules.seed).x;
-                let parts = bundle.shift.hue_parts();
-                for part in 0..parts as u32 {
-                    let hue = spectrum.one((f64::from(part) + within) / parts);
-                    hues.extend(hue.map(|hue| (hue, parts.recip())));
-                }
-                // The few hues of a triangle have another colour than all: what is missing is spread over them.
-                if sets == 1 {
-                    let of_parts: ColourMatrix =
-                        hues.iter().map(|(hue, share)| hue.channels.scaled(*share)).sum();
-                    let missing = self.rules.whole_hue().channels + of_parts.scaled(-1.0);
-                    for (hue, _) in &mut hues {
-                        hue.channels = hue.channels + missing;
-                    }
-                }
-            }
-            _ => hues.push((self.rules.whole_hue(), 1.0)),
-        }
-        let offsets = self.launch.lamp_offsets();
-        let lamp_parts = bundle.shift.lamp_parts(hues.len() > 1);
-        let on_lamp = even_point(number, LAMP_DIMENSION, self.rules.seed);
-        let mut parts = Vec::with_capacity(hues.len());
-        for part in 0..(lamp_parts.x * lamp_parts.y) as u32 {
-            let part = f64::from(part);
-            let part = DVec2::new(part % lamp_parts.x, (part / lamp_parts.x).floor());
-            let lamp = offsets.map_or(DVec2::ZERO, |offsets| offsets((part + on_lamp) / lamp_parts));
-            for &(hue, share) in &hues {
-                parts.push(Part {
-                    origin: Origin { lamp, ends: hue.ends },
-                    hue,
-                    share: share / lamp_parts.element_product(),
-                });
-            }
-        }
-        parts
-    }
-}
-
-/// Triangles by set of maps and receiver.
-type TrianglesByMap = BTreeMap<(usize, Receiver), Vec<FluxTriangle>>;
-
-/// A sample of lamp and wavelength.
-struct Part<'a> {
-    origin: Origin,
-    hue: Hue<'a>,
-    /// Of the flux.
-    share: f64,
-}
-
-/// Chooses how finely each bundle is deposited. Returns the squared relative error that this leaves.
-fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receivers) -> f64 {
-    let relative = squares.plan.relative;
-    let bundles: usize = squares.squares.iter().map(|square| square.bundles.len()).sum();
-    if relative <= 0.0 {
-        return 0.0;
-    }
-    let allowed = DEPOSIT_PART * goal * goal / (relative * bundles as f64);
-    let of_square = |square: &mut Square| -> f64 {
-        let mut left = 0.0;
-        for bundle in &mut square.bundles {
-            left += bundle.plan_deposit(receivers.weight(bundle.receiver()), allowed);
-        }
-        left
-    };
-    let left: Vec<f64> = squares.squares.par_iter_mut().map(of_square).collect();
-    left.iter().sum::<f64>() * relative * MEASURED_OVER_PLANNED
 }
 
 /// Traces residual photons.
@@ -470,6 +314,7 @@ impl ResidualPhotons<'_> {
                 block.rays += u64::from(order.photons);
                 block.segments += draw.segments;
                 if wanted <= ANEW.0 * so_far {
+                    found.of_mean += draw.found.of_half();
                     block.take(draw.deposits, &draw.ledger);
                     continue;
                 }
@@ -484,6 +329,7 @@ impl ResidualPhotons<'_> {
                 );
                 found.photons += anew.found.photons;
                 found.squares += anew.found.squares;
+                found.of_mean += anew.found.of_half();
                 block.rays += u64::from(photons);
                 block.segments += anew.segments;
                 block.take(anew.deposits, &anew.ledger);
@@ -524,8 +370,8 @@ impl ResidualPhotons<'_> {
         draw: &mut Draw,
     ) {
         let pass = self.pass;
-        let offsets = pass.launch.lamp_offsets();
-        let lamp = match offsets {
+        let outline = pass.launch.lamp_outline();
+        let lamp = match outline {
             Some(_) => even_point(index, LAMP_DIMENSION, walk.seed()),
             None => LAMP_MIDDLE,
         };
@@ -548,7 +394,7 @@ impl ResidualPhotons<'_> {
             guides: &square.guides,
             within,
             scale: unit_squares,
-            lamp: offsets.map_or(DVec2::ZERO, |offsets| offsets(lamp)),
+            lamp: outline.map_or(DVec2::ZERO, |outline| outline.at(lamp)),
         };
         let mut removals = std::mem::take(&mut draw.removals);
         let mut maps = Changes {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::bundle::{Bundle, Image, MEAN_WEIGHTS, Node, Shape, biquadratic};
+use super::bundle::{Bundle, Image, MEAN_WEIGHTS, NEAREST_WEIGHTS, Node, Shape, biquadratic};
 use super::domain::{DomainPoint, LAST_LEVEL, LitCells, PointHash, SquarePlace};
 use super::paths::{Chain, PathEnd, PathFinder, PointPaths, Route};
 use super::subcell_features::SubcellFeatures;
@@ -58,6 +58,10 @@ const LEFT_BY_MANY_CUTS: (usize, f64) = (8, 0.5);
 /// Minimum number of audits. With a fifth of it, bakes of random scenes to 20 % state a third of the error that is
 /// visible, since few photons meet the light in dark places.
 const MIN_AUDITS: f64 = 16384.0;
+
+/// Where photons of the last level found a larger squared error than planned, there is light that points have missed: the
+/// next one audits as many times as often, at most.
+const MOST_AUDITED: f64 = 4.0;
 
 /// Audits know no smaller part to arrive of the light that is looked at closely than this: of a receiver seen edge-on,
 /// they would never end.
@@ -108,6 +112,8 @@ pub(super) struct Found {
     pub(super) photons: f64,
     /// Sum over photons of the squared contribution of each, as if it stood for the whole square [W²/m²].
     pub(super) squares: f64,
+    /// Variance of the mean of both halves, of the photons that these hold [W²/m²].
+    pub(super) of_mean: f64,
 }
 
 impl Found {
@@ -119,10 +125,16 @@ impl Found {
         }
     }
 
+    /// What half of the maps adds to the variance of the mean, if it holds these photons.
+    pub(super) fn of_half(&self) -> f64 {
+        0.25 * self.variance() / self.photons.max(1.0)
+    }
+
     fn of_quarter(&self) -> Self {
         Self {
             photons: 0.25 * self.photons,
             squares: self.squares / 64.0,
+            of_mean: 0.0,
         }
     }
 }
@@ -159,6 +171,8 @@ pub(super) struct Plan {
     lost_weight: f64,
     /// Number of texels of all receivers.
     texels: f64,
+    /// [`Squares::surprise`].
+    surprise: f64,
     /// All emitted flux, and that of squares that are looked at closely [W].
     start_w: f64,
     close_start_w: f64,
@@ -200,7 +214,7 @@ impl Plan {
         } else {
             self.goal
         };
-        let audits = 4.0 * self.texels.sqrt() / goal;
+        let audits = 4.0 * self.surprise.clamp(1.0, MOST_AUDITED) * self.texels.sqrt() / goal;
         let everywhere = audits.max(MIN_AUDITS) * square.start_w / self.start_w.max(f64::MIN_POSITIVE);
         let lit = if square.is_looked_at_closely() {
             audits * square.start_w / self.arriving_w.max(LEAST_AUDITED * self.close_start_w)
@@ -268,6 +282,8 @@ pub(super) struct Squares {
     pub(super) photons: f64,
     /// Flux that arrived in the last level [W, largest channel].
     pub(super) arrived_w: Option<f64>,
+    /// Squared error that photons of the last level found, relative to the planned one.
+    pub(super) surprise: f64,
 }
 
 /// Builds squares.
@@ -419,6 +435,7 @@ impl Surveyor<'_> {
                 0.0 => f64::INFINITY,
                 known => known,
             },
+            surprise: squares.surprise,
             ..Plan::default()
         };
         let mut receivers = BTreeSet::new();
@@ -525,7 +542,7 @@ impl Surveyor<'_> {
 
         // Light that was not followed.
         let mut lost: Vec<Guide> = Vec::new();
-        for (point, weight) in square.points.iter().zip(MEAN_WEIGHTS) {
+        for (point, weight) in square.points.iter().zip(NEAREST_WEIGHTS) {
             for &(chain, flux_w) in &point.lost {
                 let weight = flux_w * weight * area;
                 square.residual.lost_w += weight;
@@ -549,15 +566,17 @@ impl Surveyor<'_> {
     fn add_bundle(&self, square: &mut Square, route: Route, parent: Option<&Square>, edges: usize) {
         let ends: [Option<&PathEnd>; 9] =
             std::array::from_fn(|node| square.points[node].end(route.signature));
+        let is_whole = ends.iter().all(Option::is_some);
+        let weights = if is_whole { MEAN_WEIGHTS } else { NEAREST_WEIGHTS };
         let mut flux_w = 0.0;
-        for (end, weight) in ends.iter().zip(MEAN_WEIGHTS) {
+        for (end, weight) in ends.iter().zip(weights) {
             flux_w += end.map_or(0.0, |end| end.flux_w.max_channel()) * weight * square.place.area();
         }
         square.arriving_w += flux_w;
         let mut bundle = Bundle::new(route, flux_w);
         let root = flux_w * self.finder.receivers.weight(route.receiver);
         let left: f64;
-        if ends.iter().all(Option::is_some) {
+        if is_whole {
             let nodes: [Node; 9] = std::array::from_fn(|node| Node::of(ends[node].expect("all are there")));
             let image = Image::of(&nodes);
             bundle.displaced_texels = parent

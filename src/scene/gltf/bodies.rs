@@ -1,7 +1,7 @@
 //! Bodies of glass: which objects bound one, alone or with others, and which are open. Files split a body wherever the
 //! material changes, and some are wound inwards.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -9,9 +9,9 @@ use glam::DVec3;
 use super::context::LoadContext;
 use crate::geometry::sampling::even_point;
 use crate::geometry::triangle::ShearedRay;
-use crate::geometry::{Ray, TriangleBvh};
+use crate::geometry::{Ray, TriangleBvh, bits, numbered};
 use crate::scene::watertight::{has_extent, is_closed, volume_m3};
-use crate::scene::{Material, Mesh, Object};
+use crate::scene::{InScene, Material, Mesh, Object};
 
 /// Distance of vertices that are one, in their coordinates [1]: a few roundings to single precision.
 const WELD: f64 = 1.0 / (1 << 20) as f64;
@@ -25,7 +25,7 @@ const LEVEL: f64 = 0.7;
 /// Highest index of water and other liquids that stand in the open; window glass has a higher one.
 const MOST_LIQUID_IOR: f64 = 1.4;
 
-/// Turns meshes that are wound inwards, and gives each object of a body that several bound its [`Object::body`].
+/// Turns meshes that are wound inwards, leaves out faces that a body has twice, and gives each object of a body that several bound its [`Object::body`].
 /// Returns whether each object bounds a body. `materials`: those of the file.
 pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadContext) -> Vec<bool> {
     let material = |object: &Object| &materials[object.material];
@@ -34,14 +34,14 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
         let mesh = object.mesh();
         *closed.entry(Arc::as_ptr(mesh)).or_insert_with(|| is_closed(mesh))
     };
-    let mut turned = Turned::default();
+    let (mut turned, mut singled) = (Remade::default(), Remade::default());
     let mut bounds_body = vec![false; objects.len()];
     let mut open = Vec::new();
     for index in 0..objects.len() {
         let object = &objects[index];
         if !material(object).transmits() {
             if !material(object).double_sided && is_against_normals(object.mesh()) {
-                turned.turn(&mut objects[index]);
+                turned.remake(&mut objects[index], |mesh| Some(inverted(mesh)));
                 let what = "was wound against its normals; its front is now where these point";
                 load.warn(
                     node(&objects[index]),
@@ -51,27 +51,38 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
             }
             continue;
         }
-        if !closes(object) {
-            open.push(index);
-            continue;
+        let mut volume_m3 = body_volume_m3(object.in_scene(), closes(object));
+        if volume_m3.is_none() && singled.remake(&mut objects[index], single) {
+            load.warn(
+                node(&objects[index]),
+                "bounds a body by faces that it has twice; the second ones were left out",
+                "write every face once",
+            );
+            volume_m3 = body_volume_m3(objects[index].in_scene(), true);
         }
-        let volume_m3 = volume_m3(object.in_scene());
-        bounds_body[index] = has_extent(object.in_scene(), volume_m3);
-        if bounds_body[index] && volume_m3 < 0.0 {
-            turned.turn(&mut objects[index]);
+        let Some(volume_m3) = volume_m3 else {
+            // A closed mesh without a volume is a sheet with two sides, which bounds nothing with others.
+            if !closes(&objects[index]) {
+                open.push(index);
+            }
+            continue;
+        };
+        bounds_body[index] = true;
+        if volume_m3 < 0.0 {
+            turned.remake(&mut objects[index], |mesh| Some(inverted(mesh)));
             warn_of_turn(&objects[index], load);
         }
     }
     if open.is_empty() {
         return bounds_body;
     }
+    let open_boxes: Vec<(DVec3, DVec3)> = open.iter().filter_map(|&index| objects[index].bounds()).collect();
     let is_near = |object: &Object| {
-        let overlaps =
-            |(a, b): (DVec3, DVec3), (low, high): (DVec3, DVec3)| a.cmple(high).all() && b.cmpge(low).all();
         let own = object.bounds();
-        open.iter().any(|&open| {
-            own.zip(objects[open].bounds())
-                .is_some_and(|(a, b)| overlaps(a, b))
+        own.is_some_and(|(low, high)| {
+            open_boxes
+                .iter()
+                .any(|&(a, b)| a.cmple(high).all() && b.cmpge(low).all())
         })
     };
     let opaque = |index: &usize| {
@@ -82,7 +93,7 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
     let pieces = Pieces::new(objects, &open, &opaque);
     for body in pieces.bodies(objects, materials) {
         let states_volume = |index: &&usize| material(&objects[**index]).volume.is_some();
-        let glass = || body.signs.keys().filter(|index| open.contains(index));
+        let glass = || body.signs.keys().filter(|index| pieces.glass.contains(index));
         let first = glass().find(states_volume).or(glass().next()).copied();
         let is_shared = glass().count() > 1;
         let members: Vec<usize> = glass().copied().collect();
@@ -90,7 +101,7 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
             bounds_body[index] = true;
             objects[index].body = first.filter(|_| is_shared);
             if body.signs[&index] < 0 {
-                turned.turn(&mut objects[index]);
+                turned.remake(&mut objects[index], |mesh| Some(inverted(mesh)));
                 warn_of_turn(&objects[index], load);
             }
         }
@@ -140,40 +151,81 @@ fn is_against_normals(mesh: &Mesh) -> bool {
     all > 0.0 && sum == -all
 }
 
-/// Turned copies of meshes, shared as the meshes were.
+/// Changed copies of meshes, shared as the meshes were.
 #[derive(Default)]
-struct Turned {
-    known: HashMap<*const Mesh, (Arc<Mesh>, Arc<Mesh>)>,
+struct Remade {
+    /// With the meshes themselves, so that their addresses stay their own.
+    known: HashMap<*const Mesh, (Arc<Mesh>, Option<Arc<Mesh>>)>,
 }
 
-impl Turned {
-    fn turn(&mut self, object: &mut Object) {
+impl Remade {
+    /// Gives an object the changed mesh, if it is to be changed. Returns whether it was.
+    fn remake(&mut self, object: &mut Object, change: impl FnOnce(&Mesh) -> Option<Mesh>) -> bool {
         let mesh = Arc::clone(object.mesh());
-        // The mesh is kept, so that its address stays its own.
-        let (_, turned) = self.known.entry(Arc::as_ptr(&mesh)).or_insert_with(|| {
-            let mut turned = Mesh::clone(&mesh);
-            let points_along = agreement(&mesh).0 > 0.0;
-            turned
-                .triangles
-                .iter_mut()
-                .for_each(|[_, b, c]| std::mem::swap(b, c));
-            if points_along {
-                turned.normals.iter_mut().for_each(|normal| *normal = -*normal);
-            }
-            (mesh, Arc::new(turned))
+        let (_, changed) = self.known.entry(Arc::as_ptr(&mesh)).or_insert_with(|| {
+            let changed = change(&mesh).map(Arc::new);
+            (mesh, changed)
         });
-        object.reshape(Arc::clone(turned));
+        if let Some(changed) = changed {
+            object.reshape(Arc::clone(changed));
+        }
+        changed.is_some()
     }
 }
 
+/// The mesh wound the other way, its normals on the side that its faces point to.
+fn inverted(mesh: &Mesh) -> Mesh {
+    let mut turned = Mesh::clone(mesh);
+    for [_, b, c] in &mut turned.triangles {
+        std::mem::swap(b, c);
+    }
+    if agreement(mesh).0 > 0.0 {
+        turned.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    }
+    turned
+}
+
+/// The mesh with the first of all triangles that have the same corners, if it then bounds a body: some programs write both
+/// sides of a face.
+fn single(mesh: &Mesh) -> Option<Mesh> {
+    let ids = numbered(mesh.positions.iter().copied().map(bits));
+    let mut known = HashSet::new();
+    let mut kept = mesh.triangles.clone();
+    kept.retain(|triangle| {
+        let mut corners = triangle.map(|vertex| ids[vertex as usize]);
+        corners.sort_unstable();
+        known.insert(corners)
+    });
+    if kept.len() == mesh.triangles.len() {
+        return None;
+    }
+    let single = Mesh {
+        triangles: kept,
+        ..mesh.clone()
+    };
+    body_volume_m3(InScene::from(&single), is_closed(&single))?;
+    Some(single)
+}
+
+/// Volume of a closed mesh that bounds a body.
+fn body_volume_m3(mesh: InScene, is_closed: bool) -> Option<f64> {
+    let volume_m3 = volume_m3(mesh);
+    (is_closed && has_extent(mesh, volume_m3)).then_some(volume_m3)
+}
+
+/// An edge by its vertices, the lower one first.
+type Edge = (u32, u32);
+
 /// Net traversals of each edge, from its lower to its higher vertex; edges traversed both ways are left out.
-type Border = BTreeMap<(u32, u32), i32>;
+type Border = BTreeMap<Edge, i32>;
 
 /// Open meshes with their borders, in common vertices.
 struct Pieces {
     /// By object.
     borders: BTreeMap<usize, Border>,
-    glass: Vec<usize>,
+    /// Objects whose borders have an edge.
+    at_edge: HashMap<Edge, Vec<usize>>,
+    glass: BTreeSet<usize>,
 }
 
 /// A closed surface of several objects: for each, 1, or −1 where its mesh has to be turned.
@@ -200,9 +252,17 @@ impl Pieces {
             border.retain(|_, net| *net != 0);
             (object, border)
         };
+        let borders: BTreeMap<usize, Border> = glass.iter().chain(opaque).map(&mut border).collect();
+        let mut at_edge: HashMap<Edge, Vec<usize>> = HashMap::new();
+        for (&object, border) in &borders {
+            for &edge in border.keys() {
+                at_edge.entry(edge).or_default().push(object);
+            }
+        }
         Self {
-            borders: glass.iter().chain(opaque).map(&mut border).collect(),
-            glass: glass.to_vec(),
+            borders,
+            at_edge,
+            glass: glass.iter().copied().collect(),
         }
     }
 
@@ -212,8 +272,9 @@ impl Pieces {
         let glass = |near: usize, far: usize| self.glass.contains(&far) && ior(near) == ior(far);
         let any = |near: usize, far: usize| !self.glass.contains(&far) || ior(near) == ior(far);
         let mut bodies: Vec<Body> = Vec::new();
+        let mut in_body = BTreeSet::new();
         for &first in &self.glass {
-            if bodies.iter().any(|body| body.signs.contains_key(&first)) {
+            if in_body.contains(&first) {
                 continue;
             }
             let closed = self.grown(first, glass).or_else(|| self.grown(first, any));
@@ -227,6 +288,7 @@ impl Pieces {
             if volumes.sum::<f64>() < 0.0 {
                 body.signs.values_mut().for_each(|sign| *sign = -*sign);
             }
+            in_body.extend(body.signs.keys().copied());
             bodies.push(body);
         }
         bodies
@@ -237,13 +299,12 @@ impl Pieces {
         let mut signs = BTreeMap::from([(first, 1)]);
         let mut waiting = vec![first];
         while let Some(piece) = waiting.pop() {
-            for (&other, border) in &self.borders {
-                if signs.contains_key(&other) || !may_join(first, other) {
-                    continue;
-                }
-                let own = &self.borders[&piece];
-                let common = border.iter().find_map(|(edge, net)| Some(net * own.get(edge)?));
-                if let Some(product) = common {
+            for (edge, net) in &self.borders[&piece] {
+                for &other in &self.at_edge[edge] {
+                    if signs.contains_key(&other) || !may_join(first, other) {
+                        continue;
+                    }
+                    let product = net * self.borders[&other][edge];
                     signs.insert(other, -signs[&piece] * product.signum());
                     waiting.push(other);
                 }

@@ -113,6 +113,15 @@ fn explained(name: &str) -> Vec<(f64, Explanation)> {
     order.sort_by(|a, b| light[*a].total_cmp(&light[*b]));
     let mean = light.iter().sum::<f64>() / light.len() as f64;
     let direct = &map.layer(LayerKind::Direct).expect("asked for").irradiance;
+    // The middle of a texel tells nothing of its mean where the edge of a shadow crosses it.
+    let width = map.chart.width;
+    order.retain(|&texel| {
+        let (x, y) = (texel % width, texel / width);
+        let near = |at: usize| at.saturating_sub(1)..(at + 2).min(width);
+        let around = near(y).flat_map(|y| near(x).map(move |x| y * width + x));
+        let lit = around.clone().filter(|&texel| direct[texel][1] > 0.0).count();
+        lit == 0 || lit == around.count()
+    });
     let check = |share: f64| {
         let texel = order[(share * (order.len() - 1) as f64) as usize];
         let target = target(&tracer, map, texel);

@@ -197,7 +197,7 @@ fn whole_pictures_come_before_the_last() {
     let scene = builtin_scene("ring");
     let mut levels = Vec::new();
     let last = session(&scene)
-        .bake_levels(&automatic(to(0.005, 0)), &(), &Control::default(), &mut |level| {
+        .bake_levels(&automatic(to(0.002, 0)), &(), &Control::default(), &mut |level| {
             levels.push(level)
         })
         .expect("a bake");

@@ -139,6 +139,36 @@ fn what_is_inside_out_is_turned() {
     }
 }
 
+/// Both sides of a face, written as two.
+#[test]
+fn faces_that_a_body_has_twice_count_once() {
+    for twice in [1, 6, 12] {
+        let mut file = Glb::empty();
+        let material = file.push("materials", glass(json!({ "thicknessFactor": 1.0 })));
+        let mut cube = unit_cube();
+        let mut backs = unit_cube();
+        backs.triangles.truncate(twice);
+        backs
+            .triangles
+            .iter_mut()
+            .for_each(|triangle| triangle.swap(1, 2));
+        backs.normals.iter_mut().for_each(|normal| *normal = -*normal);
+        shapes::append(&mut cube, &backs);
+        let part = primitive(&mut file, &cube, &cube.triangles, material);
+        let mesh = file.push_mesh(part);
+        for (place, scale) in [(0.0, 1.0), (3.0, -1.0)] {
+            file.push_root(json!({ "mesh": mesh, "translation": [0, place, 0], "scale": [scale, 1, 1] }));
+        }
+        let scene = file.scene();
+        warns(&scene, "faces that it has twice");
+        for object in &scene.objects {
+            assert_eq!(object.mesh().triangles.len(), 12);
+            near(volume_m3(object.in_scene()), 1.0, 1e-9, "volume");
+        }
+        bodies_around(&scene, DVec3::splat(0.4), 1);
+    }
+}
+
 #[test]
 fn an_open_mesh_bounds_nothing_unless_water_is_held() {
     let sheet = |double_sided: bool, walls: bool| {

@@ -1,0 +1,206 @@
+//! Bundles into maps: which triangles each is laid down as, for every wavelength and point of the lamp.
+
+use std::collections::{BTreeMap, HashMap};
+
+use glam::DVec2;
+use rayon::prelude::*;
+
+use super::bundle::{Bundle, OriginShift, flux_triangle};
+use super::launch::LAMP_DIMENSION;
+use super::pass::{half_seed, set_of};
+use super::receivers::Receivers;
+use super::residual::{ResidualPass, TIMES};
+use super::spectrum::Hue;
+use super::squares::{Square, Squares};
+use super::walk::WAVELENGTH_DIMENSION;
+use crate::geometry::sampling::{even_point, mix64};
+use crate::illumination::Receiver;
+use crate::light_pass::coverage::{FluxTriangle, deposit_triangles};
+use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::light_pass::path::PathSignature;
+use crate::light_pass::receiver_maps::ReceiverMaps;
+use crate::optics::ColourMatrix;
+use crate::scene::PanelShape;
+
+/// Part of the squared goal that the deposit of bundles may err by its plan: curves laid down as chords, slopes as
+/// steps.
+const DEPOSIT_PART: f64 = 0.1;
+
+/// Squares whose triangles are made before they are deposited: of light of one hue, and of a spectrum, which takes many
+/// times the triangles.
+const SQUARES_AT_ONCE: [usize; 2] = [1 << 12, 1 << 7];
+
+impl ResidualPass<'_> {
+    /// Deposits all bundles into a set of maps for each band, and books them so many times.
+    pub(super) fn deposit_bundles(
+        &self,
+        squares: &Squares,
+        maps: &mut [ReceiverMaps],
+        sample: u32,
+        times: usize,
+        ledger: &mut LedgerSum,
+    ) {
+        let at_once = SQUARES_AT_ONCE[usize::from(self.rules.spectrum.is_some())];
+        for squares in squares.squares.chunks(at_once) {
+            let made: Vec<TrianglesByMap> = squares
+                .par_chunks(at_once / 32)
+                .map(|squares| {
+                    let mut triangles = TrianglesByMap::new();
+                    squares
+                        .iter()
+                        .for_each(|square| self.triangles(square, (sample, maps.len()), &mut triangles));
+                    triangles
+                })
+                .collect();
+            let mut by_map = TrianglesByMap::new();
+            for (map, mut triangles) in made.into_iter().flatten() {
+                by_map.entry(map).or_default().append(&mut triangles);
+            }
+            for ((set, receiver), triangles) in by_map {
+                maps[set].touch(receiver, self.chart_for);
+                if let Some(map) = maps[set].get_mut(receiver) {
+                    let placed = deposit_triangles(&triangles, map)
+                        .deposited
+                        .map(|count| times as i128 * count);
+                    ledger.book_sum(Account::Deposited, placed);
+                    ledger.book_sum(Account::Bundled, placed);
+                    ledger.book_sum(Account::Sampling, placed.map(|count| -count));
+                }
+            }
+        }
+    }
+
+    /// Adds the triangles of a square.
+    fn triangles(&self, square: &Square, (sample, sets): (u32, usize), triangles: &mut TrianglesByMap) {
+        let lamp = self.launch.lamp_outline();
+        let seed = mix64(half_seed(self.rules.seed, sample as usize));
+        for bundle in &square.bundles {
+            if self.rules.spectrum.is_none() && lamp.is_none() {
+                let triangles = triangles.entry((0, bundle.receiver())).or_default();
+                bundle.triangles(square.place.area(), |corners, flux_w, area| {
+                    let flux = self.rules.unit.count(flux_w * (area * f64::from(TIMES)));
+                    triangles.push(flux_triangle(bundle, corners, flux));
+                });
+                continue;
+            }
+            // The triangles of a path draw from one sequence, so that lamp and spectrum are sampled evenly even where
+            // a single texel holds the light of many squares. Those of a bundle share their wavelengths: at each of these
+            // they meet without a gap.
+            let mut index = bundle.first_triangle;
+            let hues = self.hues(bundle, BundleDraw { index, seed }, sets);
+            bundle.triangles(square.place.area(), |corners, flux_w, area| {
+                let draw = BundleDraw { index, seed };
+                index = index.wrapping_add(1);
+                let spread = match lamp {
+                    Some(lamp) => draw.spread(corners, lamp, &bundle.shift, hues.len() > 1),
+                    None => vec![corners],
+                };
+                for (hue, share) in &hues {
+                    let share = share / spread.len() as f64;
+                    let flux_w = hue.channels.apply(flux_w) * (area * f64::from(TIMES) * share);
+                    let flux = self.rules.unit.count(flux_w);
+                    let moved = bundle.shift.of_hue(hue.ends);
+                    let triangles = triangles
+                        .entry((set_of(hue.band, sets), bundle.receiver()))
+                        .or_default();
+                    for corners in &spread {
+                        triangles.push(flux_triangle(bundle, corners.map(|corner| corner + moved), flux));
+                    }
+                }
+            });
+        }
+    }
+
+    /// Wavelengths for a bundle, each with its part of the flux.
+    fn hues(&self, bundle: &Bundle, draw: BundleDraw, sets: usize) -> Vec<(Hue<'_>, f64)> {
+        let spectrum = self.rules.spectrum.filter(|_| bundle.route.is_dispersed);
+        let Some(spectrum) = spectrum.filter(|_| sets > 1 || bundle.shift.parts_hues()) else {
+            return vec![(self.rules.whole_hue(), 1.0)];
+        };
+        let within = even_point(draw.index, WAVELENGTH_DIMENSION, draw.seed).x;
+        let parts = bundle.shift.hue_parts();
+        let mut hues = Vec::with_capacity(parts as usize);
+        for part in 0..parts as u32 {
+            let hue = spectrum.one((f64::from(part) + within) / parts);
+            hues.extend(hue.map(|hue| (hue, parts.recip())));
+        }
+        // The few hues of a bundle have another colour than all: what is missing is spread over them.
+        if sets == 1 {
+            let of_parts: ColourMatrix = hues.iter().map(|(hue, share)| hue.channels.scaled(*share)).sum();
+            let missing = self.rules.whole_hue().channels + of_parts.scaled(-1.0);
+            for (hue, _) in &mut hues {
+                hue.channels = hue.channels + missing;
+            }
+        }
+        hues
+    }
+}
+
+/// Random numbers of a triangle of a bundle, or of a bundle by its first.
+#[derive(Clone, Copy)]
+struct BundleDraw {
+    index: u32,
+    seed: u64,
+}
+
+impl BundleDraw {
+    /// A triangle [texels], spread by the lamp's image into triangles that share its flux evenly.
+    fn spread(
+        self,
+        corners: [DVec2; 3],
+        lamp: PanelShape,
+        shift: &OriginShift,
+        is_dispersed: bool,
+    ) -> Vec<[DVec2; 3]> {
+        let on_lamp = even_point(self.index, LAMP_DIMENSION, self.seed);
+        let parts = shift.lamp_parts(is_dispersed);
+        let [a, b, c] = corners;
+        let sides = (b - a).abs().max((c - a).abs()).max((c - b).abs());
+        if is_dispersed || sides.max_element() > shift.lamp_width() {
+            let count = (parts.x * parts.y) as u32;
+            let moved = (0..count).map(|part| {
+                let part = f64::from(part);
+                let part = DVec2::new(part % parts.x, (part / parts.x).floor());
+                shift.of_lamp(lamp.at((part + on_lamp) / parts))
+            });
+            return moved.map(|moved| corners.map(|corner| corner + moved)).collect();
+        }
+
+        // A triangle smaller than the lamp's image: this image, around its middle.
+        let middle = (a + b + c) / 3.0;
+        let outline = lamp.corners(4 * parts.max_element() as u32, on_lamp.x);
+        let corners: Vec<DVec2> = outline.iter().map(|&at| middle + shift.of_lamp(at)).collect();
+        let next = corners.iter().cycle().skip(1);
+        corners.iter().zip(next).map(|(&a, &b)| [middle, a, b]).collect()
+    }
+}
+
+/// Triangles by set of maps and receiver.
+type TrianglesByMap = BTreeMap<(usize, Receiver), Vec<FluxTriangle>>;
+
+/// Chooses how finely each bundle is deposited, and numbers its triangles. Returns the squared relative error that this
+/// leaves.
+pub(super) fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receivers) -> f64 {
+    let relative = squares.plan.relative;
+    let bundles: usize = squares.squares.iter().map(|square| square.bundles.len()).sum();
+    if relative <= 0.0 {
+        return 0.0;
+    }
+    let allowed = DEPOSIT_PART * goal * goal / (relative * bundles as f64);
+    let of_square = |square: &mut Square| -> f64 {
+        let mut left = 0.0;
+        for bundle in &mut square.bundles {
+            left += bundle.plan_deposit(receivers.weight(bundle.receiver()), allowed);
+        }
+        left
+    };
+    let left: Vec<f64> = squares.squares.par_iter_mut().map(of_square).collect();
+
+    let mut triangles: HashMap<PathSignature, u32> = HashMap::new();
+    for bundle in squares.squares.iter_mut().flat_map(|square| &mut square.bundles) {
+        let count = triangles.entry(bundle.route.signature).or_default();
+        bundle.first_triangle = *count;
+        *count = count.wrapping_add(bundle.triangle_count() as u32);
+    }
+    left.iter().sum::<f64>() * relative
+}
