@@ -24,6 +24,7 @@ use crate::light_pass::photon::subcell_features::SubcellFeatures;
 use crate::light_pass::photon::walk::PhotonRules;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::visibility::VisibleLight;
+use crate::scene::LightSize;
 use crate::settings::Estimator;
 use crate::transport::EffectSet;
 
@@ -118,7 +119,12 @@ impl CausticLayer<'_> {
                 seed: self.settings.seed,
             },
             chart_for,
+            blur_rad: match self.tracer.scene().lights[light.light].size {
+                LightSize::Angle { diameter_rad } => diameter_rad,
+                LightSize::None | LightSize::Radius { .. } => 0.0,
+            },
             cells: TEXELS_PER_CELL * columns as f64 * rows as f64,
+            reach_m: (light.launch.is_fitted() && self.settings.max_error.is_some()).then_some(light.reach_m),
         };
         let report = pass.run(context.control);
         context.outcome.count(&report, context.clock);

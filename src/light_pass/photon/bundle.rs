@@ -603,6 +603,7 @@ mod tests {
             receiver: Receiver::front(0),
             island: 0,
             is_dispersed: false,
+            leg_m: 1.0,
         }
     }
 

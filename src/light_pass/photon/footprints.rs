@@ -14,9 +14,17 @@ use crate::light_pass::footprint_statistics::{FootprintSample, FootprintStatisti
 use crate::light_pass::pass_report::{PassReport, Stopwatch};
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::progress::Control;
+use crate::scene::Object;
 
 /// Goal of the squares: that of a first picture.
 const GOAL: f64 = 0.2;
+
+/// Distance of the light of a small caster that is to be resolved, in radii of the caster: as far as receivers are from
+/// the casters of the built-in scenes.
+const REACH_IN_RADII: f64 = 5.0;
+
+/// Texels across the image of a lamp: its edges are no sharper.
+const TEXELS_PER_IMAGE: f64 = 2.0;
 
 /// Looks at the light of one light without depositing any.
 pub struct FootprintPass<'a> {
@@ -26,6 +34,11 @@ pub struct FootprintPass<'a> {
     pub chart_for: &'a ChartFor<'a>,
     /// Parts of each root of the launch domain whose footprints are asked for.
     pub cells: f64,
+    /// Angular diameter of the light.
+    pub blur_rad: f64,
+    /// Distance that the cells of a sun are made for [m]. Casters that are small beside it have finer ones: a glass in a
+    /// wide landscape throws its light no farther than one in a room.
+    pub reach_m: Option<f64>,
 }
 
 impl FootprintPass<'_> {
@@ -49,9 +62,18 @@ impl FootprintPass<'_> {
         surveyor.refine(&mut squares, GOAL);
         edge::finish(&finder, &mut squares, control, &mut report);
         report.rays += squares.points.len() as u64;
+        let finer = self.finer_cells();
         for square in &squares.squares {
             for bundle in &square.bundles {
-                self.add(bundle, square.place.area(), &receivers, &mut report.statistics);
+                let chain = bundle.route.chain;
+                let steps = (0..chain.len()).filter_map(|depth| chain.step(depth));
+                let finest = steps.map(|step| finer[step.object as usize]).fold(1.0, f64::max);
+                self.add(
+                    bundle,
+                    (square.place.area(), finest),
+                    &receivers,
+                    &mut report.statistics,
+                );
             }
         }
         report.trace_s.add(watch.elapsed());
@@ -59,18 +81,40 @@ impl FootprintPass<'_> {
         report
     }
 
-    /// Adds the footprints of a bundle of a square with this area.
-    fn add(&self, bundle: &Bundle, area: f64, receivers: &Receivers, statistics: &mut FootprintStatistics) {
+    /// By object: how many cells there are for one, so that its own light is resolved.
+    fn finer_cells(&self) -> Vec<f64> {
+        let of_object = |object: &Object| {
+            let (low, high) = object.bounds()?;
+            let reach_m = REACH_IN_RADII * 0.5 * low.distance(high);
+            Some((self.reach_m? / reach_m).max(1.0).powi(2)).filter(|cells| cells.is_finite())
+        };
+        let objects = &self.rules.tracer.scene().objects;
+        objects
+            .iter()
+            .map(|object| of_object(object).unwrap_or(1.0))
+            .collect()
+    }
+
+    /// Adds the footprints of a bundle of a square with this area, for `finer` times the cells.
+    fn add(
+        &self,
+        bundle: &Bundle,
+        (area, finer): (f64, f64),
+        receivers: &Receivers,
+        statistics: &mut FootprintStatistics,
+    ) {
         let receiver = bundle.receiver();
         let Some(chart) = receivers.get(receiver) else {
             return;
         };
+        let blurred_m = f64::from(bundle.route.leg_m) * self.blur_rad / TEXELS_PER_IMAGE;
         let size = DVec2::new(chart.chart.width as f64, chart.chart.height as f64);
         bundle.triangles(area, |corners, flux_w, area| {
             let [a, b, c] = corners.map(|corner| corner / size);
-            let cells = area * self.cells;
+            let cells = area * finer * self.cells;
             let flux_w = flux_w.luminance() * area;
-            let map_share = 0.5 * (b - a).perp_dot(c - a).abs() / cells;
+            let map_share =
+                (0.5 * (b - a).perp_dot(c - a).abs() / cells).max(blurred_m * blurred_m / chart.area_m2);
             statistics.add(receiver, flux_w, map_share * chart.area_m2, map_share);
             statistics.add_spot(FootprintSample {
                 receiver,
