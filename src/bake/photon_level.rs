@@ -90,20 +90,8 @@ fn square_by_count(sums: &PhotonSums, unit: FluxUnit, photons: u32) -> f64 {
 pub(super) struct PlannedNoise {
     /// Squared relative error as it was planned.
     pub(super) square: f64,
+    /// Photons of both halves, and points.
     pub(super) rays: f64,
-}
-
-/// What a level consists of.
-#[derive(Clone, Copy)]
-pub(super) struct Layers<'a> {
-    /// Light that bundles carry.
-    pub(super) bundles: Option<&'a ReceiverMaps>,
-    pub(super) photons: &'a PhotonSums,
-    /// Squared relative error that the flux of single photons tells.
-    pub(super) photon_square: f64,
-    pub(super) planned: Option<PlannedNoise>,
-    /// Squared relative error of bundles that photons do not correct.
-    pub(super) bundle_square: f64,
 }
 
 impl PlannedNoise {
@@ -114,6 +102,20 @@ impl PlannedNoise {
         let doubt = removed / (PARTS_PER_DOUBT * (self.rays / 1e5).max(1.0));
         (noise + doubt).max((found - MOST_PLANNED * self.square) / MOST_SURPRISE_FILTERED)
     }
+}
+
+/// What a level consists of.
+#[derive(Clone, Copy)]
+pub(super) struct Layers<'a> {
+    /// Light that bundles carry.
+    pub(super) bundles: Option<&'a ReceiverMaps>,
+    pub(super) photons: &'a PhotonSums,
+    /// Squared relative error that the flux of single photons tells.
+    pub(super) photon_square: f64,
+    /// `None` for photons without a plan.
+    pub(super) planned: Option<PlannedNoise>,
+    /// Squared relative error of bundles that photons do not correct.
+    pub(super) bundle_square: f64,
 }
 
 impl CausticLayer<'_> {

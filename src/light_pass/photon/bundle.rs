@@ -52,8 +52,8 @@ const MAX_STEP_TEXELS: f64 = 0.5;
 /// Maximum number of divisions of a square's sides for its deposit.
 const MAX_DIVISIONS: usize = 64;
 
-/// Largest distance between a curve and its chord in a deposit [texels]. Beside a fold, a sixth of the light of the last
-/// part falls on its dark side.
+/// Largest distance between a curve and its chord in a deposit [texels]. Between a flattened triangle beside a fold and the
+/// next one is a gap of two thirds of it.
 const MAX_CHORD_TEXELS: f64 = 0.06;
 
 /// Relative errors of a deposit: of curves, per distance of a chord over its part of the image's width, and of light that
@@ -62,8 +62,8 @@ const MAX_CHORD_TEXELS: f64 = 0.06;
 const ERROR_PER_CHORD: f64 = 0.65;
 const ERROR_PER_VARIATION: f64 = 0.15;
 
-/// A triangle lies beside a fold if it is moved by more than this part of its size: x(u) = u² moves the first of its parts
-/// by a sixth, and the next by an eighteenth.
+/// A triangle lies beside a fold if it is less than so many times as thick as it is moved: chords of x(u) = u² move the
+/// first part by a sixth of it, and the next by an eighteenth.
 const BESIDE_FOLD: f64 = 12.0;
 
 /// Images at least so wide are smooth enough to be moved by bilinear weights [texels].
@@ -451,7 +451,7 @@ fn centred_on_light(corners: [Predicted; 3]) -> [DVec2; 3] {
     places.map(|place| place + moved)
 }
 
-/// A triangle that was moved by `moved`. Beside a fold, which light does not cross, it is flattened instead, about its
+/// A triangle that was moved by `moved`, roughly [texels]. Beside a fold, which light does not cross, it is flattened instead, about its
 /// middle, so that it reaches no farther than before.
 fn off_fold(corners: [DVec2; 3], moved: DVec2) -> [DVec2; 3] {
     // The triangle is thin across its longest side.

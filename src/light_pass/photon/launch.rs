@@ -246,7 +246,7 @@ impl<'a> PhotonLaunch<'a> {
         matches!(self.domain, Domain::Cells { .. }) || self.lamp_outline().is_some()
     }
 
-    /// Maps the unit square of a lamp that faces one way to half-axes from its centre; `None` for other lights.
+    /// Outline of a lamp that faces one way; `None` for other lights.
     pub(super) fn lamp_outline(&self) -> Option<PanelShape> {
         match &self.domain {
             Domain::Cells { .. } => None,

@@ -25,8 +25,8 @@ const LEVEL: f64 = 0.7;
 /// Highest index of water and other liquids that stand in the open; window glass has a higher one.
 const MOST_LIQUID_IOR: f64 = 1.4;
 
-/// Turns meshes that are wound inwards, leaves out faces that a body has twice, and gives each object of a body that several bound its [`Object::body`].
-/// Returns whether each object bounds a body. `materials`: those of the file.
+/// Turns meshes that are wound inwards, leaves out faces that a body has twice, and gives each object of a body that several
+/// bound its [`Object::body`]. Returns whether each object bounds a body. `materials`: those of the file.
 pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadContext) -> Vec<bool> {
     let material = |object: &Object| &materials[object.material];
     let mut closed = HashMap::new();
@@ -41,7 +41,7 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
         let object = &objects[index];
         if !material(object).transmits() {
             if !material(object).double_sided && is_against_normals(object.mesh()) {
-                turned.remake(&mut objects[index], |mesh| Some(inverted(mesh)));
+                turned.invert(&mut objects[index]);
                 let what = "was wound against its normals; its front is now where these point";
                 load.warn(
                     node(&objects[index]),
@@ -69,7 +69,7 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
         };
         bounds_body[index] = true;
         if volume_m3 < 0.0 {
-            turned.remake(&mut objects[index], |mesh| Some(inverted(mesh)));
+            turned.invert(&mut objects[index]);
             warn_of_turn(&objects[index], load);
         }
     }
@@ -101,7 +101,7 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
             bounds_body[index] = true;
             objects[index].body = first.filter(|_| is_shared);
             if body.signs[&index] < 0 {
-                turned.remake(&mut objects[index], |mesh| Some(inverted(mesh)));
+                turned.invert(&mut objects[index]);
                 warn_of_turn(&objects[index], load);
             }
         }
@@ -171,6 +171,10 @@ impl Remade {
         }
         changed.is_some()
     }
+
+    fn invert(&mut self, object: &mut Object) {
+        self.remake(object, |mesh| Some(inverted(mesh)));
+    }
 }
 
 /// The mesh wound the other way, its normals on the side that its faces point to.
@@ -207,10 +211,10 @@ fn single(mesh: &Mesh) -> Option<Mesh> {
     Some(single)
 }
 
-/// Volume of a closed mesh that bounds a body.
+/// Volume of a mesh that is closed and bounds a body [m³].
 fn body_volume_m3(mesh: InScene, is_closed: bool) -> Option<f64> {
-    let volume_m3 = volume_m3(mesh);
-    (is_closed && has_extent(mesh, volume_m3)).then_some(volume_m3)
+    let volume_m3 = is_closed.then(|| volume_m3(mesh))?;
+    has_extent(mesh, volume_m3).then_some(volume_m3)
 }
 
 /// An edge by its vertices, the lower one first.
