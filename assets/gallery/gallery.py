@@ -60,7 +60,7 @@ def linen(n=256):
     y, x = np.mgrid[0:n, 0:n]
     weave = 0.02 * np.sin(x * np.pi / 2) * np.sin(y * np.pi / 2)
     threads = 0.025 * (noise((n, n), (4, 128), 61, 2) + noise((n, n), (128, 4), 62, 2))
-    return tinted(0.84 + weave + threads, (1, 0.985, 0.955))
+    return tinted(0.62 + weave + threads, (1, 0.955, 0.87))
 
 
 def page(seed, width=384, height=576):
@@ -161,7 +161,7 @@ def sides(x, z, y, inwards):
 def add_room():
     outer_x, outer_z = (ROOM_X[0] - WALL, ROOM_X[1] + WALL), (ROOM_Z[0] - WALL, ROOM_Z[1] + WALL)
     arched_wall('left wall', 'plaster', lambda s, y, d: (ROOM_X[0] - d, y, s), ROOM_Z, HEIGHT, [(z, 0.85, 2.20) for z in (-2.95, -0.75, 1.45)])
-    arched_wall('back wall', 'terracotta', lambda s, y, d: (s, y, ROOM_Z[0] - d), ROOM_X, HEIGHT, [(-0.62, 0.78, 1.30)])
+    arched_wall('back wall', 'terracotta', lambda s, y, d: (s, y, ROOM_Z[0] - d), ROOM_X, HEIGHT, [(-0.72, 0.62, 1.42), (0.70, 0.62, 1.42)])
     # The right wall bends into a vault, which takes the net of the pool.
     spring, width, turn = 1.3, 1.7, np.linspace(0, np.pi / 2, 33)
     profile = np.vstack([[(ROOM_X[1], 0.0)], np.stack([ROOM_X[1] - width * (1 - np.cos(turn)), spring + (HEIGHT - spring) * np.sin(turn)], 1)])
@@ -384,8 +384,8 @@ def add_sky():
 
 def add_cameras():
     file.camera('overview', [-0.11, 1.00, 1.25], [0.155, 0.872, 0.3], 0.72)
-    file.camera('wine glass', [0.16, 1.00, 0.98], [0.19, 0.82, 0.50], 0.50)
-    file.camera('tumbler', [-0.02, 0.98, 0.95], [-0.08, 0.77, 0.60], 0.42)
+    file.camera('wine glass', [0.16, 0.98, 1.10], [0.20, 0.83, 0.50], 0.50)
+    file.camera('tumbler', [-0.02, 0.98, 0.95], [-0.06, 0.79, 0.60], 0.46)
     file.camera('ring', [0.05, 0.97, 1.01], [0.075, 0.765, 0.785], 0.42)
     file.camera('pool', [-1.15, 1.35, 0.05], [0.75, 0.25, -2.3], 1.0)
     file.camera('ceiling', [-0.2, 1.0, -0.2], [1.75, 1.75, -1.5], 0.85)

@@ -24,7 +24,8 @@ use crate::light_pass::photon::subcell_features::SubcellFeatures;
 use crate::light_pass::photon::walk::PhotonRules;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::visibility::VisibleLight;
-use crate::settings::Estimator;
+use crate::scene::LightSize;
+use crate::settings::{ErrorMetric, Estimator};
 use crate::transport::EffectSet;
 
 /// Relative RMSE up to which automatic maps are as fine as in a preview.
@@ -39,6 +40,10 @@ const TEXELS_PER_CELL: f64 = 64.0;
 
 /// Goal of the first level, which gives the first picture.
 const FIRST_GOAL: f64 = 0.2;
+
+/// Root mean square of E relative to its mean up to which that goal is one for the visible error, too. Beyond, it asks for
+/// far more: it is relative to the mean.
+const USUAL_CONCENTRATION: f64 = 5.0;
 
 /// A level aims a little below what is asked: a near miss costs another level, and of levels that differ by chance, one
 /// ends the bake that looks better than it is, by up to a sixth where light is uneven.
@@ -101,9 +106,11 @@ impl CausticLayer<'_> {
             self.sizes
                 .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
         };
-        let (columns, rows) = light
-            .launch
-            .lattice_size(self.map_density_per_sr(), light.reach_m);
+        let density_per_sr = self.map_density_per_sr();
+        let (columns, rows) = light.launch.lattice_size(density_per_sr, light.reach_m);
+        let cells = columns as f64 * rows as f64;
+        // The lattice has whole cells: it is made for a smaller distance than asked for if these are few.
+        let reach_m = || (density_per_sr * light.launch.cell_measure(DVec2::ZERO, DVec2::ONE) / cells).sqrt();
         let pass = FootprintPass {
             launch: &PhotonLaunch::of_cells(light),
             rules: PhotonRules {
@@ -118,7 +125,12 @@ impl CausticLayer<'_> {
                 seed: self.settings.seed,
             },
             chart_for,
-            cells: TEXELS_PER_CELL * columns as f64 * rows as f64,
+            blur_rad: match self.tracer.scene().lights[light.light].size {
+                LightSize::Angle { diameter_rad } => diameter_rad,
+                LightSize::None | LightSize::Radius { .. } => 0.0,
+            },
+            cells: TEXELS_PER_CELL * cells,
+            reach_m: (light.launch.is_fitted() && self.settings.max_error.is_some()).then(reach_m),
         };
         let report = pass.run(context.control);
         context.outcome.count(&report, context.clock);
@@ -170,6 +182,15 @@ impl CausticLayer<'_> {
         (noise2 > wanted2).then_some(rounded)
     }
 
+    /// Goal of a first level towards a visible error: [`FIRST_GOAL`], relative to the root mean square of the light rather
+    /// than to its mean where little of the scene is lit.
+    fn first_visible_goal(&self, context: &BakeContext) -> f64 {
+        let statistics = context.statistics.as_deref();
+        let statistics = statistics.filter(|_| self.settings.error_metric == ErrorMetric::Visible);
+        let concentration = statistics.map_or(1.0, |statistics| statistics.concentration());
+        FIRST_GOAL * (concentration / USUAL_CONCENTRATION).max(1.0)
+    }
+
     /// The level of a light with a goal.
     ///
     /// # Errors
@@ -183,6 +204,9 @@ impl CausticLayer<'_> {
     ) -> Result<BundleLevel> {
         let before = last.map(|last| last.goal).filter(|goal| *goal > 0.0);
         if let Some(goal) = goals.last_mut() {
+            if last.is_none() {
+                *goal = goal.max(self.first_visible_goal(context));
+            }
             *goal = in_time(*goal, before, &light.state, context);
         }
         let key = self.key(light, Some(PhotonAim::Goals(goals.clone())), context);

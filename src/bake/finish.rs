@@ -235,11 +235,7 @@ impl MapAssembler<'_> {
             });
         }
         let size = (chart.width, chart.height);
-        let least = self.direct_size(chart.object())?;
-        let times = (size.0 / least.0)
-            .min(size.1 / least.1)
-            .checked_ilog2()
-            .unwrap_or(0);
+        let times = self.sizes.direct_halvings(chart.object(), size, self.settings) + self.coarsening;
         let of_size = |times: u32| self.sizes.chart(chart.receiver, map_size::halved(size, times));
         let finer = times.min(doublings);
         Some(DirectChart {

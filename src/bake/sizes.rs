@@ -116,6 +116,7 @@ pub struct ChartCache {
     parametrisations: Vec<OnceLock<Option<Arc<Parametrisation>>>>,
     /// Whether each object's mesh is closed.
     closed: Vec<OnceLock<bool>>,
+    core_diagonal_m: OnceLock<Option<f64>>,
     /// Charts by receiver, those used last at the end.
     charts: Mutex<BTreeMap<Receiver, Vec<Arc<Chart>>>>,
     /// Shadow borders of each light on each receiver.
@@ -133,6 +134,7 @@ impl ChartCache {
             scene,
             parametrisations,
             closed,
+            core_diagonal_m: OnceLock::new(),
             charts: Mutex::default(),
             borders: Mutex::default(),
         }
@@ -140,7 +142,11 @@ impl ChartCache {
 
     /// Moves on to an edited copy of the scene, and keeps what belongs to unchanged shapes.
     pub fn edited(self, scene: Arc<Scene>, changed: &[usize]) -> Self {
-        let mut sizes = Self { scene, ..self };
+        let mut sizes = Self {
+            scene,
+            core_diagonal_m: OnceLock::new(),
+            ..self
+        };
         for &object in changed {
             sizes.parametrisations[object] = OnceLock::new();
             sizes.closed[object] = OnceLock::new();
@@ -248,15 +254,25 @@ impl ChartCache {
     }
 
     /// Number of doublings from the first size of a receiver's map until its texels are no larger than the mean
-    /// footprint (section 3.1.1 of the paper), or until its longer side reaches `largest_side`. `None` if no footprint
-    /// was seen.
+    /// footprint (section 3.1.1 of the paper) or detail, or until its longer side reaches `largest_side`. `None` if no
+    /// footprint was seen.
+    ///
+    /// In a map without tiles, a detail on a small lit part costs fine texels everywhere. Of side h, they have an error
+    /// proportional to h times that part, and their number is proportional to 1/h²: the sum of both is least where h³ is
+    /// inversely proportional to the part.
     pub fn doublings(
         &self,
         receiver: Receiver,
         statistics: &FootprintStatistics,
         largest_side: usize,
     ) -> Option<u32> {
-        let share = statistics.mean(receiver)?.map_share;
+        let footprint_share = statistics.mean(receiver)?.map_share;
+        let is_tileable = self.parametrisation(receiver.object())?.is_uniform();
+        let detail_share = statistics.detail(receiver).map_or(1.0, |detail| {
+            let lit_share = if is_tileable { 1.0 } else { detail.lit_share };
+            detail.map_share / lit_share.powf(2.0 / 3.0)
+        });
+        let share = footprint_share.min(detail_share);
         let (width, height) = self.doubled_size(receiver.object(), 0)?;
         let coarse = |times: u32| ((width * height) << (2 * times)) as f64 * share < 1.0;
         let small = |times: u32| width.max(height) << times < largest_side;
@@ -281,22 +297,28 @@ impl ChartCache {
         Some((width << times, height << times))
     }
 
-    /// How often a map can be halved before direct light on it is coarser than on a map of its own.
+    /// How often a map can be halved before direct light on it is coarser than on a map of its own, or than on a map of
+    /// the first size: a caustic lies beside the shadow of its caster.
     pub fn direct_halvings(&self, object: usize, size: (usize, usize), settings: &BakeSettings) -> u32 {
-        let Some((width, height)) = self.direct_size(object, settings) else {
-            return 0;
+        let halvings = |(width, height): (usize, usize)| {
+            (size.0 / width).min(size.1 / height).checked_ilog2().unwrap_or(0)
         };
-        (size.0 / width).min(size.1 / height).checked_ilog2().unwrap_or(0)
+        let least = self
+            .direct_size(object, settings)
+            .zip(self.doubled_size(object, 0));
+        least.map_or(0, |(own, first)| halvings(own).min(halvings(first)))
     }
 
-    /// The size of a map that holds direct light only: texels of 1/400 of the scene's diagonal, or as requested.
+    /// The size of a map that holds direct light only: texels of 1/400 of the scene's diagonal, or as requested. Objects
+    /// that dwarf the others do not make those coarser.
     pub fn direct_size(&self, object: usize, settings: &BakeSettings) -> Option<(usize, usize)> {
         if let MapResolution::Fixed { width, height } = settings.map_resolution {
             return Some((width, height));
         }
         let parametrisation = self.parametrisation(object)?;
-        let (low, high) = self.scene.bounds()?;
-        let texel_m = (high - low).length() / 400.0;
+        let (low, high) = self.scene.objects[object].bounds()?;
+        let core_m = self.core_diagonal_m.get_or_init(|| self.scene.core_diagonal_m());
+        let texel_m = low.distance(high).max((*core_m)?) / 400.0;
         let texels = parametrisation.area_m2() / (texel_m * texel_m);
         let side = |wanted: f64| (wanted.max(8.0).log2().round().exp2() as usize).min(1024);
         let aspect = parametrisation.suggested_aspect;
@@ -312,6 +334,9 @@ impl ChartCache {
             return Some(SizeRequest::dense(size));
         };
         let finest = (size.0 << doublings, size.1 << doublings);
+        if !map_size::is_divisible(finest) {
+            return Some(SizeRequest::dense(size));
+        }
         let (columns, rows) = tile_counts(finest.0, finest.1);
         let mut tiles = vec![TileDemand::NOTHING; columns * rows];
         borders.refine(finest, 0, &mut tiles);
@@ -332,12 +357,7 @@ impl ChartCache {
             return 0;
         };
         let most = (LARGEST_TILED_SIDE / size.0.max(size.1)).checked_ilog2();
-        let doublings = border_doublings(settings).min(most.unwrap_or(0));
-        if map_size::is_divisible((size.0 << doublings, size.1 << doublings)) {
-            doublings
-        } else {
-            0
-        }
+        border_doublings(settings).min(most.unwrap_or(0))
     }
 
     /// Shadow borders of all lights on a receiver; `None` if there are none.
@@ -367,11 +387,7 @@ impl ChartCache {
             .filter(may_be_tiled)
             .filter_map(|receiver| {
                 let size = self.direct_size(receiver.object(), settings)?;
-                let (width, height) = map_size::halved(size, 1);
-                let doublings = border_doublings(settings);
-                map_size::is_divisible((size.0 << doublings, size.1 << doublings))
-                    .then(|| self.chart(receiver, (width, height)))
-                    .flatten()
+                self.chart(receiver, map_size::halved(size, 1))
             })
             .collect();
         let mut shadow_rays = 0;

@@ -22,8 +22,15 @@ pub struct FootprintSample {
     pub bounds: (DVec2, DVec2),
     /// [W].
     pub flux_w: f64,
-    /// Share of the whole map that one of its details covers, > 0.
+    /// Share of the whole map that one of its details covers, > 0: a footprint, or less.
     pub map_share: f64,
+}
+
+impl FootprintSample {
+    /// Share of the map that it lights, as a triangle: half of its bounds.
+    fn lit_share(&self) -> f64 {
+        (0.5 * (self.bounds.1 - self.bounds.0).element_product()).max(self.map_share)
+    }
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,6 +47,15 @@ pub struct MeanFootprint {
     pub area_m2: f64,
     /// Share of the whole map that it covers.
     pub map_share: f64,
+}
+
+/// How detailed the light of one receiver is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightDetail {
+    /// Flux-weighted geometric mean of the share of the whole map that a detail covers.
+    pub map_share: f64,
+    /// Share of the map that the light would cover if all of it were as bright as its flux-weighted geometric mean.
+    pub lit_share: f64,
 }
 
 /// Footprints below this share of a map are clamped to it: a focus must not demand unlimited texels.
@@ -113,6 +129,42 @@ impl FootprintStatistics {
         Some(MeanFootprint {
             area_m2: (sums.log_area_m2 / sums.flux).exp(),
             map_share: (sums.log_area_share / sums.flux).exp(),
+        })
+    }
+
+    /// Root mean square of E over all receivers that are lit, relative to its mean: large where bright light lies in wide
+    /// and nearly dark surroundings.
+    pub fn concentration(&self) -> f64 {
+        let (mut flux_w, mut area_m2, mut square) = (0.0, 0.0, 0.0);
+        for &receiver in self.receivers.keys() {
+            let Some(mean) = self.mean(receiver) else {
+                continue;
+            };
+            let receiver_m2 = mean.area_m2 / mean.map_share;
+            area_m2 += receiver_m2;
+            for spot in self.spots(receiver) {
+                flux_w += spot.flux_w;
+                square += spot.flux_w * (spot.flux_w / (spot.lit_share() * receiver_m2));
+            }
+        }
+        if flux_w > 0.0 {
+            (area_m2 * square).sqrt() / flux_w
+        } else {
+            1.0
+        }
+    }
+
+    /// The details of the light on a receiver; `None` if nothing is known of them.
+    pub fn detail(&self, receiver: Receiver) -> Option<LightDetail> {
+        let (mut flux, mut log_share, mut log_brightness) = (0.0, 0.0, 0.0);
+        for spot in self.spots(receiver) {
+            flux += spot.flux_w;
+            log_share += spot.flux_w * spot.map_share.ln();
+            log_brightness += spot.flux_w * (spot.flux_w / spot.lit_share()).ln();
+        }
+        (flux > 0.0).then(|| LightDetail {
+            map_share: (log_share / flux).exp(),
+            lit_share: (flux / (log_brightness / flux).exp()).min(1.0),
         })
     }
 

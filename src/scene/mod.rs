@@ -154,6 +154,26 @@ impl Scene {
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
+    /// Diagonal of the bounding box without objects that dwarf all others together, such as a sky dome around a house [m];
+    /// `None` without vertices.
+    pub fn core_diagonal_m(&self) -> Option<f64> {
+        let length = |(low, high): &(DVec3, DVec3)| low.distance(*high);
+        let mut boxes: Vec<(DVec3, DVec3)> =
+            self.objects.iter().filter_map(|object| object.bounds()).collect();
+        boxes.sort_by(|a, b| length(a).total_cmp(&length(b)));
+        let mut boxes = boxes.into_iter();
+        let mut all = boxes.next()?;
+        let mut core_m = length(&all);
+        for next in boxes {
+            let is_dwarfing = length(&next) > DWARFING * length(&all);
+            all = (all.0.min(next.0), all.1.max(next.1));
+            if !is_dwarfing {
+                core_m = length(&all);
+            }
+        }
+        Some(core_m)
+    }
+
     /// Number of triangles of all objects.
     pub fn triangle_count(&self) -> usize {
         self.objects
@@ -162,6 +182,10 @@ impl Scene {
             .sum()
     }
 }
+
+/// An object so many times longer than the box of all smaller ones dwarfs them: walls are up to three times as long as
+/// the furniture between them.
+const DWARFING: f64 = 4.0;
 
 /// Hashes text in words of eight bytes.
 #[derive(Default)]

@@ -257,7 +257,8 @@ impl Bundle {
         let Shape::Whole(nodes) = &self.shape else {
             return 0.0;
         };
-        let (divisions, left) = Image::of(nodes).divisions(self.flux_w * weight, allowed);
+        let image = Image::of(nodes).blurred(self.shift.lamp_width());
+        let (divisions, left) = image.divisions(self.flux_w * weight, allowed);
         self.divisions = divisions;
         left
     }
@@ -495,6 +496,8 @@ pub(super) struct Image {
     pub(super) bend: f64,
     /// Largest difference of irradiance between quarters, relative to their mean.
     variation: f64,
+    /// Width of the lamp's image [texels].
+    blur: f64,
 }
 
 impl Image {
@@ -532,30 +535,41 @@ impl Image {
             width: area / length.max(1e-9),
             bend,
             variation: 4.0 * (brightest - darkest) / (brightest + darkest).max(f64::MIN_POSITIVE),
+            blur: 0.0,
         }
+    }
+
+    /// For a lamp whose image has this width [texels].
+    fn blurred(self, blur: f64) -> Self {
+        Self { blur, ..self }
     }
 
     pub(super) fn is_smooth(&self) -> bool {
         self.width >= SMOOTH_TEXELS
     }
 
-    /// Texels that the image covers, at least one along each axis.
+    /// Finest detail of a deposit that is seen [texels]: a texel, or the image of the lamp.
+    fn detail(&self) -> f64 {
+        self.blur.max(1.0)
+    }
+
+    /// Texels that the image covers, at least one detail along each axis.
     fn spread_texels(&self) -> f64 {
-        self.length.max(1.0) * self.width.max(1.0)
+        self.length.max(self.detail()) * self.width.max(self.detail())
     }
 
     /// Squared error that a deposit in n² parts of this flux leaves, and the least n for which it is at most
     /// `allowed`: chords in the place of curves, and even light in each triangle.
     fn divisions(&self, flux: f64, allowed: f64) -> (usize, f64) {
-        let least = (self.bend / MAX_CHORD_TEXELS)
+        let least = (self.bend / (MAX_CHORD_TEXELS * self.detail()))
             .sqrt()
             .ceil()
             .clamp(1.0, MAX_DIVISIONS as f64) as usize;
         let error = |divisions: usize| {
             let parts = divisions as f64;
             let chord = self.bend / (parts * parts);
-            let moved = (ERROR_PER_CHORD * chord / (self.width / parts).max(1.0)).min(1.0);
-            let shade = if self.length / parts < 1.0 {
+            let moved = (ERROR_PER_CHORD * chord / (self.width / parts).max(self.detail())).min(1.0);
+            let shade = if self.length / parts < self.detail() {
                 0.0
             } else {
                 ERROR_PER_VARIATION * self.variation / parts
@@ -603,6 +617,7 @@ mod tests {
             receiver: Receiver::front(0),
             island: 0,
             is_dispersed: false,
+            leg_m: 1.0,
         }
     }
 
@@ -684,5 +699,10 @@ mod tests {
             assert!(bundle.divisions > before, "{} divisions", bundle.divisions);
             before = bundle.divisions;
         }
+
+        // No finer than the lamp shows it.
+        bundle.shift.lamp = [Vec2::X * 2.0, Vec2::Y * 2.0];
+        bundle.plan_deposit(1.0, 1e-8);
+        assert!(bundle.divisions < before, "{} divisions", bundle.divisions);
     }
 }

@@ -76,6 +76,8 @@ pub(super) struct Route {
     pub(super) island: u32,
     /// Whether a surface on the way separates wavelengths.
     pub(super) is_dispersed: bool,
+    /// From the last surface on the way to the receiver, at one point of the path [m].
+    pub(super) leg_m: f32,
 }
 
 /// Light of a point at the end of one path.
@@ -273,6 +275,7 @@ impl PathFinder<'_> {
                 receiver,
                 island,
                 is_dispersed: light.is_dispersed,
+                leg_m: hit.distance_m as f32,
             },
             place: chart.place(hit.triangle, hit.barycentric),
             flux_w: LinearSrgb::BLACK,

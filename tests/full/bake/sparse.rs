@@ -5,11 +5,12 @@ use std::f64::consts::TAU;
 use glam::{DQuat, DVec3};
 use nephroid::bake::{BYTES_PER_TEXEL, Bake};
 use nephroid::illumination::IlluminationMap;
+use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
 use nephroid::scene::Scene;
-use nephroid::scene::builtin::parts;
-use nephroid::settings::{BakeSettings, LayerKind};
-use nephroid::units::Flux;
+use nephroid::scene::builtin::{parts, shapes};
+use nephroid::settings::{BakeSettings, ErrorMetric, LayerKind};
+use nephroid::units::{Flux, Irradiance};
 
 use crate::bake::common::{
     CAUSTIC_AND_DIRECT, all_bits, assert_same, automatic, estimate, rmse, session, sized, torus, with_layers,
@@ -176,6 +177,50 @@ fn tiles_keep_bits_and_direct_light() {
         (in_tiles / whole - 1.0).abs() < 2e-3,
         "{in_tiles} W, dense {whole} W"
     );
+}
+
+/// A ball of glass on a table in the sun, and the ground that stretches around it.
+fn ball_in_the_sun(ground_m: Option<f64>) -> Scene {
+    let mut scene = parts::reference_scene(0.5);
+    let ball = shapes::sphere(DVec3::Y * 0.08, 0.06, 5);
+    parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
+    if let Some(side_m) = ground_m {
+        let extent = [-0.5 * side_m, 0.5 * side_m];
+        let ground = shapes::floor(extent, extent, -0.7);
+        parts::add(
+            &mut scene,
+            "ground",
+            ground,
+            parts::matte("soil", LinearSrgb::grey(0.3)),
+        );
+    }
+    let direction = DVec3::new(0.3, -1.0, 0.2).normalize();
+    scene.lights.push(parts::sun("sun", direction, Irradiance(1.0)));
+    scene
+}
+
+/// Neither caustics nor shadows on a table get coarser because of what lies far away.
+#[test]
+fn a_wide_landscape_leaves_small_things_fine() {
+    let settings = set(with_layers(&CAUSTIC_AND_DIRECT, auto(0.1)), |s| {
+        s.error_metric = ErrorMetric::Visible;
+    });
+    let alone = ball_in_the_sun(None);
+    let (width, _) = floor_size(&alone, &bake(alone.clone(), &settings));
+    let scene = ball_in_the_sun(Some(400.0));
+    let wide = bake(scene.clone(), &settings);
+    let (wide_width, _) = floor_size(&scene, &wide);
+    assert!(2 * wide_width >= width, "{wide_width} texels, alone {width}");
+    let floor = map_of(&wide, &scene, "floor").dense();
+    let direct = floor.layer(LayerKind::Direct).expect("direct light");
+    let (dark, bright) = direct
+        .irradiance
+        .iter()
+        .map(|e| e[1])
+        .fold((f32::INFINITY, 0.0_f32), |(low, high), e| {
+            (low.min(e), high.max(e))
+        });
+    assert!(dark < 0.01 * bright, "{dark} in the shadow, {bright} beside it");
 }
 
 /// Texels of automatic maps for a target.
