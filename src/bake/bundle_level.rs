@@ -182,10 +182,9 @@ impl CausticLayer<'_> {
         (noise2 > wanted2).then_some(rounded)
     }
 
-    /// Goal of a first level towards a visible error: [`FIRST_GOAL`], relative to the root mean square of the light rather
-    /// than to its mean where little of the scene is lit.
-    fn first_visible_goal(&self, context: &BakeContext) -> f64 {
-        let statistics = context.statistics.as_deref();
+    /// Minimum goal of first levels: [`FIRST_GOAL`]; towards a visible error relative to the root mean square of the light
+    /// rather than to its mean where little of the scene is lit.
+    pub(super) fn first_goal(&self, statistics: Option<&FootprintStatistics>) -> f64 {
         let statistics = statistics.filter(|_| self.settings.error_metric == ErrorMetric::Visible);
         let concentration = statistics.map_or(1.0, |statistics| statistics.concentration());
         FIRST_GOAL * (concentration / USUAL_CONCENTRATION).max(1.0)
@@ -205,7 +204,7 @@ impl CausticLayer<'_> {
         let before = last.map(|last| last.goal).filter(|goal| *goal > 0.0);
         if let Some(goal) = goals.last_mut() {
             if last.is_none() {
-                *goal = goal.max(self.first_visible_goal(context));
+                *goal = goal.max(context.first_goal);
             }
             *goal = in_time(*goal, before, &light.state, context);
         }

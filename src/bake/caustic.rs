@@ -137,6 +137,8 @@ pub(super) struct BakeContext<'a> {
     pub(super) sizes: Sizes,
     /// Mean footprints, if needed.
     pub(super) statistics: Option<Arc<FootprintStatistics>>,
+    /// Minimum goal of first levels.
+    pub(super) first_goal: f64,
     /// What each light may keep besides its last maps, of coarser levels and again of squares [bytes].
     pub(super) spare_bytes: u64,
     /// Lights that are still being refined.
@@ -215,6 +217,7 @@ impl CausticLayer<'_> {
             role,
             sizes: Sizes::default(),
             statistics: None,
+            first_goal: 0.0,
             spare_bytes: 0,
             open_lights: lights.len(),
         };

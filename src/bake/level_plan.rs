@@ -172,6 +172,7 @@ impl CausticLayer<'_> {
         }
         context.statistics = known.as_ref().map(|(_, statistics)| Arc::clone(statistics));
         let statistics = context.statistics.as_deref();
+        context.first_goal = self.first_goal(statistics);
         (context.sizes, context.outcome.warnings) = self.map_sizes(statistics);
         context.spare_bytes = self.spare_bytes(&context.sizes, statistics);
         Ok(())

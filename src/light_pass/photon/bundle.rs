@@ -6,6 +6,7 @@
 
 use glam::{DVec2, Vec2};
 
+use super::image::{Image, SMOOTH_TEXELS};
 use super::paths::{PathEnd, PointPaths, Route};
 use crate::illumination::Receiver;
 use crate::light_pass::coverage::FluxTriangle;
@@ -49,25 +50,9 @@ const HUE_PARTS: (f64, f64) = (16.0, 64.0);
 /// Maximum distance between the arrivals from neighbouring parts of a lamp [texels]. A larger lamp is left to photons.
 const MAX_STEP_TEXELS: f64 = 0.5;
 
-/// Maximum number of divisions of a square's sides for its deposit.
-const MAX_DIVISIONS: usize = 64;
-
-/// Largest distance between a curve and its chord in a deposit [texels]. Between a flattened triangle beside a fold and the
-/// next one is a gap of two thirds of it.
-const MAX_CHORD_TEXELS: f64 = 0.06;
-
-/// Relative errors of a deposit: of curves, per distance of a chord over its part of the image's width, and of light that
-/// varies, per variation in a part. With these, deposits of the built-in scenes with a reference have half to nine tenths
-/// of the planned error, at 32 x 32 and 256 x 256.
-const ERROR_PER_CHORD: f64 = 0.65;
-const ERROR_PER_VARIATION: f64 = 0.15;
-
 /// A triangle lies beside a fold if it is less than so many times as thick as it is moved: chords of x(u) = u² move the
 /// first part by a sixth of it, and the next by an eighteenth.
 const BESIDE_FOLD: f64 = 12.0;
-
-/// Images at least so wide are smooth enough to be moved by bilinear weights [texels].
-const SMOOTH_TEXELS: f64 = 1.5;
 
 /// Light at one point of a bundle.
 #[derive(Clone, Copy, Debug)]
@@ -480,107 +465,6 @@ fn off_fold(corners: [DVec2; 3], moved: DVec2) -> [DVec2; 3] {
     let flattened = if mean > distance { distance / mean } else { 1.0 };
     let back = distance.min(mean);
     std::array::from_fn(|corner| corners[corner] + along * (behind[corner] * flattened - back))
-}
-
-/// The four quarters of a square, as nodes row by row.
-const QUARTERS: [[usize; 4]; 4] = [[0, 1, 3, 4], [1, 2, 4, 5], [3, 4, 6, 7], [4, 5, 7, 8]];
-
-/// Size of the image of a whole square on the map.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Image {
-    /// Longest side along an axis of the map [texels].
-    length: f64,
-    /// Area over length [texels].
-    width: f64,
-    /// Largest deviation of a node from the middle between its neighbours [texels].
-    pub(super) bend: f64,
-    /// Largest difference of irradiance between quarters, relative to their mean.
-    variation: f64,
-    /// Width of the lamp's image [texels].
-    blur: f64,
-}
-
-impl Image {
-    pub(super) fn of(nodes: &[Node; 9]) -> Self {
-        let place = |node: usize| nodes[node].place.as_dvec2();
-        let (mut low, mut high) = (place(0), place(0));
-        for node in 1..9 {
-            low = low.min(place(node));
-            high = high.max(place(node));
-        }
-        let mut bend = 0.0_f64;
-        for [a, b, c] in [[0, 1, 2], [3, 4, 5], [6, 7, 8], [0, 3, 6], [1, 4, 7], [2, 5, 8]] {
-            bend = bend.max((0.5 * (place(a) + place(c)) - place(b)).abs().max_element());
-        }
-
-        // Area and irradiance of each quarter.
-        let (mut area, mut darkest, mut brightest) = (0.0, f64::INFINITY, 0.0_f64);
-        for [a, b, c, d] in QUARTERS {
-            let across = place(b) - place(a);
-            let diagonal = place(d) - place(a);
-            let down = place(c) - place(a);
-            let quarter = 0.5 * (across.perp_dot(diagonal).abs() + diagonal.perp_dot(down).abs());
-            let flux_w: f64 = [a, b, c, d]
-                .iter()
-                .map(|&node| nodes[node].flux_w().max_channel())
-                .sum();
-            let light = flux_w / quarter.max(1e-12);
-            darkest = darkest.min(light);
-            brightest = brightest.max(light);
-            area += quarter;
-        }
-        let length = (high - low).max_element();
-        Self {
-            length,
-            width: area / length.max(1e-9),
-            bend,
-            variation: 4.0 * (brightest - darkest) / (brightest + darkest).max(f64::MIN_POSITIVE),
-            blur: 0.0,
-        }
-    }
-
-    /// For a lamp whose image has this width [texels].
-    fn blurred(self, blur: f64) -> Self {
-        Self { blur, ..self }
-    }
-
-    pub(super) fn is_smooth(&self) -> bool {
-        self.width >= SMOOTH_TEXELS
-    }
-
-    /// Finest detail of a deposit that is seen [texels]: a texel, or the image of the lamp.
-    fn detail(&self) -> f64 {
-        self.blur.max(1.0)
-    }
-
-    /// Texels that the image covers, at least one detail along each axis.
-    fn spread_texels(&self) -> f64 {
-        self.length.max(self.detail()) * self.width.max(self.detail())
-    }
-
-    /// Squared error that a deposit in n² parts of this flux leaves, and the least n for which it is at most
-    /// `allowed`: chords in the place of curves, and even light in each triangle.
-    fn divisions(&self, flux: f64, allowed: f64) -> (usize, f64) {
-        let least = (self.bend / (MAX_CHORD_TEXELS * self.detail()))
-            .sqrt()
-            .ceil()
-            .clamp(1.0, MAX_DIVISIONS as f64) as usize;
-        let error = |divisions: usize| {
-            let parts = divisions as f64;
-            let chord = self.bend / (parts * parts);
-            let moved = (ERROR_PER_CHORD * chord / (self.width / parts).max(self.detail())).min(1.0);
-            let shade = if self.length / parts < self.detail() {
-                0.0
-            } else {
-                ERROR_PER_VARIATION * self.variation / parts
-            };
-            flux * flux / self.spread_texels() * (moved * moved + shade * shade)
-        };
-        let divisions = (least..MAX_DIVISIONS)
-            .find(|&n| error(n) <= allowed)
-            .unwrap_or(MAX_DIVISIONS);
-        (divisions, error(divisions))
-    }
 }
 
 /// A triangle of flux for the map of a bundle's receiver.

@@ -15,6 +15,7 @@ pub mod domain;
 mod edge;
 pub mod filter;
 pub mod footprints;
+mod image;
 pub mod launch;
 pub mod pass;
 mod paths;

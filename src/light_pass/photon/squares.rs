@@ -9,8 +9,9 @@ use std::sync::Arc;
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::bundle::{Bundle, Image, MEAN_WEIGHTS, NEAREST_WEIGHTS, Node, Shape, biquadratic};
+use super::bundle::{Bundle, MEAN_WEIGHTS, NEAREST_WEIGHTS, Node, Shape, biquadratic};
 use super::domain::{DomainPoint, LAST_LEVEL, LitCells, PointHash, SquarePlace};
+use super::image::Image;
 use super::paths::{Chain, PathEnd, PathFinder, PointPaths, Route};
 use super::subcell_features::SubcellFeatures;
 use crate::progress::Control;
