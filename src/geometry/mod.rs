@@ -2,6 +2,7 @@
 
 pub mod bvh;
 pub mod cube_face;
+mod disjoint_sets;
 pub mod enclosure;
 pub mod frustum;
 pub mod polygon;
@@ -11,6 +12,7 @@ pub mod triangle;
 mod wide;
 
 pub use bvh::{PackedBvh, PackedNode, TriangleBvh};
+pub use disjoint_sets::DisjointSets;
 pub use frustum::Frustum;
 pub use ray::Ray;
 

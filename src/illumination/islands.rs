@@ -7,6 +7,7 @@ use glam::DVec2;
 
 use super::Chart;
 use super::parametrisation::coverage;
+use crate::geometry::DisjointSets;
 
 /// Marks a texel that several islands share.
 const SHARED: u32 = u32::MAX;
@@ -77,30 +78,16 @@ impl Islands {
     }
 }
 
-/// The smallest triangle index of each triangle's island. Triangles that share a corner position are connected.
+/// The island of each triangle, counted from 0. Triangles that share a corner position are connected.
 fn connect(corner_uvs: &[[DVec2; 3]]) -> Vec<u32> {
-    let mut parent: Vec<u32> = (0..corner_uvs.len() as u32).collect();
-    let mut at: HashMap<(u64, u64), u32> = HashMap::new();
+    let mut islands = DisjointSets::new(corner_uvs.len());
+    let mut at: HashMap<(u64, u64), usize> = HashMap::new();
     for (triangle, corners) in corner_uvs.iter().enumerate() {
         for corner in corners {
             // Adding zero turns −0 into +0.
             let place = ((corner.x + 0.0).to_bits(), (corner.y + 0.0).to_bits());
-            let other = *at.entry(place).or_insert(triangle as u32);
-            let (a, b) = (root(&mut parent, triangle as u32), root(&mut parent, other));
-            parent[a.max(b) as usize] = a.min(b);
+            islands.join(triangle, *at.entry(place).or_insert(triangle));
         }
     }
-    (0..parent.len() as u32)
-        .map(|triangle| root(&mut parent, triangle))
-        .collect()
-}
-
-/// Root of a triangle's set in the union-find forest; halves the path to it.
-pub(crate) fn root(parent: &mut [u32], mut triangle: u32) -> u32 {
-    while parent[triangle as usize] != triangle {
-        let above = parent[parent[triangle as usize] as usize];
-        parent[triangle as usize] = above;
-        triangle = above;
-    }
-    triangle
+    islands.sets()
 }

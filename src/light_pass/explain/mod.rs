@@ -17,6 +17,7 @@ use glam::{DMat2, DVec2, DVec3};
 
 use self::search::{LitCell, TexelSearch};
 use self::walk::{LightPathWalker, WalkedPath};
+use crate::geometry::DisjointSets;
 use crate::geometry::sampling::even_point;
 use crate::light_pass::direct::bake_direct;
 use crate::light_pass::path::PathSignature;
@@ -210,31 +211,23 @@ fn explain_light(
 
 /// Groups of pieces that are connected by corners and lie on the same path.
 fn connected(pieces: Vec<LitCell>) -> Vec<Vec<LitCell>> {
-    let mut groups: Vec<usize> = (0..pieces.len()).collect();
-    fn root(groups: &mut [usize], mut at: usize) -> usize {
-        while groups[at] != at {
-            groups[at] = groups[groups[at]];
-            at = groups[at];
-        }
-        at
-    }
+    let mut groups = DisjointSets::new(pieces.len());
     let mut owner: HashMap<(usize, PathSignature, [u64; 2]), usize> = HashMap::new();
     for (index, piece) in pieces.iter().enumerate() {
         for corner in piece.corners {
-            let other = *owner.entry((piece.face, piece.way, corner)).or_insert(index);
-            let (a, b) = (root(&mut groups, index), root(&mut groups, other));
-            groups[a.max(b)] = a.min(b);
+            groups.join(
+                index,
+                *owner.entry((piece.face, piece.way, corner)).or_insert(index),
+            );
         }
     }
     let mut together: Vec<Vec<LitCell>> = Vec::new();
-    let mut number: HashMap<usize, usize> = HashMap::new();
-    for (index, piece) in pieces.into_iter().enumerate() {
-        let group = root(&mut groups, index);
-        let at = *number.entry(group).or_insert_with(|| {
+    for (piece, group) in pieces.into_iter().zip(groups.sets()) {
+        let group = group as usize;
+        if group == together.len() {
             together.push(Vec::new());
-            together.len() - 1
-        });
-        together[at].push(piece);
+        }
+        together[group].push(piece);
     }
     together
 }
