@@ -1,5 +1,7 @@
 //! `--help`: examples first, then one line for each option. `-h` leaves out rare ones.
 
+use std::ffi::OsString;
+
 use clap::CommandFactory;
 
 use super::Arguments;
@@ -98,7 +100,7 @@ nephroid study accuracy -o study",
 ];
 
 /// The help that a command line asks for.
-pub fn text(words: impl Iterator<Item = String>) -> String {
+pub fn text(words: impl Iterator<Item = OsString>) -> String {
     let mut command = <Arguments as CommandFactory>::command();
     command.build();
     // Descend to the subcommand that the words name.

@@ -120,7 +120,7 @@ fn parse_and_run() -> Result<ExitCode> {
             ) =>
         {
             let text = match error.kind() {
-                ClapErrorKind::DisplayHelp => help::text(std::env::args().skip(1)),
+                ClapErrorKind::DisplayHelp => help::text(std::env::args_os().skip(1)),
                 _ => error.render().to_string(),
             };
             console::print(text.trim_end())?;
@@ -156,6 +156,13 @@ fn report(error: &Error) -> ExitCode {
 
 /// Clap's report as one line, without its usage block.
 fn in_one_sentence(error: &clap::Error) -> Error {
+    if error.kind() == ClapErrorKind::InvalidUtf8 {
+        let words: Vec<String> = std::env::args_os()
+            .filter_map(|word| word.into_string().err())
+            .map(|word| format!("`{}`", word.display()))
+            .collect();
+        return Error::usage(words.join(", "), "this name is not UTF-8", "rename the file");
+    }
     let report = error.render().to_string();
     let what: Vec<&str> = report
         .lines()

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3, DVec4};
 
-use super::{Mesh, Scene, Waves};
+use super::{Mesh, Scene, Waves, contacts};
 
 /// Animated part of a node's transform.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -185,8 +185,8 @@ impl Scene {
         (!ways.is_empty()).then(|| ways.join(", "))
     }
 
-    /// The scene at a time [s] after this one: waves advanced, nodes posed by their keyframes. Whatever does not move
-    /// is shared.
+    /// The scene at a time [s] after this one: waves advanced, nodes posed by their keyframes, surfaces that now meet set
+    /// apart. Whatever does not move is shared.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Self {
         let mut scene = self.clone();
@@ -197,6 +197,10 @@ impl Scene {
             scene.carry(clip, &clip.moved(time_s));
         }
         scene.displace_by_waves();
+        if self.clip.is_some() {
+            let covering = contacts::set_apart(&mut scene, Some(self));
+            scene.warnings.extend(covering);
+        }
         scene
     }
 

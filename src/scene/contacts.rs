@@ -65,9 +65,10 @@ struct Contact {
 /// Movements of vertices [m], by body and place.
 type Steps = HashMap<(usize, [u64; 3]), Vec<DVec3>>;
 
-/// Sets apart all surfaces that meet. Returns a warning of those that cover others.
-pub fn set_apart(scene: &mut Scene) -> Option<Warning> {
-    let faces = faces(scene);
+/// Sets apart all surfaces that meet, but for objects that both stand as `before`, where that was done. Returns a warning
+/// of those that cover others.
+pub fn set_apart(scene: &mut Scene, before: Option<&Scene>) -> Option<Warning> {
+    let faces = faces(scene, before);
     let contacts = contacts(&faces);
     if contacts.is_empty() {
         return None;
@@ -84,8 +85,13 @@ pub fn set_apart(scene: &mut Scene) -> Option<Warning> {
     warning
 }
 
-/// All triangles within the bounding box of another object.
-fn faces(scene: &Scene) -> Vec<Face> {
+/// All triangles within the bounding box of another object, one of the two not standing as `before`.
+fn faces(scene: &Scene, before: Option<&Scene>) -> Vec<Face> {
+    let is_new = |object: usize| {
+        let was = before.and_then(|before| before.objects.get(object));
+        was.is_none_or(|was| !scene.objects[object].stands_as(was))
+    };
+    let is_new: Vec<bool> = (0..scene.objects.len()).map(is_new).collect();
     let boxes = scene
         .objects
         .iter()
@@ -104,8 +110,9 @@ fn faces(scene: &Scene) -> Vec<Face> {
     let of_object = |object: usize| {
         let is_near = |&(low, high): &Bounds| {
             !all_within(&near, (low, high), |slot| {
-                near.triangle(slot) as usize == object
-                    || !overlap(boxes[near.triangle(slot) as usize], (low, high))
+                let other = near.triangle(slot) as usize;
+                let may_meet = other != object && (is_new[object] || is_new[other]);
+                !(may_meet && overlap(boxes[other], (low, high)))
             })
         };
         let mut faces = Vec::new();

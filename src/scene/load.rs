@@ -117,7 +117,7 @@ pub fn share(before: &Scene, now: &mut Scene) -> bool {
 /// Reads a file. Only there do surfaces meet without an order: those of built-in scenes are placed to have one.
 fn load_file(source: &str, options: &LoadOptions) -> Result<Scene> {
     let mut scene = gltf::load(Path::new(source), options)?;
-    let covering = contacts::set_apart(&mut scene);
+    let covering = contacts::set_apart(&mut scene, None);
     scene.warnings.extend(covering);
     Ok(scene)
 }

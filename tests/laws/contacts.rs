@@ -56,7 +56,7 @@ pub fn fill(t: &mut Table) {
 }
 
 fn apart(mut scene: Scene) -> Scene {
-    let warnings = contacts::set_apart(&mut scene);
+    let warnings = contacts::set_apart(&mut scene, None);
     scene.warnings.extend(warnings);
     scene
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use super::context::LoadContext;
 use crate::geometry::sampling::even_point;
 use crate::geometry::triangle::ShearedRay;
-use crate::geometry::{Ray, TriangleBvh, bits, numbered};
+use crate::geometry::{DisjointSets, Ray, TriangleBvh, bits, numbered};
 use crate::scene::watertight::{has_extent, is_closed, volume_m3};
 use crate::scene::{InScene, Material, Mesh, Object};
 
@@ -18,6 +18,9 @@ const WELD: f64 = 1.0 / (1 << 20) as f64;
 
 /// Samples of an open sheet, and rays below each, that tell whether something holds what is below it.
 const SAMPLES: u32 = 16;
+
+/// Smallest cosine between the normals of triangles of one plane, whose vertices are rounded to single precision.
+const FLAT: f64 = 1.0 - 1e-9;
 
 /// Smallest vertical component of the mean normal of a level sheet.
 const LEVEL: f64 = 0.7;
@@ -189,26 +192,67 @@ fn inverted(mesh: &Mesh) -> Mesh {
     turned
 }
 
-/// The mesh with the first of all triangles that have the same corners, if it then bounds a body: some programs write both
-/// sides of a face.
+/// The mesh with the first of all facets that have the same outline, if it then bounds a body: some programs write both
+/// sides of a face, and cut each into triangles in its own way.
 fn single(mesh: &Mesh) -> Option<Mesh> {
     let ids = numbered(mesh.positions.iter().copied().map(bits));
+    let corners = |triangle: usize| mesh.triangles[triangle].map(|vertex| ids[vertex as usize]);
     let mut known = HashSet::new();
-    let mut kept = mesh.triangles.clone();
-    kept.retain(|triangle| {
-        let mut corners = triangle.map(|vertex| ids[vertex as usize]);
+    let mut kept: Vec<usize> = (0..mesh.triangles.len()).collect();
+    kept.retain(|&triangle| {
+        let mut corners = corners(triangle);
         corners.sort_unstable();
         known.insert(corners)
     });
-    if kept.len() == mesh.triangles.len() {
+    let mut outlines = HashSet::new();
+    let mut first = Vec::new();
+    for facet in facets(mesh, &kept, corners) {
+        let mut outline = Border::new();
+        for &triangle in &facet {
+            add_edges(&mut outline, corners(triangle));
+        }
+        outline.retain(|_, net| *net != 0);
+        if outlines.insert(outline.into_keys().collect::<Vec<Edge>>()) {
+            first.extend(facet);
+        }
+    }
+    if first.len() == mesh.triangles.len() {
         return None;
     }
+    first.sort_unstable();
     let single = Mesh {
-        triangles: kept,
+        triangles: first
+            .into_iter()
+            .map(|triangle| mesh.triangles[triangle])
+            .collect(),
         ..mesh.clone()
     };
     body_volume_m3(InScene::from(&single), is_closed(&single))?;
     Some(single)
+}
+
+/// Groups of triangles that continue each other in one plane.
+fn facets(mesh: &Mesh, triangles: &[usize], corners: impl Fn(usize) -> [u32; 3]) -> Vec<Vec<usize>> {
+    let mut sets = DisjointSets::new(triangles.len());
+    let mut at: HashMap<(u32, u32), Vec<usize>> = HashMap::new();
+    for (index, &triangle) in triangles.iter().enumerate() {
+        let [a, b, c] = corners(triangle);
+        let normal = mesh.face_normal(triangle);
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            for &other in at.get(&(to, from)).into_iter().flatten() {
+                if mesh.face_normal(triangles[other]).dot(normal) > FLAT {
+                    sets.join(index, other);
+                }
+            }
+            at.entry((from, to)).or_default().push(index);
+        }
+    }
+    let mut facets: Vec<Vec<usize>> = Vec::new();
+    for (&triangle, facet) in triangles.iter().zip(sets.sets()) {
+        facets.resize_with(facets.len().max(facet as usize + 1), Vec::new);
+        facets[facet as usize].push(triangle);
+    }
+    facets
 }
 
 /// Volume of a mesh that is closed and bounds a body [m³].
@@ -222,6 +266,12 @@ type Edge = (u32, u32);
 
 /// Net traversals of each edge, from its lower to its higher vertex; edges traversed both ways are left out.
 type Border = BTreeMap<Edge, i32>;
+
+fn add_edges(border: &mut Border, [a, b, c]: [u32; 3]) {
+    for (from, to) in [(a, b), (b, c), (c, a)] {
+        *border.entry((from.min(to), from.max(to))).or_default() += (to > from) as i32 - (to < from) as i32;
+    }
+}
 
 /// Open meshes with their borders, in common vertices.
 struct Pieces {
@@ -244,14 +294,8 @@ impl Pieces {
             let mesh = objects[object].in_scene();
             let ids: Vec<u32> = mesh.positions().map(|place| weld.id(place)).collect();
             let mut border = Border::new();
-            for [a, b, c] in mesh
-                .triangles()
-                .map(|vertices| vertices.map(|vertex| ids[vertex as usize]))
-            {
-                for (from, to) in [(a, b), (b, c), (c, a)] {
-                    *border.entry((from.min(to), from.max(to))).or_default() +=
-                        (to > from) as i32 - (to < from) as i32;
-                }
+            for vertices in mesh.triangles() {
+                add_edges(&mut border, vertices.map(|vertex| ids[vertex as usize]));
             }
             border.retain(|_, net| *net != 0);
             (object, border)

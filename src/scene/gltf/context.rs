@@ -1,5 +1,7 @@
 //! What a load has found so far, and the memory that it may still take.
 
+use std::collections::HashSet;
+
 use crate::error::{Error, Result, Warning};
 
 /// Remedy where the file itself is at fault.
@@ -11,11 +13,29 @@ const MAX_WARNINGS: usize = 60;
 /// Largest number of places that a warning names; further ones are counted.
 const MAX_LOCATIONS: usize = 4;
 
+/// A warning of one or several places.
+#[derive(Debug)]
+struct SharedWarning {
+    what: String,
+    remedy: String,
+    /// The first ones.
+    named: Vec<String>,
+    locations: HashSet<String>,
+}
+
+impl SharedWarning {
+    fn add(&mut self, location: String) {
+        if self.named.len() < MAX_LOCATIONS && !self.locations.contains(&location) {
+            self.named.push(location.clone());
+        }
+        self.locations.insert(location);
+    }
+}
+
 /// Warnings and memory budget of a load. A warning of several places is given once.
 #[derive(Debug)]
 pub struct LoadContext {
-    /// What, remedy, and all locations.
-    warnings: Vec<(String, String, Vec<String>)>,
+    warnings: Vec<SharedWarning>,
     left_out: usize,
     limit_bytes: u64,
     left_bytes: u64,
@@ -42,12 +62,15 @@ impl LoadContext {
     pub fn warn(&mut self, location: impl Into<String>, what: impl Into<String>, remedy: impl Into<String>) {
         let (location, what, remedy) = (location.into(), what.into(), remedy.into());
         let mut known = self.warnings.iter_mut();
-        if let Some((.., locations)) = known.find(|known| known.0 == what && known.1 == remedy) {
-            if !locations.contains(&location) {
-                locations.push(location);
-            }
+        if let Some(known) = known.find(|known| known.what == what && known.remedy == remedy) {
+            known.add(location);
         } else if self.warnings.len() < MAX_WARNINGS {
-            self.warnings.push((what, remedy, vec![location]));
+            self.warnings.push(SharedWarning {
+                what,
+                remedy,
+                named: vec![location.clone()],
+                locations: HashSet::from([location]),
+            });
         } else {
             self.left_out += 1;
         }
@@ -60,13 +83,12 @@ impl LoadContext {
 
     /// All warnings, in the order of their first occurrence.
     pub fn into_warnings(self) -> Vec<Warning> {
-        let warning = |(what, remedy, locations): (String, String, Vec<String>)| {
-            let named = locations.len().min(MAX_LOCATIONS);
-            let mut location = locations[..named].join(", ");
-            if locations.len() > named {
-                location += &format!(" and {} more", locations.len() - named);
+        let warning = |known: SharedWarning| {
+            let mut location = known.named.join(", ");
+            if known.locations.len() > known.named.len() {
+                location += &format!(" and {} more", known.locations.len() - known.named.len());
             }
-            Warning::new(location, what, remedy)
+            Warning::new(location, known.what, known.remedy)
         };
         let mut warnings: Vec<Warning> = self.warnings.into_iter().map(warning).collect();
         if self.left_out > 0 {

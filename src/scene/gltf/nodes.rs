@@ -215,8 +215,7 @@ fn not_finite(name: &str) -> Error {
     )
 }
 
-/// Perspective cameras of the placed nodes, with the glTF indices of these. Unreadable ones are left out with a
-/// warning.
+/// Cameras of the placed nodes, with the glTF indices of these. Unreadable ones are left out with a warning.
 pub fn read_all(root: &Root, placed: &[PlacedNode], load: &mut LoadContext) -> (Vec<Camera>, Vec<usize>) {
     let mut nodes = Vec::new();
     let mut cameras = Vec::new();
@@ -226,8 +225,16 @@ pub fn read_all(root: &Root, placed: &[PlacedNode], load: &mut LoadContext) -> (
         };
         let source = root.cameras.get(index.value());
         let read = source.ok_or_else(|| format!("is camera {}, which does not exist", index.value()));
+        let is_orthographic = read
+            .as_ref()
+            .is_ok_and(|source| matches!(source.type_, Checked::Valid(Type::Orthographic)));
         match read.and_then(|source| read_one(source, placed)) {
             Ok(camera) => {
+                if is_orthographic {
+                    let what = "is orthographic; it was read as one far behind, with an angle of view of 1°";
+                    let remedy = "make it a perspective camera where the last half degree matters";
+                    load.warn(format!("camera `{}`", placed.name), what, remedy);
+                }
                 let name = placed.name_or("camera", cameras.len());
                 cameras.push(Camera { name, ..camera });
                 nodes.push(placed.node);
@@ -242,19 +249,23 @@ pub fn read_all(root: &Root, placed: &[PlacedNode], load: &mut LoadContext) -> (
     (cameras, nodes)
 }
 
+/// Angle of view of an orthographic camera: its rays are parallel to within half a degree [rad].
+const PARALLEL_FOV_RAD: f64 = PI / 180.0;
+
 fn read_one(source: &Source, placed: &PlacedNode) -> std::result::Result<Camera, String> {
-    let perspective = match (&source.type_, &source.perspective) {
-        (Checked::Valid(Type::Perspective), Some(perspective)) => perspective,
-        (Checked::Valid(Type::Orthographic), _) => {
-            return Err("is orthographic, which is not supported".into());
-        }
-        _ => return Err("has no perspective".into()),
-    };
-    let vertical_fov_rad = widen(perspective.yfov);
+    let (vertical_fov_rad, near_m, behind_m) =
+        match (&source.type_, &source.perspective, &source.orthographic) {
+            (Checked::Valid(Type::Perspective), Some(lens), _) => (widen(lens.yfov), widen(lens.znear), 0.0),
+            (Checked::Valid(Type::Orthographic), _, Some(lens)) => {
+                let half_height_m = widen(lens.ymag).abs();
+                let behind_m = half_height_m / (0.5 * PARALLEL_FOV_RAD).tan();
+                (PARALLEL_FOV_RAD, behind_m + widen(lens.znear), behind_m)
+            }
+            _ => return Err("has no lens".into()),
+        };
     if !(vertical_fov_rad > 0.0 && vertical_fov_rad < PI) {
         return Err(format!("has an angle of view of {vertical_fov_rad} rad"));
     }
-    let near_m = widen(perspective.znear);
     if !(near_m > 0.0 && near_m.is_finite()) {
         return Err(format!("has a near plane at {near_m} m"));
     }
@@ -269,7 +280,7 @@ fn read_one(source: &Source, placed: &PlacedNode) -> std::result::Result<Camera,
     };
     Ok(Camera {
         name: String::new(),
-        position: placed.world_from_node.translation,
+        position: placed.world_from_node.translation - forward * behind_m,
         forward,
         up: right.cross(forward),
         vertical_fov_rad,

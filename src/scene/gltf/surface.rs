@@ -9,6 +9,7 @@ use gltf::json::mesh;
 use gltf::json::validation::Checked;
 
 use super::context::{LoadContext, damaged};
+use super::extras::widen;
 use super::nodes::PlacedNode;
 use super::pose::PrimitiveInstance;
 use super::primitive::{self, Primitives, VertexFactors};
@@ -79,11 +80,18 @@ pub fn add_objects(
         }
     }
     let bounds_body = bodies::find(&mut scene.objects, &materials.all, load);
-    for (object, (bounds_body, factors)) in scene.objects.iter_mut().zip(bounds_body.into_iter().zip(factors))
+    for (object, (bounds_body, mut factors)) in
+        scene.objects.iter_mut().zip(bounds_body.into_iter().zip(factors))
     {
         let source = root.materials.get(object.material);
         let blends = source.is_some_and(|source| source.alpha_mode == Checked::Valid(AlphaMode::Blend));
         let material = materials.thin_or_solid(object.material, bounds_body, solid_glass);
+        let volume = source.and_then(|source| source.extensions.as_ref()?.volume.as_ref());
+        if let Some(volume) = volume.filter(|_| !materials.all[material].is_solid()) {
+            let scale = object.world_from_object().matrix3.determinant().abs().cbrt();
+            let thickness_m = widen(volume.thickness_factor.0) * scale;
+            factors.colour = factors.colour * materials.through_pane(material, thickness_m);
+        }
         object.material = materials.tinted(material, factors, blends);
         materials.check_coordinates(object.material, object.mesh(), &object.name, load);
     }
@@ -233,6 +241,15 @@ impl Materials {
                 twin
             }
         }
+    }
+
+    /// What a thin pane of that thickness [m, ≥ 0] transmits of light at normal incidence [1].
+    fn through_pane(&self, material: usize, thickness_m: f64) -> LinearSrgb {
+        let is_thin = self.all[material].transmits() && thickness_m.is_finite();
+        let stated = self.stated[material].filter(|_| is_thin);
+        stated.map_or(LinearSrgb::WHITE, |interior| {
+            interior.volume.transmittance(thickness_m)
+        })
     }
 
     /// Warns of the thin walls of which the file states no interior.

@@ -142,12 +142,18 @@ fn what_is_inside_out_is_turned() {
 /// Both sides of a face, written as two.
 #[test]
 fn faces_that_a_body_has_twice_count_once() {
-    for twice in [1, 6, 12] {
+    for (twice, other_diagonal) in [(1, false), (6, false), (12, false), (12, true)] {
         let mut file = Glb::empty();
         let material = file.push("materials", glass(json!({ "thicknessFactor": 1.0 })));
         let mut cube = unit_cube();
         let mut backs = unit_cube();
         backs.triangles.truncate(twice);
+        if other_diagonal {
+            for pair in backs.triangles.chunks_exact_mut(2) {
+                let [[a, b, c], [_, _, d]] = [pair[0], pair[1]];
+                pair.copy_from_slice(&[[a, b, d], [b, c, d]]);
+            }
+        }
         backs
             .triangles
             .iter_mut()
@@ -173,7 +179,10 @@ fn faces_that_a_body_has_twice_count_once() {
 fn an_open_mesh_bounds_nothing_unless_water_is_held() {
     let sheet = |double_sided: bool, walls: bool| {
         let mut file = Glb::empty();
-        let mut water = glass(json!({ "thicknessFactor": 0.5 }));
+        // Half is left behind each 0.25 m.
+        let tint =
+            json!({ "thicknessFactor": 0.5, "attenuationDistance": 0.25, "attenuationColor": [0.5, 1, 1] });
+        let mut water = glass(tint);
         water["doubleSided"] = json!(double_sided);
         let material = file.push("materials", water);
         let wall = file.push(
@@ -197,6 +206,9 @@ fn an_open_mesh_bounds_nothing_unless_water_is_held() {
     for scene in [sheet(false, false), sheet(true, true)] {
         assert_eq!(scene.material_of(0).surface, SurfaceKind::ThinWall);
         warns(&scene, "node `sheet` | states a volume but bounds none");
+        let [red, green, _] = scene.material_of(0).base_colour.to_array();
+        near(red, 0.25, 1e-7, "as thick as it is stated to be");
+        near(green, 1.0, 1e-7, "green");
     }
 }
 

@@ -322,8 +322,8 @@ fn cameras_look_along_minus_z() {
         file.push_root(json!({ "camera": camera, "translation": [0.0, 1.0, 2.0], "scale": [2.0, 3.0, 4.0] }));
     }
     let scene = file.scene();
-    let [camera] = &scene.cameras[..] else {
-        panic!("the bad ones are left out")
+    let [camera, parallel] = &scene.cameras[..] else {
+        panic!("the bad one is left out")
     };
     assert_eq!(camera.name, "camera0");
     assert_eq!((camera.forward, camera.up), (DVec3::NEG_Z, DVec3::Y));
@@ -331,6 +331,13 @@ fn cameras_look_along_minus_z() {
     assert_eq!((camera.vertical_fov_rad, camera.near_m), (0.9, 0.01));
     warns(&scene, "angle of view of 4 rad");
     warns(&scene, "is orthographic");
+    // Its near plane, 2 m high, stands at z = 1.9.
+    assert_eq!(parallel.forward, DVec3::NEG_Z);
+    assert!((parallel.position.z - parallel.near_m - 1.9).abs() < 1e-6);
+    let height_m = 2.0 * parallel.near_m * (0.5 * parallel.vertical_fov_rad).tan();
+    assert!((height_m - 2.0).abs() < 0.01, "{height_m}");
+    // A degree of a circle around it.
+    assert!((parallel.vertical_fov_rad.to_degrees() - 1.0).abs() < 1e-9);
 }
 
 fn rippled(waves: Value) -> Value {

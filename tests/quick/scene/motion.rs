@@ -128,6 +128,39 @@ fn a_file_says_that_waves_lift_a_mesh() {
     assert!(still.swells.is_empty());
 }
 
+/// A solid that comes to stand on a floor.
+#[test]
+fn surfaces_that_come_to_meet_are_set_apart() {
+    let mut file = Glb::tetrahedron();
+    let positions = file.push_floats(&[-9.0, 0.0, 9.0, 9.0, 0.0, 9.0, 0.0, 0.0, -9.0], 3);
+    let floor = file.push_mesh(json!({ "attributes": { "POSITION": positions } }));
+    file.push_root(json!({ "name": "floor", "mesh": floor }));
+    // Three corners down.
+    let down = DQuat::from_rotation_arc(dvec3(1.0, 1.0, 1.0).normalize(), DVec3::Y).as_quat();
+    file.json["nodes"][0]["rotation"] = json!(down.to_array());
+    let material = json!({ "extensions": {
+        "KHR_materials_transmission": { "transmissionFactor": 1.0 },
+        "KHR_materials_volume": { "thicknessFactor": 1.0 }
+    } });
+    let mut file = file.with_material(material);
+    let height = 1.0 / 3.0_f32.sqrt();
+    let times = file.push_floats(&[0.0, 1.0], 1);
+    let places = file.push_floats(&[0.0, 2.0, 0.0, 0.0, height, 0.0], 3);
+    file.push(
+        "animations",
+        json!({
+            "channels": [{ "sampler": 0, "target": { "node": 0, "path": "translation" } }],
+            "samplers": [{ "input": times, "output": places }],
+        }),
+    );
+    let rest = file.scene();
+    let lowest = |time_s: f64| rest.at(time_s).objects[0].bounds().expect("has vertices").0.y;
+    near(lowest(0.5), 0.5 * (2.0 - f64::from(height)), 1e-6, "above it");
+    // A solid reaches into what it stands on, by more than roundings to single precision.
+    let met = lowest(1.0);
+    assert!((-1e-4..-1e-7).contains(&met), "{met}");
+}
+
 /// A triangle that turns about y and below it a lamp and a camera, 2 m away along x.
 fn turning() -> Glb {
     let mut file = Glb::triangle().with_light("lamp", json!({ "type": "point", "intensity": 683.0 }));
