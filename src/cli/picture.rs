@@ -232,6 +232,8 @@ pub fn choose_camera(scene: &Scene, options: &PictureOptions) -> Result<Camera> 
 
 fn framing_camera(scene: &Scene, (width, height): (u32, u32)) -> Camera {
     // An empty scene has nothing to frame: any box will do.
-    let bounds = scene.bounds().unwrap_or((-glam::DVec3::ONE, glam::DVec3::ONE));
+    let bounds = scene
+        .inner_bounds()
+        .unwrap_or((-glam::DVec3::ONE, glam::DVec3::ONE));
     Camera::framing("all", bounds, f64::from(width) / f64::from(height))
 }

@@ -9,6 +9,7 @@ use glam::DVec3;
 
 use crate::error::Warning;
 use crate::files::cache::ContentHash;
+use crate::geometry::enclosure::Bounds;
 use crate::optics::LinearSrgb;
 
 pub mod adjacency;
@@ -154,24 +155,34 @@ impl Scene {
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
-    /// Diagonal of the bounding box without objects that dwarf all others together, such as a sky dome around a house [m];
-    /// `None` without vertices.
+    /// Bounding box without objects that surround all others at a distance, such as a sky dome around a house [m]; `None`
+    /// without vertices.
+    pub fn inner_bounds(&self) -> Option<Bounds> {
+        self.core(|next, all| (next.1 - next.0).min_element() > DWARFING * diagonal_m(all))
+    }
+
+    /// Diagonal of the bounding box without objects that are longer than all others together, such as the ground around
+    /// a house [m]; `None` without vertices.
     pub fn core_diagonal_m(&self) -> Option<f64> {
-        let length = |(low, high): &(DVec3, DVec3)| low.distance(*high);
-        let mut boxes: Vec<(DVec3, DVec3)> =
-            self.objects.iter().filter_map(|object| object.bounds()).collect();
-        boxes.sort_by(|a, b| length(a).total_cmp(&length(b)));
+        let core = self.core(|next, all| diagonal_m(next) > DWARFING * diagonal_m(all));
+        core.map(|core| diagonal_m(&core))
+    }
+
+    /// The box of the smaller objects, up to the last one that does not dwarf the box of all before it.
+    fn core(&self, is_dwarfing: impl Fn(&Bounds, &Bounds) -> bool) -> Option<Bounds> {
+        let mut boxes: Vec<Bounds> = self.objects.iter().filter_map(|object| object.bounds()).collect();
+        boxes.sort_by(|a, b| diagonal_m(a).total_cmp(&diagonal_m(b)));
         let mut boxes = boxes.into_iter();
         let mut all = boxes.next()?;
-        let mut core_m = length(&all);
+        let mut core = all;
         for next in boxes {
-            let is_dwarfing = length(&next) > DWARFING * length(&all);
+            let is_core = !is_dwarfing(&next, &all);
             all = (all.0.min(next.0), all.1.max(next.1));
-            if !is_dwarfing {
-                core_m = length(&all);
+            if is_core {
+                core = all;
             }
         }
-        Some(core_m)
+        Some(core)
     }
 
     /// Number of triangles of all objects.
@@ -181,6 +192,10 @@ impl Scene {
             .map(|object| object.mesh().triangles.len())
             .sum()
     }
+}
+
+fn diagonal_m((low, high): &Bounds) -> f64 {
+    low.distance(*high)
 }
 
 /// An object so many times longer than the box of all smaller ones dwarfs them: walls are up to three times as long as

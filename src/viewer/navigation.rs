@@ -36,6 +36,8 @@ const CREEP_FACTOR: f64 = 0.25;
 const WALKING_RANGE: (f64, f64) = (0.1, 20.0);
 /// Smallest orbit radius, in scene radii.
 const NEAREST_ORBIT: f64 = 1e-3;
+/// Largest near-plane distance of a camera that moved, in scene radii.
+const NEAR: f64 = 1e-3;
 /// Largest near-plane distance, as a fraction of the distance to the framed object.
 const NEAR_OF_FRAMED: f64 = 0.01;
 /// Number of bookmarks.
@@ -132,7 +134,7 @@ pub struct Navigator {
 impl Navigator {
     /// Starts at the scene camera of that name, else at the scene's first camera, else frames the whole scene.
     pub fn new(scene: &Scene, camera: Option<&str>) -> Self {
-        let (low, high) = scene.bounds().unwrap_or((DVec3::splat(-1.0), DVec3::ONE));
+        let (low, high) = scene.inner_bounds().unwrap_or((DVec3::splat(-1.0), DVec3::ONE));
         let half_diagonal_m = 0.5 * (high - low).length();
         let radius_m = if half_diagonal_m > 0.0 {
             half_diagonal_m
@@ -147,7 +149,7 @@ impl Navigator {
             pitch_rad: -0.5,
             roll_rad: 0.0,
             vertical_fov_rad: DEFAULT_FOV_RAD,
-            near_m: 1e-3 * radius_m,
+            near_m: NEAR * radius_m,
             speed_m_per_s: FIRST_SPEED * radius_m,
             centre: 0.5 * (low + high),
             radius_m,
@@ -182,7 +184,7 @@ impl Navigator {
         }
     }
 
-    /// Half the diagonal of the scene's bounding box [m, > 0].
+    /// Half the diagonal of the scene's inner bounding box [m, > 0].
     pub fn radius_m(&self) -> f64 {
         self.radius_m
     }
@@ -329,7 +331,12 @@ impl Navigator {
         if wanted == DVec3::ZERO && self.velocity_m_per_s.length() < STILL * self.speed_m_per_s() {
             self.velocity_m_per_s = DVec3::ZERO;
         }
-        wanted * seconds + gap * (SETTLING_S * (1.0 - remaining))
+        let path = wanted * seconds + gap * (SETTLING_S * (1.0 - remaining));
+        if path != DVec3::ZERO {
+            // What the near plane of a scene's camera cuts away is met again.
+            self.near_m = self.near_m.min(NEAR * self.radius_m);
+        }
+        path
     }
 
     /// Moves forward towards the orbit's pivot; shifts the pivot sideways along with the camera.
@@ -438,7 +445,7 @@ impl Navigator {
         let (right, level_up, _) = self.level_axes();
         self.roll_rad = camera.up.dot(right).atan2(camera.up.dot(level_up));
         self.vertical_fov_rad = camera.vertical_fov_rad;
-        self.near_m = camera.near_m.min(1e-3 * self.radius_m);
+        self.near_m = camera.near_m;
     }
 
     /// Right, up and forward of the camera without roll: orthonormal at every pitch.

@@ -152,7 +152,7 @@ impl Site {
         }
         let names: Vec<String> = (0..moments.len()).map(moment_file).collect();
         let cameras = site.push_still(scene, eye)?;
-        let (low, high) = scene.bounds().unwrap_or_default();
+        let (low, high) = scene.inner_bounds().unwrap_or_default();
         let colour = |stop: usize| {
             let colour = viridis(stop as f64 / (COLOURS - 1) as f64);
             let [r, g, b] = colour.map(|code| (255.0 * code).round());
@@ -181,7 +181,7 @@ impl Site {
     /// Adds the still picture; returns what the page reads of each camera, of which there is at least one.
     fn push_still(&mut self, scene: &Scene, eye: &Eye<'_>) -> Result<Vec<Value>> {
         let aspect = f64::from(STILL_SIZE[0]) / f64::from(STILL_SIZE[1]);
-        let all = || Camera::framing("all", scene.bounds().unwrap_or_default(), aspect);
+        let all = || Camera::framing("all", scene.inner_bounds().unwrap_or_default(), aspect);
         let cameras = match &scene.cameras[..] {
             [] => vec![all()],
             cameras => cameras.to_vec(),

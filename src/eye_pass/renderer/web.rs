@@ -92,7 +92,7 @@ impl WebScene {
         renderer.set_map_budget(0);
         renderer.set_maps(&gpu, scene, maps)?;
         renderer.set_map_budget(MAP_BUDGET_BYTES);
-        let outside = || Camera::framing("outside", scene.bounds().unwrap_or_default(), 1.0);
+        let outside = || Camera::framing("outside", scene.inner_bounds().unwrap_or_default(), 1.0);
         let camera = scene.cameras.first().cloned().unwrap_or_else(outside);
         // What is far from the first camera loses its finest levels where maps are beyond the budget.
         let all: Vec<usize> = (0..renderer.objects.list.len()).collect();

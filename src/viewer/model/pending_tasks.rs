@@ -73,7 +73,7 @@ impl Model {
             direction: camera.forward,
         };
         let scene = Arc::clone(self.edits.scene());
-        let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
+        let (low, high) = scene.inner_bounds().unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let target = ViewTarget::of(surfaces, &view_ray, 0.5 * (low + high));
         let stops = self.choices.display.exposure_stops;
         let added = light.make((surfaces, radius_m), &target, stops, &scene);

@@ -196,7 +196,7 @@ fn one_of<'a>(
 
 /// A row of three coordinates [m].
 pub fn coordinates(ui: &mut Ui, name: &str, point: &mut DVec3, scene: &Scene) -> Response {
-    let (low, high) = scene.bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
+    let (low, high) = scene.inner_bounds().unwrap_or((DVec3::ZERO, DVec3::ONE));
     let speed = DRAG_SHARE * (high - low).length().max(1e-6);
     ui.horizontal(|ui| {
         // Three numbers have to fit into a narrow row.

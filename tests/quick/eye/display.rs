@@ -30,14 +30,16 @@ fn auto_exposure_finds_middle_grey() {
         picture(radiance.collect()).auto_exposure_stops()
     };
     for (parts, expected, tolerance) in [
-        // 0.18 / 0.045 = 4: two stops, and black does not count.
-        (vec![(0.045, 10)], 2.0, 1e-6),
-        (vec![(0.045, 10), (0.0, 90)], 2.0, 1e-6),
+        // 0.18 / 0.045 = 4: two stops, and one more, since nothing is light. Black does not count.
+        (vec![(0.045, 10)], 3.0, 1e-6),
+        (vec![(0.045, 10), (0.0, 90)], 3.0, 1e-6),
+        // A fifth is light: 0.6 / 0.15 = 4.
+        (vec![(0.045, 80), (0.15, 20)], 2.0, 1e-6),
         (vec![(0.0, 4)], 0.0, 0.0),
         (vec![], 0.0, 0.0),
         // A quarter of the picture is 64 times as bright as the rest: it stays below white. A lone lamp does not count.
         (vec![(1.0, 75), (64.0, 25)], -6.0, 1e-6),
-        (vec![(0.18, 999), (10.0, 1)], 0.0, 0.01),
+        (vec![(0.18, 999), (10.0, 1)], 1.0, 0.01),
     ] {
         let found = stops(&parts);
         assert!((found - expected).abs() <= tolerance, "{parts:?}: {found}");
