@@ -274,13 +274,15 @@ def add_book(half_width=0.155, half_height=0.115):
     turn, u = rotation(UP, 14), np.linspace(0, 1, 29)
     x, y = half_width * u, 0.006 + 0.023 * (1 - np.exp(-u / 0.10)) * (1 - u)**0.75 + 0.004 * (1 - u)
     z = A([-half_height, 0, half_height])
+    along = np.concatenate([[0], np.cumsum(np.hypot(np.diff(x), np.diff(y)))])
     add_edge = lambda m: file.add_to('book', moved(m, BOOK, turn), 'paper edge')
     for name, side in (('left page', -1), ('right page', 1)):
         p = A([[(side * a, b, c) for c in z] for a, b in zip(x, y)])
         n = A([[(-side * dy, dx, 0)] * 3 for dx, dy in zip(np.gradient(x), np.gradient(y))])
         leaf = sheet(p, n)
-        across = p[..., 0].ravel() / half_width
-        uv = np.stack([across if side > 0 else 1 + across, (p[..., 2].ravel() / half_height + 1) / 2], 1)
+        # By length along the page, so that texels are of one size.
+        across = np.repeat(along / along[-1], 3)
+        uv = np.stack([across if side > 0 else 1 - across, (p[..., 2].ravel() / half_height + 1) / 2], 1)
         file.add(name, moved(dict(leaf, uv0=uv, uv1=uv), BOOK, turn), name)
         for end in (z[0], z[2]):
             p = A([[(side * a, b, end), (side * a, 0.003, end)] for a, b in zip(x, y)])
@@ -367,7 +369,7 @@ def sky(width=4096, height=512):
 
 def add_sky():
     """A painted dome that one lamp above the roof lights: all of its light comes as indirect light, without noise. It has an
-    opening for the sun, and a screen keeps the lamp out of the room."""
+    opening for the sun, and a screen keeps the lamp off the house and its terrace."""
     file.material('sky', texture=sky())
     q = np.linspace(-1, 1, 33)
     azimuth, elevation = np.meshgrid(np.linspace(0, 2 * np.pi, 65), np.sign(q) * q * q * np.pi / 2, indexing='ij')
@@ -377,7 +379,7 @@ def add_sky():
     dome['i'] = dome['i'][middle @ -SUN < np.cos(np.radians(9))]
     file.add('sky', dict(dome, uv1=dome['uv0']), 'sky')
     lamp = A([0.15, HEIGHT + 7.0, -0.7])
-    file.add('screen', rect(lamp - UP * 1.2, [0.55, 0, 0], [0, 0, -0.75]), 'black')
+    file.add('screen', rect(lamp - UP * 1.2, [0.76, 0, 0], [0, 0, -0.90]), 'black')
     file.lamp('sky', lamp, SKY_W_PER_M2 * DOME**2, SKY_COLOUR)
     file.sun('sun', SUN, SUN_W_PER_M2, SUN_COLOUR, 0.53)
 
@@ -388,7 +390,7 @@ def add_cameras():
     file.camera('tumbler', [-0.02, 0.98, 0.95], [-0.06, 0.79, 0.60], 0.46)
     file.camera('ring', [0.05, 0.97, 1.01], [0.075, 0.765, 0.785], 0.42)
     file.camera('pool', [-1.15, 1.35, 0.05], [0.75, 0.25, -2.3], 1.0)
-    file.camera('ceiling', [-0.2, 1.0, -0.2], [1.75, 1.75, -1.5], 0.85)
+    file.camera('ceiling', [-1.30, 1.25, 0.10], [1.20, 1.95, -2.2], 1.05)
     file.camera('prism', [-1.55, 1.15, -3.05], [0.3, 1.02, -1.9], 0.76)
     file.camera('butterfly', [-0.62, 1.45, 1.25], [-0.52, 1.13, 2.05], 0.72)
 

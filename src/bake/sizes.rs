@@ -317,8 +317,7 @@ impl ChartCache {
         }
         let parametrisation = self.parametrisation(object)?;
         let (low, high) = self.scene.objects[object].bounds()?;
-        let core_m = self.core_diagonal_m.get_or_init(|| self.scene.core_diagonal_m());
-        let texel_m = low.distance(high).max((*core_m)?) / 400.0;
+        let texel_m = low.distance(high).max(self.core_m()?) / 400.0;
         let texels = parametrisation.area_m2() / (texel_m * texel_m);
         let side = |wanted: f64| (wanted.max(8.0).log2().round().exp2() as usize).min(1024);
         let aspect = parametrisation.suggested_aspect;
@@ -357,7 +356,23 @@ impl ChartCache {
             return 0;
         };
         let most = (LARGEST_TILED_SIDE / size.0.max(size.1)).checked_ilog2();
-        border_doublings(settings).min(most.unwrap_or(0))
+        let doublings = border_doublings(settings) + self.smallness(receiver.object()).min(settings.detail());
+        doublings.min(most.unwrap_or(0))
+    }
+
+    /// Half the number of doublings from an object's diagonal to the scene's: what is small is seen from nearer.
+    fn smallness(&self, object: usize) -> u32 {
+        let bounds = self.scene.objects[object].bounds();
+        let ratio = bounds
+            .zip(self.core_m())
+            .map(|((low, high), core_m)| core_m / low.distance(high));
+        ratio
+            .filter(|ratio| ratio.is_finite())
+            .map_or(0, |ratio| (0.5 * ratio.log2()) as u32)
+    }
+
+    fn core_m(&self) -> Option<f64> {
+        *self.core_diagonal_m.get_or_init(|| self.scene.core_diagonal_m())
     }
 
     /// Shadow borders of all lights on a receiver; `None` if there are none.
@@ -452,7 +467,7 @@ impl ChartCache {
 }
 
 /// Number of halvings of direct light's texels at shadow borders: down to 1/1,600 of the scene's diagonal for a draft,
-/// to a half and a quarter of that for better presets.
+/// to a half and a quarter of that for better presets, which add up to one and two for small objects.
 fn border_doublings(settings: &BakeSettings) -> u32 {
     2 + settings.detail()
 }

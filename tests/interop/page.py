@@ -23,7 +23,7 @@ import websocket
 
 PATIENCE_S = 3600
 # Software draws them.
-SIZE = (960, 540)
+SIZE = (480, 270)
 PICTURES = 4
 PHONE = (390, 844)
 # Mean FLIP beside `nephroid render` [1].
