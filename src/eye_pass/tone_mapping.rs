@@ -143,13 +143,13 @@ pub fn display_rgba8(picture: &Picture, exposure_stops: f64, tone_map: ToneMap) 
     picture.radiance.iter().flat_map(pixel).collect()
 }
 
-/// Exposed luminance of light things in light [1]: plaster, linen and paper, of albedo 0.6 to 0.8, beside a grey card.
-const LIGHT: f64 = 0.6;
+/// Exposed luminance of pale surfaces in full light [1]: plaster, linen and paper, of albedo 0.6 to 0.8, beside a grey card.
+const PALE: f64 = 0.6;
 
 impl Picture {
     /// Exposure [stops] that brings the log-average luminance of the lit pixels to middle grey; 0 for a black picture.
     /// The average leaves out the darkest and the brightest tenth. The exposure is lower where the brightest tenth
-    /// would exceed white, and up to a stop higher where it would stay below [`LIGHT`].
+    /// would exceed white, and up to a stop higher where it would stay below 0.6 of white.
     ///
     /// Pixels more than 8 stops below the mean count as unlit, so that neither black surroundings nor faint residual
     /// light affect the result.
@@ -166,7 +166,7 @@ impl Picture {
         let (most, bright) = (&lit[tenth..lit.len() - tenth], lit[lit.len() * 9 / 10]);
         let log_average = most.iter().map(|luminance| luminance.log2()).sum::<f64>() / most.len() as f64;
         let stops = MIDDLE_GREY.log2() - log_average;
-        let lifted = (LIGHT.log2() - bright.log2()).min(stops + 1.0);
+        let lifted = (PALE.log2() - bright.log2()).min(stops + 1.0);
         stops.min(-bright.log2()).max(lifted)
     }
 }

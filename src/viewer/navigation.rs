@@ -333,10 +333,14 @@ impl Navigator {
         }
         let path = wanted * seconds + gap * (SETTLING_S * (1.0 - remaining));
         if path != DVec3::ZERO {
-            // What the near plane of a scene's camera cuts away is met again.
-            self.near_m = self.near_m.min(NEAR * self.radius_m);
+            self.see_near();
         }
         path
+    }
+
+    /// Shows again what the near plane of a scene's camera cuts away.
+    fn see_near(&mut self) {
+        self.near_m = self.near_m.min(NEAR * self.radius_m);
     }
 
     /// Moves forward towards the orbit's pivot; shifts the pivot sideways along with the camera.
@@ -346,6 +350,7 @@ impl Navigator {
         let pivot = self.position + forward * self.orbit_m + (path - forward * ahead_m);
         self.orbit_m = (self.orbit_m - ahead_m).max(NEAREST_ORBIT * self.radius_m);
         self.position = pivot - forward * self.orbit_m;
+        self.see_near();
     }
 
     /// Turns the camera by a mouse movement [counts, x to the right, y down].
@@ -355,6 +360,7 @@ impl Navigator {
         self.pitch_rad = (self.pitch_rad - counts.y * LOOK_RAD_PER_COUNT).clamp(-FRAC_PI_2, FRAC_PI_2);
         if self.travel == NavigationMode::Orbit {
             self.position = pivot - self.level_axes().2 * self.orbit_m;
+            self.see_near();
         }
     }
 

@@ -183,6 +183,39 @@ fn cameras_of_the_file_are_shown_in_turn() {
     assert!(empty.position.is_finite() && empty.near_m > 0.0);
 }
 
+/// A plan that is cut below the ceiling, until somebody walks there.
+#[test]
+fn what_a_camera_cuts_away_is_met_once_it_moves() {
+    let plan = Camera {
+        near_m: 3.5,
+        ..Camera::look_at("plan", dvec3(0.0, 4.0, 0.0), DVec3::ZERO, 1.1)
+    };
+    let stand = || Navigator::new(&cube(2.0, DVec3::ZERO, vec![plan.clone()]), None);
+    assert_eq!(stand().camera().near_m, 3.5);
+    let mut walked = stand();
+    walked.keys = keys("w");
+    walked.advance(0.1);
+    let mut nearer = stand();
+    nearer.set_travel(NavigationMode::Orbit, None);
+    nearer.wheel(1.0);
+    for moved in [walked, nearer] {
+        assert!(moved.camera().near_m < 0.01, "{}", moved.camera().near_m);
+    }
+}
+
+/// A sky dome is no part of what is framed, nor does it make the camera fast.
+#[test]
+fn a_dome_around_a_scene_changes_no_view() {
+    let scene = cube(2.0, DVec3::ZERO, Vec::new());
+    let mut under_sky = scene.clone();
+    under_sky
+        .objects
+        .extend(cube(40.0, DVec3::ZERO, Vec::new()).objects);
+    let [alone, within] = [scene, under_sky].map(|scene| Navigator::new(&scene, None));
+    assert_view(&within.camera(), &alone.camera());
+    assert_eq!(within.speed_m_per_s(), alone.speed_m_per_s());
+}
+
 #[test]
 fn framing_shows_the_whole_box() {
     for (aspect, centre) in [(1.8, DVec3::ZERO), (0.5, dvec3(100.0, -3.0, 7.0))] {
