@@ -30,6 +30,19 @@ impl DisjointSets {
         numbered(roots)
     }
 
+    /// Items, one for each number, by set.
+    pub fn grouped<T>(self, items: impl IntoIterator<Item = T>) -> Vec<Vec<T>> {
+        let mut groups: Vec<Vec<T>> = Vec::new();
+        for (item, set) in items.into_iter().zip(self.sets()) {
+            let set = set as usize;
+            if set == groups.len() {
+                groups.push(Vec::new());
+            }
+            groups[set].push(item);
+        }
+        groups
+    }
+
     /// The lowest number of a number's set.
     pub fn root(&mut self, mut number: u32) -> u32 {
         // Each step halves the path.

@@ -221,15 +221,7 @@ fn connected(pieces: Vec<LitCell>) -> Vec<Vec<LitCell>> {
             );
         }
     }
-    let mut together: Vec<Vec<LitCell>> = Vec::new();
-    for (piece, group) in pieces.into_iter().zip(groups.sets()) {
-        let group = group as usize;
-        if group == together.len() {
-            together.push(Vec::new());
-        }
-        together[group].push(piece);
-    }
-    together
+    groups.grouped(pieces)
 }
 
 /// The path of some pieces, for a light of unit strength.

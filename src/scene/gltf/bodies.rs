@@ -247,12 +247,7 @@ fn facets(mesh: &Mesh, triangles: &[usize], corners: impl Fn(usize) -> [u32; 3])
             at.entry((from, to)).or_default().push(index);
         }
     }
-    let mut facets: Vec<Vec<usize>> = Vec::new();
-    for (&triangle, facet) in triangles.iter().zip(sets.sets()) {
-        facets.resize_with(facets.len().max(facet as usize + 1), Vec::new);
-        facets[facet as usize].push(triangle);
-    }
-    facets
+    sets.grouped(triangles.iter().copied())
 }
 
 /// Volume of a mesh that is closed and bounds a body [m³].

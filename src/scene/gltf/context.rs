@@ -25,10 +25,9 @@ struct SharedWarning {
 
 impl SharedWarning {
     fn add(&mut self, location: String) {
-        if self.named.len() < MAX_LOCATIONS && !self.locations.contains(&location) {
-            self.named.push(location.clone());
+        if self.locations.insert(location.clone()) && self.named.len() < MAX_LOCATIONS {
+            self.named.push(location);
         }
-        self.locations.insert(location);
     }
 }
 
@@ -65,12 +64,14 @@ impl LoadContext {
         if let Some(known) = known.find(|known| known.what == what && known.remedy == remedy) {
             known.add(location);
         } else if self.warnings.len() < MAX_WARNINGS {
-            self.warnings.push(SharedWarning {
+            let mut first = SharedWarning {
                 what,
                 remedy,
-                named: vec![location.clone()],
-                locations: HashSet::from([location]),
-            });
+                named: Vec::new(),
+                locations: HashSet::new(),
+            };
+            first.add(location);
+            self.warnings.push(first);
         } else {
             self.left_out += 1;
         }

@@ -9,7 +9,6 @@ use gltf::json::mesh;
 use gltf::json::validation::Checked;
 
 use super::context::{LoadContext, damaged};
-use super::extras::widen;
 use super::nodes::PlacedNode;
 use super::pose::PrimitiveInstance;
 use super::primitive::{self, Primitives, VertexFactors};
@@ -89,7 +88,7 @@ pub fn add_objects(
         let volume = source.and_then(|source| source.extensions.as_ref()?.volume.as_ref());
         if let Some(volume) = volume.filter(|_| !materials.all[material].is_solid()) {
             let scale = object.world_from_object().matrix3.determinant().abs().cbrt();
-            let thickness_m = widen(volume.thickness_factor.0) * scale;
+            let thickness_m = extras::widen(volume.thickness_factor.0) * scale;
             factors.colour = factors.colour * materials.through_pane(material, thickness_m);
         }
         object.material = materials.tinted(material, factors, blends);
