@@ -315,13 +315,9 @@ impl ChartCache {
         if let MapResolution::Fixed { width, height } = settings.map_resolution {
             return Some((width, height));
         }
-        let parametrisation = self.parametrisation(object)?;
         let (low, high) = self.scene.objects[object].bounds()?;
         let texel_m = low.distance(high).max(self.core_m()?) / 400.0;
-        let texels = parametrisation.area_m2() / (texel_m * texel_m);
-        let side = |wanted: f64| (wanted.max(8.0).log2().round().exp2() as usize).min(1024);
-        let aspect = parametrisation.suggested_aspect;
-        Some((side((texels * aspect).sqrt()), side((texels / aspect).sqrt())))
+        self.size_of_texels(object, texel_m, 8)
     }
 
     /// A map of direct and indirect light only: texels of 1/400 of the scene's diagonal, or as requested; tiled if it
@@ -427,42 +423,54 @@ impl ChartCache {
         shadow_rays
     }
 
-    /// Sizes of the grids of indirect light, by receiver: texels twice as large as those of direct light, no more of
-    /// them than a requested map has, and larger ones if all grids together would exceed `most_texels`.
+    /// Sizes of the grids of indirect light, by receiver, with at most `most_texels` texels in all if that is possible, and
+    /// for each no more than a requested map has.
     pub fn grid_sizes(&self, settings: &BakeSettings, most_texels: u64) -> Vec<(Receiver, (usize, usize))> {
-        let automatic = BakeSettings {
-            map_resolution: MapResolution::Auto,
-            ..settings.clone()
-        };
-        let fine: Vec<(Receiver, (usize, usize))> = Receiver::all(self.scene.objects.len())
-            .filter(|&receiver| self.may_see_lights(receiver))
-            .filter_map(|receiver| Some((receiver, self.direct_size(receiver.object(), &automatic)?)))
-            .collect();
         let most_side = match settings.map_resolution {
             MapResolution::Auto => (usize::MAX, usize::MAX),
             MapResolution::Fixed { width, height } => (width, height),
         };
-        let halved = |times: u32| -> Vec<(Receiver, (usize, usize))> {
-            let side = |side: usize, most: usize| {
-                let least = (MIN_GRID_SIDE >> (times - 1)).max(1);
-                (side >> times).max(least).min(most)
+        let receivers: Vec<Receiver> = Receiver::all(self.scene.objects.len())
+            .filter(|&receiver| self.may_see_lights(receiver))
+            .collect();
+        let coarsened = |step: u32| -> Vec<(Receiver, (usize, usize))> {
+            let factor = (f64::from(step) / GRID_STEPS).exp2();
+            let least = (MIN_GRID_SIDE as f64 / factor) as usize;
+            let size = |&receiver: &Receiver| {
+                let texel_m = factor * self.grid_texel_m(receiver.object())?;
+                let (width, height) = self.size_of_texels(receiver.object(), texel_m, least)?;
+                Some((receiver, (width.min(most_side.0), height.min(most_side.1))))
             };
-            let size = |&(receiver, (width, height)): &(Receiver, (usize, usize))| {
-                (receiver, (side(width, most_side.0), side(height, most_side.1)))
-            };
-            fine.iter().map(size).collect()
+            receivers.iter().filter_map(size).collect()
         };
         let texels = |sizes: &[(Receiver, (usize, usize))]| -> u64 {
-            sizes
-                .iter()
-                .map(|(_, (width, height))| (width * height) as u64)
-                .sum()
+            let texels = sizes.iter().map(|(_, (width, height))| (width * height) as u64);
+            texels.sum()
         };
-        // At eleven halvings every grid is a single texel.
-        (1..12)
-            .map(halved)
-            .find(|sizes| texels(sizes) <= most_texels)
-            .unwrap_or_else(|| halved(12))
+        // The last step is coarse enough for single texels.
+        let last = 12 * GRID_STEPS as u32;
+        let fitting = (0..last)
+            .map(coarsened)
+            .find(|sizes| texels(sizes) <= most_texels);
+        fitting.unwrap_or_else(|| coarsened(last))
+    }
+
+    /// Texels of a grid of indirect light [m] before they are coarsened to fit: 1/200 of the diagonal of the scene's core
+    /// for an object as large as that. What is small is seen from nearer, and has finer ones by the root of the ratio; what
+    /// dwarfs the core, as a sky does, is seen from far away.
+    fn grid_texel_m(&self, object: usize) -> Option<f64> {
+        let (low, high) = self.scene.objects[object].bounds()?;
+        let (own_m, core_m) = (low.distance(high), self.core_m()?);
+        Some(own_m.max(core_m) * (own_m / core_m).sqrt() / 200.0)
+    }
+
+    /// The size of a map with texels of about a length [m], of powers of two.
+    fn size_of_texels(&self, object: usize, texel_m: f64, least: usize) -> Option<(usize, usize)> {
+        let parametrisation = self.parametrisation(object)?;
+        let texels = parametrisation.area_m2() / (texel_m * texel_m);
+        let side = |wanted: f64| (wanted.max(least.max(1) as f64).log2().round().exp2() as usize).min(1024);
+        let aspect = parametrisation.suggested_aspect;
+        Some((side((texels * aspect).sqrt()), side((texels / aspect).sqrt())))
     }
 }
 
@@ -471,6 +479,9 @@ impl ChartCache {
 fn border_doublings(settings: &BakeSettings) -> u32 {
     2 + settings.detail()
 }
+
+/// Steps from grids of indirect light to ones with texels twice as large.
+const GRID_STEPS: f64 = 4.0;
 
 /// Minimum side of a grid of indirect light, if there is room for it [texels].
 const MIN_GRID_SIDE: usize = 8;
