@@ -5,6 +5,8 @@
 override HAS_TINTED_GLASS: bool;
 // Whether direct light is traced, and not in the maps.
 override TRACES_LIGHTS: bool;
+// Whether any specular surface is rough.
+override HAS_LOBES: bool;
 
 // Maximum number of surfaces at which both branches are followed.
 const MAX_BRANCHING: u32 = 4u;
@@ -24,11 +26,13 @@ struct Gaze {
     media: vec4u,
     // Number of the wavelength that is traced; 0 for all of them.
     wavelength: u32,
+    // GGX α of the surface that it left, which has added the highlights of lamps smaller than its lobe.
+    alpha: f32,
 }
 
 struct Seen {
     hit: Hit,
-    // From the ray's origin.
+    // From the ray's origin; FAR_AWAY for a miss.
     distance: f32,
 }
 
@@ -48,7 +52,7 @@ fn nearest(gaze: Gaze) -> Seen {
     for (var backs = 0u; backs < MAX_BACKS; backs += 1u) {
         let hit = closest_hit(origin, gaze.direction, FAR_AWAY);
         if hit.triangle == NO_TRIANGLE {
-            return Seen(hit, 0.0);
+            return Seen(hit, FAR_AWAY);
         }
         let triangle = met(hit);
         let object = objects[triangle.object];
@@ -60,7 +64,7 @@ fn nearest(gaze: Gaze) -> Seen {
         }
         origin = leave(surface_point(hit), gaze.direction);
     }
-    return Seen(Hit(NO_TRIANGLE, 0.0, vec3f(0.0), 0u), 0.0);
+    return Seen(Hit(NO_TRIANGLE, 0.0, vec3f(0.0), 0u), FAR_AWAY);
 }
 
 // Level at which a texel is as large as the footprint at an oblique angle.
@@ -100,6 +104,7 @@ fn onward(gaze: Gaze, point: SurfacePoint, branch: Branch) -> Gaze {
         gaze.spread * branch.spread_factor + bent + branch.spread_added,
         branch.media,
         gaze.wavelength,
+        branch.alpha,
     );
 }
 
@@ -142,6 +147,10 @@ fn has_map(surface: u32) -> bool {
     return surface == SURFACE_DIFFUSE || surface == SURFACE_COATED || surface == SURFACE_VARIED;
 }
 
+fn is_rough(object: ObjectRecord) -> bool {
+    return HAS_LOBES && object.surface != SURFACE_DIFFUSE && object.roughness > SMOOTH_ROUGHNESS;
+}
+
 fn tint(gaze: Gaze, point: SurfacePoint, cos_view: f32) -> vec3f {
     let object = objects[point.object];
     let level = footprint_look_level(object.texture, point.uv_densities, gaze.width, cos_view);
@@ -166,15 +175,42 @@ fn lit_point(point: SurfacePoint, is_front: bool, gaze: Gaze) -> LitPoint {
     );
 }
 
+// Diffuse radiance of a surface with a map, beneath its coat.
+fn own_radiance(point: SurfacePoint, gaze: Gaze, colour: vec3f) -> vec3f {
+    let object = objects[point.object];
+    let cos_signed = dot(point.geometric_normal, gaze.direction);
+    let is_front = cos_signed <= 0.0;
+    let record = map_of(object, is_front);
+    let level = footprint_level(record, point.map_density, gaze.width, abs(cos_signed));
+    let baked = irradiance(record, point.map_uv, level);
+    if baked.a > 0.0 {
+        return fault_colour() / frame.radiance_scale;
+    }
+    var lit = baked.rgb;
+    if HAS_BUMPS && object.bumps != NO_IMAGE {
+        let side = select(-1.0, 1.0, is_front);
+        let normals = array(side * point.interpolated_normal, side * point.shading_normal);
+        lit = in_relief(lit, object.bumps, in_scene_m(point.place), normals);
+    }
+    if TRACES_LIGHTS {
+        lit += direct_irradiance(lit_point(point, is_front, gaze), object);
+    }
+    return colour * lit / PI;
+}
+
 fn chain_radiance(first: Gaze) -> vec3f {
     var walk = Walk(first, vec3f(0.0), 0u);
     loop {
-        // Passes purely specular surfaces until another one is hit, so that neighbouring paths look up maps at the same
-        // time.
+        // Passes smooth specular surfaces until another one is hit, so that neighbouring paths look up maps and trace
+        // shadow rays at the same time.
         var point: SurfacePoint;
         var arrives = false;
         loop {
             let seen = nearest(walk.gaze);
+            if walk.gaze.depth > 0u {
+                let lamps = walk.gaze.weight * lamps_on(walk.gaze, seen.distance);
+                walk.radiance += shown(lamps, walk.gaze.wavelength);
+            }
             if seen.hit.triangle == NO_TRIANGLE {
                 let beyond = walk.gaze.weight * background(walk.gaze.direction);
                 walk.radiance += shown(beyond, walk.gaze.wavelength);
@@ -192,7 +228,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 emitted *= looked_up(object.glow, point.uvs, level).rgb;
             }
             walk.radiance += shown(walk.gaze.weight * emitted, walk.gaze.wavelength);
-            if has_map(object.surface) {
+            if has_map(object.surface) || is_rough(object) {
                 arrives = true;
                 break;
             }
@@ -208,29 +244,19 @@ fn chain_radiance(first: Gaze) -> vec3f {
         var goes_on = false;
         if arrives {
             let gaze = walk.gaze;
-            let cos_signed = dot(point.geometric_normal, gaze.direction);
-            let is_front = cos_signed <= 0.0;
-            let record = map_of(objects[point.object], is_front);
-            let cos_view = abs(cos_signed);
-            let level = footprint_level(record, point.map_density, gaze.width, cos_view);
-            let baked = irradiance(record, point.map_uv, level);
-            var lit = baked.rgb;
-            let bumps = objects[point.object].bumps;
-            if HAS_BUMPS && bumps != NO_IMAGE {
-                let side = select(-1.0, 1.0, is_front);
-                let normals = array(side * point.interpolated_normal, side * point.shading_normal);
-                lit = in_relief(lit, bumps, in_scene_m(point.place), normals);
-            }
-            if TRACES_LIGHTS {
-                lit += direct_irradiance(lit_point(point, is_front, gaze), objects[point.object]);
-            }
-            let colour = tint(gaze, point, cos_view);
-            var own = colour * lit / PI;
-            if baked.a > 0.0 {
-                own = fault_colour() / frame.radiance_scale;
-            }
+            let object = objects[point.object];
+            let colour = tint(gaze, point, abs(dot(point.geometric_normal, gaze.direction)));
             let next = interact(point, gaze, colour);
-            walk.radiance += shown(gaze.weight * next.own * own, gaze.wavelength);
+            if has_map(object.surface) {
+                let own = next.own * own_radiance(point, gaze, colour);
+                walk.radiance += shown(gaze.weight * own, gaze.wavelength);
+            }
+            if HAS_LOBES && next.reflection.alpha > 0.0 {
+                let facing = face(point, gaze.direction);
+                let reflected = largest(gaze.weight * next.reflection.share);
+                let gloss = Gloss(point, facing, next.reflection.alpha, next.facets, colour, reflected);
+                walk.radiance += shown(gaze.weight * highlights(gloss, gaze), gaze.wavelength);
+            }
             goes_on = go_on(&walk, point, next);
         }
         if !goes_on {

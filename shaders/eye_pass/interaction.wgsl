@@ -19,6 +19,17 @@ struct Branch {
     spread_factor: f32,
     // Spread due to roughness: an approximation that blurs maps and textures, but no edges.
     spread_added: f32,
+    // GGX α of a rough surface whose highlights are added where the branch begins; else 0.
+    alpha: f32,
+}
+
+// Parts of a surface by how their microfacets reflect.
+struct Facets {
+    metal: f32,
+    // An interface or a coat, of this ratio of indices; a wall without thickness.
+    coat: f32,
+    wall: f32,
+    eta: f32,
 }
 
 struct Interaction {
@@ -26,6 +37,13 @@ struct Interaction {
     own: f32,
     reflection: Branch,
     transmission: Branch,
+    facets: Facets,
+}
+
+fn reflectance_of(facets: Facets, cos_incident: f32, tint: vec3f) -> vec3f {
+    let wall = facets.wall * thin_wall_reflectance(cos_incident, facets.eta);
+    let coat = facets.coat * dielectric_reflectance(cos_incident, facets.eta);
+    return facets.metal * metal_reflectance(cos_incident, tint) + wall + coat;
 }
 
 fn face(point: SurfacePoint, incident: vec3f) -> Facing {
@@ -37,13 +55,21 @@ fn face(point: SurfacePoint, incident: vec3f) -> Facing {
 }
 
 fn no_branch() -> Branch {
-    return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0, 0.0);
+    return Branch(vec3f(0.0), vec3f(0.0), vec4u(0u), 0.0, 1.0, 0.0, 0.0);
 }
 
-// Angle between the reflections off microfacets that are tilted by atan α (GGX) one way and the other; half of all
+// Up to this roughness surfaces are smooth.
+const SMOOTH_ROUGHNESS: f32 = 0.01;
+
+// GGX α; 0 of smooth surfaces.
+fn lobe_alpha(roughness: f32) -> f32 {
+    return select(0.0, roughness * roughness, roughness > SMOOTH_ROUGHNESS);
+}
+
+// Angle between the reflections off microfacets that are tilted by atan α one way and the other; half of all
 // microfacets are tilted less.
-fn lobe_rad(roughness: f32) -> f32 {
-    return 4.0 * atan(roughness * roughness);
+fn lobe_rad(alpha: f32) -> f32 {
+    return 4.0 * atan(alpha);
 }
 
 // Factors of transmission, roughness and metallic from an image, at the footprint of the ray.
@@ -63,27 +89,28 @@ fn mixture_at(point: SurfacePoint, gaze: Gaze, factors: vec3f) -> Mixture {
     return mixture_of(object, factors, looked_up(object.texture, point.uvs, level).a);
 }
 
-fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f, lobe: f32) -> Branch {
+fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f, alpha: f32) -> Branch {
     let incident = gaze.direction;
     var direction = mirrored(incident, facing.shading);
     if dot(direction, facing.geometric) <= 0.0 {
         direction = mirrored(incident, facing.geometric);
     }
     let curvature = select(-point.curvature, point.curvature, facing.front);
-    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, lobe);
+    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, lobe_rad(alpha), alpha);
 }
 
-fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe: f32) -> Interaction {
+fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alpha: f32) -> Interaction {
     let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
     let reflectance = thin_wall_reflectance(-dot(gaze.direction, facing.shading), eta);
     return Interaction(
         0.0,
-        reflection(point, facing, gaze, vec3f(reflectance), lobe),
-        Branch(gaze.direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, lobe),
+        reflection(point, facing, gaze, vec3f(reflectance), alpha),
+        Branch(gaze.direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, lobe_rad(alpha), 0.0),
+        Facets(0.0, 0.0, 1.0, eta),
     );
 }
 
-fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe: f32) -> Interaction {
+fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alpha: f32) -> Interaction {
     let incident = gaze.direction;
     let media = gaze.media;
     let ior = ior_of(point.object, gaze.wavelength);
@@ -102,7 +129,8 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe
     let cos_incident = -dot(incident, facing.shading);
     let cos_clamped = clamp(cos_incident, 0.0, 1.0);
     let cos_geometric = clamp(-dot(incident, facing.geometric), 0.0, 1.0);
-    let whole = Interaction(0.0, reflection(point, facing, gaze, vec3f(1.0), lobe), no_branch());
+    let facets = Facets(0.0, 1.0, 0.0, eta);
+    let whole = Interaction(0.0, reflection(point, facing, gaze, vec3f(1.0), alpha), no_branch(), facets);
     if eta != 1.0 && scaled_cos2_transmitted(cos_clamped, eta) <= 0.0 {
         return whole;
     }
@@ -119,7 +147,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe
     let curvature = select(-point.curvature, point.curvature, facing.front);
     return Interaction(
         0.0,
-        reflection(point, facing, gaze, vec3f(reflectance), lobe),
+        reflection(point, facing, gaze, vec3f(reflectance), alpha),
         // A facet's tilt turns a refracted ray by |1/eta - 1| times the tilt, and a reflected one by twice the tilt.
         Branch(
             direction,
@@ -127,35 +155,40 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, lobe
             beyond,
             curvature * (1.0 / eta - 1.0),
             1.0 / eta,
-            0.5 * abs(1.0 / eta - 1.0) * lobe,
+            0.5 * abs(1.0 / eta - 1.0) * lobe_rad(alpha),
+            0.0,
         ),
+        facets,
     );
 }
 
 // Sum of the interactions of a mixture's shares. No surface is both clear and perforated.
 fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors: vec3f) -> Interaction {
     let object = objects[point.object];
-    let lobe = lobe_rad(object.roughness * factors.y);
+    let alpha = lobe_alpha(object.roughness * factors.y);
     let mixture = mixture_at(point, gaze, factors);
-    var met = Interaction(0.0, no_branch(), no_branch());
+    let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
+    var met = Interaction(0.0, no_branch(), no_branch(), Facets(0.0, 0.0, 0.0, eta));
     if mixture.clear > 0.0 {
         if object.solid != 0u {
-            met = dielectric(point, facing, gaze, tint, lobe);
+            met = dielectric(point, facing, gaze, tint, alpha);
         } else {
-            met = thin_wall(point, facing, gaze, tint, lobe);
+            met = thin_wall(point, facing, gaze, tint, alpha);
         }
         met.reflection.share *= mixture.clear;
         met.transmission.share *= mixture.clear;
     } else if mixture.hole > 0.0 {
-        met.transmission = Branch(gaze.direction, vec3f(mixture.hole), gaze.media, 0.0, 1.0, 0.0);
+        met.transmission = Branch(gaze.direction, vec3f(mixture.hole), gaze.media, 0.0, 1.0, 0.0, gaze.alpha);
     }
     let cos_incident = -dot(gaze.direction, facing.shading);
-    let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
     let coat = mixture.coat * dielectric_reflectance(cos_incident, eta);
     let back = mixture.metal * metal_reflectance(cos_incident, tint) + vec3f(mixture.body * coat);
-    met.reflection = reflection(point, facing, gaze, met.reflection.share + back, lobe);
+    met.reflection = reflection(point, facing, gaze, met.reflection.share + back, alpha);
     // The map already accounts for the body's share.
     met.own = 1.0 - coat;
+    met.facets.metal = mixture.metal;
+    met.facets.coat = mixture.clear * met.facets.coat + mixture.body * mixture.coat;
+    met.facets.wall *= mixture.clear;
     return met;
 }
 
@@ -164,29 +197,30 @@ fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
     let facing = face(point, gaze.direction);
     let cos_incident = -dot(gaze.direction, facing.shading);
     let factors = factors_at(point, gaze);
-    let lobe = lobe_rad(object.roughness * factors.y);
+    let alpha = lobe_alpha(object.roughness * factors.y);
     switch object.surface {
         case SURFACE_MIRROR: {
             let share = metal_reflectance(cos_incident, tint);
-            return Interaction(0.0, reflection(point, facing, gaze, share, lobe), no_branch());
+            let facets = Facets(1.0, 0.0, 0.0, 1.0);
+            return Interaction(0.0, reflection(point, facing, gaze, share, alpha), no_branch(), facets);
         }
         case SURFACE_COATED: {
             let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
             let reflectance = object.coat * dielectric_reflectance(cos_incident, eta);
-            let back = reflection(point, facing, gaze, vec3f(reflectance), lobe);
-            return Interaction(1.0 - reflectance, back, no_branch());
+            let back = reflection(point, facing, gaze, vec3f(reflectance), alpha);
+            return Interaction(1.0 - reflectance, back, no_branch(), Facets(0.0, object.coat, 0.0, eta));
         }
         case SURFACE_THIN_WALL: {
-            return thin_wall(point, facing, gaze, tint, lobe);
+            return thin_wall(point, facing, gaze, tint, alpha);
         }
         case SURFACE_DIELECTRIC: {
-            return dielectric(point, facing, gaze, tint, lobe);
+            return dielectric(point, facing, gaze, tint, alpha);
         }
         case SURFACE_VARIED: {
             return varied(point, facing, gaze, tint, factors);
         }
         default: {
-            return Interaction(1.0, no_branch(), no_branch());
+            return Interaction(1.0, no_branch(), no_branch(), Facets(0.0, 0.0, 0.0, 1.0));
         }
     }
 }

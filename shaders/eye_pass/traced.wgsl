@@ -13,6 +13,7 @@ fn traced(fragment: Fragment) -> @location(0) vec4f {
     let within = fragment.clip.xy / size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0) + frame.jitter;
     let direction = normalize(frame.forward + within.x * frame.right + within.y * frame.up);
     let origin = start.eye + direction * (start.near / dot(direction, frame.forward));
-    let gaze = Gaze(origin, 0u, direction, start.near * frame.pixel_rad, vec3f(1.0), frame.pixel_rad, start.media, 0u);
+    let width = start.near * frame.pixel_rad;
+    let gaze = Gaze(origin, 0u, direction, width, vec3f(1.0), frame.pixel_rad, start.media, 0u, 0.0);
     return vec4f(written(chain_radiance(gaze)), mark(fragment.object));
 }

@@ -2,6 +2,7 @@
 
 #[cfg(feature = "gpu")]
 pub mod frame_times;
+pub mod highlights;
 pub mod reference;
 mod relief;
 #[cfg(feature = "gpu")]

@@ -141,6 +141,15 @@ impl Waves {
         self.waves.iter().map(slope).sum()
     }
 
+    /// Δh [1/m] within the tangent plane of a unit normal.
+    pub fn laplacian(&self, point: DVec3, normal: DVec3) -> f64 {
+        let bend = |wave: &Wave| {
+            let along = wave.wave_vector().reject_from_normalized(normal);
+            -along.length_squared() * wave.amplitude_m * wave_phase(wave, point).cos()
+        };
+        self.waves.iter().map(bend).sum()
+    }
+
     /// Whether any wave moves.
     pub fn is_moving(&self) -> bool {
         self.waves

@@ -364,6 +364,20 @@ impl Tracer {
         }
     }
 
+    /// GGX α of the lobes at a hit; 0 where the surface is smooth.
+    pub fn lobe_alpha(&self, hit: &SurfaceHit) -> f64 {
+        let material = self.scene().material_of(hit.object);
+        let roughness = match material.variation {
+            Some(_) => {
+                self.mixture(hit.object, (hit.triangle, hit.barycentric), true)
+                    .roughness
+            }
+            None => material.roughness,
+        };
+        let is_rough = material.surface.is_specular() && roughness > SMOOTH_ROUGHNESS;
+        if is_rough { roughness * roughness } else { 0.0 }
+    }
+
     /// Splits light that arrives at `hit` along the unit direction `incident` within `media`. Fractions of branches
     /// outside `effects` are `switched_off`; without textures, the material's factor alone tints. `micro` selects the
     /// microfacet of a rough surface by a point of the unit square; without it, or without lobes among the effects,

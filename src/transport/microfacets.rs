@@ -94,6 +94,23 @@ impl Facet {
     }
 }
 
+/// Radiance that a rough mirror reflects per irradiance across a beam [1/sr], at a reflectance of 1: the GGX distribution
+/// with the height-correlated shadowing of Smith (Heitz, "Understanding the Masking-Shadowing Function in
+/// Microfacet-Based BRDFs", JCGT 2014), times the cosine of incidence. 0 where eye or light is behind the surface.
+pub fn ggx_reflection(normal: DVec3, to_eye: DVec3, to_light: DVec3, alpha_squared: f64) -> f64 {
+    let [eye, light] = [to_eye, to_light].map(|direction| direction.dot(normal));
+    if eye <= 0.0 || light <= 0.0 {
+        return 0.0;
+    }
+    let cos_half = (to_eye + to_light).normalize().dot(normal);
+    // sin² + α² cos² of the half vector; the sine from a cross product keeps its digits in narrow lobes.
+    let sine = (to_eye + to_light).normalize().cross(normal).length_squared();
+    let stretched = sine + alpha_squared * cos_half * cos_half;
+    let distribution = alpha_squared / (std::f64::consts::PI * stretched * stretched);
+    let hidden = |cosine: f64| (alpha_squared + (1.0 - alpha_squared) * cosine * cosine).sqrt();
+    distribution * light * 0.5 / (light * hidden(eye) + eye * hidden(light))
+}
+
 /// Mirror image of a direction in the plane perpendicular to a unit normal.
 fn mirrored(direction: DVec3, normal: DVec3) -> DVec3 {
     direction - normal * (2.0 * direction.dot(normal))

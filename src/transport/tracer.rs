@@ -402,6 +402,23 @@ impl Tracer {
         normal_texture::gradient((&self.scene, mesh), map, place, hit.interpolated_normal)
     }
 
+    /// Divergence of the normals at a hit per length [1/m], half the sum of the curvatures: > 0 where the surface is
+    /// convex. Normal maps, whose curvature depends on their resolution, are left out.
+    pub fn curvature(&self, hit: &SurfaceHit) -> f64 {
+        let mesh = self.scene.objects[hit.object].in_scene();
+        let (places, normals) = (mesh.corners(hit.triangle), mesh.corner_normals(hit.triangle));
+        let bend = |from: usize, to: usize| {
+            let edge = places[to] - places[from];
+            (normals[to] - normals[from]).dot(edge) / edge.length_squared().max(f64::MIN_POSITIVE)
+        };
+        let of_mesh = (bend(0, 1) + bend(1, 2) + bend(2, 0)) / 3.0;
+        let waves = self.scene.material_of(hit.object).bending_waves();
+        let of_waves = waves
+            .filter(|_| self.is_bumpy(hit.object))
+            .map(|waves| waves.laplacian(hit.point, hit.interpolated_normal));
+        of_mesh - 0.5 * of_waves.unwrap_or_default()
+    }
+
     /// Whether any surface lies on the ray before `distance_m`.
     pub fn is_blocked(&self, ray: &Ray, distance_m: f64) -> bool {
         self.note_ray(ray, distance_m);

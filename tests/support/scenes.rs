@@ -9,10 +9,10 @@ use nephroid::illumination::{Chart, IlluminationMap, Layer, parametrise};
 use nephroid::light_pass::direct::{DirectLayer, bake_direct};
 use nephroid::optics::LinearSrgb;
 use nephroid::progress::Control;
-use nephroid::scene::{Camera, Light, LightKind, LightSize, Material, Mesh, Object, Scene, SurfaceKind, Wave};
+use nephroid::scene::{Camera, Light, LightKind, LightSize, Material, Mesh, Object, PanelShape, Scene, SurfaceKind, Wave};
 use nephroid::settings::LayerKind;
 use nephroid::transport::Tracer;
-use nephroid::units::{Irradiance, RadiantIntensity};
+use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
 
 /// A scene of meshes, each with its own material.
 pub fn scene(parts: Vec<(Mesh, Material)>, lights: Vec<Light>) -> Scene {
@@ -76,6 +76,24 @@ pub fn sun(direction: DVec3, normal_irradiance: f64) -> Light {
 }
 
 /// A wave that stands still.
+/// A bulb, a sun and panels of both outlines: small ones, which shine down and towards +z.
+pub fn lamps_of_all_kinds(place: DVec3) -> Vec<Light> {
+    let panel = |shape| {
+        light(LightKind::Panel {
+            centre: place,
+            across: DVec3::X * 0.06,
+            down: DVec3::new(0.0, 0.05, 0.06),
+            shape,
+            radiance: Radiance(40.0),
+        })
+    };
+    let mut bulb = point_light(place, 2.0);
+    bulb.size = LightSize::Radius { radius_m: 0.04 };
+    let mut sun = sun(DVec3::new(0.0, -0.6, 0.8), 3.0);
+    sun.size = LightSize::Angle { diameter_rad: 0.05 };
+    vec![bulb, sun, panel(PanelShape::Rectangle), panel(PanelShape::Disc)]
+}
+
 pub fn wave(amplitude_m: f64, wavelength_m: f64, direction: DVec3, phase_rad: f64) -> Wave {
     Wave {
         amplitude_m,

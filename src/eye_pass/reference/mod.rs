@@ -6,6 +6,7 @@ mod radiance;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::highlights::RayCone;
 use super::view::{Picture, View};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
@@ -120,8 +121,8 @@ fn trace<const CHAINS: bool>(
         let mut sum = LinearSrgb::BLACK;
         for (sample, spectrum) in (0..).zip(&looks.spectra) {
             let within = [sample % side, sample / side].map(|s| (f64::from(s) + 0.5) / f64::from(side));
-            let ray = eye_ray(view, [column, row], within);
-            sum += lit.radiance::<CHAINS>(ray, media, spectrum, rays);
+            let cone = eye_cone(view, [column, row], within);
+            sum += lit.radiance::<CHAINS>(cone, media, spectrum, rays);
         }
         let mean = sum / f64::from(side * side);
         mean.to_array().map(|channel| channel as f32)
@@ -164,6 +165,19 @@ pub fn first_hits(tracer: &Tracer, view: &View) -> Vec<Option<usize>> {
             })
         })
         .collect()
+}
+
+/// The footprint of a pixel about a position within it, as wide as that of one at the centre of the picture.
+fn eye_cone(view: &View, pixel: [u32; 2], within: [f64; 2]) -> RayCone {
+    let ray = eye_ray(view, pixel, within);
+    let half_height = (0.5 * view.camera.vertical_fov_rad).tan();
+    let spread_rad = 2.0 * half_height / f64::from(view.height);
+    RayCone {
+        ray,
+        width_m: spread_rad * view.camera.near_m,
+        spread_rad,
+        alpha: 0.0,
+    }
 }
 
 /// The ray through a position within a pixel ([0, 1] from its left and top), starting at the near plane.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::effect::EffectSwitch;
+use crate::eye_pass::highlights::{Lobe, RayCone, VisibleLamp};
 use crate::eye_pass::relief::ReliefLights;
 use crate::eye_pass::wavelengths::{self, SeenWavelength};
 use crate::geometry::Ray;
@@ -10,7 +11,11 @@ use crate::illumination::lookup::in_chart;
 use crate::illumination::{Chart, IlluminationMap, Receiver, Side};
 use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
-use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
+use crate::transport::{Branch, Event, MediumStack, SurfaceHit, Tracer};
+
+/// Highlights that reflect a smaller radiance per irradiance [1/sr] are left out: a thousandth of a white surface in the
+/// same light has 0.0003.
+const DIMMEST_HIGHLIGHT: f64 = 3e-4;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ChainLimits {
@@ -67,6 +72,7 @@ pub struct LitScene<'a> {
     /// Emitted radiance by object [W/(m² sr)].
     emitted: Vec<LinearSrgb>,
     relief: ReliefLights,
+    lamps: Vec<VisibleLamp>,
     background: LinearSrgb,
     limits: ChainLimits,
 }
@@ -80,7 +86,7 @@ struct MapTotal<'a> {
 /// One ray of a chain, traced from the eye.
 #[derive(Clone, Copy)]
 struct EyePath<'a> {
-    ray: Ray,
+    cone: RayCone,
     media: MediumStack,
     /// Throughput: share of the ray's radiance that reaches the pixel, per channel.
     weight: LinearSrgb,
@@ -123,17 +129,18 @@ impl<'a> LitScene<'a> {
             maps: by_receiver,
             emitted: emitted.collect(),
             relief: ReliefLights::of(tracer.scene()),
+            lamps: VisibleLamp::all(tracer.scene()),
             background,
             limits,
         }
     }
 
-    /// Radiance [W/(m² sr)] that arrives along a ray, which starts within `media` and splits into the wavelengths of
+    /// Radiance [W/(m² sr)] that arrives within a cone, which starts within `media` and splits into the wavelengths of
     /// `spectrum` at the first dispersive surface. Without `CHAINS` the ray ends at the first surface that is not
     /// clear.
     pub fn radiance<const CHAINS: bool>(
         &self,
-        ray: Ray,
+        cone: RayCone,
         media: MediumStack,
         spectrum: &SpectralScene,
         rays: &mut EyeRays,
@@ -141,17 +148,20 @@ impl<'a> LitScene<'a> {
         rays.camera_rays += 1;
         let mut seen = LinearSrgb::BLACK;
         let mut waiting = vec![EyePath {
-            ray,
+            cone,
             media,
             weight: LinearSrgb::WHITE,
             depth: 0,
             at: None,
         }];
         while let Some(mut path) = waiting.pop() {
-            let Some((hit, distance_m)) = nearest::<CHAINS>(self.tracer, path.ray) else {
-                seen += path.brings(self.beyond(path.ray.direction));
+            let next = nearest::<CHAINS>(self.tracer, path.cone.ray);
+            seen += self.lamps_on(&path, next.map_or(f64::INFINITY, |(_, distance_m)| distance_m));
+            let Some((hit, distance_m)) = next else {
+                seen += path.brings(self.beyond(path.cone.ray.direction));
                 continue;
             };
+            path.cone.width_m += path.cone.spread_rad * distance_m;
             if CHAINS {
                 path.weight = path.weight * path.media.transmittance(self.tracer.scene(), distance_m);
             }
@@ -175,16 +185,23 @@ impl<'a> LitScene<'a> {
         waiting: &mut Vec<EyePath<'b>>,
         rays: &mut EyeRays,
     ) -> LinearSrgb {
-        let incident = path.ray.direction;
+        let incident = path.cone.ray.direction;
         let tracer = path.at.map_or(self.tracer, |at| &at.tracer);
         let interaction = tracer.interact(hit, incident, &path.media);
         let side = Side::met(incident, hit.geometric_normal);
-        let seen = path.brings(self.own_radiance(hit, side, interaction.leaving));
+        let mut seen = path.brings(self.own_radiance(hit, side, interaction.leaving));
         if !CHAINS {
             return seen;
         }
+        let shape = ChainSurface {
+            curvature: tracer.curvature(hit) * side.sign(),
+            alpha: tracer.lobe_alpha(hit),
+        };
+        if let Some(reflection) = interaction.reflection.filter(|_| shape.alpha > 0.0) {
+            seen += path.brings(self.highlights(tracer, &path, hit, &reflection, shape.alpha));
+        }
         let [back, through] = [interaction.reflection, interaction.transmission]
-            .map(|branch| branch.and_then(|branch| self.followed(&path, &branch)));
+            .map(|branch| branch.and_then(|branch| self.followed(&path, &branch, &shape)));
         let is_through_stronger = match (&back, &through) {
             (Some(back), Some(through)) => through.weight.max_channel() >= back.weight.max_channel(),
             _ => through.is_some(),
@@ -198,6 +215,73 @@ impl<'a> LitScene<'a> {
             waiting.push(next);
         }
         seen
+    }
+
+    /// Contribution of the lamps between a surface that a path has left and the next one.
+    fn lamps_on(&self, path: &EyePath<'_>, reach_m: f64) -> LinearSrgb {
+        if path.depth == 0 {
+            return LinearSrgb::BLACK;
+        }
+        let mut seen = LinearSrgb::BLACK;
+        for lamp in &self.lamps {
+            if let Some((radiance, distance_m)) = lamp.seen(&path.cone, reach_m) {
+                seen += path.brings(radiance * self.transmittance(&path.media, distance_m));
+            }
+        }
+        seen
+    }
+
+    /// Reflected radiance [W/(m² sr)] of the lamps that are smaller than the lobe of a rough surface.
+    fn highlights(
+        &self,
+        tracer: &Tracer,
+        path: &EyePath<'_>,
+        hit: &SurfaceHit,
+        reflection: &Branch,
+        alpha: f64,
+    ) -> LinearSrgb {
+        let incident = path.cone.ray.direction;
+        let geometric = hit.geometric_normal * -hit.geometric_normal.dot(incident).signum();
+        let shading = hit.shading_normal * hit.shading_normal.dot(geometric).signum();
+        let faces_the_eye = shading.dot(incident) < 0.0;
+        let lobe = Lobe {
+            point: hit.point,
+            to_eye: -incident,
+            normal: if faces_the_eye { shading } else { geometric },
+            alpha,
+        };
+        let reflected = (path.weight * reflection.share).max_channel();
+        let mut seen = LinearSrgb::BLACK;
+        for lamp in &self.lamps {
+            lamp.highlights(&lobe, |highlight| {
+                let is_seen = highlight.response * reflected >= DIMMEST_HIGHLIGHT;
+                let ray = hit.spawn(highlight.to_light);
+                if !is_seen
+                    || highlight.to_light.dot(geometric) <= 0.0
+                    || tracer.is_blocked(&ray, highlight.distance_m)
+                {
+                    return;
+                }
+                // The reflectance of the microfacets that shine.
+                let facet = SurfaceHit {
+                    shading_normal: highlight.half,
+                    ..*hit
+                };
+                let reflection = tracer.interact(&facet, incident, &path.media).reflection;
+                let share = reflection.map_or(LinearSrgb::BLACK, |branch| branch.share);
+                let left = self.transmittance(&path.media, highlight.distance_m);
+                seen += highlight.irradiance * share * left * highlight.response;
+            });
+        }
+        seen
+    }
+
+    /// Share of light that is left after a distance in a medium; all of what comes from infinity.
+    fn transmittance(&self, media: &MediumStack, distance_m: f64) -> LinearSrgb {
+        if distance_m.is_infinite() {
+            return LinearSrgb::WHITE;
+        }
+        media.transmittance(self.tracer.scene(), distance_m)
     }
 
     /// Radiance of the environment or the background [W/(m² sr)].
@@ -230,18 +314,61 @@ impl<'a> LitScene<'a> {
 
     /// The path along a branch; `None` beyond the limits. Refraction scales radiance by the square of n on the eye's
     /// side over n on the far side.
-    fn followed<'b>(&self, path: &EyePath<'b>, branch: &Branch) -> Option<EyePath<'b>> {
+    fn followed<'b>(
+        &self,
+        path: &EyePath<'b>,
+        branch: &Branch,
+        surface: &ChainSurface,
+    ) -> Option<EyePath<'b>> {
         let weight = path.weight * branch.share * (branch.ior_ratio * branch.ior_ratio);
         let within = path.depth < self.limits.max_depth
             && weight.max_channel() > 0.0
             && weight.max_channel() >= self.limits.branch_threshold;
         within.then(|| EyePath {
-            ray: branch.ray,
+            cone: surface.bent(&path.cone, branch),
             media: branch.media,
             weight,
             depth: path.depth + 1,
             at: path.at,
         })
+    }
+}
+
+/// What turns the edges of a cone at a specular surface.
+struct ChainSurface {
+    /// Divergence of the normals per length on the side of the ray [1/m].
+    curvature: f64,
+    /// GGX α; 0 where the surface is smooth.
+    alpha: f64,
+}
+
+impl ChainSurface {
+    /// The cone along a branch, which starts as wide as another arrives.
+    fn bent(&self, cone: &RayCone, branch: &Branch) -> RayCone {
+        // Between the reflections off microfacets that are tilted by atan α one way and the other.
+        let lobe_rad = 4.0 * self.alpha.atan();
+        let (spread_rad, alpha) = match branch.event {
+            Event::Reflection | Event::TotalInternalReflection => {
+                let of_shape = 2.0 * self.curvature * cone.width_m;
+                (cone.spread_rad + of_shape + lobe_rad, self.alpha)
+            }
+            Event::Refraction => {
+                let ratio = branch.ior_ratio;
+                let of_shape = (ratio - 1.0) * self.curvature * cone.width_m;
+                (
+                    cone.spread_rad * ratio + of_shape + 0.5 * (ratio - 1.0).abs() * lobe_rad,
+                    0.0,
+                )
+            }
+            Event::ThinTransmission => (cone.spread_rad + lobe_rad, 0.0),
+            Event::Passage => (cone.spread_rad, cone.alpha),
+        };
+        RayCone {
+            ray: branch.ray,
+            width_m: cone.width_m,
+            spread_rad,
+            alpha,
+        }
     }
 }
 

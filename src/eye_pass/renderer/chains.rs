@@ -13,12 +13,13 @@ use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle};
 use super::web::Content;
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
+use crate::eye_pass::highlights::Outline;
 use crate::eye_pass::reference::ChainLimits;
 use crate::geometry::PackedNode;
 use crate::geometry::bvh::Frame;
 use crate::gpu::Gpu;
 use crate::scene::emitter::Emitter;
-use crate::scene::{Object, Scene};
+use crate::scene::{Light, Object, PanelShape, Scene};
 use crate::transport::{MediumStack, PackedInstance, PackedMesh, Tracer, media_at};
 
 /// Capacity of the traversal stack; `STACK` in the shader.
@@ -196,8 +197,7 @@ impl ChainScene {
         1.0 / self.tracer.frame().scale
     }
 
-    /// What nodes and triangles hold, by name, and lamps, of which there are none. Triangles of the scene come without their
-    /// corners, which their indices tell, and nodes of meshes without boxes, which their triangles tell.
+    /// What nodes, triangles and lamps hold, by name. Triangles of the scene come without their corners, which their indices tell, and nodes of meshes without boxes, which their triangles tell.
     pub(super) fn contents_without_corners(&self) -> [(&'static str, Content); 3] {
         let mut triangles: Vec<Triangle> = bytemuck::pod_collect_to_vec(self.triangles.bytes());
         for triangle in triangles
@@ -261,13 +261,13 @@ impl ChainScene {
         Some(bind_group(gpu, "chains", layout, resources))
     }
 
-    /// Uploads the lamps of a scene, each reduced to its centre. An environment is left out.
+    /// Uploads the lamps of a scene, whose direct light comes from their centres. An environment is left out.
     pub(super) fn set_lights(&mut self, gpu: &Gpu, scene: &Scene) {
-        let middles = scene
-            .lights
-            .iter()
-            .filter_map(|light| Emitter::middle(light, scene));
-        let records: Vec<LightRecord> = middles.map(|middle| self.record(&middle, scene)).collect();
+        let record = |light: &Light| {
+            let record = self.record(&Emitter::middle(light, scene)?, scene);
+            Some(self.outlined(record, Outline::of(light)))
+        };
+        let records: Vec<LightRecord> = scene.lights.iter().filter_map(record).collect();
         self.light_count = records.len() as u32;
         self.lights.write(gpu, &records);
     }
@@ -286,8 +286,33 @@ impl ChainScene {
         }
     }
 
-    /// Start of the chains of a view. `traces_lights`: whether direct light is traced.
-    pub(super) fn start(&self, view: &View, limits: &ChainLimits, traces_lights: bool) -> ChainStart {
+    /// A lamp with its outline; without one it is an emissive surface.
+    fn outlined(&self, record: LightRecord, outline: Option<Outline>) -> LightRecord {
+        let local = |axis: DVec3| (axis / self.unit_m()).as_vec3().to_array();
+        match outline {
+            None => LightRecord { outline: 3, ..record },
+            Some(Outline::Angle { tan_radius }) => LightRecord {
+                radius: tan_radius as f32,
+                ..record
+            },
+            Some(Outline::Round { radius_m }) => LightRecord {
+                radius: (radius_m / self.unit_m()) as f32,
+                ..record
+            },
+            Some(Outline::Flat { across, down, shape }) => LightRecord {
+                across: local(across),
+                down: local(down),
+                outline: match shape {
+                    PanelShape::Rectangle => 1,
+                    PanelShape::Disc => 2,
+                },
+                ..record
+            },
+        }
+    }
+
+    /// Start of the chains of a view.
+    pub(super) fn start(&self, view: &View, limits: &ChainLimits) -> ChainStart {
         let eye = view.camera.position;
         ChainStart {
             eye: self.local(eye),
@@ -297,7 +322,7 @@ impl ChainScene {
             branch_threshold: limits.branch_threshold as f32,
             max_depth: limits.max_depth,
             branching_depth: limits.branching_depth.min(MAX_BRANCHING),
-            light_count: if traces_lights { self.light_count } else { 0 },
+            light_count: self.light_count,
             ..Default::default()
         }
     }

@@ -79,6 +79,8 @@ pub struct Renderer {
     chain_scene: Option<ChainScene>,
     /// Whether geometry changed since `chain_scene` was built.
     chain_scene_is_stale: bool,
+    /// Whether lights or what is around them changed since they were uploaded.
+    lights_are_stale: bool,
     /// Why chains are not drawn although they were requested.
     refusal: Option<Error>,
     sky: Option<Sky>,
@@ -136,6 +138,7 @@ impl Renderer {
             surfaces: SurfacePipelines::new(gpu, sample_count),
             chain_scene: None,
             chain_scene_is_stale: false,
+            lights_are_stale: true,
             refusal: None,
             sky: None,
             targets: None,
@@ -161,6 +164,7 @@ impl Renderer {
     /// An error of the device.
     pub fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Result<Uploaded> {
         let mut uploaded = Uploaded::default();
+        self.lights_are_stale = true;
         if self.scene.triangle_count() != scene.triangle_count() {
             self.refusal = None;
         }
@@ -398,6 +402,8 @@ impl Renderer {
                 has_bumps: self.objects.list.iter().any(|look| look.has_bumps),
                 has_sky: self.shows_sky(),
                 is_dispersive: self.dispersion != EffectSwitch::Off && !self.objects.glasses.is_empty(),
+                has_lobes: (0..self.scene.objects.len())
+                    .any(|object| self.scene.material_of(object).is_rough()),
                 has_mask: self.objects.list.iter().any(Appearance::has_mask),
                 is_logarithmic: self.map_style.is_logarithmic(),
             },

@@ -8,6 +8,7 @@ use super::draws::visible_objects;
 use super::{EyeCounts, EyeQuality, MapStyle, Renderer};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::error::Result;
+use crate::eye_pass::highlights::VisibleLamp;
 use crate::eye_pass::{Picture, View};
 use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
@@ -17,7 +18,7 @@ use crate::scene::Scene;
 /// the square of a refractive index.
 const LARGEST_SCALED: f64 = 4096.0;
 
-/// Ratio of the environment's radiance to that of surfaces above which it is clipped. Half floats then keep eleven
+/// Ratio of the radiance of the environment and of lamps to that of surfaces above which it is clipped. Half floats then keep eleven
 /// binary digits for radiance of a thousandth of the brightest surface.
 const LARGEST_OVER_SURFACES: f64 = 1024.0;
 
@@ -118,6 +119,7 @@ impl Renderer {
             return 1.0;
         }
         let peak = self.objects.peak_radiance.max(self.peak_behind(view));
+        let peak = peak.max(self.peak_of_lamps());
         // Powers of two are lossless.
         if peak > 0.0 {
             (LARGEST_SCALED / peak).log2().floor().exp2()
@@ -139,6 +141,22 @@ impl Renderer {
             }
             _ => view.background.max_channel(),
         }
+    }
+
+    /// Largest radiance of lamps in mirrors and glass [W/(m² sr)]. It depends on the view, so the limit is taken; without
+    /// lit surfaces, that of white ones that a lamp lights from 1 m.
+    fn peak_of_lamps(&self) -> f64 {
+        let draw_state = self.draw_state();
+        if !self.objects.list.iter().any(|look| draw_state.is_specular(look)) {
+            return 0.0;
+        }
+        let lamps = VisibleLamp::all(&self.scene).into_iter();
+        let strongest = lamps.map(|lamp| lamp.strength().max_channel()).reduce(f64::max);
+        let lit = match self.objects.peak_radiance {
+            0.0 => strongest.map(|strength| strength / std::f64::consts::PI),
+            of_surfaces => strongest.map(|_| of_surfaces),
+        };
+        lit.unwrap_or_default() * LARGEST_OVER_SURFACES
     }
 
     fn add_to_mean(&mut self, gpu: &Gpu, encoder: &mut wgpu::CommandEncoder, is_first: bool) {

@@ -105,7 +105,7 @@ impl Renderer {
             branching_depth: quality.branching_depth,
             ..ChainLimits::default()
         };
-        let start = scene.start(view, &limits, self.traces_lights);
+        let start = scene.start(view, &limits);
         let wavelengths = if self.draw_state().flags.is_dispersive {
             SeenWavelengths::of(&wavelengths::of_picture(sample.picture), &self.objects.glasses)
         } else {
@@ -153,13 +153,6 @@ impl Renderer {
         let is_specular = |object: &usize| draw_state.is_specular(&self.objects.list[*object]);
         if draw_state.flags.traces_lights || visible.iter().any(is_specular) {
             self.make_chain_scene(gpu);
-        }
-        if let Some(scene) = self
-            .chain_scene
-            .as_mut()
-            .filter(|_| draw_state.flags.traces_lights)
-        {
-            scene.set_lights(gpu, &self.scene);
         }
         // Chains may have been refused just above, which changes the draw state.
         let list = DrawList::new(&self.objects, &visible, self.draw_state());
@@ -226,19 +219,23 @@ impl Renderer {
 
     /// Builds what chains are traced through, or updates it if it is stale.
     pub(super) fn make_chain_scene(&mut self, gpu: &Gpu) {
-        if self.chain_scene.is_some() && !self.chain_scene_is_stale {
-            return;
+        if self.chain_scene.is_none() || self.chain_scene_is_stale {
+            let before = self.chain_scene.take();
+            match ChainScene::new(gpu, &self.scene, &self.geometry, before) {
+                Ok(made) => {
+                    self.chain_scene = Some(made);
+                    self.chain_scene_is_stale = false;
+                    self.lights_are_stale = true;
+                }
+                Err(refusal) => {
+                    log::warn!("{refusal}");
+                    self.refusal = Some(refusal);
+                }
+            }
         }
-        let before = self.chain_scene.take();
-        match ChainScene::new(gpu, &self.scene, &self.geometry, before) {
-            Ok(made) => {
-                self.chain_scene = Some(made);
-                self.chain_scene_is_stale = false;
-            }
-            Err(refusal) => {
-                log::warn!("{refusal}");
-                self.refusal = Some(refusal);
-            }
+        if let Some(scene) = self.chain_scene.as_mut().filter(|_| self.lights_are_stale) {
+            scene.set_lights(gpu, &self.scene);
+            self.lights_are_stale = false;
         }
     }
 

@@ -108,6 +108,8 @@ pub(super) struct PipelineFlags {
     pub(super) has_sky: bool,
     /// Whether chains split into wavelengths at dispersive surfaces.
     pub(super) is_dispersive: bool,
+    /// Whether any specular surface of the scene is rough.
+    pub(super) has_lobes: bool,
     /// Whether the surface has an alpha mask; for chains, whether any surface of the scene has.
     pub(super) has_mask: bool,
     /// Whether the scale of false colours is logarithmic.
@@ -151,6 +153,7 @@ impl PipelineKey {
                 has_bumps: flags.has_bumps && looks_up,
                 has_sky: flags.has_sky && writes == RenderTarget::Traced,
                 is_dispersive: flags.is_dispersive && writes == RenderTarget::Traced,
+                has_lobes: flags.has_lobes && writes == RenderTarget::Traced,
                 has_mask: flags.has_mask,
                 is_logarithmic: flags.is_logarithmic && matches!(writes, RenderTarget::Inspected(_)),
             },
@@ -233,6 +236,7 @@ impl PipelineKey {
                 mask,
                 ("HAS_TINTED_GLASS", flag(self.flags.has_texture)),
                 ("TRACES_LIGHTS", flag(self.flags.traces_lights)),
+                ("HAS_LOBES", flag(self.flags.has_lobes)),
                 ("HAS_BUMPS", flag(self.flags.has_bumps)),
             ],
             RenderTarget::Composed => vec![mask, ("IS_SCALED", flag(self.flags.is_scaled))],

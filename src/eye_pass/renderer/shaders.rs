@@ -19,7 +19,7 @@ macro_rules! chains {
             "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
             "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
             "eye_pass/mixture" "eye_pass/light_record" "eye_pass/relief" "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/interaction"
-            $background "eye_pass/chain" "eye_pass/traced"
+            "eye_pass/highlights" $background "eye_pass/chain" "eye_pass/traced"
         }
     };
 }
@@ -204,7 +204,7 @@ mod tests {
         let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
         for writes in targets() {
             for kind in KINDS {
-                for flags in 0..64 {
+                for flags in 0..128 {
                     let draw_state = PipelineFlags {
                         has_texture: flags & 1 > 0,
                         is_scaled: flags & 1 > 0,
@@ -213,6 +213,7 @@ mod tests {
                         has_sky: flags & 4 > 0,
                         is_dispersive: flags & 16 > 0,
                         has_mask: flags & 32 > 0,
+                        has_lobes: flags & 64 > 0,
                         is_logarithmic: flags & 1 > 0,
                     };
                     let key = PipelineKey::new(writes, kind, Faces::Both, draw_state);

@@ -82,7 +82,7 @@ shader_struct! {
         max_depth: u32,
         /// Number of surfaces on a chain at which both branches are followed; beyond, only the stronger one is.
         branching_depth: u32,
-        /// Number of lights to trace.
+        /// Number of lights.
         light_count: u32,
         padding0: u32,
         padding1: u32,
@@ -175,6 +175,13 @@ shader_struct! {
         absorption_per_m: [f32; 3],
         /// Refractive index of that medium.
         ior: f32,
+        /// Half-axes of a panel, local or [m].
+        across: [f32; 3],
+        /// Radius of a round lamp, local or [m]; of suns the tangent of its angle.
+        radius: f32,
+        down: [f32; 3],
+        /// `OUTLINE_*`.
+        outline: u32,
     }
 }
 

@@ -162,7 +162,7 @@ impl Renderer {
         }
         if let Some(scene) = &self.chain_scene {
             contents.extend(scene.contents_without_corners());
-            let start = scene.start(&View::new(camera, [1, 1]), &ChainLimits::default(), false);
+            let start = scene.start(&View::new(camera, [1, 1]), &ChainLimits::default());
             contents.push(("start", Content::plain(&[start])));
         }
         let named = contents.into_iter();

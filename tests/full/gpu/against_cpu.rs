@@ -24,7 +24,7 @@ use support::chain_laws;
 use support::floors::{
     diffuse, floor, floor_map, floor_scene, four_colours, from_above, image, lambert, texture_reference,
 };
-use support::scenes::{bits, light, map_of, middles, seen, view};
+use support::scenes::{bits, lamps_of_all_kinds, light, map_of, middles, seen, view};
 
 /// Rounding of one half float; the map and the picture are one each.
 const HALF: f64 = 1.0 / 2048.0;
@@ -288,8 +288,10 @@ fn reliefs() -> Vec<Case> {
         scene.lights = lamps.map(light).to_vec();
         let normals = NormalMap::new(texture_reference(), 0.7, &image);
         (scene.materials[0].surface, scene.materials[0].normal_map) = (surface, normals);
+        // Images of the lamps in a smooth coat would be far brighter than the relief.
+        scene.materials[0].roughness = 0.3;
         case.maps = even([6.0, 5.0, 7.0].map(|e| e * share));
-        (case.tolerance, case.of_peak, case.few) = (0.004, 0.2, 0.01);
+        (case.tolerance, case.of_peak, case.few) = (0.004, 0.05, 0.01);
         case
     };
     let shares = [0.1, 0.6, 2.0];
@@ -298,6 +300,30 @@ fn reliefs() -> Vec<Case> {
         .into_iter()
         .flat_map(|kind| shares.map(|share| of((kind, share))))
         .collect()
+}
+
+/// Lamps of all kinds in a smooth or a rough coloured mirror, a mirror ball and a glass ball; the balls' outlines differ.
+fn highlights() -> Vec<Case> {
+    let of = |roughness: f64| {
+        let mut mirror = parts::mirror();
+        (mirror.base_colour, mirror.roughness) = (ALBEDO, roughness);
+        let mut scene = floor_scene(mirror);
+        let ball = |x: f64| shapes::sphere(DVec3::new(x, 0.12, 0.6), 0.1, 4);
+        parts::add(&mut scene, "mirror", ball(0.3), parts::mirror());
+        parts::add(&mut scene, "glass", ball(0.75), parts::dielectric("glass", 1.5));
+        for (lamp, x) in [0.2, 0.4, 0.6, 0.8].into_iter().enumerate() {
+            scene
+                .lights
+                .push(lamps_of_all_kinds(DVec3::new(x, 0.7, -0.3)).swap_remove(lamp));
+        }
+        let mut case = case("highlights", scene, vec![], 1);
+        let (eye, target) = (DVec3::new(0.5, 0.6, 1.7), DVec3::new(0.5, 0.0, 0.5));
+        case.view = view(eye, target, 0.6, [120, 80]);
+        case.view.background = LinearSrgb::new(0.2, 0.1, 0.4);
+        (case.tolerance, case.of_peak, case.few) = (0.01, 0.003, 0.01);
+        case
+    };
+    [0.0, 0.2, 0.5].map(of).into()
 }
 
 /// A mirror ball and a glass ball over a dark floor, the sky ahead, and back over the seam of its image with the pole in
@@ -343,6 +369,7 @@ fn device_shows_what_the_cpu_shows() {
         .chain(&masks())
         .chain(&mixtures())
         .chain(&reliefs())
+        .chain(&highlights())
         .chain(&skies())
     {
         let mut rig = or_skip!(Rig::at(AS_CPU, &case.scene, &case.maps));

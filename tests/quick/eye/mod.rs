@@ -3,6 +3,7 @@
 mod charts;
 mod direct;
 mod display;
+mod highlights;
 mod pictures;
 
 fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> T + Send) -> T {

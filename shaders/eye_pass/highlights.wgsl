@@ -1,0 +1,225 @@
+// Lamps in mirrors, in glass and on glossy surfaces; twin of eye_pass/highlights.rs. Lengths are local unless noted.
+
+// Angular radius of lamps without extent where a focus leaves no footprint [rad].
+const POINT_RADIUS_RAD: f32 = 2e-4;
+// A lamp lies on a ray if it is nearer than the next surface by this part of the distance.
+const BEFORE_SURFACE: f32 = 1e-4;
+// Patches across and down a panel that are highlights of their own.
+const PATCHES: u32 = 4u;
+// Highlights that reflect a smaller radiance per irradiance [1/sr] are left out.
+const DIMMEST_HIGHLIGHT: f32 = 3e-4;
+
+// Radius of the disc with the area of a square footprint.
+fn disc_of(width: f32) -> f32 {
+    return abs(width) / sqrt(PI);
+}
+
+// Share of a disc, the footprint, that lies within another at an offset.
+fn share_of_disc(offset: f32, radius: f32, disc: f32) -> f32 {
+    let footprint = max(disc, 1e-3 * radius);
+    if offset >= radius + footprint {
+        return 0.0;
+    }
+    let small = min(radius, footprint);
+    let large = max(radius, footprint);
+    if offset <= large - small {
+        return small * small / (footprint * footprint);
+    }
+    // The lens between two circles.
+    let squares = vec2f(small * small, large * large);
+    let cosines = (offset * offset + squares - squares.yx) / (2.0 * offset * vec2f(small, large));
+    let angles = acos(clamp(cosines, vec2f(-1.0), vec2f(1.0)));
+    return dot(squares, angles - sin(angles) * cos(angles)) / (PI * footprint * footprint);
+}
+
+// Share of an interval of a half-width about a place that lies between -1 and 1.
+fn share_of_side(place: f32, half_width: f32) -> f32 {
+    let low = max(place - half_width, -1.0);
+    let high = min(place + half_width, 1.0);
+    return max(high - low, 0.0) / (2.0 * half_width);
+}
+
+// 0 of round lamps.
+fn panel_area(light: LightRecord) -> f32 {
+    return length(cross(light.across, light.down)) * select(4.0, PI, light.outline == OUTLINE_ELLIPSE);
+}
+
+// GGX α of a lobe as wide as a lamp, or a patch of a panel, is seen from a place.
+fn alpha_from(light: LightRecord, place: vec3f) -> f32 {
+    if light.kind == LIGHT_SUN {
+        return 0.5 * light.radius;
+    }
+    var radius = light.radius;
+    if light.outline != OUTLINE_ROUND {
+        radius = max(length(light.across), length(light.down)) / f32(PATCHES);
+    }
+    return 0.5 * radius / max(distance(light.place, place), 1e-20);
+}
+
+// What a lamp shows to a ray that sees it at `distance`, infinite for suns.
+struct SeenLamp {
+    radiance: vec3f,
+    distance: f32,
+}
+
+fn seen_sun(light: LightRecord, gaze: Gaze) -> SeenLamp {
+    let cosine = -dot(light.place, gaze.direction);
+    if cosine <= 0.0 {
+        return SeenLamp(vec3f(0.0), 0.0);
+    }
+    let offset = length(gaze.direction / cosine + light.place);
+    let footprint = disc_of(gaze.spread);
+    let radius = max(max(light.radius, POINT_RADIUS_RAD), footprint);
+    let share = share_of_disc(offset, radius, footprint);
+    return SeenLamp(light.strength * (share * (1.0 + radius * radius) / (PI * radius * radius)), FAR_AWAY);
+}
+
+fn seen_bulb(light: LightRecord, gaze: Gaze) -> SeenLamp {
+    let to_lamp = light.place - gaze.origin;
+    let along = dot(to_lamp, gaze.direction);
+    if along <= 0.0 {
+        return SeenLamp(vec3f(0.0), 0.0);
+    }
+    let offset = length(to_lamp - gaze.direction * along);
+    let footprint = disc_of(gaze.width + gaze.spread * along);
+    let radius = max(max(light.radius, POINT_RADIUS_RAD * along), footprint);
+    let share = share_of_disc(offset, radius, footprint) * falloff(light, -gaze.direction);
+    let radius_m = radius * start.unit_m;
+    return SeenLamp(light.strength * (share / (PI * radius_m * radius_m)), along);
+}
+
+fn seen_panel(light: LightRecord, gaze: Gaze) -> SeenLamp {
+    let normal = cross(light.across, light.down);
+    let slope = dot(gaze.direction, normal);
+    let to_lamp = light.place - gaze.origin;
+    let distance = dot(to_lamp, normal) / min(slope, -1e-30);
+    if slope >= 0.0 || distance <= 0.0 {
+        return SeenLamp(vec3f(0.0), 0.0);
+    }
+    let from_centre = gaze.direction * distance - to_lamp;
+    let along = vec2f(dot(cross(from_centre, light.down), normal), dot(cross(light.across, from_centre), normal));
+    let place = along / dot(normal, normal);
+    let width = 0.5 * abs(gaze.width + gaze.spread * distance);
+    let widths = max(width / vec2f(length(light.across), length(light.down)), vec2f(1e-3));
+    var share = share_of_side(place.x, widths.x) * share_of_side(place.y, widths.y);
+    if light.outline == OUTLINE_ELLIPSE {
+        share = share_of_disc(length(place), 1.0, 2.0 * sqrt(widths.x * widths.y / PI));
+    }
+    let area_m2 = panel_area(light) * start.unit_m * start.unit_m;
+    return SeenLamp(light.strength * (share / area_m2), distance);
+}
+
+// Radiance of the lamps between a surface that a path has left and the next one at `reach`, averaged over the footprint.
+fn lamps_on(gaze: Gaze, reach: f32) -> vec3f {
+    var sum = vec3f(0.0);
+    for (var index = 0u; index < start.light_count; index += 1u) {
+        let light = lights[index];
+        if light.outline == OUTLINE_SURFACE || alpha_from(light, gaze.origin) < gaze.alpha {
+            continue;
+        }
+        var seen: SeenLamp;
+        if light.kind == LIGHT_SUN {
+            seen = seen_sun(light, gaze);
+        } else if light.outline == OUTLINE_ROUND {
+            seen = seen_bulb(light, gaze);
+        } else {
+            seen = seen_panel(light, gaze);
+        }
+        if largest(seen.radiance) > 0.0 && (seen.distance < reach * (1.0 - BEFORE_SURFACE) || reach >= FAR_AWAY) {
+            sum += seen.radiance * left_after(gaze.media, seen.distance);
+        }
+    }
+    return sum;
+}
+
+// Share of light that is left after a distance in a medium; all of what comes from infinity.
+fn left_after(media: vec4u, distance: f32) -> vec3f {
+    if distance >= FAR_AWAY {
+        return vec3f(1.0);
+    }
+    return medium_transmittance(media, distance * start.unit_m);
+}
+
+// Radiance that a rough mirror reflects per irradiance across a beam [1/sr], at a reflectance of 1; twin of
+// transport/microfacets.rs.
+fn ggx_reflection(normal: vec3f, to_eye: vec3f, to_light: vec3f, alpha_squared: f32) -> f32 {
+    let cos_eye = dot(to_eye, normal);
+    let cos_light = dot(to_light, normal);
+    if cos_eye <= 0.0 || cos_light <= 0.0 {
+        return 0.0;
+    }
+    let half_vector = normalize(to_eye + to_light);
+    let cos_half = dot(half_vector, normal);
+    let across = cross(half_vector, normal);
+    let stretched = dot(across, across) + alpha_squared * cos_half * cos_half;
+    let distribution = alpha_squared / (PI * stretched * stretched);
+    let hidden_eye = sqrt(alpha_squared + (1.0 - alpha_squared) * cos_eye * cos_eye);
+    let hidden_light = sqrt(alpha_squared + (1.0 - alpha_squared) * cos_light * cos_light);
+    return distribution * cos_light * 0.5 / (cos_light * hidden_eye + cos_eye * hidden_light);
+}
+
+// A point of a rough surface that reflects lamps.
+struct Gloss {
+    point: SurfacePoint,
+    facing: Facing,
+    alpha: f32,
+    facets: Facets,
+    tint: vec3f,
+    // Share of the radiance that the chain's own reflection carries to the eye.
+    reflected: f32,
+}
+
+// Reflected radiance of a lamp, or of a patch of it at a place.
+fn highlight_from(light: LightRecord, place: vec3f, patch_m2: f32, gloss: Gloss, gaze: Gaze) -> vec3f {
+    var to_light = -light.place;
+    var reach = FAR_AWAY;
+    var across_beam = 1.0;
+    if light.kind != LIGHT_SUN {
+        let offset = place - gloss.point.place;
+        let far = length(offset);
+        to_light = offset / max(far, 1e-20);
+        reach = far * (1.0 - BEFORE_SURFACE);
+        let far_m = far * start.unit_m;
+        across_beam = falloff(light, -to_light) / max(far_m * far_m + patch_m2 / PI, 1e-20);
+    }
+    let to_eye = -gaze.direction;
+    let size = alpha_from(light, gloss.point.place);
+    let response = ggx_reflection(gloss.facing.shading, to_eye, to_light, gloss.alpha * gloss.alpha + size * size);
+    let is_bright = response * gloss.reflected >= DIMMEST_HIGHLIGHT && across_beam > 0.0;
+    if !is_bright || dot(to_light, gloss.facing.geometric) <= 0.0 {
+        return vec3f(0.0);
+    }
+    if closest_hit(leave(gloss.point, to_light), to_light, reach).triangle != NO_TRIANGLE {
+        return vec3f(0.0);
+    }
+    let cos_facet = dot(normalize(to_eye + to_light), to_light);
+    let reflectance = reflectance_of(gloss.facets, cos_facet, gloss.tint);
+    return light.strength * left_after(gaze.media, reach) * reflectance * (across_beam * response);
+}
+
+// Reflected radiance of the lamps that are smaller than the lobe of a rough surface.
+fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
+    var sum = vec3f(0.0);
+    for (var index = 0u; index < start.light_count; index += 1u) {
+        let light = lights[index];
+        if light.outline == OUTLINE_SURFACE || alpha_from(light, gloss.point.place) >= gloss.alpha {
+            continue;
+        }
+        let is_panel = light.outline != OUTLINE_ROUND;
+        let is_ellipse = light.outline == OUTLINE_ELLIPSE;
+        let count = select(1u, PATCHES * PATCHES, is_panel);
+        // The corners of a grid lie outside of an ellipse.
+        let share = 1.0 / f32(count - select(0u, 4u, is_ellipse));
+        let patch_m2 = panel_area(light) * start.unit_m * start.unit_m * share;
+        for (var number = 0u; number < count; number += 1u) {
+            let cell = vec2f(f32(number % PATCHES), f32(number / PATCHES));
+            let at = (cell + 0.5) * (2.0 / f32(PATCHES)) - 1.0;
+            if !is_ellipse || length(at) < 1.0 {
+                // A round lamp has no axes.
+                let place = light.place + light.across * at.x + light.down * at.y;
+                sum += share * highlight_from(light, place, patch_m2, gloss, gaze);
+            }
+        }
+    }
+    return sum;
+}

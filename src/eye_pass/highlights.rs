@@ -1,0 +1,332 @@
+//! Lamps in mirrors, in glass and on glossy surfaces; twin of `shaders/eye_pass/highlights.wgsl`.
+//!
+//! A ray of a chain stands for a cone, the footprint of its pixel, and sees a lamp by the share of the cone that the lamp
+//! fills. Bulbs and suns that are smaller than the footprint are spread over a disc of its size. The image of a lamp
+//! thus holds the same energy at any resolution, and lamps without extent are seen too.
+//!
+//! At a rough surface that would show the lamp through one direction of a whole lobe. A lamp that is smaller than the
+//! lobe is a highlight there instead: the lobe times the lamp's irradiance, with a shadow ray, to which clear surfaces are
+//! opaque, as they are to direct light.
+
+use std::f64::consts::PI;
+
+use glam::{DVec2, DVec3};
+
+use crate::geometry::Ray;
+use crate::optics::LinearSrgb;
+use crate::scene::emitter::{Emitter, EmitterKind};
+use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
+use crate::transport::ggx_reflection;
+
+/// Angular radius of lamps without extent where a focus leaves no footprint [rad]: a fifth of a pixel of 1 mrad.
+const POINT_RADIUS_RAD: f64 = 2e-4;
+/// A lamp lies on a ray if it is nearer than the next surface by this part of the distance: panels often lie on the glowing
+/// surface that shows them.
+const BEFORE_SURFACE: f64 = 1e-4;
+/// Patches across and down a panel that are highlights of their own.
+const PATCHES: u32 = 4;
+
+/// A ray with the cone of directions that it stands for.
+#[derive(Clone, Copy, Debug)]
+pub struct RayCone {
+    pub ray: Ray,
+    /// Width of the cone at the origin [m].
+    pub width_m: f64,
+    /// Growth of the width per length [rad]; negative where the cone narrows.
+    pub spread_rad: f64,
+    /// GGX α of the surface that the ray left, whose highlights are those of all lamps smaller than its lobe; 0 without
+    /// highlights.
+    pub alpha: f64,
+}
+
+impl RayCone {
+    /// Width [m] at a distance [m]; negative beyond a focus.
+    fn width_at(&self, distance_m: f64) -> f64 {
+        self.width_m + self.spread_rad * distance_m
+    }
+}
+
+/// A point of a rough surface and the direction from which it is seen.
+#[derive(Clone, Copy, Debug)]
+pub struct Lobe {
+    /// [m].
+    pub point: DVec3,
+    /// Unit, towards the eye.
+    pub to_eye: DVec3,
+    /// Unit normal for scattering, on the side of the eye.
+    pub normal: DVec3,
+    /// GGX α, > 0.
+    pub alpha: f64,
+}
+
+/// Unshadowed reflection of one lamp, or of a patch of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Highlight {
+    /// Unit.
+    pub to_light: DVec3,
+    /// Infinite for suns.
+    pub distance_m: f64,
+    /// Unit normal of the microfacets that reflect it, whose reflectance is a factor of the radiance.
+    pub half: DVec3,
+    /// Reflected radiance per irradiance across the beam [1/sr], at a reflectance of 1.
+    pub response: f64,
+    /// Irradiance across the beam [W/m²].
+    pub irradiance: LinearSrgb,
+}
+
+/// A lamp without glowing surface.
+#[derive(Clone, Debug)]
+pub struct VisibleLamp {
+    /// The whole lamp, from its centre.
+    emitter: Emitter,
+    outline: Outline,
+}
+
+/// What a lamp looks like.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Outline {
+    /// A sun: a disc in the sky.
+    Angle {
+        /// Tangent of its angular radius.
+        tan_radius: f64,
+    },
+    /// A bulb: a circle from all sides.
+    Round { radius_m: f64 },
+    /// A panel.
+    Flat {
+        /// Half-axis [m].
+        across: DVec3,
+        /// Half-axis [m].
+        down: DVec3,
+        shape: PanelShape,
+    },
+}
+
+impl Outline {
+    /// `None` for surfaces, which are seen themselves, and the sky.
+    pub(super) fn of(light: &Light) -> Option<Self> {
+        let radius = match light.size {
+            LightSize::None => 0.0,
+            LightSize::Radius { radius_m } => radius_m,
+            LightSize::Angle { diameter_rad } => (0.5 * diameter_rad).tan(),
+        };
+        match light.kind {
+            LightKind::Surface { .. } | LightKind::Environment { .. } => None,
+            LightKind::Panel {
+                across, down, shape, ..
+            } => Some(Self::Flat { across, down, shape }),
+            LightKind::Sun { .. } => Some(Self::Angle { tan_radius: radius }),
+            LightKind::Point { .. } | LightKind::Spot { .. } => Some(Self::Round { radius_m: radius }),
+        }
+    }
+}
+
+impl VisibleLamp {
+    /// All lamps of a scene that are no surfaces and no sky.
+    pub fn all(scene: &Scene) -> Vec<Self> {
+        let lamps = scene.lights.iter();
+        lamps.filter_map(|light| Self::of(light, scene)).collect()
+    }
+
+    fn of(light: &Light, scene: &Scene) -> Option<Self> {
+        Some(Self {
+            outline: Outline::of(light)?,
+            emitter: Emitter::middle(light, scene)?,
+        })
+    }
+
+    /// Intensity on the axis [W/sr]; of suns normal irradiance [W/m²].
+    #[cfg(feature = "gpu")]
+    pub(super) fn strength(&self) -> LinearSrgb {
+        self.emitter.strength
+    }
+
+    /// Radiance [W/(m² sr)] that a cone sees, averaged over it, with the distance of the lamp [m]. `reach_m`: distance of
+    /// the next surface, infinite if there is none.
+    pub fn seen(&self, cone: &RayCone, reach_m: f64) -> Option<(LinearSrgb, f64)> {
+        if self.alpha_from(cone.ray.origin) < cone.alpha {
+            return None;
+        }
+        match self.outline {
+            Outline::Angle { tan_radius } if reach_m.is_infinite() => self.seen_sun(cone, tan_radius),
+            Outline::Angle { .. } => None,
+            Outline::Round { radius_m } => self.seen_bulb(cone, radius_m),
+            Outline::Flat { across, down, shape } => self.seen_panel(cone, [across, down], shape),
+        }
+        .filter(|(_, distance_m)| reach_m.is_infinite() || *distance_m < reach_m * (1.0 - BEFORE_SURFACE))
+    }
+
+    fn seen_sun(&self, cone: &RayCone, tan_radius: f64) -> Option<(LinearSrgb, f64)> {
+        let (to_sun, ..) = self.emitter.kind.seen_from(DVec3::ZERO, 0.0)?;
+        let direction = cone.ray.direction;
+        let cosine = to_sun.dot(direction);
+        if cosine <= 0.0 {
+            return None;
+        }
+        let offset = (direction / cosine - to_sun).length();
+        let footprint = disc_of(cone.spread_rad);
+        let radius = tan_radius.max(POINT_RADIUS_RAD).max(footprint);
+        let share = share_of_disc(offset, radius, footprint);
+        // E⊥ = πL sin²α.
+        let per_irradiance = (1.0 + radius * radius) / (PI * radius * radius);
+        (share > 0.0).then_some((self.emitter.strength * (share * per_irradiance), f64::INFINITY))
+    }
+
+    fn seen_bulb(&self, cone: &RayCone, radius_m: f64) -> Option<(LinearSrgb, f64)> {
+        let Ray { origin, direction } = cone.ray;
+        let to_lamp = self.emitter.kind.position()? - origin;
+        let along_m = to_lamp.dot(direction);
+        if along_m <= 0.0 {
+            return None;
+        }
+        let offset_m = (to_lamp - direction * along_m).length();
+        let footprint_m = disc_of(cone.width_at(along_m));
+        let radius_m = radius_m.max(POINT_RADIUS_RAD * along_m).max(footprint_m);
+        let share = share_of_disc(offset_m, radius_m, footprint_m) * self.emitter.kind.falloff(-direction);
+        let radiance = self.emitter.strength * (share / (PI * radius_m * radius_m));
+        (share > 0.0).then_some((radiance, along_m))
+    }
+
+    fn seen_panel(
+        &self,
+        cone: &RayCone,
+        [across, down]: [DVec3; 2],
+        shape: PanelShape,
+    ) -> Option<(LinearSrgb, f64)> {
+        let Ray { origin, direction } = cone.ray;
+        let normal = across.cross(down);
+        let slope = direction.dot(normal);
+        let to_lamp = self.emitter.kind.position()? - origin;
+        let distance_m = to_lamp.dot(normal) / slope;
+        // Also where the quotient is not a number.
+        if !(slope < 0.0 && distance_m > 0.0) {
+            return None;
+        }
+        let from_centre = direction * distance_m - to_lamp;
+        let along = DVec2::new(
+            from_centre.cross(down).dot(normal),
+            across.cross(from_centre).dot(normal),
+        );
+        let width = 0.5 * cone.width_at(distance_m).abs();
+        let half_widths = [across, down].map(|axis| width / axis.length());
+        let share = share_of_panel(along / normal.length_squared(), half_widths, shape);
+        let radiance = self.emitter.strength * (share / (normal.length() * outline_area(shape)));
+        (share > 0.0).then_some((radiance, distance_m))
+    }
+
+    /// Highlights of the lamp in a lobe that is wider than it.
+    pub fn highlights(&self, lobe: &Lobe, mut met: impl FnMut(&Highlight)) {
+        let of_patch = self.alpha_from(lobe.point);
+        if of_patch >= lobe.alpha {
+            return;
+        }
+        // A lobe as wide as the real one and the patch together.
+        let alpha_squared = lobe.alpha * lobe.alpha + of_patch * of_patch;
+        let mut from = |emitter: &Emitter, patch_m2: f64| {
+            let Some((to_light, distance_m, across_beam)) = emitter.kind.seen_from(lobe.point, patch_m2)
+            else {
+                return;
+            };
+            let response = ggx_reflection(lobe.normal, lobe.to_eye, to_light, alpha_squared);
+            if response > 0.0 && across_beam > 0.0 {
+                met(&Highlight {
+                    to_light,
+                    distance_m: distance_m * (1.0 - BEFORE_SURFACE),
+                    half: (lobe.to_eye + to_light).normalize(),
+                    response,
+                    irradiance: emitter.strength * across_beam,
+                });
+            }
+        };
+        let (EmitterKind::Facet { position, normal }, Outline::Flat { across, down, shape }) =
+            (self.emitter.kind, self.outline)
+        else {
+            return from(&self.emitter, 0.0);
+        };
+        let places = patches(shape);
+        let share = 1.0 / places.len() as f64;
+        let patch_m2 = across.cross(down).length() * outline_area(shape) * share;
+        for place in places {
+            let kind = EmitterKind::Facet {
+                position: position + across * place.x + down * place.y,
+                normal,
+            };
+            let strength = self.emitter.strength * share;
+            from(&Emitter { kind, strength }, patch_m2);
+        }
+    }
+
+    /// GGX α of a lobe as wide as a lamp, or a patch of a panel, is seen from a point: half the tangent of its angular
+    /// radius, as a microfacet's tilt turns its reflection twice as far.
+    fn alpha_from(&self, point: DVec3) -> f64 {
+        let distance = self
+            .emitter
+            .kind
+            .position()
+            .map_or(1.0, |place| place.distance(point));
+        let radius = match self.outline {
+            Outline::Angle { tan_radius } => tan_radius,
+            Outline::Round { radius_m } => radius_m,
+            Outline::Flat { across, down, .. } => across.length().max(down.length()) / f64::from(PATCHES),
+        };
+        0.5 * radius / distance.max(f64::MIN_POSITIVE)
+    }
+}
+
+/// Centres of the patches of a panel in the coordinates of its half-axes.
+fn patches(shape: PanelShape) -> Vec<DVec2> {
+    let centre = |step: u32| (f64::from(step) + 0.5) * 2.0 / f64::from(PATCHES) - 1.0;
+    let all =
+        (0..PATCHES * PATCHES).map(|patch| DVec2::new(centre(patch % PATCHES), centre(patch / PATCHES)));
+    all.filter(|place| shape == PanelShape::Rectangle || place.length() < 1.0)
+        .collect()
+}
+
+/// Area of a panel over that of the parallelogram of its half-axes.
+fn outline_area(shape: PanelShape) -> f64 {
+    match shape {
+        PanelShape::Rectangle => 4.0,
+        PanelShape::Disc => PI,
+    }
+}
+
+/// Radius of the disc with the area of a square footprint.
+fn disc_of(width: f64) -> f64 {
+    width.abs() / PI.sqrt()
+}
+
+/// Share of a disc, the footprint, that lies within another at an offset.
+fn share_of_disc(offset: f64, radius: f64, footprint: f64) -> f64 {
+    let footprint = footprint.max(1e-3 * radius);
+    if offset >= radius + footprint {
+        return 0.0;
+    }
+    let (small, large) = (radius.min(footprint), radius.max(footprint));
+    let whole = (small / footprint).powi(2);
+    if offset <= large - small {
+        return whole;
+    }
+    // The lens between two circles.
+    let angle = |of: f64, other: f64| {
+        let cosine = (offset * offset + of * of - other * other) / (2.0 * offset * of);
+        let angle = cosine.clamp(-1.0, 1.0).acos();
+        of * of * (angle - angle.sin() * angle.cos())
+    };
+    let lens = angle(small, large) + angle(large, small);
+    lens / (PI * footprint * footprint)
+}
+
+/// Share of a footprint of these half-widths that lies on a panel, all in coordinates of its half-axes.
+fn share_of_panel(place: DVec2, half_widths: [f64; 2], shape: PanelShape) -> f64 {
+    let [x, y] = half_widths.map(|width| width.max(1e-3));
+    match shape {
+        PanelShape::Rectangle => share_of_side(place.x, x) * share_of_side(place.y, y),
+        PanelShape::Disc => share_of_disc(place.length(), 1.0, 2.0 * (x * y / PI).sqrt()),
+    }
+}
+
+/// Share of an interval of a half-width about a place that lies between -1 and 1.
+fn share_of_side(place: f64, half_width: f64) -> f64 {
+    let (low, high) = ((place - half_width).max(-1.0), (place + half_width).min(1.0));
+    (high - low).max(0.0) / (2.0 * half_width)
+}
