@@ -317,7 +317,7 @@ impl ChartCache {
         }
         let (low, high) = self.scene.objects[object].bounds()?;
         let texel_m = low.distance(high).max(self.core_m()?) / 400.0;
-        self.size_of_texels(object, texel_m, 8)
+        Some(self.map_surface(object)?.size(texel_m, 8))
     }
 
     /// A map of direct and indirect light only: texels of 1/400 of the scene's diagonal, or as requested; tiled if it
@@ -430,18 +430,21 @@ impl ChartCache {
             MapResolution::Auto => (usize::MAX, usize::MAX),
             MapResolution::Fixed { width, height } => (width, height),
         };
-        let receivers: Vec<Receiver> = Receiver::all(self.scene.objects.len())
+        let surfaces: Vec<(Receiver, MapSurface, f64)> = Receiver::all(self.scene.objects.len())
             .filter(|&receiver| self.may_see_lights(receiver))
+            .filter_map(|receiver| {
+                let object = receiver.object();
+                Some((receiver, self.map_surface(object)?, self.grid_texel_m(object)?))
+            })
             .collect();
         let coarsened = |step: u32| -> Vec<(Receiver, (usize, usize))> {
             let factor = (f64::from(step) / GRID_STEPS).exp2();
             let least = (MIN_GRID_SIDE as f64 / factor) as usize;
-            let size = |&receiver: &Receiver| {
-                let texel_m = factor * self.grid_texel_m(receiver.object())?;
-                let (width, height) = self.size_of_texels(receiver.object(), texel_m, least)?;
-                Some((receiver, (width.min(most_side.0), height.min(most_side.1))))
+            let size = |(receiver, surface, texel_m): &(Receiver, MapSurface, f64)| {
+                let (width, height) = surface.size(factor * texel_m, least);
+                (*receiver, (width.min(most_side.0), height.min(most_side.1)))
             };
-            receivers.iter().filter_map(size).collect()
+            surfaces.iter().map(size).collect()
         };
         let texels = |sizes: &[(Receiver, (usize, usize))]| -> u64 {
             let texels = sizes.iter().map(|(_, (width, height))| (width * height) as u64);
@@ -464,13 +467,31 @@ impl ChartCache {
         Some(own_m.max(core_m) * (own_m / core_m).sqrt() / 200.0)
     }
 
-    /// The size of a map with texels of about a length [m], of powers of two.
-    fn size_of_texels(&self, object: usize, texel_m: f64, least: usize) -> Option<(usize, usize)> {
+    fn map_surface(&self, object: usize) -> Option<MapSurface> {
         let parametrisation = self.parametrisation(object)?;
-        let texels = parametrisation.area_m2() / (texel_m * texel_m);
+        Some(MapSurface {
+            area_m2: parametrisation.area_m2(),
+            aspect: parametrisation.suggested_aspect,
+        })
+    }
+}
+
+/// What a map of an object covers.
+struct MapSurface {
+    area_m2: f64,
+    /// Width over height.
+    aspect: f64,
+}
+
+impl MapSurface {
+    /// The size of a map with texels of about a length [m]: powers of two from `least` to 1024.
+    fn size(&self, texel_m: f64, least: usize) -> (usize, usize) {
+        let texels = self.area_m2 / (texel_m * texel_m);
         let side = |wanted: f64| (wanted.max(least.max(1) as f64).log2().round().exp2() as usize).min(1024);
-        let aspect = parametrisation.suggested_aspect;
-        Some((side((texels * aspect).sqrt()), side((texels / aspect).sqrt())))
+        (
+            side((texels * self.aspect).sqrt()),
+            side((texels / self.aspect).sqrt()),
+        )
     }
 }
 

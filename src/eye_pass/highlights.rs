@@ -14,7 +14,7 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::Ray;
 use crate::optics::LinearSrgb;
-use crate::scene::emitter::{Emitter, EmitterKind};
+use crate::scene::emitter::{Emitter, EmitterKind, EmitterSampler};
 use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
 use crate::transport::ggx_reflection;
 
@@ -80,6 +80,8 @@ pub struct VisibleLamp {
     /// The whole lamp, from its centre.
     emitter: Emitter,
     outline: Outline,
+    /// Of a panel; 0 for others.
+    area_m2: f64,
 }
 
 /// What a lamp looks like.
@@ -132,6 +134,7 @@ impl VisibleLamp {
         Some(Self {
             outline: Outline::of(light)?,
             emitter: Emitter::middle(light, scene)?,
+            area_m2: EmitterSampler::new(light, scene).area_m2(),
         })
     }
 
@@ -210,7 +213,7 @@ impl VisibleLamp {
         let width = 0.5 * cone.width_at(distance_m).abs();
         let half_widths = [across, down].map(|axis| width / axis.length());
         let share = share_of_panel(along / normal.length_squared(), half_widths, shape);
-        let radiance = self.emitter.strength * (share / (normal.length() * outline_area(shape)));
+        let radiance = self.emitter.strength * (share / self.area_m2);
         (share > 0.0).then_some((radiance, distance_m))
     }
 
@@ -245,7 +248,7 @@ impl VisibleLamp {
         };
         let places = patches(shape);
         let share = 1.0 / places.len() as f64;
-        let patch_m2 = across.cross(down).length() * outline_area(shape) * share;
+        let patch_m2 = self.area_m2 * share;
         for place in places {
             let kind = EmitterKind::Facet {
                 position: position + across * place.x + down * place.y,
@@ -280,14 +283,6 @@ fn patches(shape: PanelShape) -> Vec<DVec2> {
         (0..PATCHES * PATCHES).map(|patch| DVec2::new(centre(patch % PATCHES), centre(patch / PATCHES)));
     all.filter(|place| shape == PanelShape::Rectangle || place.length() < 1.0)
         .collect()
-}
-
-/// Area of a panel over that of the parallelogram of its half-axes.
-fn outline_area(shape: PanelShape) -> f64 {
-    match shape {
-        PanelShape::Rectangle => 4.0,
-        PanelShape::Disc => PI,
-    }
 }
 
 /// Radius of the disc with the area of a square footprint.

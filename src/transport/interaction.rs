@@ -112,6 +112,15 @@ struct ScatteredDirection {
     by: NormalSource,
 }
 
+impl SurfaceHit {
+    /// The triangle's normal and the one for scattering, on the side of a ray along the unit vector `incident`: where the
+    /// shading normal faces away from the ray, both are the triangle's.
+    pub fn normals_towards(&self, incident: DVec3) -> [DVec3; 2] {
+        let frame = HitFrame::new(self, incident, None);
+        [frame.geometric, frame.shading]
+    }
+}
+
 impl HitFrame {
     fn new(hit: &SurfaceHit, incident: DVec3, micro: Option<Facet>) -> Self {
         let front = incident.dot(hit.geometric_normal) < 0.0;

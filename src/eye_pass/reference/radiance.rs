@@ -190,7 +190,7 @@ impl<'a> LitScene<'a> {
         let interaction = tracer.interact(hit, incident, &path.media);
         let side = Side::met(incident, hit.geometric_normal);
         let mut seen = path.brings(self.own_radiance(hit, side, interaction.leaving));
-        if !CHAINS {
+        if !CHAINS || (interaction.reflection.is_none() && interaction.transmission.is_none()) {
             return seen;
         }
         let shape = ChainSurface {
@@ -241,13 +241,11 @@ impl<'a> LitScene<'a> {
         alpha: f64,
     ) -> LinearSrgb {
         let incident = path.cone.ray.direction;
-        let geometric = hit.geometric_normal * -hit.geometric_normal.dot(incident).signum();
-        let shading = hit.shading_normal * hit.shading_normal.dot(geometric).signum();
-        let faces_the_eye = shading.dot(incident) < 0.0;
+        let [geometric, normal] = hit.normals_towards(incident);
         let lobe = Lobe {
             point: hit.point,
             to_eye: -incident,
-            normal: if faces_the_eye { shading } else { geometric },
+            normal,
             alpha,
         };
         let reflected = (path.weight * reflection.share).max_channel();

@@ -28,6 +28,11 @@ impl DrawState {
         self.style == MapStyle::Lit && self.has_chains && look.surface.is_specular()
     }
 
+    /// Whether any object shows chains, in view or not.
+    pub(super) fn has_specular(self, objects: &Objects) -> bool {
+        objects.list.iter().any(|look| self.is_specular(look))
+    }
+
     /// Pipeline of an object in the frame; `None` if it is left out.
     pub(super) fn key(self, look: &Appearance) -> Option<PipelineKey> {
         let writes = match self.style {

@@ -18,8 +18,8 @@ use crate::scene::Scene;
 /// the square of a refractive index.
 const LARGEST_SCALED: f64 = 4096.0;
 
-/// Ratio of the radiance of the environment and of lamps to that of surfaces above which it is clipped. Half floats then keep eleven
-/// binary digits for radiance of a thousandth of the brightest surface.
+/// Ratio of the radiance of the environment and of lamps to that of surfaces above which it is clipped. Half floats then
+/// keep eleven binary digits for radiance of a thousandth of the brightest surface.
 const LARGEST_OVER_SURFACES: f64 = 1024.0;
 
 /// Scaled radiance from which on a mean may contain clipped values.
@@ -146,8 +146,7 @@ impl Renderer {
     /// Largest radiance of lamps in mirrors and glass [W/(m² sr)]. It depends on the view, so the limit is taken; without
     /// lit surfaces, that of white ones that a lamp lights from 1 m.
     fn peak_of_lamps(&self) -> f64 {
-        let draw_state = self.draw_state();
-        if !self.objects.list.iter().any(|look| draw_state.is_specular(look)) {
+        if !self.draw_state().has_specular(&self.objects) {
             return 0.0;
         }
         let lamps = VisibleLamp::all(&self.scene).into_iter();

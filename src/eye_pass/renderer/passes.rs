@@ -199,8 +199,7 @@ impl Renderer {
             style: MapStyle::Lit,
             ..draw_state
         };
-        let is_specular = |look| lit(self.draw_state()).is_specular(look);
-        let has_specular = self.objects.list.iter().any(is_specular);
+        let has_specular = lit(self.draw_state()).has_specular(&self.objects);
         if has_specular {
             self.make_chain_scene(gpu);
         }

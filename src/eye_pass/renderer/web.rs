@@ -108,8 +108,7 @@ impl WebScene {
                 "export a scene of fewer triangles",
             ));
         }
-        let mut looks = renderer.objects.list.iter();
-        if looks.any(|look| renderer.draw_state().is_specular(look)) {
+        if renderer.draw_state().has_specular(&renderer.objects) {
             renderer.make_chain_scene(&gpu);
         }
         let mut contents = renderer.web_contents(&gpu, camera)?;
