@@ -26,6 +26,7 @@ use crate::light_pass::ledger::LightLedger;
 use crate::light_pass::receiver_maps::ReceiverMap;
 use crate::optics::{LinearSrgb, luminance};
 use crate::plan::{self, Effect, EffectPlan};
+use crate::progress::Progress;
 use crate::scene::{Light, Scene};
 use crate::settings::{BakeSettings, LayerKind, Sigma};
 
@@ -39,8 +40,54 @@ pub(super) struct MapAssembler<'a> {
     pub(super) sizes: &'a ChartCache,
     pub(super) settings: &'a BakeSettings,
     pub(super) plan: &'a EffectPlan,
-    /// Halvings of direct maps below the requested size.
-    pub(super) coarsening: u32,
+    pub(super) direct: DirectDetail,
+}
+
+/// How finely direct light is baked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum DirectDetail {
+    /// Not at all.
+    Absent,
+    /// For a first look, or because the visible error weighs caustics against it.
+    Coarse,
+    /// As the maps ask for.
+    Full,
+}
+
+/// Halvings of coarse direct maps below the requested size.
+const COARSE_HALVINGS: u32 = 2;
+
+impl DirectDetail {
+    /// What a bake needs.
+    pub(super) fn of(plan: &EffectPlan, settings: &BakeSettings) -> Self {
+        if plan.is_on(Effect::Direct) {
+            Self::Full
+        } else if plan.is_on(Effect::LightPass) && plan::weighs_direct(settings) {
+            Self::Coarse
+        } else {
+            Self::Absent
+        }
+    }
+
+    /// What a first look needs: nothing that it does not show.
+    pub(super) fn of_first_look(self) -> Self {
+        match self {
+            Self::Full => Self::Coarse,
+            Self::Coarse | Self::Absent => Self::Absent,
+        }
+    }
+
+    /// Who is told of its progress: nobody, where it is done on the side.
+    pub(super) fn progress(self, shown: &dyn Progress) -> &dyn Progress {
+        match self {
+            Self::Full => shown,
+            Self::Coarse | Self::Absent => &(),
+        }
+    }
+
+    fn halvings(self) -> u32 {
+        if self == Self::Coarse { COARSE_HALVINGS } else { 0 }
+    }
 }
 
 /// Levels of all lights with maps, in scene order.
@@ -61,29 +108,16 @@ impl MapAssembler<'_> {
         outcome: &CausticOutcome,
     ) -> Bake {
         let is_shown = |kind: LayerKind| plan::is_wanted(self.settings, kind);
+        let ledgers = self.ledgers(levels);
+        let truncated = truncated_share(&ledgers);
+        let estimated_visible = self.estimate_visible(&mut maps, truncated);
         for map in &mut maps {
             map.layers.retain(|layer| is_shown(layer.kind));
             map.estimated_relative_rmse = relative_rmse(std::slice::from_ref(map));
         }
         maps.retain(|map| !map.layers.is_empty());
         light_layers.retain(|part| is_shown(part.kind));
-        let ledgers = levels.iter().map(|(light, level)| {
-            let light = &self.scene.lights[*light];
-            let ledger = level
-                .ledger
-                .report(&light.name, level.unit, level.strength(light));
-            LightLedger {
-                carried_w: level.carried_w(ledger.energy_w.deposited, light),
-                ..ledger.with_radiant(level.radiant, level.deposited_radiant_w(light))
-            }
-        });
-        let ledgers: Vec<LightLedger> = ledgers.collect();
-        let truncated = truncated_share(&ledgers);
         let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(truncated));
-        let (estimated_visible, of_maps) = visible_error(&maps, truncated);
-        for (map, error) in maps.iter_mut().zip(of_maps) {
-            map.estimated_visible = error;
-        }
         let metric = self.settings.error_metric;
         let estimated_error = metric.of(estimated_visible, estimated_relative_rmse);
         let is_scarce = outcome.warnings.iter().any(|warning| warning.location == MEMORY);
@@ -128,6 +162,37 @@ impl MapAssembler<'_> {
         }
     }
 
+    /// Energy of the caustic layer, light by light.
+    fn ledgers(&self, levels: &Levels) -> Vec<LightLedger> {
+        let ledgers = levels.iter().map(|(light, level)| {
+            let light = &self.scene.lights[*light];
+            let ledger = level
+                .ledger
+                .report(&light.name, level.unit, level.strength(light));
+            LightLedger {
+                carried_w: level.carried_w(ledger.energy_w.deposited, light),
+                ..ledger.with_radiant(level.radiant, level.deposited_radiant_w(light))
+            }
+        });
+        ledgers.collect()
+    }
+
+    /// The visible error of all maps and of each, beside the light of all layers; `None` if direct light is not known.
+    fn estimate_visible(&self, maps: &mut [IlluminationMap], truncated: f64) -> Option<f64> {
+        let is_off = self.settings.effects.get(Effect::Direct) == EffectSwitch::Off;
+        if self.direct == DirectDetail::Absent && !is_off {
+            return None;
+        }
+        let is_traced =
+            |kind: &LayerKind| *kind != LayerKind::Direct && plan::is_wanted(self.settings, *kind);
+        let traced: Vec<LayerKind> = LayerKind::ALL.into_iter().filter(is_traced).collect();
+        let (all, of_maps) = visible_error(maps, &traced, truncated);
+        for (map, error) in maps.iter_mut().zip(of_maps) {
+            map.estimated_visible = error;
+        }
+        all
+    }
+
     /// The warning that the caustic layer is empty, where other layers fill the maps.
     fn empty_layer(&self) -> Option<Warning> {
         let mut effects = self.plan.effects.iter();
@@ -161,7 +226,7 @@ impl MapAssembler<'_> {
     /// a light may reach; with a warning if the memory limit makes the latter coarser.
     pub(super) fn charts(&self, levels: &Levels) -> (Charts, Option<Warning>) {
         let (mut charts, mut wishes) = (Charts::new(), BTreeMap::new());
-        let is_everywhere = self.plan.is_on(Effect::Direct) || self.plan.is_on(Effect::Indirect);
+        let is_everywhere = self.direct != DirectDetail::Absent || self.plan.is_on(Effect::Indirect);
         for receiver in Receiver::all(self.scene.objects.len()) {
             let lit = levels.iter().find_map(|(_, level)| level.maps.get(receiver));
             if let Some(map) = lit {
@@ -194,8 +259,9 @@ impl MapAssembler<'_> {
                 charts.insert(receiver, chart);
             }
         }
-        let warning =
-            (sizes != requested).then(|| map_plan::memory_warning(&requested, &sizes, (left, memory)));
+        let is_shown = self.direct != DirectDetail::Coarse;
+        let warning = (is_shown && sizes != requested)
+            .then(|| map_plan::memory_warning(&requested, &sizes, (left, memory)));
         (charts, warning)
     }
 
@@ -209,7 +275,7 @@ impl MapAssembler<'_> {
 
     /// Size request of a map with direct and indirect light only.
     fn direct_wish(&self, receiver: Receiver) -> Option<SizeRequest> {
-        if self.coarsening > 0 {
+        if self.direct == DirectDetail::Coarse {
             return self.direct_size(receiver.object()).map(SizeRequest::dense);
         }
         self.sizes.direct_wish(receiver, self.settings)
@@ -217,16 +283,16 @@ impl MapAssembler<'_> {
 
     fn direct_size(&self, object: usize) -> Option<(usize, usize)> {
         let size = self.sizes.direct_size(object, self.settings)?;
-        Some(map_size::halved(size, self.coarsening))
+        Some(map_size::halved(size, self.direct.halvings()))
     }
 
     fn direct_chart(&self, chart: &Arc<Chart>) -> Option<DirectChart> {
-        let doublings = match self.coarsening {
-            0 => self.sizes.border_doublings(chart.receiver, self.settings),
-            _ => 0,
+        let doublings = match self.direct {
+            DirectDetail::Full => self.sizes.border_doublings(chart.receiver, self.settings),
+            DirectDetail::Coarse | DirectDetail::Absent => 0,
         };
         // Unwrapped charts have another layout at every size.
-        let is_fixed = chart.uv_set == UvSet::Generated || self.coarsening == 0;
+        let is_fixed = chart.uv_set == UvSet::Generated || self.direct != DirectDetail::Coarse;
         if chart.layout.is_none() && is_fixed && doublings == 0 {
             return Some(DirectChart {
                 map: Arc::clone(chart),
@@ -235,7 +301,7 @@ impl MapAssembler<'_> {
             });
         }
         let size = (chart.width, chart.height);
-        let times = self.sizes.direct_halvings(chart.object(), size, self.settings) + self.coarsening;
+        let times = self.sizes.direct_halvings(chart.object(), size, self.settings) + self.direct.halvings();
         let of_size = |times: u32| self.sizes.chart(chart.receiver, map_size::halved(size, times));
         let finer = times.min(doublings);
         Some(DirectChart {
@@ -257,7 +323,7 @@ impl MapAssembler<'_> {
         if !lit.is_empty() {
             layers.push(self.caustic_layer(chart, &lit));
         }
-        if self.plan.is_on(Effect::Direct) {
+        if self.direct != DirectDetail::Absent {
             layers.extend(self.direct_layer(chart, direct));
         }
         let is_shown = plan::is_wanted(self.settings, LayerKind::Caustic);

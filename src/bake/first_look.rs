@@ -5,7 +5,7 @@
 
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
-use super::finish::{Levels, MapAssembler};
+use super::finish::{DirectDetail, Levels, MapAssembler};
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
 use super::result::LightLayer;
@@ -14,9 +14,6 @@ use crate::light_pass::indirect::{MIN_PASSES, Network};
 use crate::plan::{Effect, wants_caustics};
 use crate::progress::{Control, Progress};
 use crate::transport::Tracer;
-
-/// Halvings of direct maps below the requested size.
-const HALVINGS: u32 = 2;
 
 /// Elements of all grids of indirect light together.
 const ELEMENTS: u64 = 1_500;
@@ -37,12 +34,12 @@ impl FirstLook {
         on_whom: (&dyn Progress, &Control),
     ) -> (Vec<IlluminationMap>, Vec<LightLayer>) {
         let finish = &MapAssembler {
-            coarsening: HALVINGS,
+            direct: finish.direct.of_first_look(),
             ..*finish
         };
         let (charts, _) = finish.charts(levels);
         let mut direct = DirectCache::default();
-        if finish.plan.is_on(Effect::Direct) {
+        if finish.direct != DirectDetail::Absent {
             let passes_glass = levels.is_empty() && wants_caustics(finish.settings);
             let passing = passes_glass.then(|| tracer.without_clear_bodies());
             let direct_charts = finish.direct_charts(&charts);

@@ -55,7 +55,7 @@ use caustic::{CausticLayer, CausticOutcome, Stopped};
 use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
-use finish::{CompletedLevel, MapAssembler};
+use finish::{CompletedLevel, DirectDetail, MapAssembler};
 use first_look::FirstLook;
 use indirect_cache::IndirectCache;
 use indirect_work::IndirectWork;
@@ -325,12 +325,13 @@ impl Baker {
         let level = level.as_mut().filter(|_| is_new)?;
         progress.advance(Stage::Build, 0, 1);
         let tracer = clock.time(|clock| &mut clock.build, || self.tracer());
+        let plan = plan::decide(&self.scene, settings, &[]);
         let finish = MapAssembler {
             scene: &self.scene,
             sizes: &self.sizes,
             settings,
-            plan: &plan::decide(&self.scene, settings, &[]),
-            coarsening: 0,
+            plan: &plan,
+            direct: DirectDetail::of(&plan, settings),
         };
         let mut look = FirstLook::default();
         let maps = look.maps(&finish, &tracer, &[], (progress, control));
@@ -369,18 +370,21 @@ impl Baker {
             sizes: &self.sizes,
             settings,
             plan,
-            coarsening: 0,
+            direct: DirectDetail::of(plan, settings),
         };
         self.direct.begin(settings);
         let mut lamps = DirectWork::default();
         if plan.is_on(Effect::Direct) {
             lamps.look_for_borders(tracer, &self.sizes, settings, control);
         }
-        let for_direct = limited(
-            control,
-            settings.max_time_s.map(|limit_s| PART_OF_DIRECT * limit_s),
-            began,
-        );
+        let direct_limit_s = match finish.direct {
+            // A few samples of each texel are enough.
+            DirectDetail::Coarse => Some(0.0),
+            DirectDetail::Full | DirectDetail::Absent => {
+                settings.max_time_s.map(|limit_s| PART_OF_DIRECT * limit_s)
+            }
+        };
+        let for_direct = limited(control, direct_limit_s, began);
         let lights = &mut self.lights;
         let mut showing = Showing {
             for_direct: &for_direct,
@@ -410,12 +414,13 @@ impl Baker {
             .collect();
         let (charts, memory_warning) = finish.charts(&finished);
         outcome.warnings.extend(memory_warning);
-        if plan.is_on(Effect::Direct) {
+        if finish.direct != DirectDetail::Absent {
             let direct_charts = finish.direct_charts(&charts);
-            let complete = lamps.shine(tracer, &direct_charts, direct, (progress, &for_direct));
+            let on_whom = (finish.direct.progress(progress), &for_direct);
+            let complete = lamps.shine(tracer, &direct_charts, direct, on_whom);
             if !complete {
                 outcome.stopped = Some(Stopped::Cancelled);
-            } else if !direct.is_refined() {
+            } else if finish.direct == DirectDetail::Full && !direct.is_refined() {
                 outcome.warnings.push(Warning::new(
                     "direct layer",
                     "the time was up before all shadows had the samples that they need",

@@ -6,7 +6,7 @@ use super::caustic::CausticOutcome;
 use super::clock::Clock;
 use super::direct_cache::DirectCache;
 use super::direct_work::DirectWork;
-use super::finish::{CompletedLevel, MapAssembler};
+use super::finish::{CompletedLevel, DirectDetail, MapAssembler};
 use super::first_look::FirstLook;
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
@@ -70,7 +70,7 @@ impl Showing<'_, '_> {
         so_far: &CausticOutcome,
         clock: &mut Clock,
     ) {
-        if self.level.is_none() || levels.is_empty() || !self.finish.plan.is_on(Effect::Direct) {
+        if self.level.is_none() || levels.is_empty() || self.finish.direct != DirectDetail::Full {
             return;
         }
         let (charts, _) = self.finish.charts(levels);
@@ -100,7 +100,7 @@ impl Showing<'_, '_> {
         let direct_charts = finish.direct_charts(&charts);
         // The first picture after a change has to come soon; direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
-        if !waits && plan.is_on(Effect::Direct) {
+        if !waits && finish.direct == DirectDetail::Full {
             let on_whom = (self.bake.progress, self.for_direct);
             self.lamps
                 .shine(&self.bake.tracer, &direct_charts, self.direct, on_whom);
@@ -120,12 +120,12 @@ impl Showing<'_, '_> {
     /// Light of other layers on the maps of these levels and on all other maps.
     pub(super) fn backdrop(&mut self, levels: &[CompletedLevel]) -> Backdrop {
         let finish = self.finish;
-        if !finish.plan.is_on(Effect::Direct) && !finish.plan.is_on(Effect::Indirect) {
+        if finish.direct == DirectDetail::Absent && !finish.plan.is_on(Effect::Indirect) {
             return Backdrop::new();
         }
         let (charts, _) = finish.charts(levels);
-        let on_whom = (self.bake.progress, self.for_direct);
-        if finish.plan.is_on(Effect::Direct) {
+        let on_whom = (finish.direct.progress(self.bake.progress), self.for_direct);
+        if finish.direct != DirectDetail::Absent {
             self.lamps.shine(
                 &self.bake.tracer,
                 &finish.direct_charts(&charts),

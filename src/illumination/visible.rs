@@ -135,14 +135,18 @@ pub fn white(blocks: impl Iterator<Item = BlockLight>) -> Option<f64> {
     (counted_m2 > 0.0 && white.is_finite() && white > 0.0).then_some(white)
 }
 
-/// Visible error of all maps together, and of each. `truncated` is the share of traced light that was truncated, which
-/// the error of the maps does not include. `None` if the error of a lit map is unknown, or if there is no caustic or
-/// indirect light.
-pub fn visible_error(maps: &[IlluminationMap], truncated: f64) -> (Option<f64>, Vec<Option<f64>>) {
+/// Visible error of all maps together, and of each: that of the layers `of` beside the light of all. `truncated` is the
+/// share of traced light that was truncated, which the error of the maps does not include. `None` if the error of a lit
+/// map is unknown, or if these layers hold no light.
+pub fn visible_error(
+    maps: &[IlluminationMap],
+    of: &[LayerKind],
+    truncated: f64,
+) -> (Option<f64>, Vec<Option<f64>>) {
     let none = || (None, vec![None; maps.len()]);
     let mut lit = Vec::with_capacity(maps.len());
     for map in maps {
-        let traced_of_texels = map.luminance_of(&[LayerKind::Caustic, LayerKind::Indirect]);
+        let traced_of_texels = map.luminance_of(of);
         if map.error.is_none() && traced_of_texels.iter().any(|e| *e > 0.0) {
             return none();
         }

@@ -2,7 +2,7 @@
 
 use super::{Effect, EffectLine, EffectPlan, EffectSwitch, LightLine};
 use crate::scene::{Material, Scene, SurfaceKind};
-use crate::settings::{BakeSettings, LayerKind};
+use crate::settings::{BakeSettings, ErrorMetric, LayerKind};
 
 /// Specular objects that a light sees or reaches.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -74,7 +74,7 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> 
             "no lit mirror, glass or coat has waves or a normal texture",
         ),
         decision.area_lights(pass.on),
-        decision.direct(),
+        decision.direct(pass.on),
         decision.indirect(),
         decision.motion(),
     ];
@@ -102,6 +102,13 @@ pub fn is_wanted(settings: &BakeSettings, layer: LayerKind) -> bool {
 fn is_needed(settings: &BakeSettings, layer: LayerKind) -> bool {
     let is_off = settings.effects.get(effect_of(layer)) == EffectSwitch::Off;
     !is_off && (is_wanted(settings, layer) || is_wanted(settings, LayerKind::Indirect))
+}
+
+/// Whether the error of caustics is weighed against direct light that no layer needs.
+pub fn weighs_direct(settings: &BakeSettings) -> bool {
+    settings.error_metric == ErrorMetric::Visible
+        && is_wanted(settings, LayerKind::Caustic)
+        && settings.effects.get(Effect::Direct) != EffectSwitch::Off
 }
 
 /// The effect that produces a layer.
@@ -251,14 +258,18 @@ impl Decision<'_> {
         }
     }
 
-    fn direct(&self) -> EffectLine {
+    fn direct(&self, pass: bool) -> EffectLine {
         let effect = Effect::Direct;
         let line = |on, reason: &str| self.line(effect, on, reason);
         match self.settings.effects.get(effect) {
             EffectSwitch::Off => line(false, SWITCHED_OFF),
-            _ if !is_needed(self.settings, LayerKind::Direct) => {
-                line(false, "the direct layer is not asked for")
-            }
+            _ if !is_needed(self.settings, LayerKind::Direct) => match weighs_direct(self.settings) && pass {
+                true => line(
+                    false,
+                    "the direct layer is not asked for, but the visible error is judged beside it",
+                ),
+                false => line(false, "the direct layer is not asked for"),
+            },
             switch => match self.why_dark() {
                 Some(why) => line(false, why),
                 None if switch == EffectSwitch::On => line(true, "switched on by the user"),

@@ -5,7 +5,7 @@ mod eye;
 mod reach;
 mod sealed_regions;
 
-pub use decide::{LightReach, decide, is_wanted, wants_caustics};
+pub use decide::{LightReach, decide, is_wanted, wants_caustics, weighs_direct};
 pub use eye::{chains, dispersion};
 pub use reach::SceneReach;
 

@@ -56,7 +56,8 @@ pub fn same_map<'a>(result: &'a Bake, map: &IlluminationMap) -> Option<&'a Illum
 /// Luminance of the same receiver's caustic [W/m²]; black where the result has none.
 pub fn caustic_like(result: &Bake, map: &IlluminationMap) -> Vec<f64> {
     let dark = || vec![0.0; map.chart.texel_count()];
-    same_map(result, map).map_or_else(dark, caustic)
+    let same = same_map(result, map).filter(|map| map.layer(LayerKind::Caustic).is_some());
+    same.map_or_else(dark, caustic)
 }
 
 /// Root mean square of the difference over the reference's mean, texels weighing alike.

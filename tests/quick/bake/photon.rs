@@ -1,8 +1,9 @@
 //! Photons against the law of energy and against themselves. `full` holds them against brute force.
 
+use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::optics::luminance;
 use nephroid::scene::Scene;
-use nephroid::settings::{BakeSettings, Estimator, LayerKind};
+use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
 
 use support::hard_scenes::roughened;
 use support::tools::{bake, bits, builtin_scene, energy_fault, photons};
@@ -27,11 +28,34 @@ fn threads_change_no_photon() {
     }
 }
 
+/// Caustics are judged beside direct light, which need not be baked for that.
+#[test]
+fn visible_errors_count_light_that_is_not_baked() {
+    let stated = |layers: &[LayerKind], direct: EffectSwitch| {
+        let settings = BakeSettings {
+            error_metric: ErrorMetric::Visible,
+            layers: layers.to_vec(),
+            effects: EffectSwitches::default().with(Effect::Direct, direct),
+            ..photons(3e4, SIDE)
+        };
+        let result = bake(builtin_scene("ring"), &settings);
+        let mut layers_of_maps = result.maps.iter().flat_map(|map| &map.layers);
+        assert!(layers_of_maps.all(|layer| layers.contains(&layer.kind)));
+        result.estimated_visible.expect("an estimate")
+    };
+    let beside = stated(&[LayerKind::Caustic, LayerKind::Direct], EffectSwitch::Auto);
+    let alone = stated(&[LayerKind::Caustic], EffectSwitch::Auto);
+    let in_the_dark = stated(&[LayerKind::Caustic], EffectSwitch::Off);
+    assert!((alone / beside - 1.0).abs() < 0.05, "{alone} beside {beside}");
+    assert!(in_the_dark > 1.5 * beside, "{in_the_dark} beside {beside}");
+}
+
 /// Few photons leave most texels empty: what is left of the noise there is still a number.
 #[test]
 fn errors_of_few_filtered_photons_are_numbers() {
     let settings = BakeSettings {
         max_error: Some(1.0),
+        error_metric: ErrorMetric::Visible,
         filter: Some(true),
         ..photons(1e4, FINE)
     };
