@@ -363,11 +363,9 @@ struct Glowing<'a> {
     weight: fn(&Glow, usize) -> f64,
 }
 
-/// Sampling weight of a triangle relative to its area; bounded from below, since the estimate of a dark triangle may
-/// have missed bright texels.
+/// Sampling weight of a triangle relative to its area.
 fn weight(glow: &Glow, triangle: usize) -> f64 {
-    const LEAST: f64 = 0.05;
-    glow.by_triangle[triangle].max(LEAST)
+    glow.weights[triangle]
 }
 
 impl<'a> Glowing<'a> {

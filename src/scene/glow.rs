@@ -13,13 +13,24 @@ const STEPS: (f64, f64) = (4.0, 64.0);
 /// Approximate number of texture samples for a mesh of many triangles: enough to tell which triangles are bright.
 const LOOKS: f64 = 1e6;
 
+/// Texels that are searched for the brightest of each triangle, over a whole mesh.
+const SEARCHED_TEXELS: f64 = 1.6e7;
+
+/// Radiance of a point relative to what its triangle's weight stands for, at most: a bright spot in a dark triangle makes
+/// no photon that outshines all others.
+const MAX_CONTRAST: f64 = 16.0;
+
+/// Minimum weight of a triangle.
+const LEAST_WEIGHT: f64 = 0.05;
+
 /// Mean of an emission texture over an object, and its distribution over the triangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Glow {
     /// Area-weighted mean over the surface.
     pub mean: LinearSrgb,
-    /// Luminance of each triangle's mean relative to that of `mean`.
-    pub by_triangle: Vec<f64>,
+    /// Sampling weight of each triangle relative to its area: the luminance of its mean relative to that of `mean`, or
+    /// more if that misses bright texels.
+    pub weights: Vec<f64>,
 }
 
 impl Glow {
@@ -39,9 +50,15 @@ impl Glow {
         }
         let mean = sum / area_m2;
         let luminance = mean.luminance();
+        let brightest = Brightest::new(mesh, image, texture);
+        let weight = |(triangle, mean): (usize, &LinearSrgb)| {
+            let peak = brightest.in_triangle(triangle).unwrap_or(0.0);
+            let least = (peak / (MAX_CONTRAST * luminance)).max(LEAST_WEIGHT);
+            (mean.luminance() / luminance).max(least)
+        };
         (luminance > 0.0).then(|| Self {
             mean,
-            by_triangle: means.iter().map(|mean| mean.luminance() / luminance).collect(),
+            weights: means.par_iter().enumerate().map(weight).collect(),
         })
     }
 
@@ -73,6 +90,42 @@ fn triangle_mean(
         }
     }
     Some(sum / f64::from(steps * steps))
+}
+
+/// Upper bounds of an emission texture over triangles.
+struct Brightest<'a> {
+    mesh: InScene<'a>,
+    image: &'a TextureRef,
+    texture: &'a Texture,
+    /// Over the whole image.
+    overall: f64,
+    /// Texels that may be searched for a triangle.
+    most_texels: f64,
+}
+
+impl<'a> Brightest<'a> {
+    fn new(mesh: InScene<'a>, image: &'a TextureRef, texture: &'a Texture) -> Self {
+        Self {
+            mesh,
+            image,
+            texture,
+            overall: texture.brightest_within(DVec2::ZERO, DVec2::ONE),
+            most_texels: SEARCHED_TEXELS / mesh.triangle_count() as f64,
+        }
+    }
+
+    /// Largest luminance in the bounding box of a triangle; `None` if the mesh lacks the texture coordinates.
+    fn in_triangle(&self, triangle: usize) -> Option<f64> {
+        let at = |barycentric| self.image.place(self.mesh, triangle, barycentric);
+        let [a, b, c] = [at([1.0, 0.0, 0.0])?, at([0.0, 1.0, 0.0])?, at([0.0, 0.0, 1.0])?];
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        let sides = (high - low) * DVec2::new(f64::from(self.texture.width), f64::from(self.texture.height));
+        Some(if sides.element_product() > self.most_texels {
+            self.overall
+        } else {
+            self.texture.brightest_within(low, high)
+        })
+    }
 }
 
 impl Scene {

@@ -53,6 +53,30 @@ impl Texture {
         row(0.0) * (1.0 - share.y) + row(1.0) * share.y
     }
 
+    /// Largest luminance of all texels that samples between two texture coordinates may touch.
+    pub fn brightest_within(&self, low: DVec2, high: DVec2) -> f64 {
+        let size = [self.width, self.height].map(f64::from);
+        let (first, last) = (self.between(low).0, self.between(high).0 + 1.0);
+        // Beyond the size of the image, texels repeat.
+        let range = |axis: usize| {
+            let count = last[axis] - first[axis] + 1.0;
+            if count < size[axis] {
+                (first[axis], count as u32)
+            } else {
+                (0.0, size[axis] as u32)
+            }
+        };
+        let ((left, columns), (top, rows)) = (range(0), range(1));
+        let mut brightest = 0.0_f64;
+        for row in 0..rows {
+            for column in 0..columns {
+                let texel = self.texel(left + f64::from(column), top + f64::from(row));
+                brightest = brightest.max(texel.luminance());
+            }
+        }
+        brightest
+    }
+
     /// Alpha at a texture coordinate, [0, 1].
     pub fn alpha(&self, uv: DVec2) -> f64 {
         let (low, share) = self.between(uv);
