@@ -23,6 +23,8 @@ const OWN_WEIGHTS: [f32; 4] = [5.0 / 32.0, 3.0 / 16.0, 3.0 / 16.0, 5.0 / 32.0];
 /// Cells of all levels, finest first.
 pub(super) struct Cells {
     levels: Vec<Level>,
+    /// Level and index of the cell that each texel is.
+    of_texels: Vec<(u8, u32)>,
 }
 
 /// Values of every cell, level by level.
@@ -32,6 +34,7 @@ pub(super) type Values<const N: usize> = Vec<Vec<[f32; N]>>;
 pub(super) struct Level {
     /// Cells across and down, including those that are missing.
     size: (usize, usize),
+    tiles_across: usize,
     /// A tile is 2^shift cells long.
     shift: u32,
     /// First cell of each tile; [`NONE`] if the tile is coarser than the level.
@@ -80,6 +83,7 @@ impl Level {
         }
         Self {
             size,
+            tiles_across: tiles.0,
             shift: side.trailing_zeros(),
             begins,
             areas_m2: vec![0.0; places.len()],
@@ -90,9 +94,8 @@ impl Level {
     }
 
     fn index(&self, column: usize, row: usize) -> Option<usize> {
-        let tiles_across = self.size.0.div_ceil(1 << self.shift);
         let (tile_column, tile_row) = (column >> self.shift, row >> self.shift);
-        let begin = self.begins[tile_row * tiles_across + tile_column];
+        let begin = self.begins[tile_row * self.tiles_across + tile_column];
         let (first_column, first_row) = (tile_column << self.shift, tile_row << self.shift);
         let across = (1 << self.shift).min(self.size.0 - first_column);
         (begin != NONE).then(|| begin as usize + (row - first_row) * across + column - first_column)
@@ -128,12 +131,22 @@ impl Cells {
             .layout
             .as_ref()
             .map_or((chart.width, chart.height), |layout| layout.size());
-        let mut cells = Self { levels: Vec::new() };
+        let mut cells = Self {
+            levels: Vec::new(),
+            of_texels: vec![(0, NONE); chart.texel_count()],
+        };
         for level in 0.. {
             cells.levels.push(Level::new(level, size, chart));
             let last = cells.levels[usize::from(level)].size;
             if last.0.max(last.1) <= FEWEST_ACROSS && (level >= COARSEST || chart.layout.is_none()) {
                 break;
+            }
+        }
+        for (number, level) in cells.levels.iter().enumerate() {
+            for (index, &texel) in level.texels.iter().enumerate() {
+                if texel != NONE {
+                    cells.of_texels[texel as usize] = (number as u8, index as u32);
+                }
             }
         }
         let areas = cells.sums(|texel| [chart.texel_area_m2(texel) as f32]);
@@ -153,7 +166,7 @@ impl Cells {
     }
 
     pub fn texels<const N: usize>(&self, values: &Values<N>) -> Vec<[f32; N]> {
-        self.inherited(0, [0.0; N], |level, index| values[level][index])
+        self.inherited(0, |level, index| values[level][index])
     }
 
     /// Surface area in each of a level's cells [m²].
@@ -163,36 +176,24 @@ impl Cells {
 
     /// Area of each texel, relative to the largest of its size.
     pub fn shares(&self) -> Vec<f32> {
-        self.inherited(0, 0.0, |level, index| {
+        self.inherited(0, |level, index| {
             let level = &self.levels[level];
             level.share(level.areas_m2[index])
         })
     }
 
     /// For each texel, the value of a cell, given its level and index: the cell of a level in which the texel lies, or
-    /// the texel's own if that is larger. `blank` is overwritten.
-    pub fn inherited<T: Copy>(&self, level: usize, blank: T, value: impl Fn(usize, usize) -> T) -> Vec<T> {
-        let is_texel = |texel: &&u32| **texel != NONE;
-        let count = self
-            .levels
-            .iter()
-            .map(|own| own.texels.iter().filter(is_texel).count());
-        let mut of_texels = vec![blank; count.sum()];
-        for (number, own) in self.levels.iter().enumerate() {
+    /// the texel's own if that is larger.
+    pub fn inherited<T: Send>(&self, level: usize, value: impl Fn(usize, usize) -> T + Sync) -> Vec<T> {
+        let of_texel = |&(number, index): &(u8, u32)| {
+            let (number, index) = (usize::from(number), index as usize);
             let steps = level.saturating_sub(number);
+            let (column, row) = self.levels[number].places[index];
             let above = &self.levels[number + steps];
-            for (&texel, &(column, row)) in own
-                .texels
-                .iter()
-                .zip(&own.places)
-                .filter(|(texel, _)| **texel != NONE)
-            {
-                let cell = above.index(column as usize >> steps, row as usize >> steps);
-                of_texels[texel as usize] =
-                    value(number + steps, cell.expect("coarser cells cover finer ones"));
-            }
-        }
-        of_texels
+            let cell = above.index(column as usize >> steps, row as usize >> steps);
+            value(number + steps, cell.expect("coarser cells cover finer ones"))
+        };
+        self.of_texels.par_iter().map(of_texel).collect()
     }
 
     /// Sum of a value of texels over every cell.
@@ -235,38 +236,43 @@ impl Cells {
         })
     }
 
-    /// Densities of a level's cells, averaged over cells `steps` levels coarser and interpolated back.
-    pub fn pooled<const N: usize>(&self, level: usize, values: Vec<[f32; N]>, steps: usize) -> Vec<[f32; N]> {
+    /// Surface area of a level's cells [m²], and of all that lie in each coarser cell, up to so many levels above.
+    pub fn areas_above(&self, level: usize, steps: usize) -> Vec<Vec<[f32; 1]>> {
+        let own = self.levels[level].areas_m2.par_iter().map(|area_m2| [*area_m2]);
+        let mut areas = vec![own.collect::<Vec<_>>()];
         let last = (level + steps).min(self.levels.len() - 1);
-        let mut sums = values;
-        let mut areas = vec![
-            self.levels[level]
-                .areas_m2
-                .iter()
-                .map(|area_m2| [*area_m2])
-                .collect::<Vec<_>>(),
-        ];
-        for (values, [area_m2]) in sums.iter_mut().zip(&areas[0]) {
-            values.iter_mut().for_each(|value| *value *= area_m2);
-        }
         for number in level + 1..=last {
-            let (coarse, fine) = (&self.levels[number], &self.levels[number - 1]);
-            let added = coarse
-                .places
-                .par_iter()
-                .map(|&place| coarse.add_up(place, fine, &sums));
-            sums = added.collect();
-            let finer = areas.last().expect("it has one");
-            let added = coarse
-                .places
-                .par_iter()
-                .map(|&place| coarse.add_up(place, fine, finer));
-            areas.push(added.collect());
+            let finer = &areas[number - level - 1];
+            areas.push(self.added_up(number, finer));
         }
-        let flat: Vec<f32> = areas[last - level].iter().map(|[area_m2]| *area_m2).collect();
-        divide(&mut sums, &flat);
+        areas
+    }
+
+    /// Sums over the cells of the next finer level in each of a level's.
+    fn added_up<const N: usize>(&self, level: usize, finer: &[[f32; N]]) -> Vec<[f32; N]> {
+        let places = self.levels[level].places.par_iter();
+        let sum = |&place| self.levels[level].add_up(place, &self.levels[level - 1], finer);
+        places.map(sum).collect()
+    }
+
+    /// Densities of a level's cells, averaged over cells as many levels coarser as `above` goes, which is of
+    /// [`Self::areas_above`], and interpolated back.
+    pub fn pooled<const N: usize>(
+        &self,
+        level: usize,
+        values: Vec<[f32; N]>,
+        above: &[Vec<[f32; 1]>],
+    ) -> Vec<[f32; N]> {
+        let last = level + above.len() - 1;
+        let mut sums = values;
+        let weighted = sums.par_iter_mut().zip(&above[0]);
+        weighted.for_each(|(values, [area_m2])| values.iter_mut().for_each(|value| *value *= area_m2));
+        for number in level + 1..=last {
+            sums = self.added_up(number, &sums);
+        }
+        divide(&mut sums, bytemuck::cast_slice(&above[last - level]));
         for number in (level..last).rev() {
-            let (coarse, areas) = (&self.levels[number + 1], &areas[number + 1 - level]);
+            let (coarse, areas) = (&self.levels[number + 1], &above[number + 1 - level]);
             sums = self.interpolated(number, |column, row| {
                 let index = coarse.index(column, row)?;
                 Some((coarse.share(areas[index][0]), sums[index]))
@@ -275,10 +281,13 @@ impl Cells {
         sums
     }
 
-    /// Area of a level's cells, relative to the harmonic mean of those around.
-    pub fn relative_areas(&self, level: usize) -> Vec<f32> {
+    /// Area of a level's cells, relative to the harmonic mean of those around; `above` is of [`Self::areas_above`].
+    pub fn relative_areas(&self, level: usize, above: &[Vec<[f32; 1]>]) -> Vec<f32> {
         let of_level = &self.levels[level];
-        let shares = of_level.areas_m2.iter().map(|area_m2| of_level.share(*area_m2));
+        let shares = of_level
+            .areas_m2
+            .par_iter()
+            .map(|area_m2| of_level.share(*area_m2));
         let shares: Vec<f32> = shares.collect();
         if shares.iter().all(|share| *share == 1.0) {
             return shares;
@@ -286,7 +295,7 @@ impl Cells {
         let per_share = shares
             .iter()
             .map(|share| [if *share > 0.0 { 1.0 / share } else { 0.0 }]);
-        let around = self.pooled(level, per_share.collect(), STEPS_AROUND);
+        let around = self.pooled(level, per_share.collect(), surroundings(above));
         shares
             .iter()
             .zip(around)
@@ -296,8 +305,13 @@ impl Cells {
 
     /// [`Self::pooled`] without a cell's own contribution, given [`Self::relative_areas`]; exact where the surface covers
     /// the coarser cells evenly.
-    pub fn around<const N: usize>(&self, level: usize, values: &[[f32; N]], areas: &[f32]) -> Vec<[f32; N]> {
-        let mut means = self.pooled(level, values.to_vec(), STEPS_AROUND);
+    pub fn around<const N: usize>(
+        &self,
+        level: usize,
+        values: &[[f32; N]],
+        (areas, above): (&[f32], &[Vec<[f32; 1]>]),
+    ) -> Vec<[f32; N]> {
+        let mut means = self.pooled(level, values.to_vec(), surroundings(above));
         if level + STEPS_AROUND < self.levels.len() {
             let own = |place: u32| OWN_WEIGHTS[place as usize % OWN_WEIGHTS.len()];
             let places = areas.par_iter().zip(&self.levels[level].places);
@@ -351,9 +365,15 @@ impl Cells {
     }
 }
 
+/// The levels of [`Cells::areas_above`] that the surroundings of a cell are averaged over.
+fn surroundings(above: &[Vec<[f32; 1]>]) -> &[Vec<[f32; 1]>] {
+    &above[..above.len().min(STEPS_AROUND + 1)]
+}
+
 fn divide<const N: usize>(values: &mut [[f32; N]], areas_m2: &[f32]) {
-    for (values, area_m2) in values.iter_mut().zip(areas_m2) {
+    let cells = values.par_iter_mut().zip(areas_m2);
+    cells.for_each(|(values, area_m2)| {
         let per_m2 = if *area_m2 > 0.0 { 1.0 / area_m2 } else { 0.0 };
         values.iter_mut().for_each(|value| *value *= per_m2);
-    }
+    });
 }

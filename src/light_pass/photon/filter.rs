@@ -209,15 +209,16 @@ impl Details {
             let layers = self.raw[level][cell].iter().chain(&self.bundled[level][cell]);
             layers.copied().any(|channel| channel != 0.0)
         };
-        let reached = self.cells.inherited(DARK_LEVEL.min(coarsest), false, is_reached);
+        let reached = self.cells.inherited(DARK_LEVEL.min(coarsest), is_reached);
         let bundled = self.cells.texels(&self.bundled);
-        for ((texel, is_reached), bundled) in texels.iter_mut().zip(reached).zip(bundled) {
+        let layers = texels.par_iter_mut().zip(reached).zip(bundled);
+        layers.for_each(|((texel, is_reached), bundled)| {
             *texel = with_bundles(texel, &bundled);
             let [.., a, b, _] = *texel;
             if !is_reached && 0.5 * (a + b) < DARK {
                 *texel = [0.0; 6];
             }
-        }
+        });
         texels
     }
 
@@ -233,7 +234,8 @@ impl Details {
         };
         // Noise is proportional to light where photons carry equal flux.
         let light = |smooth: &FilteredCell| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
-        let areas = self.cells.relative_areas(level);
+        let above = self.cells.areas_above(level, PHOTONS_POOLED);
+        let areas = self.cells.relative_areas(level, &above);
         let whole: Vec<FilteredCell> = refined
             .par_iter()
             .zip(&self.bundled[level])
@@ -243,7 +245,7 @@ impl Details {
         let both = cells
             .clone()
             .map(|((detail, smooth), area)| [noise(detail) * area, light(smooth)]);
-        let by_light = self.cells.pooled(level, both.collect(), PHOTONS_POOLED);
+        let by_light = self.cells.pooled(level, both.collect(), &above);
         let power = cells
             .zip(&by_light)
             .map(|(((detail, smooth), area), [noise_of_all, light])| {
@@ -270,7 +272,7 @@ impl Details {
             });
         let power: Vec<[f32; 4]> = power.collect();
         drop(by_light);
-        let pooled = self.cells.around(level, &power, &areas);
+        let pooled = self.cells.around(level, &power, (&areas, &above));
         drop(power);
         let cells = refined
             .par_iter_mut()
@@ -355,7 +357,7 @@ impl Details {
         }
         let ratios = self.cells.texels(&ratios);
         let squares = of_texels
-            .iter()
+            .par_iter()
             .zip(&ratios)
             .map(|(kept, [square, expected_there, _])| {
                 let ratio = if *expected_there > 0.0 {
@@ -397,14 +399,11 @@ fn add_untold(cells: &mut [[f32; 3]], areas_m2: &[f32]) {
 
 /// Replaces a map's counts; each channel keeps its sum. The difference is distributed in proportion to the channel, or
 /// to luminance where channels may be negative: luminance stays above 0. Returns what no texel could take.
-fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3], is_signed: bool) -> Sums {
+fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3] + Sync, is_signed: bool) -> Sums {
     let texels = map.texels_mut();
     let sums = |texels: &[FluxCount]| {
-        let mut sums = [0; 3];
-        texels
-            .iter()
-            .for_each(|count| add(&mut sums, count.map(i128::from)));
-        sums
+        let counts = texels.par_iter().map(|count| count.map(i128::from));
+        counts.reduce(|| [0; 3], |a, b| [0, 1, 2].map(|channel| a[channel] + b[channel]))
     };
     let share = |flux: [f64; 3]| match is_signed {
         true => [LinearSrgb::from(flux).luminance(); 3],
@@ -423,11 +422,11 @@ fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3], is_signed: bool)
         true => (before[channel] as f64 - after[channel]) / size[channel],
         false => 0.0,
     });
-    for (texel, count) in texels.iter_mut().enumerate() {
+    texels.par_iter_mut().enumerate().for_each(|(texel, count)| {
         let (flux, share) = (flux(texel), share(flux(texel)));
         let wanted = [0, 1, 2].map(|channel| flux[channel] + share[channel] * missing[channel]);
         *count = lit(wanted.map(|wanted| wanted.round() as i64), is_signed);
-    }
+    });
     // The brightest texel takes the rounding error.
     let rounded = sums(texels);
     let left = [0, 1, 2].map(|channel| before[channel] - rounded[channel]);
