@@ -62,7 +62,7 @@ impl DirectDetail {
     pub(super) fn of(plan: &EffectPlan, settings: &BakeSettings) -> Self {
         if plan.is_on(Effect::Direct) {
             Self::Full
-        } else if plan.is_on(Effect::LightPass) && plan::weighs_direct(settings) {
+        } else if plan::weighs_direct(settings, plan.is_on(Effect::LightPass)) {
             Self::Coarse
         } else {
             Self::Absent

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
-use super::direct_cache::DirectCache;
+use super::direct_cache::{DirectCache, DirectCharts};
 use super::direct_work::DirectWork;
 use super::finish::{CompletedLevel, DirectDetail, MapAssembler};
 use super::first_look::FirstLook;
@@ -63,6 +63,15 @@ impl Showing<'_, '_> {
         }
     }
 
+    /// Bakes direct light that is missing on these charts, where there is any.
+    fn shine(&mut self, charts: &DirectCharts) {
+        let detail = self.finish.direct;
+        if detail != DirectDetail::Absent {
+            let on_whom = (detail.progress(self.bake.progress), self.for_direct);
+            self.lamps.shine(&self.bake.tracer, charts, self.direct, on_whom);
+        }
+    }
+
     /// Takes the first result, when the light of other layers is not known yet.
     pub(super) fn show_first(
         &mut self,
@@ -100,10 +109,8 @@ impl Showing<'_, '_> {
         let direct_charts = finish.direct_charts(&charts);
         // The first picture after a change has to come soon; direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
-        if !waits && finish.direct == DirectDetail::Full {
-            let on_whom = (self.bake.progress, self.for_direct);
-            self.lamps
-                .shine(&self.bake.tracer, &direct_charts, self.direct, on_whom);
+        if !waits {
+            self.shine(&direct_charts);
         }
         let mut so_far = self.lamps.added_to(so_far);
         so_far.counts.item_buffer_tests = self.bake.item_buffer_tests;
@@ -124,15 +131,8 @@ impl Showing<'_, '_> {
             return Backdrop::new();
         }
         let (charts, _) = finish.charts(levels);
-        let on_whom = (finish.direct.progress(self.bake.progress), self.for_direct);
-        if finish.direct != DirectDetail::Absent {
-            self.lamps.shine(
-                &self.bake.tracer,
-                &finish.direct_charts(&charts),
-                self.direct,
-                on_whom,
-            );
-        }
+        let on_whom = (self.bake.progress, self.for_direct);
+        self.shine(&finish.direct_charts(&charts));
         let (mut maps, _) = finish.maps(levels, &charts, self.direct);
         if finish.plan.is_on(Effect::Indirect) {
             let known = match &self.first_look {

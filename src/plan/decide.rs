@@ -104,9 +104,9 @@ fn is_needed(settings: &BakeSettings, layer: LayerKind) -> bool {
     !is_off && (is_wanted(settings, layer) || is_wanted(settings, LayerKind::Indirect))
 }
 
-/// Whether the error of caustics is weighed against direct light that no layer needs.
-pub fn weighs_direct(settings: &BakeSettings) -> bool {
-    settings.error_metric == ErrorMetric::Visible
+/// Whether the error of caustics is judged beside direct light, baked or not. `pass`: whether the light pass is on.
+pub fn weighs_direct(settings: &BakeSettings, pass: bool) -> bool {
+    pass && settings.error_metric == ErrorMetric::Visible
         && is_wanted(settings, LayerKind::Caustic)
         && settings.effects.get(Effect::Direct) != EffectSwitch::Off
 }
@@ -263,14 +263,7 @@ impl Decision<'_> {
         let line = |on, reason: &str| self.line(effect, on, reason);
         match self.settings.effects.get(effect) {
             EffectSwitch::Off => line(false, SWITCHED_OFF),
-            _ if !is_needed(self.settings, LayerKind::Direct) => match weighs_direct(self.settings) && pass {
-                true => line(
-                    false,
-                    "the direct layer is not asked for, but the visible error is judged beside it",
-                ),
-                false => line(false, "the direct layer is not asked for"),
-            },
-            switch => match self.why_dark() {
+            switch if is_needed(self.settings, LayerKind::Direct) => match self.why_dark() {
                 Some(why) => line(false, why),
                 None if switch == EffectSwitch::On => line(true, "switched on by the user"),
                 None if is_wanted(self.settings, LayerKind::Direct) => {
@@ -278,6 +271,11 @@ impl Decision<'_> {
                 }
                 None => line(true, "the indirect layer gathers from it"),
             },
+            _ if weighs_direct(self.settings, pass) => line(
+                false,
+                "the direct layer is not asked for, but the visible error is judged beside it",
+            ),
+            _ => line(false, "the direct layer is not asked for"),
         }
     }
 

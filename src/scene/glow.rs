@@ -52,9 +52,16 @@ impl Glow {
         let luminance = mean.luminance();
         let brightest = Brightest::new(mesh, image, texture);
         let weight = |(triangle, mean): (usize, &LinearSrgb)| {
-            let peak = brightest.in_triangle(triangle).unwrap_or(0.0);
-            let least = (peak / (MAX_CONTRAST * luminance)).max(LEAST_WEIGHT);
-            (mean.luminance() / luminance).max(least)
+            let mean = mean.luminance();
+            // No texel can call for more than the triangle has, which spares the search.
+            let is_bright = MAX_CONTRAST * mean >= brightest.overall;
+            let peak = if is_bright {
+                None
+            } else {
+                brightest.in_triangle(triangle)
+            };
+            let least = peak.unwrap_or(0.0) / MAX_CONTRAST;
+            (mean.max(least) / luminance).max(LEAST_WEIGHT)
         };
         (luminance > 0.0).then(|| Self {
             mean,
@@ -77,7 +84,7 @@ fn triangle_mean(
 ) -> Option<LinearSrgb> {
     let at = |barycentric| image.place(mesh, triangle, barycentric);
     let size = DVec2::new(f64::from(texture.width), f64::from(texture.height));
-    let [a, b, c] = [at([1.0, 0.0, 0.0])?, at([0.0, 1.0, 0.0])?, at([0.0, 0.0, 1.0])?].map(|uv| uv * size);
+    let [a, b, c] = image.corners(mesh, triangle)?.map(|uv| uv * size);
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
     let steps = longest.clamp(STEPS.0, most_steps) as u32;
     let mut sum = LinearSrgb::BLACK;
@@ -116,8 +123,7 @@ impl<'a> Brightest<'a> {
 
     /// Largest luminance in the bounding box of a triangle; `None` if the mesh lacks the texture coordinates.
     fn in_triangle(&self, triangle: usize) -> Option<f64> {
-        let at = |barycentric| self.image.place(self.mesh, triangle, barycentric);
-        let [a, b, c] = [at([1.0, 0.0, 0.0])?, at([0.0, 1.0, 0.0])?, at([0.0, 0.0, 1.0])?];
+        let [a, b, c] = self.image.corners(self.mesh, triangle)?;
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         let sides = (high - low) * DVec2::new(f64::from(self.texture.width), f64::from(self.texture.height));
         Some(if sides.element_product() > self.most_texels {

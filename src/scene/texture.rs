@@ -121,6 +121,12 @@ impl TextureRef {
         Some(self.transform(uv))
     }
 
+    /// Texture coordinates of a triangle's corners; `None` if the mesh lacks the TEXCOORD set.
+    pub fn corners(&self, mesh: InScene, triangle: usize) -> Option<[DVec2; 3]> {
+        let at = |barycentric| self.place(mesh, triangle, barycentric);
+        Some([at([1.0, 0.0, 0.0])?, at([0.0, 1.0, 0.0])?, at([0.0, 0.0, 1.0])?])
+    }
+
     /// Applies KHR_texture_transform to a texture coordinate.
     pub fn transform(&self, uv: DVec2) -> DVec2 {
         self.uv_transform.transform_point2(uv)

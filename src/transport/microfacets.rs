@@ -102,9 +102,10 @@ pub fn ggx_reflection(normal: DVec3, to_eye: DVec3, to_light: DVec3, alpha_squar
     if eye <= 0.0 || light <= 0.0 {
         return 0.0;
     }
-    let cos_half = (to_eye + to_light).normalize().dot(normal);
+    let half = (to_eye + to_light).normalize();
+    let cos_half = half.dot(normal);
     // sin² + α² cos² of the half vector; the sine from a cross product keeps its digits in narrow lobes.
-    let sine = (to_eye + to_light).normalize().cross(normal).length_squared();
+    let sine = half.cross(normal).length_squared();
     let stretched = sine + alpha_squared * cos_half * cos_half;
     let distribution = alpha_squared / (std::f64::consts::PI * stretched * stretched);
     let hidden = |cosine: f64| (alpha_squared + (1.0 - alpha_squared) * cosine * cosine).sqrt();
