@@ -205,3 +205,16 @@ pub fn half_seed(seed: u64, half: usize) -> u64 {
         .wrapping_add(half as u64)
         .wrapping_mul(GOLDEN_64)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn halves_of_all_seeds_are_independent() {
+        let seeds = (0..1000).flat_map(|seed| (0..HALVES).map(move |half| half_seed(seed, half)));
+        assert_eq!(seeds.collect::<HashSet<_>>().len(), 1000 * HALVES);
+    }
+}

@@ -203,7 +203,80 @@ impl Block {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec2;
+
     use super::*;
+    use crate::light_pass::splat::footprint::Ellipse;
+    use crate::light_pass::splat::kernel::Profile;
+    use crate::settings::Kernel;
+
+    /// A map of so many texels across and down, all of them covered.
+    struct Whole(usize);
+
+    impl Coverage for Whole {
+        fn size(&self) -> (usize, usize) {
+            (self.0, self.0)
+        }
+
+        fn is_full(&self) -> bool {
+            true
+        }
+
+        fn covers(&self, _: usize, _: usize, _: u32) -> bool {
+            true
+        }
+    }
+
+    /// Each texel has the part of the flux that the kernel's integral over it is of the whole.
+    #[test]
+    fn texels_take_their_share_of_a_kernel() {
+        const SIDE: usize = 24;
+        const SAMPLES: usize = 16;
+        for kernel in [Kernel::Gaussian, Kernel::Cone, Kernel::Disc] {
+            let ellipse = Ellipse {
+                xx: 4.0,
+                xy: 0.8,
+                yy: 2.5,
+            };
+            let splat = Splat {
+                centre: DVec2::new(12.3, 11.6),
+                ellipse,
+                profile: Profile::new(kernel, 0.5),
+                flux: [1 << 40; 3],
+                island: 0,
+            };
+            let mut window = Window::default();
+            splat.weigh(KernelSampling::Integrated, &Whole(SIDE), &mut window);
+            let mut block = Block::default();
+            let range = (0, SIDE as u32 - 1);
+            block.clear(Some(SplatBounds {
+                columns: range,
+                rows: range,
+            }));
+            window.add(splat.flux, (SIDE, SIDE), &mut block);
+
+            let determinant = ellipse.xx * ellipse.yy - ellipse.xy * ellipse.xy;
+            let mut integrals = vec![0.0; SIDE * SIDE];
+            for (texel, integral) in integrals.iter_mut().enumerate() {
+                for sample in 0..SAMPLES * SAMPLES {
+                    let within = DVec2::new((sample % SAMPLES) as f64, (sample / SAMPLES) as f64) + 0.5;
+                    let corner = DVec2::new((texel % SIDE) as f64, (texel / SIDE) as f64);
+                    let DVec2 { x, y } = corner + within / SAMPLES as f64 - splat.centre;
+                    let square = ellipse.yy * x * x - 2.0 * ellipse.xy * x * y + ellipse.xx * y * y;
+                    *integral += splat.profile.weight((square / determinant).sqrt(), 0.0);
+                }
+            }
+            let whole: f64 = integrals.iter().sum();
+            for (count, integral) in block.texels.iter().zip(&integrals) {
+                let share = count[1] as f64 / splat.flux[1] as f64;
+                assert!(
+                    (share - integral / whole).abs() < 2e-3,
+                    "{kernel:?}: {share} of {}",
+                    integral / whole
+                );
+            }
+        }
+    }
 
     #[test]
     fn folded_ranges_hold_every_folded_index() {
