@@ -293,6 +293,14 @@ impl PanelShape {
         }
     }
 
+    /// Mean square of a coordinate, in half-axes from its centre.
+    pub fn second_moment(self) -> f64 {
+        match self {
+            Self::Rectangle => 1.0 / 3.0,
+            Self::Disc => 0.25,
+        }
+    }
+
     /// Corners of the shape, in half-axes from its centre. For a disc, those of a regular polygon of the same area,
     /// turned by a part of a side.
     pub fn corners(self, sides: u32, turn: f64) -> Vec<DVec2> {

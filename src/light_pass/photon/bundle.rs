@@ -4,13 +4,14 @@
 //! Where only some have it, the square is cut along the edge of the path, and the bundle consists of triangles between
 //! which both are linear.
 
-use glam::{DVec2, Vec2};
+use glam::{DMat2, DVec2, Vec2};
 
 use super::image::{Image, SMOOTH_TEXELS};
 use super::paths::{PathEnd, PointPaths, Route};
 use crate::illumination::Receiver;
 use crate::light_pass::coverage::FluxTriangle;
 use crate::optics::LinearSrgb;
+use crate::scene::PanelShape;
 
 /// Weights of the nine points in a mean over the square (Simpson's rule).
 pub(super) const MEAN_WEIGHTS: [f64; 9] = [
@@ -141,6 +142,15 @@ impl OriginShift {
         (shift.lamp_step_texels() < MAX_STEP_TEXELS).then_some(shift)
     }
 
+    /// For light from the ends of a lamp's half-axes [texels].
+    #[cfg(test)]
+    pub(super) fn of_lamp_sides(lamp: [DVec2; 2]) -> Self {
+        Self {
+            lamp: lamp.map(|moved| moved.as_vec2()),
+            ..Self::default()
+        }
+    }
+
     /// Whether lamp and wavelengths spread the light over several texels.
     pub(super) fn is_smooth(&self) -> bool {
         let [x, y] = self.lamp.map(|moved| 2.0 * moved.abs().max_element());
@@ -155,6 +165,22 @@ impl OriginShift {
     pub(super) fn of_lamp(&self, at: DVec2) -> DVec2 {
         let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
         x * at.x + y * at.y
+    }
+
+    /// Map of the lamp, in half-axes from its centre, after which its image has the second moments of the light that it
+    /// and a triangle around the same middle [texels] spread together.
+    pub(super) fn widened(&self, lamp: PanelShape, corners: [DVec2; 3]) -> DMat2 {
+        let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
+        let on_lamp = DMat2::from_cols(x, y).inverse();
+        let mut square = DMat2::IDENTITY;
+        for corner in corners {
+            let at = on_lamp * corner;
+            square += DMat2::from_cols(at * at.x, at * at.y) * (1.0 / (12.0 * lamp.second_moment()));
+        }
+        // The square root of a symmetric matrix.
+        let root = square.determinant().sqrt();
+        let trace = square.x_axis.x + square.y_axis.y;
+        (square + DMat2::IDENTITY * root) * (trace + 2.0 * root).sqrt().recip()
     }
 
     /// For a wavelength, by its [`Hue::ends`](super::spectrum::Hue::ends).

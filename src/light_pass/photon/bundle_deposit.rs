@@ -6,7 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::bundle::{Bundle, OriginShift, flux_triangle};
-use super::launch::LAMP_DIMENSION;
+use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE};
 use super::pass::{half_seed, set_of};
 use super::receivers::Receivers;
 use super::residual::{ResidualPass, TIMES};
@@ -88,11 +88,12 @@ impl ResidualPass<'_> {
             // they meet without a gap.
             let mut index = bundle.first_triangle;
             let hues = self.hues(bundle, BundleDraw { index, seed }, sets);
+            let lamp = lamp.map(|lamp| LampImage::new(lamp, &bundle.shift, hues.len() > 1));
             bundle.triangles(square.place.area(), |corners, flux_w, area| {
                 let draw = BundleDraw { index, seed };
                 index = index.wrapping_add(1);
-                let spread = match lamp {
-                    Some(lamp) => draw.spread(corners, lamp, &bundle.shift, hues.len() > 1),
+                let spread = match &lamp {
+                    Some(lamp) => lamp.spread(corners, draw),
                     None => vec![corners],
                 };
                 for (hue, share) in &hues {
@@ -143,33 +144,74 @@ struct BundleDraw {
     seed: u64,
 }
 
-impl BundleDraw {
-    /// A triangle [texels], spread by the lamp's image into triangles that share its flux evenly.
-    fn spread(
-        self,
-        corners: [DVec2; 3],
-        lamp: PanelShape,
-        shift: &OriginShift,
-        is_dispersed: bool,
-    ) -> Vec<[DVec2; 3]> {
-        let on_lamp = even_point(self.index, LAMP_DIMENSION, self.seed);
-        let parts = shift.lamp_parts(is_dispersed);
-        let [a, b, c] = corners;
-        let sides = (b - a).abs().max((c - a).abs()).max((c - b).abs());
-        if is_dispersed || sides.max_element() > shift.lamp_width() {
-            let count = (parts.x * parts.y) as u32;
-            let moved = (0..count).map(|part| {
-                let part = f64::from(part);
-                let part = DVec2::new(part % parts.x, (part / parts.x).floor());
-                shift.of_lamp(lamp.at((part + on_lamp) / parts))
-            });
+/// The image of an extended lamp on the map of a bundle.
+struct LampImage<'a> {
+    lamp: PanelShape,
+    shift: &'a OriginShift,
+    /// Along both axes.
+    parts: DVec2,
+    /// Displacement for each part [texels]; empty where each triangle draws its own.
+    middles: Vec<DVec2>,
+}
+
+impl<'a> LampImage<'a> {
+    fn new(lamp: PanelShape, shift: &'a OriginShift, is_dispersed: bool) -> Self {
+        let mut image = Self {
+            lamp,
+            shift,
+            parts: shift.lamp_parts(is_dispersed),
+            middles: Vec::new(),
+        };
+        if !is_dispersed {
+            // The middles of parts are nearer to the centre than all of the lamp: they are moved out to have its second
+            // moments.
+            let middles = image.places(LAMP_MIDDLE);
+            let moment = middles.iter().map(|at| at * at).sum::<DVec2>() / middles.len() as f64;
+            let scale = (DVec2::splat(lamp.second_moment()) / moment).map(f64::sqrt);
+            let scale = DVec2::select(image.parts.cmpgt(DVec2::ONE), scale, DVec2::ONE);
+            image.middles = middles.iter().map(|&at| shift.of_lamp(at * scale)).collect();
+        }
+        image
+    }
+
+    /// A place in each part of the lamp, in half-axes from its centre, by a point of the unit square.
+    fn places(&self, within: DVec2) -> Vec<DVec2> {
+        let count = (self.parts.x * self.parts.y) as u32;
+        let place = |part: u32| {
+            let part = f64::from(part);
+            let part = DVec2::new(part % self.parts.x, (part / self.parts.x).floor());
+            self.lamp.at((part + within) / self.parts)
+        };
+        (0..count).map(place).collect()
+    }
+
+    /// A triangle [texels], spread by the lamp's image into triangles that share its flux evenly. Those of one hue are
+    /// spread alike, so that they meet without a gap: what is left to chance there is not in the difference of halves,
+    /// and would be an error that is not stated.
+    fn spread(&self, corners: [DVec2; 3], draw: BundleDraw) -> Vec<[DVec2; 3]> {
+        let on_lamp = even_point(draw.index, LAMP_DIMENSION, draw.seed);
+        if self.middles.is_empty() {
+            let places = self.places(on_lamp);
+            let moved = places.iter().map(|&at| self.shift.of_lamp(at));
             return moved.map(|moved| corners.map(|corner| corner + moved)).collect();
         }
+        let [a, b, c] = corners;
+        let sides = (b - a).abs().max((c - a).abs()).max((c - b).abs());
+        if sides.max_element() > self.shift.lamp_width() {
+            let moved = self.middles.iter();
+            return moved.map(|&moved| corners.map(|corner| corner + moved)).collect();
+        }
 
-        // A triangle smaller than the lamp's image: this image, around its middle.
+        // A triangle smaller than the lamp's image: this image, around its middle, as much wider as the triangle makes it.
         let middle = (a + b + c) / 3.0;
-        let outline = lamp.corners(4 * parts.max_element() as u32, on_lamp.x);
-        let corners: Vec<DVec2> = outline.iter().map(|&at| middle + shift.of_lamp(at)).collect();
+        let wider = self
+            .shift
+            .widened(self.lamp, corners.map(|corner| corner - middle));
+        let outline = self.lamp.corners(4 * self.parts.max_element() as u32, on_lamp.x);
+        let corners: Vec<DVec2> = outline
+            .iter()
+            .map(|&at| middle + self.shift.of_lamp(wider * at))
+            .collect();
         let next = corners.iter().cycle().skip(1);
         corners.iter().zip(next).map(|(&a, &b)| [middle, a, b]).collect()
     }
@@ -203,4 +245,50 @@ pub(super) fn plan_deposits(squares: &mut Squares, goal: f64, receivers: &Receiv
         *count = count.wrapping_add(bundle.triangle_count() as u32);
     }
     left.iter().sum::<f64>() * relative
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DMat2;
+
+    /// Mean of the products of coordinates over triangles of equal flux, around a point.
+    fn second_moments(triangles: &[[DVec2; 3]], around: DVec2) -> DMat2 {
+        let product = |at: DVec2| DMat2::from_cols(at * at.x, at * at.y);
+        let mut sum = DMat2::ZERO;
+        for corners in triangles {
+            let corners = corners.map(|corner| corner - around);
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            sum += product(middle);
+            for corner in corners {
+                sum += product(corner - middle) * (1.0 / 12.0);
+            }
+        }
+        sum * (triangles.len() as f64).recip()
+    }
+
+    /// However large a triangle is, its light spreads as far as triangle and lamp together.
+    #[test]
+    fn spread_light_has_the_moments_of_lamp_and_triangle() {
+        let shift = OriginShift::of_lamp_sides([DVec2::new(0.8, 0.3), DVec2::new(-0.1, 0.6)]);
+        let triangle = [DVec2::ZERO, DVec2::new(1.0, 0.2), DVec2::new(0.3, 1.0)];
+        for shape in [PanelShape::Disc, PanelShape::Rectangle] {
+            let image = LampImage::new(shape, &shift, false);
+            let of_lamp = second_moments(
+                &image.spread([DVec2::ZERO; 3], BundleDraw { index: 0, seed: 1 }),
+                DVec2::ZERO,
+            );
+            for size in [0.2, 0.8, 3.0] {
+                let corners = triangle.map(|corner| corner * size);
+                let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+                let spread = image.spread(corners, BundleDraw { index: 7, seed: 1 });
+                let off = second_moments(&spread, middle) - second_moments(&[corners], middle) - of_lamp;
+                let largest = off
+                    .to_cols_array()
+                    .into_iter()
+                    .fold(0.0, |most: f64, off| most.max(off.abs()));
+                assert!(largest < 1e-3, "{shape:?}, {size} times: {off}");
+            }
+        }
+    }
 }

@@ -58,9 +58,10 @@ pub fn filter(
             bundles.and_then(|maps| maps.get(receiver)),
         ];
         let details = Details::new(map, layers, unit, is_signed);
-        let kept = details.filtered();
-        let squares = details.squares(&kept, map);
-        ((receiver, squares), details.put(&kept, map, unit))
+        let bundled = details.cells.texels(&details.bundled);
+        let kept = details.filtered(&bundled);
+        let squares = details.squares(&kept, &bundled, map);
+        ((receiver, squares), details.put(&kept, &bundled, map, unit))
     };
     let is_small = |(_, map): &(Receiver, &mut ReceiverMap)| map.chart.texel_count() <= SMALL_TEXELS;
     let (small, large): (Vec<_>, Vec<_>) = sum.iter_mut().partition(is_small);
@@ -88,7 +89,7 @@ pub fn without_negative(maps: &mut ReceiverMaps, is_signed: bool, left: &mut Sum
         if counts.iter().any(|&count| lit(count, is_signed) != count) {
             let counts = counts.to_vec();
             let flux = |texel: usize| lit(counts[texel], is_signed).map(|count| count as f64);
-            add(left, put(map, flux, is_signed));
+            add(left, put(map, (flux, flux), is_signed));
         }
     }
 }
@@ -192,8 +193,8 @@ impl Details {
         }
     }
 
-    /// All texels: the coarsest cells as they are, plus the filtered details of each finer level.
-    fn filtered(&self) -> Vec<FilteredCell> {
+    /// All texels: the coarsest cells as they are, plus the filtered details of each finer level, and what is `bundled`.
+    fn filtered(&self, bundled: &[[f32; 3]]) -> Vec<FilteredCell> {
         let coarsest = self.raw.len() - 1;
         let mut kept: Values<6> = vec![Vec::new(); self.raw.len()];
         let as_is = |raw: &Raw| {
@@ -210,10 +211,9 @@ impl Details {
             layers.copied().any(|channel| channel != 0.0)
         };
         let reached = self.cells.inherited(DARK_LEVEL.min(coarsest), is_reached);
-        let bundled = self.cells.texels(&self.bundled);
         let layers = texels.par_iter_mut().zip(reached).zip(bundled);
         layers.for_each(|((texel, is_reached), bundled)| {
-            *texel = with_bundles(texel, &bundled);
+            *texel = with_bundles(texel, bundled);
             let [.., a, b, _] = *texel;
             if !is_reached && 0.5 * (a + b) < DARK {
                 *texel = [0.0; 6];
@@ -329,7 +329,7 @@ impl Details {
 
     /// The squared error of each texel [W²/m⁴], bias and remaining noise: averaged over the texels around, weighted by
     /// the square of their area, and distributed among them by their irradiance.
-    fn squares(&self, of_texels: &[FilteredCell], map: &ReceiverMap) -> Vec<f64> {
+    fn squares(&self, of_texels: &[FilteredCell], bundled: &[[f32; 3]], map: &ReceiverMap) -> Vec<f64> {
         let expected = |[.., a, b, _]: &FilteredCell| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
         let shares = self.cells.shares();
         let area_of = |texel: usize| shares[texel] * map.chart.texel_area_m2(texel) as f32;
@@ -337,7 +337,6 @@ impl Details {
         // What the filter took from both halves alike is its bias, of whatever levels it is made. Levels by themselves
         // tell of less, as those details are dropped that happen to disagree.
         let raw = self.cells.texels(&self.raw);
-        let bundled = self.cells.texels(&self.bundled);
         let untold = |texel: usize| {
             let [.., a, b, missed] = of_texels[texel];
             let [first, second] = luminances(&raw[texel]);
@@ -371,14 +370,23 @@ impl Details {
     }
 
     /// Replaces a map's counts by the filtered light.
-    fn put(&self, of_texels: &[FilteredCell], map: &mut ReceiverMap, unit: FluxUnit) -> Sums {
+    fn put(
+        &self,
+        of_texels: &[FilteredCell],
+        bundled: &[[f32; 3]],
+        map: &mut ReceiverMap,
+        unit: FluxUnit,
+    ) -> Sums {
         let counts_per_mean = self.mean / unit.watts();
         let chart = map.chart.clone();
-        let flux = |texel: usize| {
-            let counts = chart.texel_area_m2(texel) * counts_per_mean;
-            [0, 1, 2].map(|channel| f64::from(of_texels[texel][channel]) * counts)
+        let counts =
+            |texel: usize, relative: f32| f64::from(relative) * chart.texel_area_m2(texel) * counts_per_mean;
+        let flux = |texel: usize| [0, 1, 2].map(|channel| counts(texel, of_texels[texel][channel]));
+        // Bundles have no noise: photons alone take what is missing.
+        let of_photons = |texel: usize| {
+            [0, 1, 2].map(|channel| counts(texel, of_texels[texel][channel] - bundled[texel][channel]).abs())
         };
-        put(map, flux, self.is_signed)
+        put(map, (flux, of_photons), self.is_signed)
     }
 }
 
@@ -397,22 +405,30 @@ fn add_untold(cells: &mut [[f32; 3]], areas_m2: &[f32]) {
     }
 }
 
-/// Replaces a map's counts; each channel keeps its sum. The difference is distributed in proportion to the channel, or
-/// to luminance where channels may be negative: luminance stays above 0. Returns what no texel could take.
-fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3] + Sync, is_signed: bool) -> Sums {
+/// Replaces a map's counts; each channel keeps its sum. The difference is distributed in proportion to the flux of
+/// `takers` in the channel, or to its luminance where channels may be negative: luminance stays above 0. Returns what no
+/// texel could take.
+fn put(
+    map: &mut ReceiverMap,
+    (flux, takers): (
+        impl Fn(usize) -> [f64; 3] + Sync,
+        impl Fn(usize) -> [f64; 3] + Sync,
+    ),
+    is_signed: bool,
+) -> Sums {
     let texels = map.texels_mut();
     let sums = |texels: &[FluxCount]| {
         let counts = texels.par_iter().map(|count| count.map(i128::from));
         counts.reduce(|| [0; 3], |a, b| [0, 1, 2].map(|channel| a[channel] + b[channel]))
     };
-    let share = |flux: [f64; 3]| match is_signed {
-        true => [LinearSrgb::from(flux).luminance(); 3],
-        false => flux,
+    let share = |texel: usize| match is_signed {
+        true => [LinearSrgb::from(takers(texel)).luminance(); 3],
+        false => takers(texel),
     };
     let before = sums(texels);
     let (mut after, mut size) = ([0.0; 3], [0.0; 3]);
-    for flux in (0..texels.len()).map(&flux) {
-        let share = share(flux);
+    for texel in 0..texels.len() {
+        let (flux, share) = (flux(texel), share(texel));
         for channel in 0..3 {
             after[channel] += flux[channel];
             size[channel] += share[channel];
@@ -423,7 +439,7 @@ fn put(map: &mut ReceiverMap, flux: impl Fn(usize) -> [f64; 3] + Sync, is_signed
         false => 0.0,
     });
     texels.par_iter_mut().enumerate().for_each(|(texel, count)| {
-        let (flux, share) = (flux(texel), share(flux(texel)));
+        let (flux, share) = (flux(texel), share(texel));
         let wanted = [0, 1, 2].map(|channel| flux[channel] + share[channel] * missing[channel]);
         *count = lit(wanted.map(|wanted| wanted.round() as i64), is_signed);
     });

@@ -3,12 +3,13 @@
 use nephroid::bake::forecast::{forecast, stood_at};
 use nephroid::bake::{Bake, StopReason};
 use nephroid::illumination::visible::visible_error;
-use nephroid::scene::Scene;
+use nephroid::scene::{LoadOptions, Scene};
 use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, RayPlacement};
 
 use crate::bake::common::{caustic_like, same_map};
-use support::random_scenes;
+use support::glb::load_path;
 use support::tools::{bake, builtin_scene, caustic, photons, set, settings, to};
+use support::{or_skip, random_scenes, shared_or_skip};
 
 /// Side of all maps [texels].
 const SIDE: usize = 128;
@@ -212,6 +213,42 @@ fn random_glass_within_a_factor_of_two() {
         assert!(too_low <= 2 && too_high <= 6 && most < 3.0, "{way:?}: {ratios:?}");
         assert!((0.83..=1.2).contains(&median), "{way:?}: {median}");
     }
+}
+
+/// How far seeds part is in the stated error, also of light that a sun's disc spreads.
+#[test]
+fn the_scatter_of_seeds_is_stated() {
+    const SEEDS: u64 = 4;
+    const SIDE: usize = 64;
+    let lens = or_skip!(shared_or_skip("oracle/glass/lens.glb"));
+    let of_seed = |seed| {
+        let settings = set(to(0.03, SIDE), |s| {
+            s.error_metric = ErrorMetric::Rmse;
+            s.seed = seed;
+        });
+        bake(
+            load_path(&lens, &LoadOptions::default()).expect("a scene"),
+            &settings,
+        )
+    };
+    let (mut sums, mut squares, mut stated) = ([0.0; SIDE * SIDE], [0.0; SIDE * SIDE], 0.0);
+    for seed in 0..SEEDS {
+        let result = of_seed(seed);
+        let values = caustic(&result.maps[0]);
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        for (texel, value) in values.iter().map(|value| value / mean).enumerate() {
+            sums[texel] += value;
+            squares[texel] += value * value;
+        }
+        stated += result.estimated_relative_rmse.expect("known").powi(2);
+    }
+    let count = SEEDS as f64;
+    let of_texel = |(sum, square): (&f64, &f64)| (square - sum * sum / count) / (count - 1.0);
+    let variances = sums.iter().zip(&squares).map(of_texel);
+    let scatter = (variances.sum::<f64>() / sums.len() as f64).sqrt();
+    let stated = (stated / count).sqrt();
+    println!("scatter {scatter:.4}, stated {stated:.4}");
+    assert!((0.5..1.2).contains(&(scatter / stated)), "{scatter} of {stated}");
 }
 
 /// A splat bake of randomly placed rays against the mean of many such: what is left is noise.
