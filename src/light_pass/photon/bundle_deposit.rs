@@ -189,9 +189,9 @@ impl<'a> LampImage<'a> {
     /// spread alike, so that they meet without a gap: what is left to chance there is not in the difference of halves,
     /// and would be an error that is not stated.
     fn spread(&self, corners: [DVec2; 3], draw: BundleDraw) -> Vec<[DVec2; 3]> {
-        let on_lamp = even_point(draw.index, LAMP_DIMENSION, draw.seed);
+        let on_lamp = || even_point(draw.index, LAMP_DIMENSION, draw.seed);
         if self.middles.is_empty() {
-            let places = self.places(on_lamp);
+            let places = self.places(on_lamp());
             let moved = places.iter().map(|&at| self.shift.of_lamp(at));
             return moved.map(|moved| corners.map(|corner| corner + moved)).collect();
         }
@@ -207,7 +207,9 @@ impl<'a> LampImage<'a> {
         let wider = self
             .shift
             .widened(self.lamp, corners.map(|corner| corner - middle));
-        let outline = self.lamp.corners(4 * self.parts.max_element() as u32, on_lamp.x);
+        let outline = self
+            .lamp
+            .corners(4 * self.parts.max_element() as u32, on_lamp().x);
         let corners: Vec<DVec2> = outline
             .iter()
             .map(|&at| middle + self.shift.of_lamp(wider * at))

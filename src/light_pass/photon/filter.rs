@@ -89,7 +89,7 @@ pub fn without_negative(maps: &mut ReceiverMaps, is_signed: bool, left: &mut Sum
         if counts.iter().any(|&count| lit(count, is_signed) != count) {
             let counts = counts.to_vec();
             let flux = |texel: usize| lit(counts[texel], is_signed).map(|count| count as f64);
-            add(left, put(map, (flux, flux), is_signed));
+            add(left, put(map, flux, flux, is_signed));
         }
     }
 }
@@ -386,7 +386,7 @@ impl Details {
         let of_photons = |texel: usize| {
             [0, 1, 2].map(|channel| counts(texel, of_texels[texel][channel] - bundled[texel][channel]).abs())
         };
-        put(map, (flux, of_photons), self.is_signed)
+        put(map, flux, of_photons, self.is_signed)
     }
 }
 
@@ -410,10 +410,8 @@ fn add_untold(cells: &mut [[f32; 3]], areas_m2: &[f32]) {
 /// texel could take.
 fn put(
     map: &mut ReceiverMap,
-    (flux, takers): (
-        impl Fn(usize) -> [f64; 3] + Sync,
-        impl Fn(usize) -> [f64; 3] + Sync,
-    ),
+    flux: impl Fn(usize) -> [f64; 3] + Sync,
+    takers: impl Fn(usize) -> [f64; 3] + Sync,
     is_signed: bool,
 ) -> Sums {
     let texels = map.texels_mut();

@@ -221,19 +221,14 @@ fn the_scatter_of_seeds_is_stated() {
     const SEEDS: u64 = 4;
     const SIDE: usize = 64;
     let lens = or_skip!(shared_or_skip("oracle/glass/lens.glb"));
-    let of_seed = |seed| {
+    let scene = load_path(&lens, &LoadOptions::default()).expect("a scene");
+    let (mut sums, mut squares, mut stated) = ([0.0; SIDE * SIDE], [0.0; SIDE * SIDE], 0.0);
+    for seed in 0..SEEDS {
         let settings = set(to(0.03, SIDE), |s| {
             s.error_metric = ErrorMetric::Rmse;
             s.seed = seed;
         });
-        bake(
-            load_path(&lens, &LoadOptions::default()).expect("a scene"),
-            &settings,
-        )
-    };
-    let (mut sums, mut squares, mut stated) = ([0.0; SIDE * SIDE], [0.0; SIDE * SIDE], 0.0);
-    for seed in 0..SEEDS {
-        let result = of_seed(seed);
+        let result = bake(scene.clone(), &settings);
         let values = caustic(&result.maps[0]);
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         for (texel, value) in values.iter().map(|value| value / mean).enumerate() {
