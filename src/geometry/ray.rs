@@ -38,6 +38,7 @@ pub fn point_with_error(corners: &[DVec3; 3], barycentric: [f64; 3]) -> (DVec3, 
 /// Origin of a ray that leaves a surface at `point` in `direction`: offset along the geometric normal just beyond the
 /// point's rounding error, to the side of the direction. No fixed epsilon: in double precision the offset is some 1e-15
 /// of the coordinates.
+#[inline(always)]
 pub fn offset_origin(point: DVec3, error: DVec3, geometric_normal: DVec3, direction: DVec3) -> DVec3 {
     let step = geometric_normal.abs().dot(error);
     let side = if direction.dot(geometric_normal) < 0.0 {
@@ -45,17 +46,16 @@ pub fn offset_origin(point: DVec3, error: DVec3, geometric_normal: DVec3, direct
     } else {
         step
     };
-    let moved = point + geometric_normal * side;
-    let away = |moved: f64, offset: f64| {
-        if offset > 0.0 {
-            moved.next_up()
-        } else if offset < 0.0 {
-            moved.next_down()
-        } else {
-            moved
-        }
-    };
     let offset = geometric_normal * side;
+    let moved = point + offset;
+    let away = |moved: f64, offset: f64| {
+        // The next number in the offset's direction, without unpredictable branches. Adding zero turns −0 into +0.
+        let sign = 1.0_f64.copysign(offset);
+        let up = moved * sign + 0.0;
+        let step = (up.to_bits() as i64 >> 63) | 1;
+        let next = f64::from_bits(up.to_bits().wrapping_add_signed(step)) * sign;
+        if offset.abs() > 0.0 { next } else { moved }
+    };
     DVec3::new(
         away(moved.x, offset.x),
         away(moved.y, offset.y),

@@ -17,12 +17,11 @@ pub struct ShearedRay {
 impl ShearedRay {
     /// Expects a finite, non-zero direction.
     pub fn new(ray: &Ray) -> Self {
-        let d = ray.direction;
-        let magnitude = d.abs();
-        let z = if magnitude.x > magnitude.y {
-            if magnitude.x > magnitude.z { 0 } else { 2 }
-        } else if magnitude.y > magnitude.z {
-            1
+        let d = ray.direction.to_array();
+        let magnitude = d.map(f64::abs);
+        let larger = usize::from(magnitude[1] >= magnitude[0]);
+        let z = if magnitude[larger] > magnitude[2] {
+            larger
         } else {
             2
         };
@@ -39,7 +38,7 @@ impl ShearedRay {
 
     /// Distance in units of the ray's direction and barycentric coordinates of the hit in front of the origin;
     /// triangles are two-sided. Triangles that share an edge or a vertex leave no gap.
-    #[inline]
+    #[inline(always)]
     pub fn intersect(&self, corners: &[DVec3; 3]) -> Option<(f64, [f64; 3])> {
         let [a, b, c] = corners.map(|corner| (corner - self.origin).to_array());
         let [kx, ky, kz] = self.axes;
@@ -50,11 +49,10 @@ impl ShearedRay {
         let u = cx * by - cy * bx;
         let v = ax * cy - ay * cx;
         let w = bx * ay - by * ax;
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
+        // Unpredictable branches would cost more than all comparisons.
+        let is_outside = ((u < 0.0) | (v < 0.0) | (w < 0.0)) & ((u > 0.0) | (v > 0.0) | (w > 0.0));
         let determinant = u + v + w;
-        if determinant == 0.0 {
+        if is_outside | (determinant == 0.0) {
             return None;
         }
         let distance = self.shear.z * (u * a[kz] + v * b[kz] + w * c[kz]) / determinant;
@@ -70,8 +68,11 @@ impl ShearedRay {
     }
 }
 
+/// The largest magnitude. A NaN may or may not be passed on: with one, no hit's distance is finite.
 fn max(values: [f64; 3]) -> f64 {
-    values[0].abs().max(values[1].abs()).max(values[2].abs())
+    let larger = |a: f64, b: f64| if a > b { a } else { b };
+    let [a, b, c] = values.map(f64::abs);
+    larger(larger(a, b), c)
 }
 
 /// Bound on the rounding error of a hit's distance, times the determinant. A distance below it may be zero, as when a

@@ -54,6 +54,8 @@ pub(super) struct WideRay {
     pub(super) direction: Vec3A,
     /// End of the search.
     pub(super) end: f32,
+    /// Slot of the triangle that it leaves.
+    pub(super) left: u32,
 }
 
 /// A four-wide hierarchy in single precision.
@@ -139,7 +141,9 @@ impl WideBvh {
         loop {
             if child & LEAF != 0 {
                 for pack in &self.packs[(child & !LEAF) as usize..] {
-                    let mut met = pack.may_meet(&lanes, ray.end);
+                    // The lane of the triangle that the ray leaves; beyond all lanes in other packs.
+                    let left = 1_u64 << ray.left.wrapping_sub(pack.first).min(63);
+                    let mut met = pack.may_meet(&lanes, ray.end) & !(left as u32);
                     while met != 0 {
                         let lane = met.trailing_zeros();
                         met &= met - 1;

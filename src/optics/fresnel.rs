@@ -9,6 +9,7 @@ use super::refraction::cos_transmitted;
 /// Returns 1 beyond the critical angle, decided exactly as in [`refract`](super::refraction::refract), and 0 at every
 /// angle where `eta` is 1. At normal incidence this is ((η − 1)/(η + 1))². No angle divides by zero, because the
 /// p-polarised part uses the amplitude ratio instead of tangents. Source: Born and Wolf, Principles of Optics, 1.5.2.
+#[inline]
 pub fn dielectric_reflectance(cos_incident: f64, eta: f64) -> f64 {
     if eta == 1.0 {
         return 0.0;

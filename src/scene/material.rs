@@ -164,6 +164,7 @@ impl Material {
     }
 
     /// Whether it bounds a solid whose index varies with wavelength.
+    #[inline]
     pub fn is_dispersive(&self) -> bool {
         let glass = self.glass.as_ref();
         self.is_solid() && glass.is_some_and(|glass| glass.dispersion.is_dispersive())
@@ -236,6 +237,7 @@ impl Material {
     }
 
     /// Whether it bounds a transparent body.
+    #[inline]
     pub fn is_solid(&self) -> bool {
         match self.surface {
             SurfaceKind::Dielectric => true,

@@ -12,7 +12,7 @@ use glam::{DAffine3, DVec3};
 
 use super::smoothing::smoothing_groups;
 use super::tracer::RayHit;
-use crate::geometry::bvh::{self, Frame};
+use crate::geometry::bvh::{self, Frame, NO_SLOT};
 use crate::geometry::triangle::ShearedRay;
 use crate::geometry::{Ray, TriangleBvh};
 use crate::scene::mesh::Placement;
@@ -157,17 +157,19 @@ impl Hierarchy {
     }
 
     /// Closest hit for which `is_there` holds; among hits at the same distance, that of the lowest object and triangle.
-    /// Of two faces of an object that lie back to back, the one that faces the ray.
+    /// Of two faces of an object that lie back to back, the one that faces the ray. Never the copied triangle in the slot
+    /// that the ray `left`.
     #[inline]
     pub(super) fn closest(
         &self,
         ray: &Ray,
+        left: u32,
         is_there: impl Fn(usize, usize, [f64; 3]) -> bool,
     ) -> Option<(RayHit, Found<'_>)> {
         let sheared = ShearedRay::new(ray);
         let mut best: Option<(RayHit, Found)> = None;
         let mut limit_m = f64::INFINITY;
-        self.search(ray, limit_m, |corners, found| {
+        self.search(ray, left, limit_m, |corners, found| {
             let hit = sheared.intersect(corners);
             let Some((distance_m, barycentric)) = hit.filter(|(distance_m, _)| *distance_m <= limit_m) else {
                 return Some(f64::INFINITY);
@@ -213,7 +215,7 @@ impl Hierarchy {
     ) -> bool {
         let sheared = ShearedRay::new(ray);
         let mut is_blocked = false;
-        self.search(ray, distance_m, |corners, found| {
+        self.search(ray, NO_SLOT, distance_m, |corners, found| {
             let hit = sheared.intersect(corners);
             is_blocked = hit.is_some_and(|(hit_m, barycentric)| {
                 let (object, triangle) = self.triangle(found);
@@ -232,11 +234,12 @@ impl Hierarchy {
     fn search<'a>(
         &'a self,
         ray: &Ray,
+        left: u32,
         mut end_m: f64,
         mut meet: impl FnMut(&[DVec3; 3], Found<'a>) -> Option<f64>,
     ) {
         let bvh = &self.copied.bvh;
-        bvh.search(ray, end_m, |slot| {
+        bvh.search_from(ray, left, end_m, |slot| {
             let met_m = meet(bvh.corners(slot), (None, slot));
             end_m = end_m.min(met_m.unwrap_or(0.0));
             met_m
@@ -433,10 +436,11 @@ mod tests {
 
     use super::Hierarchy;
     use crate::geometry::Ray;
+    use crate::geometry::bvh::NO_SLOT;
     use crate::geometry::sampling::even_point;
     use crate::scene::builtin::shapes;
     use crate::scene::{Edit, Material, Motion, Object, Scene, SurfaceKind};
-    use crate::transport::Tracer;
+    use crate::transport::{SurfaceHit, Tracer};
 
     /// Reproducible vector in the box from −1 to 1.
     fn vector(index: usize, seed: u64) -> DVec3 {
@@ -496,7 +500,9 @@ mod tests {
     fn compare(copied: &Tracer, shared: &Tracer) {
         let mut hits = 0;
         for ray in rays(copied.scene()) {
-            let [was, is] = [copied, shared].map(|tracer| tracer.closest_hit(&ray));
+            // Only copies have slots.
+            let without_slot = |hit| SurfaceHit { slot: NO_SLOT, ..hit };
+            let [was, is] = [copied, shared].map(|tracer| tracer.closest_hit(&ray).map(without_slot));
             assert_eq!(format!("{was:?}"), format!("{is:?}"), "{ray:?}");
             let distance_m = was.map_or(7.0, |hit| hit.distance_m);
             for distance_m in [distance_m, distance_m.next_up(), 2.0 * distance_m] {

@@ -116,13 +116,13 @@ impl SurfaceHit {
     /// The triangle's normal and the one for scattering, on the side of a ray along the unit vector `incident`: where the
     /// shading normal faces away from the ray, both are the triangle's.
     pub fn normals_towards(&self, incident: DVec3) -> [DVec3; 2] {
-        let frame = HitFrame::new(self, incident, None);
+        let frame = HitFrame::new(self, incident);
         [frame.geometric, frame.shading]
     }
 }
 
 impl HitFrame {
-    fn new(hit: &SurfaceHit, incident: DVec3, micro: Option<Facet>) -> Self {
+    fn new(hit: &SurfaceHit, incident: DVec3) -> Self {
         let front = incident.dot(hit.geometric_normal) < 0.0;
         let side = if front { 1.0 } else { -1.0 };
         let geometric = hit.geometric_normal * side;
@@ -138,7 +138,7 @@ impl HitFrame {
             geometric,
             shading: if is_smooth { shading } else { geometric },
             is_smooth,
-            micro,
+            micro: None,
         }
     }
 
@@ -166,6 +166,7 @@ impl HitFrame {
     }
 
     /// Mirror direction about the shading normal; about the geometric one where the former points below the surface.
+    #[inline(always)]
     fn reflected(&self, incident: DVec3) -> ScatteredDirection {
         let by_micro = self
             .micro
@@ -187,6 +188,7 @@ impl HitFrame {
 
     /// Refracted direction about the shading normal; about the geometric one where the former stays above the surface.
     /// `None` for total internal reflection.
+    #[inline(always)]
     fn refracted(&self, incident: DVec3, eta: f64) -> Option<ScatteredDirection> {
         if let Some(facet) = self.micro {
             return self.at_facet(facet, incident, MicrofacetEvent::Refracted { eta });
@@ -261,8 +263,26 @@ enum BehindSurface {
     },
 }
 
-impl Meeting<'_> {
-    #[inline]
+impl<'a> Meeting<'a> {
+    /// Light that arrives at `hit` along the unit direction `incident` within `media`, before it is split.
+    #[inline(always)]
+    pub fn new(hit: &'a SurfaceHit, incident: DVec3, media: &'a MediumStack) -> Self {
+        Self {
+            hit,
+            incident,
+            media,
+            frame: HitFrame::new(hit, incident),
+            reflected: None,
+            transmitted: None,
+            deposit: LinearSrgb::BLACK,
+            leaving: None,
+            absorbed: LinearSrgb::BLACK,
+            switched_off: LinearSrgb::BLACK,
+            through: BehindSurface::Nothing,
+        }
+    }
+
+    #[inline(always)]
     pub fn reflection(&self) -> Option<Branch> {
         let share = self.reflected?;
         let event = match self.through {
@@ -277,6 +297,7 @@ impl Meeting<'_> {
         ))
     }
 
+    #[inline(always)]
     fn branch(
         &self,
         to: &ScatteredDirection,
@@ -295,7 +316,7 @@ impl Meeting<'_> {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn transmission(&self) -> Option<Branch> {
         let share = self.transmitted?;
         let straight = (self.media, 1.0);
@@ -318,6 +339,7 @@ impl Meeting<'_> {
     }
 
     /// Adds a reflected fraction, or books it as switched off if reflection is off.
+    #[inline]
     fn add_reflection(&mut self, effects: EffectSet, share: LinearSrgb) {
         if effects.reflection {
             self.reflected = Some(self.reflected.map_or(share, |before| before + share));
@@ -335,6 +357,7 @@ impl Meeting<'_> {
     }
 
     /// Transmits what is not reflected; the tint's loss is absorbed.
+    #[inline]
     fn add_transmission(&mut self, effects: EffectSet, reflectance: f64, tint: impl FnOnce() -> LinearSrgb) {
         let beneath = LinearSrgb::grey(1.0 - reflectance);
         if effects.transmission {
@@ -362,7 +385,8 @@ impl Tracer {
         media: &MediumStack,
         micro: Option<DVec2>,
     ) -> Interaction {
-        let meeting = self.meet(effects, hit, incident, media, micro);
+        let mut meeting = Meeting::new(hit, incident, media);
+        self.meet(effects, micro, &mut meeting);
         Interaction {
             reflection: meeting.reflection(),
             transmission: meeting.transmission(),
@@ -387,19 +411,14 @@ impl Tracer {
         if is_rough { roughness * roughness } else { 0.0 }
     }
 
-    /// Splits light that arrives at `hit` along the unit direction `incident` within `media`. Fractions of branches
-    /// outside `effects` are `switched_off`; without textures, the material's factor alone tints. `micro` selects the
-    /// microfacet of a rough surface by a point of the unit square; without it, or without lobes among the effects,
-    /// rough surfaces are smooth.
-    #[inline]
-    pub fn meet<'a>(
-        &self,
-        effects: EffectSet,
-        hit: &'a SurfaceHit,
-        incident: DVec3,
-        media: &'a MediumStack,
-        micro: Option<DVec2>,
-    ) -> Meeting<'a> {
+    /// Splits light. Fractions of branches outside `effects` are `switched_off`; without textures, the material's factor
+    /// alone tints. `micro` selects the microfacet of a rough surface by a point of the unit square; without it, or
+    /// without lobes among the effects, rough surfaces are smooth.
+    #[inline(always)]
+    pub fn meet(&self, effects: EffectSet, micro: Option<DVec2>, meeting: &mut Meeting) {
+        let &mut Meeting {
+            hit, incident, media, ..
+        } = meeting;
         let material = self.scene().material_of(hit.object);
         let place = (hit.triangle, hit.barycentric);
         let is_varied = material.surface == SurfaceKind::Varied;
@@ -407,23 +426,10 @@ impl Tracer {
         let mixture = varies.then(|| self.mixture(hit.object, place, effects.textures));
         let roughness = mixture.map_or(material.roughness, |mixture| mixture.roughness);
         let is_rough = material.surface.is_specular() && roughness > SMOOTH_ROUGHNESS;
-        let micro = micro.filter(|_| effects.lobes && is_rough).map(|point| Facet {
+        meeting.frame.micro = micro.filter(|_| effects.lobes && is_rough).map(|point| Facet {
             alpha: roughness * roughness,
             point,
         });
-        let mut meeting = Meeting {
-            hit,
-            incident,
-            media,
-            frame: HitFrame::new(hit, incident, micro),
-            reflected: None,
-            transmitted: None,
-            deposit: LinearSrgb::BLACK,
-            leaving: None,
-            absorbed: LinearSrgb::BLACK,
-            switched_off: LinearSrgb::BLACK,
-            through: BehindSurface::Nothing,
-        };
         match material.surface {
             SurfaceKind::Diffuse => meeting.deposit = LinearSrgb::WHITE,
             SurfaceKind::Mirror => {
@@ -440,15 +446,14 @@ impl Tracer {
                 meeting.deposit = LinearSrgb::WHITE - share;
                 meeting.add_reflection(effects, share);
             }
-            SurfaceKind::ThinWall => self.meet_thin_wall(effects, material, &mut meeting),
-            SurfaceKind::Dielectric => self.meet_dielectric(effects, material, &mut meeting),
+            SurfaceKind::ThinWall => self.meet_thin_wall(effects, material, meeting),
+            SurfaceKind::Dielectric => self.meet_dielectric(effects, material, meeting),
             SurfaceKind::Varied => {
                 if let Some(mixture) = mixture {
-                    self.meet_mixture(effects, material, mixture, &mut meeting);
+                    self.meet_mixture(effects, material, mixture, meeting);
                 }
             }
         }
-        meeting
     }
 
     fn meet_thin_wall(&self, effects: EffectSet, material: &Material, meeting: &mut Meeting) {
@@ -495,6 +500,8 @@ impl Tracer {
         }
     }
 
+    // Inlined, as is all that photons do at clear glass: they meet it more often than all else.
+    #[inline(always)]
     fn meet_dielectric(&self, effects: EffectSet, material: &Material, meeting: &mut Meeting) {
         let &mut Meeting {
             hit, incident, media, ..

@@ -39,6 +39,7 @@ impl MediumStack {
 
     /// The media after entering a body.
     #[must_use]
+    #[inline]
     pub fn entered(mut self, object: usize) -> Self {
         if usize::from(self.depth) < CAPACITY {
             self.objects[usize::from(self.depth)] = object as u32;
@@ -50,6 +51,7 @@ impl MediumStack {
     /// The media after leaving a body; unchanged where the path was not inside it (an open sheet, or a start
     /// inside).
     #[must_use]
+    #[inline]
     pub fn left(mut self, object: usize) -> Self {
         let depth = usize::from(self.depth);
         // The usual case, without a search.

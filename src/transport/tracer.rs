@@ -13,7 +13,7 @@ use super::normal_texture;
 use super::sharp_edges::sharp_edges;
 use super::smoothing::smoothing_groups;
 use super::traversed::TraversedCells;
-use crate::geometry::{Ray, ray};
+use crate::geometry::{Ray, bvh::NO_SLOT, ray};
 use crate::optics::spectrum::Spectrum;
 use crate::optics::{LinearSrgb, Nanometres};
 use crate::scene::{
@@ -91,10 +91,13 @@ pub struct SurfaceHit {
     pub interpolated_normal: DVec3,
     /// Unit, the normal for scattering: interpolated, and perturbed by the bumps of a specular surface.
     pub shading_normal: DVec3,
+    /// Slot in the hierarchy of copied triangles, for [`Tracer::next_hit`].
+    pub slot: u32,
 }
 
 impl SurfaceHit {
     /// A ray that leaves this point in a unit direction, offset so that it does not hit the surface again.
+    #[inline(always)]
     pub fn spawn(&self, direction: DVec3) -> Ray {
         Ray {
             origin: ray::offset_origin(self.point, self.point_error, self.geometric_normal, direction),
@@ -315,23 +318,31 @@ impl Tracer {
     }
 
     /// Closest surface in front of the ray's origin.
-    #[inline]
+    #[inline(always)]
     pub fn closest_hit(&self, ray: &Ray) -> Option<SurfaceHit> {
-        let (place, found) = self.closest(ray)?;
-        Some(self.surface_with(&place, &self.hierarchy.corners(found)))
+        self.next_hit(ray, NO_SLOT)
+    }
+
+    /// The same for a ray that leaves the hit with this slot: a triangle is flat, so that it cannot be met again.
+    #[inline(always)]
+    pub fn next_hit(&self, ray: &Ray, left: u32) -> Option<SurfaceHit> {
+        let (place, found) = self.closest(ray, left)?;
+        let slot = if found.0.is_none() { found.1 } else { NO_SLOT };
+        Some(self.surface_with(&place, &self.hierarchy.corners(found), slot))
     }
 
     /// Closest hit in front of the ray's origin, without surface data.
     pub fn intersect(&self, ray: &Ray) -> Option<RayHit> {
-        Some(self.closest(ray)?.0)
+        Some(self.closest(ray, NO_SLOT)?.0)
     }
 
-    fn closest(&self, ray: &Ray) -> Option<(RayHit, hierarchy::Found<'_>)> {
+    fn closest(&self, ray: &Ray, left: u32) -> Option<(RayHit, hierarchy::Found<'_>)> {
         let closest = if self.has_masks {
-            self.hierarchy
-                .closest(ray, |object, triangle, at| self.is_there(object, triangle, at))
+            self.hierarchy.closest(ray, left, |object, triangle, at| {
+                self.is_there(object, triangle, at)
+            })
         } else {
-            self.hierarchy.closest(ray, |_, _, _| true)
+            self.hierarchy.closest(ray, left, |_, _, _| true)
         };
         self.note_ray(ray, closest.map_or(f64::INFINITY, |(place, _)| place.distance_m));
         closest
@@ -340,10 +351,11 @@ impl Tracer {
     /// Surface data of a hit.
     pub fn surface_at(&self, hit: &RayHit) -> SurfaceHit {
         let mesh = self.scene.objects[hit.object as usize].in_scene();
-        self.surface_with(hit, &mesh.corners(hit.triangle as usize))
+        self.surface_with(hit, &mesh.corners(hit.triangle as usize), NO_SLOT)
     }
 
-    fn surface_with(&self, hit: &RayHit, corners: &[DVec3; 3]) -> SurfaceHit {
+    #[inline(always)]
+    fn surface_with(&self, hit: &RayHit, corners: &[DVec3; 3], slot: u32) -> SurfaceHit {
         let (object, triangle) = (hit.object as usize, hit.triangle as usize);
         let mesh = self.scene.objects[object].in_scene();
         let (point, point_error) = ray::point_with_error(corners, hit.barycentric);
@@ -354,7 +366,7 @@ impl Tracer {
         let interpolated_normal = (a * wa + b * wb + c * wc)
             .try_normalize()
             .unwrap_or(geometric_normal);
-        let mut surface = SurfaceHit {
+        let flat = SurfaceHit {
             object,
             triangle,
             barycentric: hit.barycentric,
@@ -364,11 +376,18 @@ impl Tracer {
             geometric_normal,
             interpolated_normal,
             shading_normal: interpolated_normal,
+            slot,
         };
-        if let Some(gradient) = self.bump_gradient(&surface) {
-            surface.shading_normal = bend::bent(interpolated_normal, gradient);
+        if !self.is_bumpy(object) {
+            return flat;
         }
-        surface
+        // Only a copy has an address: the usual hit is built in place.
+        let gradient = self.bump_gradient(&{ flat });
+        let bent = |gradient| bend::bent(interpolated_normal, gradient);
+        SurfaceHit {
+            shading_normal: gradient.map_or(interpolated_normal, bent),
+            ..flat
+        }
     }
 
     /// Height gradient that perturbs the normal at a hit [1]; `None` without bumps.

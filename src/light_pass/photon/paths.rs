@@ -7,10 +7,11 @@ use super::receivers::Receivers;
 use super::spectrum::PhotonSpectrum;
 use super::walk::PhotonRules;
 use crate::geometry::Ray;
+use crate::geometry::bvh::NO_SLOT;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::path::PathSignature;
 use crate::optics::LinearSrgb;
-use crate::transport::{Branch, MediumStack, SurfaceHit, Tracer};
+use crate::transport::{Branch, MediumStack, Meeting, SurfaceHit, Tracer};
 
 /// Longer paths are left to photons.
 pub(super) const MAX_STEPS: usize = 12;
@@ -120,6 +121,8 @@ impl PointPaths {
 /// Light of a path that is to be continued.
 struct QueuedLight {
     ray: Ray,
+    /// Slot of the triangle that it leaves.
+    left: u32,
     media: MediumStack,
     flux_w: LinearSrgb,
     signature: PathSignature,
@@ -171,6 +174,7 @@ impl PathFinder<'_> {
         let mut waiting = Vec::with_capacity(8);
         waiting.push(QueuedLight {
             ray: start.ray,
+            left: NO_SLOT,
             media: start.media,
             flux_w: start.flux_w,
             signature: PathSignature::default(),
@@ -180,7 +184,7 @@ impl PathFinder<'_> {
         while let Some(light) = waiting.pop() {
             paths.traced += 1;
             paths.segments += light.flux_w.max_channel() / paths.start_w;
-            if let Some(hit) = tracer.closest_hit(&light.ray) {
+            if let Some(hit) = tracer.next_hit(&light.ray, light.left) {
                 self.meet(tracer, light, &hit, &mut paths, &mut waiting);
             }
         }
@@ -212,7 +216,8 @@ impl PathFinder<'_> {
         if effects.absorption && light.media.absorbs(tracer.scene()) {
             flux_w = flux_w * light.media.transmittance(tracer.scene(), hit.distance_m);
         }
-        let meeting = tracer.meet(effects, hit, light.ray.direction, &light.media, None);
+        let mut meeting = Meeting::new(hit, light.ray.direction, &light.media);
+        tracer.meet(effects, None, &mut meeting);
         let least_w = MIN_SHARE * paths.start_w;
 
         // What a diffuse surface takes, if it has a map.
@@ -251,6 +256,7 @@ impl PathFinder<'_> {
             }
             waiting.push(QueuedLight {
                 ray: branch.ray,
+                left: hit.slot,
                 media: branch.media,
                 flux_w,
                 signature: signature.event(branch.event),

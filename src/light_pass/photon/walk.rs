@@ -8,6 +8,7 @@ use super::paths::{Chain, ChainStep};
 use super::spectrum::{Hue, PhotonSpectrum};
 use super::squares::Guide;
 use crate::geometry::Ray;
+use crate::geometry::bvh::NO_SLOT;
 use crate::geometry::sampling::{GOLDEN_64, even_number, even_point, mix64};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
@@ -108,13 +109,21 @@ pub struct PhotonWalk<'a> {
     pub segments: u64,
 }
 
+/// A straight part of a photon's path.
+struct Leg {
+    ray: Ray,
+    media: MediumStack,
+    /// Slot of the triangle that it leaves. All tracers of a light have the same hierarchy.
+    left: u32,
+}
+
 /// The photon that is being traced.
-struct Photon<'a, 'b> {
-    hue: Hue<'a>,
+struct Photon<'b> {
+    hue: &'b Hue<'b>,
     /// All wavelengths.
-    whole_hue: Hue<'a>,
+    whole_hue: &'b Hue<'b>,
     /// Its single wavelength, once the light is dispersed.
-    own_hue: Option<Hue<'a>>,
+    own_hue: Option<&'b Hue<'b>>,
     flux_w: LinearSrgb,
     index: u32,
     choice: Choice,
@@ -165,14 +174,15 @@ impl<'a> PhotonWalk<'a> {
         followed: Followed<'_>,
         mut arrive: impl FnMut(Hit),
     ) {
+        let whole_hue = self.rules.whole_hue();
         let own_hue = self.rules.spectrum.and_then(|spectrum| {
             let place = even_point(index, WAVELENGTH_DIMENSION, self.rules.seed).x;
             spectrum.one(place)
         });
         let mut photon = Photon {
-            hue: self.rules.whole_hue(),
-            whole_hue: self.rules.whole_hue(),
-            own_hue,
+            hue: &whole_hue,
+            whole_hue: &whole_hue,
+            own_hue: own_hue.as_ref(),
             flux_w: start.map_or(LinearSrgb::BLACK, |start| start.flux_w),
             choice: Choice::new(index, self.rules.seed),
             index,
@@ -196,9 +206,13 @@ impl<'a> PhotonWalk<'a> {
         } else {
             GUIDED_ROULETTE_BELOW
         };
-        let (mut ray, mut media) = (start.ray, start.media);
+        let mut leg = Leg {
+            ray: start.ray,
+            media: start.media,
+            left: NO_SLOT,
+        };
         for depth in 0.. {
-            let Some(next) = self.step(&mut photon, depth, &ray, &media, &mut arrive) else {
+            let Some(next) = self.step(&mut photon, depth, &leg, &mut arrive) else {
                 return;
             };
             if depth >= self.rules.max_depth {
@@ -207,22 +221,21 @@ impl<'a> PhotonWalk<'a> {
             if !self.survives(&mut photon, roulette_below * brightest_w) {
                 return;
             }
-            (ray, media) = next;
+            leg = next;
         }
     }
 
-    /// Traces to the next surface and returns the ray that is followed from there, with its media; `None` at the end of
-    /// the path.
+    /// Traces to the next surface and returns the leg that is followed from there; `None` at the end of the path.
+    #[inline(always)]
     fn step(
         &mut self,
-        photon: &mut Photon<'a, '_>,
+        photon: &mut Photon,
         depth: u32,
-        ray: &Ray,
-        media: &MediumStack,
+        Leg { ray, media, left }: &Leg,
         arrive: &mut impl FnMut(Hit),
-    ) -> Option<(Ray, MediumStack)> {
+    ) -> Option<Leg> {
         self.segments += 1;
-        let Some(hit) = photon.hue.tracer.closest_hit(ray) else {
+        let Some(hit) = photon.hue.tracer.next_hit(ray, *left) else {
             photon.leave_all(arrive);
             let account = if depth == 0 {
                 Account::NotEmitted
@@ -253,7 +266,8 @@ impl<'a> PhotonWalk<'a> {
         let micro = (effects.lobes && material.is_rough())
             .then(|| even_point(photon.index, LAMP_DIMENSION + 1 + depth, self.rules.seed));
         let tracer = photon.hue.tracer;
-        let meeting = tracer.meet(effects, &hit, ray.direction, media, micro);
+        let mut meeting = Meeting::new(&hit, ray.direction, media);
+        tracer.meet(effects, micro, &mut meeting);
         let deposit_w = photon.flux_w * meeting.deposit;
         if photon.followed.mask != 0 {
             photon.leave_at(depth as usize, hit.object, &meeting, arrive);
@@ -285,11 +299,13 @@ impl<'a> PhotonWalk<'a> {
             &photon.hue.channels,
             photon.flux_w * meeting.switched_off,
         );
-        self.choose(photon, (depth as usize, hit.object), &meeting)
+        let (ray, media) = self.choose(photon, (depth as usize, hit.object), &meeting)?;
+        let left = hit.slot;
+        Some(Leg { ray, media, left })
     }
 
     /// Reduces a photon of all wavelengths to its own one.
-    fn part(&mut self, photon: &mut Photon<'a, '_>) {
+    fn part(&mut self, photon: &mut Photon) {
         if photon.hue.band.is_some() {
             return;
         }
@@ -302,9 +318,10 @@ impl<'a> PhotonWalk<'a> {
 
     /// Draws reflection or transmission at an object, in proportion to flux and towards guides; `None` if neither carries
     /// any.
+    #[inline(always)]
     fn choose(
         &mut self,
-        photon: &mut Photon<'a, '_>,
+        photon: &mut Photon,
         (depth, object): (usize, usize),
         meeting: &Meeting,
     ) -> Option<(Ray, MediumStack)> {
@@ -352,25 +369,26 @@ impl<'a> PhotonWalk<'a> {
     }
 
     /// Russian roulette for photons of little flux.
-    fn survives(&mut self, photon: &mut Photon<'a, '_>, least_w: f64) -> bool {
+    #[inline]
+    fn survives(&mut self, photon: &mut Photon, least_w: f64) -> bool {
         let probability = photon.flux_w.max_channel() / least_w;
         if probability >= 1.0 {
             return true;
         }
         let survives = photon.choice.falls_below(probability);
         photon.probability *= probability;
-        let (before_w, channels) = (photon.flux_w, photon.hue.channels);
+        let before_w = photon.flux_w;
         photon.flux_w = if survives {
             before_w * probability.recip()
         } else {
             LinearSrgb::BLACK
         };
-        self.book(Account::Sampling, &channels, before_w - photon.flux_w);
+        self.book(Account::Sampling, &photon.hue.channels, before_w - photon.flux_w);
         survives
     }
 }
 
-impl Photon<'_, '_> {
+impl Photon<'_> {
     /// Separates the photon from all bundles that it has followed.
     #[inline]
     fn leave_all(&mut self, arrive: &mut impl FnMut(Hit)) {
