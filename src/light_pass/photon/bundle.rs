@@ -40,7 +40,7 @@ pub(super) const NEAREST_WEIGHTS: [f64; 9] = [
 ];
 
 /// Extent of the light from one part of a lamp, or of a spectrum, on the map [texels], unless that takes too many parts.
-const PART_TEXELS: f64 = 0.1;
+pub(super) const PART_TEXELS: f64 = 0.1;
 
 /// Maximum number of parts of a lamp along each axis: of light of one hue, and of dispersed light.
 const MAX_LAMP_PARTS: [f64; 2] = [4.0, 2.0];
@@ -49,7 +49,7 @@ const MAX_LAMP_PARTS: [f64; 2] = [4.0, 2.0];
 const HUE_PARTS: (f64, f64) = (16.0, 64.0);
 
 /// Maximum distance between the arrivals from neighbouring parts of a lamp [texels]. A larger lamp is left to photons.
-const MAX_STEP_TEXELS: f64 = 0.5;
+pub(super) const MAX_STEP_TEXELS: f64 = 0.5;
 
 /// A triangle lies beside a fold if it is less than so many times as thick as it is moved: chords of x(u) = u² move the
 /// first part by a sixth of it, and the next by an eighteenth.
@@ -189,9 +189,18 @@ impl OriginShift {
         first * ends[0] + last * ends[1]
     }
 
-    /// Parts of a lamp for which a bundle is deposited, along both axes.
-    pub(super) fn lamp_parts(&self, is_dispersed: bool) -> DVec2 {
-        let parts = |moved: Vec2| (2.0 * f64::from(moved.abs().max_element()) / PART_TEXELS).ceil();
+    /// Parts of a lamp for which a bundle is deposited, along both axes: each spreads light over about so many texels.
+    pub(super) fn lamp_parts(&self, part_texels: f64, is_dispersed: bool) -> DVec2 {
+        let parts = |moved: Vec2| {
+            let width = 2.0 * f64::from(moved.abs().max_element());
+            let parts = (width / part_texels).ceil();
+            // A single part would have no width at all.
+            if width > PART_TEXELS {
+                parts.max(2.0)
+            } else {
+                parts
+            }
+        };
         let most = MAX_LAMP_PARTS[usize::from(is_dispersed)];
         DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(most))
     }
@@ -204,7 +213,7 @@ impl OriginShift {
 
     /// Distance between the arrivals from neighbouring parts of a lamp [texels].
     fn lamp_step_texels(&self) -> f64 {
-        let parts = self.lamp_parts(false).to_array();
+        let parts = self.lamp_parts(PART_TEXELS, false).to_array();
         let step = |axis: usize| 2.0 * f64::from(self.lamp[axis].abs().max_element()) / parts[axis];
         step(0).max(step(1))
     }

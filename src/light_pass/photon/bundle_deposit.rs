@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use glam::DVec2;
 use rayon::prelude::*;
 
-use super::bundle::{Bundle, OriginShift, flux_triangle};
+use super::bundle::{Bundle, MAX_STEP_TEXELS, OriginShift, PART_TEXELS, flux_triangle};
 use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE};
 use super::pass::{half_seed, set_of};
 use super::receivers::Receivers;
@@ -41,6 +41,12 @@ impl ResidualPass<'_> {
         ledger: &mut LedgerSum,
     ) {
         let at_once = SQUARES_AT_ONCE[usize::from(self.rules.spectrum.is_some())];
+        let pass = DepositPass {
+            sample,
+            sets: maps.len(),
+            // A displacement by a part of a texel leaves about that relative error.
+            lamp_part_texels: squares.plan.goal.clamp(PART_TEXELS, MAX_STEP_TEXELS),
+        };
         for squares in squares.squares.chunks(at_once) {
             let made: Vec<TrianglesByMap> = squares
                 .par_chunks(at_once / 32)
@@ -48,7 +54,7 @@ impl ResidualPass<'_> {
                     let mut triangles = TrianglesByMap::new();
                     squares
                         .iter()
-                        .for_each(|square| self.triangles(square, (sample, maps.len()), &mut triangles));
+                        .for_each(|square| self.triangles(square, pass, &mut triangles));
                     triangles
                 })
                 .collect();
@@ -71,7 +77,8 @@ impl ResidualPass<'_> {
     }
 
     /// Adds the triangles of a square.
-    fn triangles(&self, square: &Square, (sample, sets): (u32, usize), triangles: &mut TrianglesByMap) {
+    fn triangles(&self, square: &Square, pass: DepositPass, triangles: &mut TrianglesByMap) {
+        let DepositPass { sample, sets, .. } = pass;
         let lamp = self.launch.lamp_outline();
         let seed = mix64(half_seed(self.rules.seed, sample as usize));
         for bundle in &square.bundles {
@@ -88,7 +95,8 @@ impl ResidualPass<'_> {
             // they meet without a gap.
             let mut index = bundle.first_triangle;
             let hues = self.hues(bundle, BundleDraw { index, seed }, sets);
-            let lamp = lamp.map(|lamp| LampImage::new(lamp, &bundle.shift, hues.len() > 1));
+            let parts = bundle.shift.lamp_parts(pass.lamp_part_texels, hues.len() > 1);
+            let lamp = lamp.map(|lamp| LampImage::new(lamp, &bundle.shift, parts, hues.len() > 1));
             bundle.triangles(square.place.area(), |corners, flux_w, area| {
                 let draw = BundleDraw { index, seed };
                 index = index.wrapping_add(1);
@@ -137,6 +145,17 @@ impl ResidualPass<'_> {
     }
 }
 
+/// How bundles are deposited.
+#[derive(Clone, Copy)]
+struct DepositPass {
+    /// Number among samples of lamp and spectrum.
+    sample: u32,
+    /// Sets of maps: one, or one for each band.
+    sets: usize,
+    /// Extent of the light from one part of a lamp [texels].
+    lamp_part_texels: f64,
+}
+
 /// Random numbers of a triangle of a bundle, or of a bundle by its first.
 #[derive(Clone, Copy)]
 struct BundleDraw {
@@ -155,11 +174,11 @@ struct LampImage<'a> {
 }
 
 impl<'a> LampImage<'a> {
-    fn new(lamp: PanelShape, shift: &'a OriginShift, is_dispersed: bool) -> Self {
+    fn new(lamp: PanelShape, shift: &'a OriginShift, parts: DVec2, is_dispersed: bool) -> Self {
         let mut image = Self {
             lamp,
             shift,
-            parts: shift.lamp_parts(is_dispersed),
+            parts,
             middles: Vec::new(),
         };
         if !is_dispersed {
@@ -275,7 +294,7 @@ mod tests {
         let shift = OriginShift::of_lamp_sides([DVec2::new(0.8, 0.3), DVec2::new(-0.1, 0.6)]);
         let triangle = [DVec2::ZERO, DVec2::new(1.0, 0.2), DVec2::new(0.3, 1.0)];
         for shape in [PanelShape::Disc, PanelShape::Rectangle] {
-            let image = LampImage::new(shape, &shift, false);
+            let image = LampImage::new(shape, &shift, shift.lamp_parts(PART_TEXELS, false), false);
             let of_lamp = second_moments(
                 &image.spread([DVec2::ZERO; 3], BundleDraw { index: 0, seed: 1 }),
                 DVec2::ZERO,
