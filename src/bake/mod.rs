@@ -134,6 +134,13 @@ impl Baker {
         })
     }
 
+    /// Calls a function at the start of each of its threads.
+    #[must_use]
+    pub fn with_thread_start(mut self, start: fn()) -> Self {
+        self.threads.start = Some(start);
+        self
+    }
+
     /// The scene.
     pub fn scene(&self) -> &Arc<Scene> {
         &self.scene
@@ -473,20 +480,32 @@ fn limited(control: &Control, limit_s: Option<f64>, began: Instant) -> Control {
 
 /// Thread pool of the last bake, kept for the next one.
 #[derive(Clone, Debug, Default)]
-struct Threads(Option<(usize, Arc<ThreadPool>)>);
+struct Threads {
+    /// With the number of threads that was asked for.
+    pool: Option<(usize, Arc<ThreadPool>)>,
+    /// What each thread does first.
+    start: Option<fn()>,
+}
 
 impl Threads {
     /// A pool of as many threads as the settings ask for.
     fn of(&mut self, settings: &BakeSettings) -> Result<Arc<ThreadPool>> {
-        match &self.0 {
+        match &self.pool {
             Some((count, pool)) if *count == settings.threads => Ok(Arc::clone(pool)),
             _ => {
-                let builder = ThreadPoolBuilder::new().num_threads(settings.threads);
+                let start = self.start;
+                let builder = ThreadPoolBuilder::new()
+                    .num_threads(settings.threads)
+                    .start_handler(move |_| {
+                        if let Some(start) = start {
+                            start();
+                        }
+                    });
                 let pool = builder.build().map_err(|error| {
                     Error::failure("--threads", error.to_string(), "ask for fewer threads")
                 })?;
                 let pool = Arc::new(pool);
-                self.0 = Some((settings.threads, Arc::clone(&pool)));
+                self.pool = Some((settings.threads, Arc::clone(&pool)));
                 Ok(pool)
             }
         }

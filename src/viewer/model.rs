@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 
 pub use self::showing::MapsShown;
 use super::ViewerOptions;
-use super::background::Wake;
+use super::background::{self, Wake};
 use super::command::{Choices, Command};
 use super::comparison_view::SavedMaps;
 use super::edits::EditedScene;
@@ -134,7 +134,8 @@ impl Model {
     /// The event log cannot be written; the system cannot create a thread.
     pub fn new(options: &ViewerOptions, wake: &Wake) -> Result<Self> {
         let scene = Arc::clone(&options.scene);
-        let worker = Worker::spawn(Baker::new, wake)?;
+        let make_baker = |scene| Ok(Baker::new(scene)?.with_thread_start(background::give_way));
+        let worker = Worker::spawn(make_baker, wake)?;
         let wanted = BakeRequest::new(Arc::clone(&scene), options.settings.clone());
         let mut model = Self {
             navigator: Navigator::new(&scene, options.camera.as_deref()),

@@ -130,7 +130,6 @@ impl BakeRequest {
 pub struct BakedLevel {
     /// Number of the request, as returned by [`Worker::request`].
     pub serial: u64,
-    /// The request, with `threads` as requested, before a core is reserved for the window.
     pub request: BakeRequest,
     /// Counted from 1 within the request.
     pub level: u32,
@@ -149,15 +148,6 @@ pub struct EffectDifference {
     pub with: Arc<BakedLevel>,
     /// That bake minus the one without the effect, or one sentence on what failed.
     pub difference: std::result::Result<Difference, String>,
-}
-
-/// Number of baking threads, ≥ 1: `asked`, or if that is 0, all cores but one, which is left to the window.
-pub fn baking_threads(asked: usize, cores: usize) -> usize {
-    if asked == 0 {
-        cores.saturating_sub(1).max(1)
-    } else {
-        asked
-    }
 }
 
 /// How long to wait for a cancelled bake to end.
@@ -499,11 +489,6 @@ fn bake<B: LevelBaker>(
     level: &mut (dyn FnMut(Bake) + Send),
 ) -> std::result::Result<Bake, BakeState> {
     let (asked, control) = (&job.asked, &job.control);
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let settings = BakeSettings {
-        threads: baking_threads(asked.settings.threads, cores),
-        ..asked.settings.clone()
-    };
     let outcome = catch_unwind(AssertUnwindSafe(|| {
         let scene = Arc::clone(&asked.scene);
         let baker = match baker {
@@ -513,7 +498,7 @@ fn bake<B: LevelBaker>(
             }
             None => baker.insert(make_baker(scene)?),
         };
-        baker.bake_levels(&settings, job, control, level)
+        baker.bake_levels(&asked.settings, job, control, level)
     }));
     match outcome {
         Ok(Ok(result)) if result.stop_reason != StopReason::Cancelled => Ok(result),

@@ -3,11 +3,11 @@
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use nephroid::bake::Bake;
+use nephroid::bake::{Bake, Baker};
 use nephroid::error::{Error, Result};
 use nephroid::progress::Progress;
 use nephroid::viewer::background::Wake;
-use nephroid::viewer::worker::{BakeRequest, LevelBaker, Worker, baking_threads};
+use nephroid::viewer::worker::{BakeRequest, LevelBaker, Worker};
 
 use super::headless::nothing;
 use super::*;
@@ -342,7 +342,17 @@ fn dropping_ends_the_bake_and_its_thread() {
 }
 
 #[test]
-fn one_core_is_left_to_the_window() {
-    assert_eq!([1, 2, 8].map(|cores| baking_threads(0, cores)), [1, 1, 7]);
-    assert_eq!(baking_threads(5, 2), 5, "what the user asks for is honoured");
+fn each_baking_thread_starts_as_it_is_told() {
+    static STARTED: AtomicUsize = AtomicUsize::new(0);
+    let baker = Baker::new(Scene::default()).expect("it has no triangles");
+    let mut baker = baker.with_thread_start(|| {
+        STARTED.fetch_add(1, Ordering::SeqCst);
+    });
+    let settings = with(BakeSettings::splat(), |it| it.threads = 3);
+    for _ in 0..2 {
+        baker.bake(&settings, &(), &Control::default()).expect("it bakes");
+        // A bake of nothing may end before all of them have started.
+        wait_for("three threads", || STARTED.load(Ordering::SeqCst) >= 3);
+    }
+    assert_eq!(STARTED.load(Ordering::SeqCst), 3, "they are kept");
 }
