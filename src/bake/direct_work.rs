@@ -31,12 +31,13 @@ impl DirectWork {
     }
 
     /// Bakes missing layers; false if cancelled.
-    pub(super) fn shine(
+    pub(super) fn bake_missing(
         &mut self,
         tracer: &Tracer,
         charts: &DirectCharts,
         direct: &mut DirectCache,
-        (progress, control): (&dyn Progress, &Control),
+        progress: &dyn Progress,
+        control: &Control,
     ) -> bool {
         let watch = Stopwatch::start();
         let report = direct.complete(tracer, charts, progress, control);

@@ -31,7 +31,8 @@ impl FirstLook {
         finish: &MapAssembler,
         tracer: &Tracer,
         levels: &Levels,
-        on_whom: (&dyn Progress, &Control),
+        progress: &dyn Progress,
+        control: &Control,
     ) -> (Vec<IlluminationMap>, Vec<LightLayer>) {
         let finish = &MapAssembler {
             direct: finish.direct.of_first_look(),
@@ -44,11 +45,11 @@ impl FirstLook {
             let passing = passes_glass.then(|| tracer.without_clear_bodies());
             let direct_charts = finish.direct_charts(&charts);
             let lit_by = passing.as_ref().unwrap_or(tracer);
-            DirectWork::default().shine(lit_by, &direct_charts, &mut direct, on_whom);
+            DirectWork::default().bake_missing(lit_by, &direct_charts, &mut direct, progress, control);
         }
         let (mut maps, mut parts) = finish.maps(levels, &charts, &direct);
         if finish.plan.is_on(Effect::Indirect) {
-            let known = self.traced(finish, tracer, on_whom);
+            let known = self.traced(finish, tracer, progress, control);
             IndirectWork::of_known(known, &maps).add_to(known, &mut maps, &mut parts);
         }
         (maps, parts)
@@ -59,12 +60,13 @@ impl FirstLook {
         &mut self,
         finish: &MapAssembler,
         tracer: &Tracer,
-        on_whom: (&dyn Progress, &Control),
+        progress: &dyn Progress,
+        control: &Control,
     ) -> &IndirectCache {
         let indirect = &mut self.indirect;
         indirect.prepare(tracer, finish.sizes, finish.settings, ELEMENTS);
         let passes = vec![MIN_PASSES; indirect.network().map_or(0, Network::element_count)];
-        if indirect.passes != passes && indirect.trace(tracer, &passes, on_whom) {
+        if indirect.passes != passes && indirect.trace(tracer, &passes, progress, control) {
             indirect.passes = passes;
         }
         indirect

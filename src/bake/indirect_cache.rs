@@ -69,12 +69,13 @@ impl IndirectCache {
         &mut self,
         tracer: &Tracer,
         passes: &[u8],
-        (progress, control): (&dyn Progress, &Control),
+        progress: &dyn Progress,
+        control: &Control,
     ) -> bool {
         match &mut self.network {
             Some((key, network)) => {
                 let (max_depth, seed) = (key.max_depth, key.seed);
-                network.trace(tracer, passes, (max_depth, seed), (progress, control))
+                network.trace(tracer, passes, (max_depth, seed), progress, control)
             }
             None => false,
         }

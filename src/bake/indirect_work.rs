@@ -99,7 +99,7 @@ impl IndirectWork {
         let before = network.counts();
         self.is_cramped = has_solution && network.bytes_after(passes) > link_bytes(bake.settings);
         let control = if has_solution { limited } else { bake.control };
-        let is_traced = !self.is_cramped && cache.trace(&bake.tracer, passes, (bake.progress, control));
+        let is_traced = !self.is_cramped && cache.trace(&bake.tracer, passes, bake.progress, control);
         let Some(network) = cache.network() else {
             return false;
         };

@@ -325,7 +325,8 @@ impl Baker {
     fn first_look(
         &mut self,
         settings: &BakeSettings,
-        (progress, control): (&dyn Progress, &Control),
+        progress: &dyn Progress,
+        control: &Control,
         (level, clock): (&mut Option<&mut LevelCallback>, &mut Clock),
     ) -> Option<FirstLook> {
         let is_new = self.lights.is_empty() && self.direct.is_empty();
@@ -341,7 +342,7 @@ impl Baker {
             direct: DirectDetail::of(&plan, settings),
         };
         let mut look = FirstLook::default();
-        let maps = look.maps(&finish, &tracer, &[], (progress, control));
+        let maps = look.maps(&finish, &tracer, &[], progress, control);
         let mut result = finish.result(maps, &[], &CausticOutcome::default());
         // The plan is not known before item buffers are built.
         result.plan = EffectPlan::default();
@@ -362,7 +363,7 @@ impl Baker {
         let (whole, began) = (Stopwatch::start(), Instant::now());
         let mut clock = Clock::default();
         let mut level = level;
-        let first_look = self.first_look(settings, (progress, control), (&mut level, &mut clock));
+        let first_look = self.first_look(settings, progress, control, (&mut level, &mut clock));
         let ground = self.prepare(settings, progress, control, (&mut clock, began));
         let PreparedBake {
             tracer,
@@ -423,8 +424,8 @@ impl Baker {
         outcome.warnings.extend(memory_warning);
         if finish.direct != DirectDetail::Absent {
             let direct_charts = finish.direct_charts(&charts);
-            let on_whom = (finish.direct.progress(progress), &for_direct);
-            let complete = lamps.shine(tracer, &direct_charts, direct, on_whom);
+            let progress = finish.direct.progress(progress);
+            let complete = lamps.bake_missing(tracer, &direct_charts, direct, progress, &for_direct);
             if !complete {
                 outcome.stopped = Some(Stopped::Cancelled);
             } else if finish.direct == DirectDetail::Full && !direct.is_refined() {

@@ -64,11 +64,13 @@ impl Showing<'_, '_> {
     }
 
     /// Bakes direct light that is missing on these charts, where there is any.
-    fn shine(&mut self, charts: &DirectCharts) {
+    fn bake_direct(&mut self, charts: &DirectCharts) {
         let detail = self.finish.direct;
         if detail != DirectDetail::Absent {
-            let on_whom = (detail.progress(self.bake.progress), self.for_direct);
-            self.lamps.shine(&self.bake.tracer, charts, self.direct, on_whom);
+            let progress = detail.progress(self.bake.progress);
+            let tracer = &self.bake.tracer;
+            self.lamps
+                .bake_missing(tracer, charts, self.direct, progress, self.for_direct);
         }
     }
 
@@ -96,8 +98,13 @@ impl Showing<'_, '_> {
             return;
         }
         if is_first && let Some(look) = &mut self.first_look {
-            let on_whom = (self.bake.progress, self.bake.control);
-            let maps = look.maps(self.finish, &self.bake.tracer, levels, on_whom);
+            let PreparedBake {
+                tracer,
+                progress,
+                control,
+                ..
+            } = self.bake;
+            let maps = look.maps(self.finish, tracer, levels, *progress, control);
             self.hand_out(maps, levels, so_far, clock);
             return;
         }
@@ -110,7 +117,7 @@ impl Showing<'_, '_> {
         // The first picture after a change has to come soon; direct light follows with the second.
         let waits = is_first && !self.direct.knows(finish.scene.lights.len(), &direct_charts);
         if !waits {
-            self.shine(&direct_charts);
+            self.bake_direct(&direct_charts);
         }
         let mut so_far = self.lamps.added_to(so_far);
         so_far.counts.item_buffer_tests = self.bake.item_buffer_tests;
@@ -131,17 +138,18 @@ impl Showing<'_, '_> {
             return Backdrop::new();
         }
         let (charts, _) = finish.charts(levels);
-        let on_whom = (self.bake.progress, self.for_direct);
-        self.shine(&finish.direct_charts(&charts));
+        self.bake_direct(&finish.direct_charts(&charts));
         let (mut maps, _) = finish.maps(levels, &charts, self.direct);
         if finish.plan.is_on(Effect::Indirect) {
             let known = match &self.first_look {
                 Some(look) => look.indirect(),
                 None if self.indirect.network().is_some() => &*self.indirect,
-                None => self
-                    .glance
-                    .get_or_insert_default()
-                    .traced(finish, &self.bake.tracer, on_whom),
+                None => self.glance.get_or_insert_default().traced(
+                    finish,
+                    &self.bake.tracer,
+                    self.bake.progress,
+                    self.for_direct,
+                ),
             };
             IndirectWork::of_known(known, &maps).add_to(known, &mut maps, &mut Vec::new());
         }

@@ -163,7 +163,8 @@ impl Network {
         tracer: &Tracer,
         passes: &[u8],
         (max_depth, seed): (u32, u64),
-        (progress, control): (&dyn Progress, &Control),
+        progress: &dyn Progress,
+        control: &Control,
     ) -> bool {
         for pass in 0..passes.iter().copied().max().unwrap_or(0) {
             let elements = self.missing(passes, pass);
@@ -184,7 +185,7 @@ impl Network {
                 seed,
                 rays: (rays, Self::rays_after(pass + 1)),
             };
-            let Some(batch) = work.run(&elements, (progress, control)) else {
+            let Some(batch) = work.run(&elements, progress, control) else {
                 return false;
             };
             self.keep(pass, &elements, batch);

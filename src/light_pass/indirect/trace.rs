@@ -107,7 +107,7 @@ struct RayEnd {
 
 impl GatherPass<'_> {
     /// Traces the rays of some elements; `None` if cancelled.
-    pub fn run(&self, elements: &[u32], (progress, control): (&dyn Progress, &Control)) -> Option<Batch> {
+    pub fn run(&self, elements: &[u32], progress: &dyn Progress, control: &Control) -> Option<Batch> {
         let has_bodies = self.has_bodies();
         let chunks = elements.len().div_ceil(CHUNK);
         let done = AtomicU64::new(0);

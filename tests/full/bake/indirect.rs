@@ -133,7 +133,7 @@ fn under_even_light(parts: Vec<(Mesh, Material)>, maps: &[(usize, usize)], rays:
     let mut network = Network::new(&scene, &charts);
     let count = network.element_count();
     let passes = vec![MIN_PASSES; count];
-    assert!(network.trace(&tracer, &passes, (rays, 0), (&(), &Control::default())));
+    assert!(network.trace(&tracer, &passes, (rays, 0), &(), &Control::default()));
     network.solve(&vec![LinearSrgb::WHITE; count], &passes).irradiance
 }
 
