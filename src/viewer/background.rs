@@ -247,6 +247,7 @@ mod tests {
             give_way();
             niceness()
         });
-        assert_eq!(nicer.join().expect("it ends"), 4);
+        let nicer = nicer.join().expect("it ends");
+        assert!(nicer >= 4, "niceness {nicer}");
     }
 }
