@@ -111,8 +111,7 @@ impl TriangleBvh {
     /// The same for a ray that leaves the triangle in a slot: it does not meet that one again.
     #[inline(always)]
     pub fn search_from(&self, ray: &Ray, left: u32, end_m: f64, mut meet: impl FnMut(u32) -> Option<f64>) {
-        let (local, advanced_m) = self.frame.local_ray(ray, end_m);
-        let local = WideRay { left, ..local };
+        let (local, advanced_m) = self.frame.local_ray(ray, left, end_m);
         self.wide.search(local, |slot| match meet(slot as u32) {
             Some(end_m) if end_m.is_finite() => self.frame.local_distance(end_m, advanced_m),
             Some(_) => f32::INFINITY,
@@ -217,7 +216,7 @@ impl Frame {
     }
 
     /// The ray in single precision, and the distance [m] by which its origin was advanced.
-    fn local_ray(&self, ray: &Ray, limit_m: f64) -> (WideRay, f64) {
+    fn local_ray(&self, ray: &Ray, left: u32, limit_m: f64) -> (WideRay, f64) {
         let towards_centre = (self.centre - ray.origin).dot(ray.direction);
         let advanced_m = (towards_centre - FAR_RADII * self.radius_m).max(0.0);
         // A branch: the origin of most rays need not wait for the distance.
@@ -238,7 +237,7 @@ impl Frame {
             origin: origin.clamp(-Vec3A::MAX, Vec3A::MAX),
             direction,
             end: limit,
-            left: NO_SLOT,
+            left,
         };
         (local, advanced_m)
     }

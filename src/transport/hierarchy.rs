@@ -518,6 +518,28 @@ mod tests {
         assert!(hits > 10_000, "{hits}");
     }
 
+    /// Whatever leaves a triangle meets the same with and without testing that one again.
+    #[test]
+    fn a_triangle_that_is_left_is_not_met_again() {
+        let tracer = Tracer::sharing(Arc::new(balls()), usize::MAX);
+        let mut hits = 0;
+        for (index, ray) in rays(tracer.scene()).enumerate() {
+            let Some(hit) = tracer.closest_hit(&ray) else {
+                continue;
+            };
+            hits += 1;
+            // Some along the triangle, where rounding would be seen first.
+            let direction = vector(index, 8);
+            let along = direction.reject_from_normalized(hit.geometric_normal);
+            for direction in [direction, along] {
+                let left = hit.spawn(direction.normalize());
+                let [with, without] = [NO_SLOT, hit.slot].map(|slot| tracer.next_hit(&left, slot));
+                assert_eq!(format!("{with:?}"), format!("{without:?}"), "{left:?}");
+            }
+        }
+        assert!(hits > 10_000, "{hits}");
+    }
+
     #[test]
     fn instances_are_met_as_copies_are() {
         let scene = Arc::new(balls());

@@ -383,22 +383,18 @@ impl Tracer {
         }
         // Only a copy has an address: the usual hit is built in place.
         let gradient = self.bump_gradient(&{ flat });
-        let bent = |gradient| bend::bent(interpolated_normal, gradient);
         SurfaceHit {
-            shading_normal: gradient.map_or(interpolated_normal, bent),
+            shading_normal: bend::bent(interpolated_normal, gradient),
             ..flat
         }
     }
 
-    /// Height gradient that perturbs the normal at a hit [1]; `None` without bumps.
-    pub(super) fn bump_gradient(&self, hit: &SurfaceHit) -> Option<DVec3> {
-        if !self.is_bumpy(hit.object) {
-            return None;
-        }
+    /// Height gradient that perturbs the normal at a hit on a bumpy object [1].
+    fn bump_gradient(&self, hit: &SurfaceHit) -> DVec3 {
         let waves = self.scene.material_of(hit.object).bending_waves();
         let of_waves = waves.map(|waves| waves.gradient(hit.point));
         let of_texture = self.texture_gradient(hit);
-        Some(of_waves.unwrap_or_default() + of_texture.unwrap_or_default())
+        of_waves.unwrap_or_default() + of_texture.unwrap_or_default()
     }
 
     fn texture_gradient(&self, hit: &SurfaceHit) -> Option<DVec3> {

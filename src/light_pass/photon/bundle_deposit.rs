@@ -95,8 +95,8 @@ impl ResidualPass<'_> {
             // they meet without a gap.
             let mut index = bundle.first_triangle;
             let hues = self.hues(bundle, BundleDraw { index, seed }, sets);
-            let parts = bundle.shift.lamp_parts(pass.lamp_part_texels, hues.len() > 1);
-            let lamp = lamp.map(|lamp| LampImage::new(lamp, &bundle.shift, parts, hues.len() > 1));
+            let part_texels = pass.lamp_part_texels;
+            let lamp = lamp.map(|lamp| LampImage::new(lamp, &bundle.shift, part_texels, hues.len() > 1));
             bundle.triangles(square.place.area(), |corners, flux_w, area| {
                 let draw = BundleDraw { index, seed };
                 index = index.wrapping_add(1);
@@ -174,11 +174,11 @@ struct LampImage<'a> {
 }
 
 impl<'a> LampImage<'a> {
-    fn new(lamp: PanelShape, shift: &'a OriginShift, parts: DVec2, is_dispersed: bool) -> Self {
+    fn new(lamp: PanelShape, shift: &'a OriginShift, part_texels: f64, is_dispersed: bool) -> Self {
         let mut image = Self {
             lamp,
             shift,
-            parts,
+            parts: shift.lamp_parts(part_texels, is_dispersed),
             middles: Vec::new(),
         };
         if !is_dispersed {
@@ -294,7 +294,7 @@ mod tests {
         let shift = OriginShift::of_lamp_sides([DVec2::new(0.8, 0.3), DVec2::new(-0.1, 0.6)]);
         let triangle = [DVec2::ZERO, DVec2::new(1.0, 0.2), DVec2::new(0.3, 1.0)];
         for shape in [PanelShape::Disc, PanelShape::Rectangle] {
-            let image = LampImage::new(shape, &shift, shift.lamp_parts(PART_TEXELS, false), false);
+            let image = LampImage::new(shape, &shift, PART_TEXELS, false);
             let of_lamp = second_moments(
                 &image.spread([DVec2::ZERO; 3], BundleDraw { index: 0, seed: 1 }),
                 DVec2::ZERO,
