@@ -69,14 +69,8 @@ impl MapAssembler<'_> {
             let texels = sums.par_iter_mut().zip(flux.texels());
             texels.for_each(|(sum, counts)| *sum += counts[band.channel] as f64 * scale);
         }
-        let per_area = |(texel, flux): (usize, f64)| {
-            let area_m2 = chart.texel_area_m2(texel);
-            if area_m2 > 0.0 {
-                (flux / area_m2) as f32
-            } else {
-                0.0
-            }
-        };
-        sums.into_iter().enumerate().map(per_area).collect()
+        let sums = sums.into_iter().enumerate();
+        sums.map(|(texel, flux)| chart.per_area(texel, flux) as f32)
+            .collect()
     }
 }

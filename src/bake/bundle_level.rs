@@ -14,7 +14,6 @@ use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::accuracy;
 use crate::light_pass::footprint_statistics::FootprintStatistics;
-use crate::light_pass::pass_report::ProgressScope;
 use crate::light_pass::photon::domain::FIRST_LEVEL;
 use crate::light_pass::photon::footprints::FootprintPass;
 use crate::light_pass::photon::launch::PhotonLaunch;
@@ -114,15 +113,12 @@ impl CausticLayer<'_> {
         let pass = FootprintPass {
             launch: &PhotonLaunch::of_cells(light),
             rules: PhotonRules {
-                tracer: self.tracer,
                 spectrum: None,
                 effects: EffectSet {
                     lobes: false,
                     ..EffectSet::of(self.plan)
                 },
-                max_depth: self.settings.photon_depth(),
-                unit,
-                seed: self.settings.seed,
+                ..self.rules(light, unit)
             },
             chart_for,
             blur_rad: match self.tracer.scene().lights[light.light].size {
@@ -299,20 +295,7 @@ impl CausticLayer<'_> {
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let mut bundles = self.no_maps();
         let mut halves = vec![self.part_maps(), self.part_maps()];
-        let listener = ProgressScope {
-            progress: self.progress,
-            control: context.control,
-            done: context.outcome.counts.rays,
-            total: 0,
-        };
-        let rules = PhotonRules {
-            tracer: self.tracer,
-            spectrum: self.spectra.photons(light.light),
-            effects: EffectSet::of(self.plan),
-            max_depth: self.settings.photon_depth(),
-            unit,
-            seed: self.settings.seed,
-        };
+        let listener = self.listener(context, 0);
         let [first, second] = &mut halves[..] else {
             unreachable!("there are two halves");
         };
@@ -328,7 +311,7 @@ impl CausticLayer<'_> {
         let report = self.with_launch(light, |launch| {
             let pass = ResidualPass {
                 launch,
-                rules,
+                rules: self.rules(light, unit),
                 chart_for: &chart_for,
                 sought: sought.as_ref(),
                 is_rough: self.rough_object(light).is_some(),

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::BakeCounts;
-use super::carrier::Carrier;
 use super::clock::Clock;
 use super::finish::CompletedLevel;
 use super::forecast::{CostPoint, Forecast, forecast};
@@ -20,7 +19,7 @@ use super::splat_level::LEVEL_STRIDES;
 use crate::error::{Error, Result, Warning};
 use crate::light_pass::accuracy::LightError;
 use crate::light_pass::footprint_statistics::FootprintStatistics;
-use crate::light_pass::pass_report::{PassReport, ProgressScope};
+use crate::light_pass::pass_report::PassReport;
 use crate::light_pass::receiver_maps::ChartFor;
 use crate::light_pass::shard_index::ShardIndex;
 use crate::light_pass::visibility::{LightVisibility, VisibleLight};
@@ -81,7 +80,6 @@ pub(super) struct LightProgress<'a> {
     pub(super) visible: &'a VisibleLight,
     /// What is kept of it between bakes.
     pub(super) state: LightState,
-    pub(super) carrier: Carrier,
     /// From coarse to fine.
     pub(super) levels: Vec<LightLevel>,
     /// Relative RMSE of this light's maps that the target of the whole bake asks for.
@@ -92,11 +90,10 @@ pub(super) struct LightProgress<'a> {
 }
 
 impl<'a> LightProgress<'a> {
-    fn new(visible: &'a VisibleLight, state: LightState, carrier: Carrier) -> Self {
+    fn new(visible: &'a VisibleLight, state: LightState) -> Self {
         Self {
             visible,
             state,
-            carrier,
             levels: Vec::new(),
             target_rmse: None,
             done: false,
@@ -108,7 +105,7 @@ impl<'a> LightProgress<'a> {
     fn start_over(&mut self) {
         *self = Self {
             is_underrated: true,
-            ..Self::new(self.visible, std::mem::take(&mut self.state), self.carrier)
+            ..Self::new(self.visible, std::mem::take(&mut self.state))
         };
     }
 
@@ -143,16 +140,6 @@ pub(super) struct BakeContext<'a> {
     pub(super) spare_bytes: u64,
     /// Lights that are still being refined.
     pub(super) open_lights: usize,
-}
-
-/// The scope of passes that nobody watches.
-pub(super) fn unwatched(control: &Control) -> ProgressScope<'_> {
-    ProgressScope {
-        progress: &(),
-        control,
-        done: 0,
-        total: 0,
-    }
 }
 
 impl BakeContext<'_> {
@@ -283,7 +270,7 @@ impl CausticLayer<'_> {
             let mut state = states.take(light.light);
             let bytes = self.kept_light_bytes();
             state.begin(light, self.spectra.has(light.light), bytes, moving);
-            LightProgress::new(light, state, self.carrier())
+            LightProgress::new(light, state)
         };
         lights.into_iter().map(begin).collect()
     }
@@ -368,7 +355,7 @@ impl CausticLayer<'_> {
     }
 
     fn next_level(&self, light: &mut LightProgress, context: &mut BakeContext) -> Result<()> {
-        if light.carrier == Carrier::Photons {
+        if self.settings.estimator.refines() {
             return self.advance_photons(light, context);
         }
         let unit = self.unit(light.visible)?;
@@ -402,12 +389,11 @@ impl CausticLayer<'_> {
     }
 
     pub(super) fn has_next_level(&self, light: &LightProgress) -> bool {
-        match light.carrier {
-            Carrier::Photons => self
-                .next_aim(light.visible, light.levels.last(), light.target_rmse)
-                .is_some(),
-            Carrier::Splats => light.levels.len() < LEVEL_STRIDES.len(),
+        if !self.settings.estimator.refines() {
+            return light.levels.len() < LEVEL_STRIDES.len();
         }
+        self.next_aim(light.visible, light.levels.last(), light.target_rmse)
+            .is_some()
     }
 }
 

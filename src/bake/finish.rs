@@ -12,11 +12,12 @@ use super::light_level::LightLevel;
 use super::map_plan::MEMORY;
 use super::map_size::{self, SizeRequest};
 use super::sizes::{ChartCache, MapMemory};
-use super::{Bake, LightLayer, StopReason, Timings, map_plan};
+use super::{Bake, LightLayer, StopReason, map_plan};
 use crate::effect::EffectSwitch;
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
+use crate::illumination::map::relative_rmse;
 use crate::illumination::resolution::variance_within;
 use crate::illumination::smoothing::smooth;
 use crate::illumination::visible::visible_error;
@@ -142,7 +143,6 @@ impl MapAssembler<'_> {
             maps,
             light_layers,
             plan: self.plan.clone(),
-            item_buffers: Vec::new(),
             ledgers,
             counts: outcome.counts,
             course: outcome.course.clone(),
@@ -154,11 +154,10 @@ impl MapAssembler<'_> {
                     actual,
                 })
             }),
-            timings_s: Timings::default(),
-            cpu_s: Timings::default(),
             stop_reason,
             partial: stop_reason == StopReason::Cancelled,
             warnings,
+            ..Bake::default()
         }
     }
 
@@ -350,14 +349,7 @@ impl MapAssembler<'_> {
                 *sum += LinearSrgb::from(counts.map(|count| count as f64)) * scale;
             });
         }
-        let mean = |(texel, sum): (usize, &LinearSrgb)| {
-            let area_m2 = chart.texel_area_m2(texel);
-            if area_m2 > 0.0 {
-                (*sum / area_m2).to_array().map(single)
-            } else {
-                [0.0; 3]
-            }
-        };
+        let mean = |(texel, sum): (usize, &LinearSrgb)| chart.per_area(texel, *sum).to_array().map(single);
         let mut irradiance: Vec<[f32; 3]> = sums.par_iter().enumerate().map(mean).collect();
         fill_gutter(chart, &mut irradiance);
         Layer {
@@ -484,32 +476,10 @@ fn error_of(chart: &Chart, lit: &[LitMap]) -> Option<Vec<f32>> {
     for (light, level, _) in lit {
         let strength = light.strength().luminance();
         let error = level.error.as_ref()?;
-        for (square, texel) in squares.iter_mut().zip(&error.maps.get(&chart.receiver)?.texels) {
+        for (square, texel) in squares.iter_mut().zip(error.maps.get(&chart.receiver)?) {
             *square += (f64::from(*texel) * strength).powi(2);
         }
     }
     let root = |square: &f64| single(square.sqrt());
     (!lit.is_empty()).then(|| squares.iter().map(root).collect())
-}
-
-/// RMSE of the caustic and indirect layers over their mean irradiance, weighted by area; `None` if the error of a map
-/// is unknown, or no light arrived.
-fn relative_rmse(maps: &[IlluminationMap]) -> Option<f64> {
-    let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
-    for map in maps {
-        let estimated = [LayerKind::Caustic, LayerKind::Indirect];
-        let layers: Vec<&Layer> = estimated.iter().filter_map(|&kind| map.layer(kind)).collect();
-        if layers.is_empty() {
-            continue;
-        }
-        for (texel, error) in map.error.as_ref()?.iter().enumerate() {
-            let texel_m2 = map.chart.texel_area_m2(texel);
-            squares += f64::from(*error) * f64::from(*error) * texel_m2;
-            for layer in &layers {
-                flux_w += luminance(&layer.irradiance[texel]) * texel_m2;
-            }
-            area_m2 += texel_m2;
-        }
-    }
-    (flux_w > 0.0).then(|| (squares * area_m2).sqrt() / flux_w)
 }

@@ -245,7 +245,7 @@ impl LightLevel {
             .chain(self.bands.iter().map(|band| &band.maps))
             .chain(halves.flat_map(BandMaps::sets));
         let error = self.error.iter().flat_map(|error| error.maps.values());
-        all.map(ReceiverMaps::bytes).sum::<u64>() + error.map(|map| 4 * map.texels.len() as u64).sum::<u64>()
+        all.map(ReceiverMaps::bytes).sum::<u64>() + error.map(|map| 4 * map.len() as u64).sum::<u64>()
     }
 }
 

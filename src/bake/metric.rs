@@ -113,7 +113,7 @@ impl Counts {
             let squares = self.squares(*receiver, image, error, truncated);
             let by_area = squares.iter().enumerate();
             by_area
-                .map(|(texel, square)| square * image.area_m2(texel))
+                .map(|(texel, square)| square * image.chart.texel_area_m2(texel))
                 .sum::<f64>()
         });
         squares.sum::<f64>().sqrt()
@@ -124,7 +124,7 @@ impl Counts {
         let (Some(counts), Some(map)) = (self.0.get(&receiver), error.maps.get(&receiver)) else {
             return vec![0.0; image.luminance.len()];
         };
-        let texels = counts.iter().zip(&map.texels).zip(&image.luminance);
+        let texels = counts.iter().zip(map).zip(&image.luminance);
         texels
             .map(|((count, error), e)| count * (f64::from(*error).powi(2) + (truncated * e).powi(2)))
             .collect()

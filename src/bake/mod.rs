@@ -3,7 +3,6 @@
 mod band_layers;
 mod band_maps;
 mod bundle_level;
-mod carrier;
 mod caustic;
 mod clock;
 mod direct_cache;
@@ -25,6 +24,7 @@ mod scene_change;
 pub mod shards;
 mod showing;
 mod sizes;
+mod soft_light;
 mod spectra;
 mod splat_level;
 pub mod survey;

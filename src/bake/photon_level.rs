@@ -197,17 +197,13 @@ impl CausticLayer<'_> {
 
     pub(super) fn with_launch<T>(&self, light: &VisibleLight, f: impl FnOnce(&PhotonLaunch) -> T) -> T {
         let source = self.tracer.scene().lights[light.light].of_unit_strength();
-        if self.has_places(light) {
-            let spheres = light.spheres(self.tracer, &source);
-            f(&PhotonLaunch::of_places(
-                self.tracer,
-                &source,
-                spheres,
-                self.settings.seed,
-            ))
-        } else {
-            f(&PhotonLaunch::of_cells(light))
-        }
+        let extended = self.has_places(light).then_some(&source);
+        f(&PhotonLaunch::of(
+            self.tracer,
+            light,
+            extended,
+            self.settings.seed,
+        ))
     }
 
     /// Adds a level of photons to a light.
@@ -292,28 +288,15 @@ impl CausticLayer<'_> {
             .unwrap_or(0);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
-        let spectrum = self.spectra.photons(light.light);
         let sums = context.pass(&chart_for, nothing, |context, share, mut sums| {
-            let rules = PhotonRules {
-                tracer: self.tracer,
-                spectrum,
-                effects: EffectSet::of(self.plan),
-                max_depth: self.settings.photon_depth(),
-                unit,
-                seed: self.settings.seed,
-            };
-            let listener = ProgressScope {
-                progress: self.progress,
-                control: context.control,
-                done: context.outcome.counts.rays,
-                total: context.outcome.counts.rays + HALVES as u64 * u64::from(photons - first),
-            };
+            let total = context.outcome.counts.rays + HALVES as u64 * u64::from(photons - first);
+            let listener = self.listener(context, total);
             let mut halves = sums.maps.iter_mut().map(|maps| maps.sets_mut());
             let mut halves = [halves.next(), halves.next()].map(|half| half.unwrap_or(&mut []));
             sums.report = self.with_launch(light, |launch| {
                 let pass = PhotonPass {
                     launch,
-                    rules,
+                    rules: self.rules(light, unit),
                     chart_for: &chart_for,
                 };
                 pass.run(first..photons, share, &mut halves, &listener)
@@ -436,6 +419,28 @@ impl CausticLayer<'_> {
     /// Maps of both halves, not divided by the number of photons.
     fn half_maps<'a>(&self, light: &VisibleLight, raw: &'a PhotonSums) -> [Cow<'a, ReceiverMaps>; HALVES] {
         [0, 1].map(|half| self.srgb_sum(light, &raw.halves[half]))
+    }
+
+    /// What the photons of a light share.
+    pub(super) fn rules(&self, light: &VisibleLight, unit: FluxUnit) -> PhotonRules<'_> {
+        PhotonRules {
+            tracer: self.tracer,
+            spectrum: self.spectra.photons(light.light),
+            effects: EffectSet::of(self.plan),
+            max_depth: self.settings.photon_depth(),
+            unit,
+            seed: self.settings.seed,
+        }
+    }
+
+    /// The scope of a pass after which there are so many rays.
+    pub(super) fn listener<'b>(&'b self, context: &BakeContext<'b>, total: u64) -> ProgressScope<'b> {
+        ProgressScope {
+            progress: self.progress,
+            control: context.control,
+            done: context.outcome.counts.rays,
+            total,
+        }
     }
 
     /// Unit of a single photon's flux, for sums over the maximum number of photons.

@@ -11,10 +11,11 @@ use crate::plan::EffectPlan;
 use crate::settings::{ErrorMetric, LayerKind};
 
 /// Why a bake ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
     /// The lattice of the requested density was traced.
+    #[default]
     Density,
     /// The estimated error met the target.
     MaxError,
@@ -104,7 +105,7 @@ pub struct LightLayer {
 }
 
 /// Maps and everything that is known about how they were made.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Bake {
     /// One per surface that received flux, in the order of `Scene::objects`.
     pub maps: Vec<IlluminationMap>,

@@ -1,7 +1,7 @@
 //! One light by splats: the full lattice at once, and sparser ones to estimate the error.
 
 use super::band_maps::BandMaps;
-use super::caustic::{BakeContext, CausticLayer, LightProgress, unwatched};
+use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::{LevelKey, LightLevel, LightState, TraceKey};
 use super::shards::PassSums;
 use crate::error::Result;
@@ -154,23 +154,15 @@ impl CausticLayer<'_> {
             statistics: context.statistics.as_deref(),
             gathers: false,
         };
-        let listener = ProgressScope {
-            progress: self.progress,
-            control: context.control,
-            done: context.outcome.counts.rays,
-            total: match worker.share {
-                Some(share) => share.of(lattice.ray_count()),
-                None => lattice.ray_count(),
-            },
-        };
+        let rays = lattice.ray_count();
+        let total = worker.share.map_or(rays, |share| share.of(rays));
+        let listener = self.listener(context, total);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
-        match worker.share {
-            Some(share) => {
-                let report = pass::run_share(&depositor, share, halves, &chart_for, &listener);
-                (report, None)
-            }
-            None => pass::run(&depositor, worker.source, halves, &chart_for, &listener),
-        }
+        let source = match worker.share {
+            Some(_) => PassInput::Rays { keep_bytes: 0 },
+            None => worker.source,
+        };
+        pass::run(&depositor, source, worker.share, halves, &chart_for, &listener)
     }
 
     /// Error of a level, estimated from a thinner one; `None` for a level that is thinned itself, and for a shard's part.
@@ -273,7 +265,10 @@ impl CausticLayer<'_> {
             statistics: None,
             gathers: true,
         };
-        let listener = unwatched(context.control);
+        let listener = ProgressScope {
+            progress: &(),
+            ..self.listener(context, 0)
+        };
         let chart_for = |receiver: Receiver| {
             self.sizes
                 .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
@@ -284,7 +279,7 @@ impl CausticLayer<'_> {
             second: None,
         };
         let source = source_of(state, &self.trace_key(light));
-        let (mut report, _) = pass::run(&depositor, source, &mut all, &chart_for, &listener);
+        let (mut report, _) = pass::run(&depositor, source, None, &mut all, &chart_for, &listener);
         // Kernels of the coarse run are on no map.
         report.splats = 0;
         context.outcome.count(&report, context.clock);

@@ -66,6 +66,16 @@ impl Chart {
         }
     }
 
+    /// A value of a texel per surface area [1/m²]; zero where the texel holds no surface.
+    pub fn per_area<T: Default + std::ops::Div<f64, Output = T>>(&self, texel: usize, value: T) -> T {
+        let area_m2 = self.texel_area_m2(texel);
+        if area_m2 > 0.0 {
+            value / area_m2
+        } else {
+            T::default()
+        }
+    }
+
     /// Index of the texel at a column and row of the finest size.
     pub fn texel_at(&self, column: usize, row: usize) -> usize {
         match &self.layout {

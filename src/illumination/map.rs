@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::Chart;
-use crate::optics::LinearSrgb;
+use crate::optics::{LinearSrgb, luminance};
 use crate::settings::LayerKind;
 
 /// One layer of a map: mean irradiance of each texel of its chart [W/m²], linear sRGB; row 0 at v = 0.
@@ -103,4 +103,26 @@ impl IlluminationMap {
         }
         flux
     }
+}
+
+/// RMSE of the caustic and indirect layers over their mean irradiance, weighted by area; `None` if the error of a map
+/// is unknown, or no light arrived.
+pub fn relative_rmse(maps: &[IlluminationMap]) -> Option<f64> {
+    let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
+    for map in maps {
+        let estimated = [LayerKind::Caustic, LayerKind::Indirect];
+        let layers: Vec<&Layer> = estimated.iter().filter_map(|&kind| map.layer(kind)).collect();
+        if layers.is_empty() {
+            continue;
+        }
+        for (texel, error) in map.error.as_ref()?.iter().enumerate() {
+            let texel_m2 = map.chart.texel_area_m2(texel);
+            squares += f64::from(*error) * f64::from(*error) * texel_m2;
+            for layer in &layers {
+                flux_w += luminance(&layer.irradiance[texel]) * texel_m2;
+            }
+            area_m2 += texel_m2;
+        }
+    }
+    (flux_w > 0.0).then(|| (squares * area_m2).sqrt() / flux_w)
 }

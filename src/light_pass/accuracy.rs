@@ -11,7 +11,6 @@ use rayon::prelude::*;
 use super::ledger::EnergyLedger;
 use super::receiver_maps::{ReceiverMap, ReceiverMaps};
 use crate::illumination::accumulator::FluxUnit;
-use crate::illumination::tiles::TileLayout;
 use crate::illumination::{Chart, Receiver};
 
 /// Error of splats of every fourth ray relative to those of all: first order.
@@ -21,34 +20,22 @@ const RATIO_OF_THINNED: f64 = 2.0;
 const WINDOW_TEXELS: usize = 2;
 
 /// Irradiance of one map, for error estimates.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Image {
-    /// Texels across; in a tiled map, of the finest size.
-    pub width: usize,
-    pub height: usize,
+    pub chart: Arc<Chart>,
     /// Luminance of E per texel [W/m², for a light of unit strength].
     pub luminance: Vec<f64>,
-    /// Area under each texel [m²]; a single value if all are equal.
-    pub texel_areas_m2: Vec<f64>,
-    /// `None` for an untiled map.
-    pub layout: Option<Arc<TileLayout>>,
 }
 
 /// Images of one level, by receiver.
 pub type Images = BTreeMap<Receiver, Image>;
 
-/// Error estimate of one map.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MapError {
-    /// Expected error of each texel's luminance, the root of variance and squared bias [W/m², for a light of unit
-    /// strength].
-    pub texels: Vec<f32>,
-}
-
 /// Error estimate of all maps of one light.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LightError {
-    pub maps: BTreeMap<Receiver, MapError>,
+    /// Expected error of each texel's luminance, the root of variance and squared bias [W/m², for a light of unit
+    /// strength].
+    pub maps: BTreeMap<Receiver, Vec<f32>>,
     /// Root mean square error over all texels, weighted by area, relative to the mean irradiance.
     pub relative_rmse: f64,
 }
@@ -63,7 +50,7 @@ impl LightError {
         self.relative_rmse *= factor;
         for map in self.maps.values_mut() {
             let raise = |error: &mut f32| *error = single(f64::from(*error) * factor);
-            map.texels.iter_mut().for_each(raise);
+            map.iter_mut().for_each(raise);
         }
     }
 
@@ -84,7 +71,7 @@ impl LightError {
             let Some(image) = light.get(receiver) else {
                 continue;
             };
-            for (error, value) in map.texels.iter_mut().zip(&image.luminance) {
+            for (error, value) in map.iter_mut().zip(&image.luminance) {
                 *error = single((f64::from(*error).powi(2) + per_light * value.max(0.0)).sqrt());
             }
         }
@@ -98,49 +85,24 @@ fn single(error: f64) -> f32 {
 
 pub fn images(maps: &ReceiverMaps, unit: FluxUnit) -> Images {
     let image = |(receiver, map): (Receiver, &ReceiverMap)| {
-        let chart = &map.chart;
+        let chart = Arc::clone(&map.chart);
         let luminance = map
             .flux()
             .texels()
             .par_iter()
             .enumerate()
-            .map(|(texel, &count)| {
-                let area_m2 = chart.texel_area_m2(texel);
-                if area_m2 > 0.0 {
-                    unit.flux_w(count).luminance() / area_m2
-                } else {
-                    0.0
-                }
-            })
+            .map(|(texel, &count)| chart.per_area(texel, unit.flux_w(count).luminance()))
             .collect();
-        (receiver, Image::new(chart, luminance))
+        (receiver, Image { chart, luminance })
     };
     maps.iter().map(image).collect()
 }
 
 impl Image {
-    fn new(chart: &Chart, luminance: Vec<f64>) -> Self {
-        Self {
-            width: chart.width,
-            height: chart.height,
-            luminance,
-            texel_areas_m2: chart.texel_areas_m2.clone(),
-            layout: chart.layout.clone(),
-        }
-    }
-
-    pub fn area_m2(&self, texel: usize) -> f64 {
-        if self.texel_areas_m2.len() == 1 {
-            self.texel_areas_m2[0]
-        } else {
-            self.texel_areas_m2[texel]
-        }
-    }
-
     /// Flux [W] and area [m²] of all texels.
     fn sums(&self) -> (f64, f64) {
         (0..self.luminance.len()).fold((0.0, 0.0), |(flux, area), texel| {
-            let texel_m2 = self.area_m2(texel);
+            let texel_m2 = self.chart.texel_area_m2(texel);
             (flux + self.luminance[texel] * texel_m2, area + texel_m2)
         })
     }
@@ -157,15 +119,17 @@ impl Image {
     /// The sum of these values of texels, weighted by their areas.
     fn integral(&self, values: &[f64]) -> f64 {
         let by_area = values.iter().enumerate();
-        by_area.map(|(texel, value)| value * self.area_m2(texel)).sum()
+        by_area
+            .map(|(texel, value)| value * self.chart.texel_area_m2(texel))
+            .sum()
     }
 
     /// Means over a square window around each texel, clipped to the map or to the texel's tile.
     fn windowed(&self, squares: &[f64]) -> Vec<f64> {
         let mut means = vec![0.0; squares.len()];
-        let Some(layout) = &self.layout else {
-            let size = (self.width, self.height);
-            let lines = means.par_chunks_mut(self.width).enumerate();
+        let Some(layout) = &self.chart.layout else {
+            let size = (self.chart.width, self.chart.height);
+            let lines = means.par_chunks_mut(self.chart.width).enumerate();
             lines.for_each(|(row, line)| window(squares, size, row, line));
             return means;
         };
@@ -238,7 +202,7 @@ pub fn expected_noise(shown: f64, [a, b]: [&Images; 2], light: &Images, by_photo
             (None, None) => continue,
         };
         for (texel, square) in differences.iter().enumerate() {
-            let by_area = square * image.area_m2(texel);
+            let by_area = square * image.chart.texel_area_m2(texel);
             squares += by_area;
             fourths += by_area * by_area;
         }
@@ -299,10 +263,8 @@ fn by_squares(
         squares_sum += image.integral(&squares);
         let (map_w, map_m2) = image.sums();
         (flux_w, area_m2) = (flux_w + map_w, area_m2 + map_m2);
-        let map = MapError {
-            texels: squares.iter().map(|square| single(square.sqrt())).collect(),
-        };
-        error.maps.insert(receiver, map);
+        let map = squares.iter().map(|square| single(square.sqrt()));
+        error.maps.insert(receiver, map.collect());
     }
     let mean = flux_w / area_m2;
     error.relative_rmse = (squares_sum / area_m2 / (mean * mean))

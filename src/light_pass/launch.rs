@@ -78,6 +78,13 @@ impl Launch {
         Self { media, ..self }
     }
 
+    /// The same light, so many times as strong.
+    #[must_use]
+    pub fn scaled(mut self, strength: LinearSrgb) -> Self {
+        self.emitter.strength = self.emitter.strength * strength;
+        self
+    }
+
     /// The media in which its rays start; none for parallel light.
     pub fn media(&self) -> &MediumStack {
         &self.media

@@ -1,26 +1,23 @@
 //! Traces one light ray through specular surfaces, along every branch above the threshold, and books its flux.
 
+use std::rc::Rc;
+
 use glam::{DVec2, DVec3};
 
 use super::ledger_sum::{Account, LedgerSum};
 use crate::geometry::Ray;
-use crate::geometry::sampling::{GOLDEN_64, mix64};
+use crate::geometry::sampling::{GOLDEN_64, even_point, mix64};
 use crate::illumination::accumulator::FluxUnit;
 use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
-use crate::transport::{Branch, EffectSet, Event, MediumStack, Microfacets, SurfaceHit, Tracer};
+use crate::transport::{Branch, EffectSet, Event, MediumStack, SurfaceHit, Tracer};
 
-/// Hash of the sequence of (object, event) along a path: equal for neighbouring rays that took the same path.
+/// Hash of the sequence of (object, smoothing group, event) along a path: equal for neighbouring rays that took the same
+/// path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PathSignature(pub u64);
 
 impl PathSignature {
-    /// After one more event at an object.
-    #[must_use]
-    pub fn with(self, object: usize, event: Event) -> Self {
-        self.mixed((object as u64) << 3 | event as u64)
-    }
-
     /// At a surface: an object and the smoothing group that was hit.
     #[must_use]
     pub fn at(self, object: usize, group: u32) -> Self {
@@ -63,14 +60,54 @@ pub struct PathLimits {
     /// Smallest share of the ray's flux (luminance) at which a branch is traced.
     pub branch_threshold: f64,
     pub effects: EffectSet,
-    /// Samples of the microfacets of rough surfaces; without them, these are smooth.
-    pub microfacets: Option<Microfacets>,
+    /// Seed of the microfacets that are met on rough surfaces; without one, these are smooth.
+    pub microfacets: Option<u64>,
 }
 
-/// A ray that waits to be traced.
-#[derive(Clone, Copy, Debug)]
-struct Segment {
-    ray: Ray,
+impl PathLimits {
+    /// With every effect, and rough surfaces as if they were smooth.
+    pub fn smooth(max_depth: u32, branch_threshold: f64) -> Self {
+        Self {
+            max_depth,
+            branch_threshold,
+            effects: EffectSet::EVERYTHING,
+            microfacets: None,
+        }
+    }
+}
+
+/// A specular surface on a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathVertex {
+    /// Index into `Scene::objects`.
+    pub object: usize,
+    /// Index within the object's mesh.
+    pub triangle: usize,
+    /// [m].
+    pub point: DVec3,
+    /// Unit vector, the direction of the incident light.
+    pub incident: DVec3,
+    /// Unit vector, the direction in which it continues.
+    pub outgoing: DVec3,
+    /// Unit normal of the surface, on the side of the incident light.
+    pub normal: DVec3,
+    /// Refractive index of the side that light leaves over that of the side it enters; 1 if it is reflected or passes
+    /// straight.
+    pub ior_ratio: f64,
+    pub event: Event,
+}
+
+/// The last vertex of a path and those before it.
+#[derive(Debug)]
+pub struct Trail {
+    vertex: PathVertex,
+    before: Option<Rc<Self>>,
+}
+
+/// A ray to be traced, or the one on which an arrival came.
+#[derive(Debug)]
+pub struct Segment {
+    pub ray: Ray,
     flux_w: LinearSrgb,
     media: MediumStack,
     signature: PathSignature,
@@ -78,6 +115,18 @@ struct Segment {
     path_m: f64,
     /// Whether it is still direct light.
     is_straight: bool,
+    /// `None` at the light, and where no vertices are kept.
+    trail: Option<Rc<Trail>>,
+}
+
+impl Segment {
+    /// The specular surfaces before it, from the light on; empty unless the tracer keeps them.
+    pub fn vertices(&self) -> Vec<PathVertex> {
+        let trail = std::iter::successors(self.trail.as_deref(), |trail| trail.before.as_deref());
+        let mut vertices: Vec<PathVertex> = trail.map(|trail| trail.vertex).collect();
+        vertices.reverse();
+        vertices
+    }
 }
 
 /// Traces light rays of one light; reused from ray to ray.
@@ -85,9 +134,11 @@ struct Segment {
 pub struct PathTracer<'a> {
     tracer: &'a Tracer,
     pub limits: PathLimits,
-    unit: FluxUnit,
+    /// `None` if the ledger stays empty.
+    unit: Option<FluxUnit>,
     /// From the flux of paths to the light's channels.
     channels: ColourMatrix,
+    keeps_vertices: bool,
     waiting: Vec<Segment>,
     /// Of all rays so far.
     pub ledger: LedgerSum,
@@ -99,10 +150,19 @@ impl<'a> PathTracer<'a> {
     /// With an empty ledger, for linear sRGB.
     pub fn new(tracer: &'a Tracer, limits: PathLimits, unit: FluxUnit) -> Self {
         Self {
+            unit: Some(unit),
+            ..Self::without_ledger(tracer, limits)
+        }
+    }
+
+    /// The same, but nothing is booked.
+    pub fn without_ledger(tracer: &'a Tracer, limits: PathLimits) -> Self {
+        Self {
             tracer,
             limits,
-            unit,
+            unit: None,
             channels: ColourMatrix::IDENTITY,
+            keeps_vertices: false,
             waiting: Vec::new(),
             ledger: LedgerSum::default(),
             segments: 0,
@@ -115,17 +175,26 @@ impl<'a> PathTracer<'a> {
         Self { channels, ..self }
     }
 
+    /// Keeps the vertices of each path, and tells paths apart by the smoothing groups that they meet.
+    #[must_use]
+    pub fn with_vertices(self) -> Self {
+        Self {
+            keeps_vertices: true,
+            ..self
+        }
+    }
+
     /// Traces a ray that carries `flux_w` from the light, which lies within `media`. Arrivals at diffuse surfaces after
-    /// at least one specular event are passed to `arrive`. `Deposited` is not booked here, but by whoever places the
-    /// flux.
+    /// at least one specular event are passed to `arrive`, with the segment that they come on. `Deposited` is not
+    /// booked here, but by whoever places the flux.
     pub fn trace(
         &mut self,
         ray: Ray,
         flux_w: LinearSrgb,
         media: &MediumStack,
-        mut arrive: impl FnMut(Arrival),
+        mut arrive: impl FnMut(Arrival, &Segment),
     ) {
-        if !flux_w.is_finite() {
+        if !(flux_w.is_finite() && flux_w.max_channel() > 0.0) {
             return;
         }
         let floor_w = flux_w.luminance() * self.limits.branch_threshold;
@@ -137,19 +206,21 @@ impl<'a> PathTracer<'a> {
             depth: 0,
             path_m: 0.0,
             is_straight: true,
+            trail: None,
         };
         self.waiting.push(first);
         while let Some(segment) = self.waiting.pop() {
-            self.step(segment, floor_w, &mut arrive);
+            self.step(&segment, floor_w, &mut arrive);
         }
     }
 
     fn book(&mut self, account: Account, flux_w: LinearSrgb) {
-        self.ledger
-            .book(account, self.unit.count(self.channels.apply(flux_w)));
+        if let Some(unit) = self.unit {
+            self.ledger.book(account, unit.count(self.channels.apply(flux_w)));
+        }
     }
 
-    fn step(&mut self, segment: Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival)) {
+    fn step(&mut self, segment: &Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival, &Segment)) {
         self.segments += 1;
         let Some(hit) = self.tracer.closest_hit(&segment.ray) else {
             let account = if segment.depth == 0 {
@@ -165,7 +236,11 @@ impl<'a> PathTracer<'a> {
             flux_w = flux_w * segment.media.transmittance(self.tracer.scene(), hit.distance_m);
         }
         let path_m = segment.path_m + hit.distance_m;
-        let micro = self.limits.microfacets.map(|facets| facets.at(segment.depth));
+        // Independent from event to event.
+        let micro = self
+            .limits
+            .microfacets
+            .map(|seed| even_point(0, segment.depth, seed));
         let interaction =
             self.tracer
                 .interact_with(effects, &hit, segment.ray.direction, &segment.media, micro);
@@ -186,7 +261,7 @@ impl<'a> PathTracer<'a> {
             }
         } else if deposit_w.max_channel() > 0.0 {
             let arriving_w = self.channels.apply(deposit_w);
-            arrive(arrival(&hit, &segment, arriving_w, path_m));
+            arrive(arrival(&hit, segment, arriving_w, path_m), segment);
         }
         let on_the_way_w = segment.flux_w - flux_w;
         self.book(Account::Absorbed, on_the_way_w + flux_w * interaction.absorbed);
@@ -195,14 +270,14 @@ impl<'a> PathTracer<'a> {
             .into_iter()
             .flatten()
         {
-            self.follow(&branch, hit.object, flux_w, path_m, &segment, floor_w);
+            self.follow(&branch, &hit, flux_w, path_m, segment, floor_w);
         }
     }
 
     fn follow(
         &mut self,
         branch: &Branch,
-        object: usize,
+        hit: &SurfaceHit,
         incident_w: LinearSrgb,
         path_m: f64,
         from: &Segment,
@@ -224,15 +299,41 @@ impl<'a> PathTracer<'a> {
         if flux_w.luminance() < floor_w {
             return self.book(Account::Threshold, flux_w);
         }
+        let group = if self.keeps_vertices {
+            self.tracer.smoothing_group(hit.object, hit.triangle)
+        } else {
+            0
+        };
         self.waiting.push(Segment {
             ray: branch.ray,
             flux_w,
             media: branch.media,
-            signature: from.signature.with(object, branch.event),
+            signature: from.signature.at(hit.object, group).event(branch.event),
             depth: from.depth + 1,
             path_m,
             is_straight: from.is_straight && branch.event == Event::Passage,
+            trail: self
+                .keeps_vertices
+                .then(|| Rc::new(Trail::new(hit, branch, from))),
         });
+    }
+}
+
+impl Trail {
+    fn new(hit: &SurfaceHit, branch: &Branch, from: &Segment) -> Self {
+        Self {
+            vertex: PathVertex {
+                object: hit.object,
+                triangle: hit.triangle,
+                point: hit.point,
+                incident: from.ray.direction,
+                outgoing: branch.ray.direction,
+                normal: branch.normal,
+                ior_ratio: branch.ior_ratio,
+                event: branch.event,
+            },
+            before: from.trail.clone(),
+        }
     }
 }
 

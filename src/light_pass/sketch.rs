@@ -3,22 +3,16 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 use rayon::prelude::*;
 
-use crate::illumination::Receiver;
-use crate::illumination::accumulator::FluxUnit;
-use crate::light_pass::item_buffer::CELLS_PER_SIDE;
-use crate::light_pass::path::{PathLimits, PathSignature, PathTracer};
+use crate::light_pass::path::{Arrival, PathLimits, PathTracer};
+use crate::light_pass::photon::domain::{DomainPoint, LitCells};
+use crate::light_pass::photon::launch::{LAMP_MIDDLE, PhotonLaunch};
 use crate::light_pass::visibility::{CullMode, LightVisibility, VisibleLight};
 use crate::progress::Control;
 use crate::settings::ItemBufferKind;
-use crate::transport::{EffectSet, Tracer};
-
-/// Inset of rays from the border of the domain, which may coincide with the border of a surface.
-const MARGIN: f64 = 1e-9;
-/// Maximum number of subdivisions of the domain's side.
-const FINEST: u32 = 14;
+use crate::transport::Tracer;
 
 /// Limits of a sketch.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,16 +54,6 @@ pub struct PathPreview {
     pub rays: u64,
 }
 
-/// A corner of a cell: face, column and row.
-type Corner = (usize, u32, u32);
-
-/// The path of a ray to a point.
-#[derive(Clone, Copy, Debug)]
-struct ArrivalKind {
-    way: (PathSignature, Receiver),
-    point: DVec3,
-}
-
 /// Traces thin wavefronts of all lights. Extended lights emit from their centres, glass refracts all light as at 587.56
 /// nm, and rough surfaces are smooth. Ends early if cancelled.
 pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> PathPreview {
@@ -85,12 +69,13 @@ pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> PathP
 }
 
 fn of_light(tracer: &Tracer, visible_light: &VisibleLight, limits: SketchLimits, all: &mut PathPreview) {
-    let (side, cells) = cells(visible_light, limits.cells);
-    let corners: BTreeSet<Corner> = cells.iter().flat_map(|cell| corners_of(*cell)).collect();
-    let corners: Vec<Corner> = corners.into_iter().collect();
-    let arrived: Vec<Vec<ArrivalKind>> = corners
+    let launch = PhotonLaunch::of_cells(visible_light);
+    let squares = LitCells::of(&launch).fine(limits.cells);
+    let corners: BTreeSet<DomainPoint> = squares.iter().flat_map(|square| square.corners()).collect();
+    let corners: Vec<DomainPoint> = corners.into_iter().collect();
+    let arrived: Vec<Vec<Arrival>> = corners
         .par_iter()
-        .map(|corner| follow(tracer, visible_light, limits, *corner, side))
+        .map(|corner| follow(tracer, &launch, limits, *corner))
         .collect();
     let light = visible_light.light;
     let points = arrived.iter().flatten();
@@ -99,87 +84,35 @@ fn of_light(tracer: &Tracer, visible_light: &VisibleLight, limits: SketchLimits,
         point: arrived.point,
     }));
     all.rays += corners.len() as u64;
-    let known: BTreeMap<Corner, Vec<ArrivalKind>> = corners.into_iter().zip(arrived).collect();
-    for cell in cells {
-        let at = corners_of(cell).map(|corner| &known[&corner][..]);
+    let known: BTreeMap<DomainPoint, Vec<Arrival>> = corners.into_iter().zip(arrived).collect();
+    for square in squares {
+        let at = square.corners().map(|corner| &known[&corner][..]);
         all.patches
             .extend(patches(at).map(|corners| SketchedPatch { light, corners }));
     }
 }
 
-/// Cells that see a caster, as many as `most` or down to a quarter of that, and how many fit along a side of the
-/// domain.
-fn cells(visible_light: &VisibleLight, most: usize) -> (u32, BTreeSet<Corner>) {
-    let marked = |face: usize| {
-        let all = (0..CELLS_PER_SIDE).flat_map(|row| (0..CELLS_PER_SIDE).map(move |column| (column, row)));
-        let buffer = visible_light.visible();
-        all.filter(move |(column, row)| buffer.is_marked(face, *column, *row))
-            .map(move |(column, row)| (face, column as u32, row as u32))
-    };
-    let mut cells: BTreeSet<Corner> = (0..visible_light.launch.face_count()).flat_map(marked).collect();
-    let mut level = CELLS_PER_SIDE.trailing_zeros();
-    while cells.len() > most && level > 0 {
-        cells = cells
-            .iter()
-            .map(|(face, column, row)| (*face, column / 2, row / 2))
-            .collect();
-        level -= 1;
-    }
-    while !cells.is_empty() && 4 * cells.len() <= most && level < FINEST {
-        cells = cells.iter().flat_map(|cell| quarters(*cell)).collect();
-        level += 1;
-    }
-    (1 << level, cells)
-}
-
-fn quarters((face, column, row): Corner) -> [Corner; 4] {
-    [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| (face, 2 * column + x, 2 * row + y))
-}
-
-/// In order around the cell.
-fn corners_of((face, column, row): Corner) -> [Corner; 4] {
-    [(0, 0), (1, 0), (1, 1), (0, 1)].map(|(x, y)| (face, column + x, row + y))
-}
-
 /// All landings of a corner's ray.
-fn follow(
-    tracer: &Tracer,
-    visible_light: &VisibleLight,
-    limits: SketchLimits,
-    (face, column, row): Corner,
-    side: u32,
-) -> Vec<ArrivalKind> {
-    let place = DVec2::new(f64::from(column), f64::from(row)) / f64::from(side);
-    let square = place.clamp(DVec2::splat(MARGIN), DVec2::splat(1.0 - MARGIN));
-    let ray = visible_light.launch.ray(face, square);
-    let flux_w = visible_light.launch.flux_density_w(square, ray.direction);
+fn follow(tracer: &Tracer, launch: &PhotonLaunch, limits: SketchLimits, corner: DomainPoint) -> Vec<Arrival> {
     let mut found = Vec::new();
-    if !(flux_w.is_finite() && flux_w.max_channel() > 0.0) {
+    let Some(start) = launch.start_at(corner.root as usize, corner.off_border(), LAMP_MIDDLE) else {
         return found;
-    }
-    let limits = PathLimits {
-        max_depth: limits.max_depth,
-        branch_threshold: limits.branch_threshold,
-        effects: EffectSet::EVERYTHING,
-        microfacets: None,
     };
-    let unit = FluxUnit::for_power(flux_w.max_channel());
-    let mut paths = PathTracer::new(tracer, limits, unit);
-    paths.trace(ray, flux_w, visible_light.launch.media(), |arrival| {
-        found.push(ArrivalKind {
-            way: (arrival.signature, arrival.receiver),
-            point: arrival.point,
-        });
+    let limits = PathLimits::smooth(limits.max_depth, limits.branch_threshold);
+    let mut paths = PathTracer::without_ledger(tracer, limits);
+    paths.trace(start.ray, start.flux_w, &start.media, |arrival, _| {
+        found.push(arrival)
     });
     found
 }
 
 /// Patches between four rays on the same path.
-fn patches<'a>(at: [&'a [ArrivalKind]; 4]) -> impl Iterator<Item = [DVec3; 4]> + 'a {
+fn patches<'a>(at: [&'a [Arrival]; 4]) -> impl Iterator<Item = [DVec3; 4]> + 'a {
     let [first, others @ ..] = at;
     first.iter().filter_map(move |arrived| {
-        let same = |others: &[ArrivalKind]| Some(others.iter().find(|other| other.way == arrived.way)?.point);
-        let [b, c, d] = others.map(same);
-        Some([arrived.point, b?, c?, d?])
+        let is_same =
+            |other: &&Arrival| (other.signature, other.receiver) == (arrived.signature, arrived.receiver);
+        let [b, c, d] = others.map(|others| others.iter().find(is_same));
+        Some([arrived.point, b?.point, c?.point, d?.point])
     })
 }

@@ -1,5 +1,5 @@
 //! Brute-force light tracing, the reference for the estimators: random rays, each hit's whole flux into the texel it
-//! falls in. It shares only transport and aiming with the code it judges.
+//! falls in. It shares only transport and aiming with bundles and photons, and the walk of rays with splats.
 //!
 //! Rays are stratified: one at a random position in each cell of a lattice. The noise is measured with two such
 //! lattices, each with half of the rays. Each carries half of the flux, so that their sum is the map, and their
@@ -9,27 +9,28 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 
 use glam::DVec2;
-use rand_pcg::Pcg64Mcg;
-use rand_pcg::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
-use crate::bake::{Bake, BakeCounts, StopReason, Timings};
+use crate::bake::{Bake, StopReason};
 use crate::error::{Error, Result};
+use crate::geometry::sampling::{even_point, mix64};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::illumination::gutter::fill_gutter;
+use crate::illumination::map::relative_rmse;
 use crate::illumination::parametrisation::parametrise;
 use crate::illumination::{Chart, IlluminationMap, Receiver};
 use crate::light_pass::emitter::Emitter;
-use crate::light_pass::ledger_sum::{Account, LedgerSum};
-use crate::light_pass::pass_report::Stopwatch;
-use crate::light_pass::path::{Arrival, PathLimits, PathTracer};
+use crate::light_pass::ledger_sum::Account;
+use crate::light_pass::pass_report::{PassReport, Stopwatch};
+use crate::light_pass::path::{Arrival, PathLimits};
+use crate::light_pass::splat::lattice::Lattice;
 use crate::light_pass::visibility::{CullMode, LightVisibility, VisibleLight};
 use crate::optics::LinearSrgb;
-use crate::plan::{self, Effect, EffectPlan, EffectSwitch};
+use crate::plan::{self, Effect, EffectSwitch};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Material, Scene};
-use crate::settings::{BakeSettings, ItemBufferKind, LayerKind, MapResolution};
-use crate::transport::{EffectSet, Microfacets, Tracer};
+use crate::settings::{BakeSettings, ItemBufferKind, LayerKind, MapResolution, RayPlacement};
+use crate::transport::Tracer;
 
 /// Range of the number of rays.
 pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
@@ -90,18 +91,16 @@ fn run(
     } else {
         &[]
     };
+    let is_rough = settings.effects.get(Effect::Roughness) != EffectSwitch::Off
+        && scene.materials.iter().any(Material::is_rough);
     let run = Run {
         tracer,
         limits: PathLimits {
-            max_depth: settings.photon_depth(),
-            branch_threshold: settings.path_threshold(),
-            effects: EffectSet::EVERYTHING,
-            microfacets: None,
+            microfacets: is_rough.then_some(0),
+            ..PathLimits::smooth(settings.photon_depth(), settings.path_threshold())
         },
-        aiming: (settings.item_buffer, CullMode::Reachable),
+        item_buffer: settings.item_buffer,
         sizes,
-        lobes: settings.effects.get(Effect::Roughness) != EffectSwitch::Off
-            && scene.materials.iter().any(Material::is_rough),
         unit: unit(scene, lights)?,
         targets: targets(scene, size),
         seed: settings.seed,
@@ -111,18 +110,26 @@ fn run(
         done: AtomicU64::new(0),
         total: lights.len() as u64 * OF_A_LIGHT,
     };
-    let mut result = empty_result(plan, lights.is_empty());
+    let mut result = Bake {
+        stop_reason: if lights.is_empty() {
+            StopReason::NothingToDo
+        } else {
+            StopReason::Density
+        },
+        plan,
+        ..Bake::default()
+    };
     for light in lights {
-        let tally = run.light(light);
+        let report = run.light(light);
         if control.is_cancelled() {
             return Err(Error::cancelled(&scene.source));
         }
-        result.counts.rays += tally.rays;
-        result.counts.segments += tally.segments;
+        result.counts.rays += report.rays;
+        result.counts.segments += report.segments;
         let name = &scene.lights[light.light].name;
         result
             .ledgers
-            .push(tally.ledger.report(name, run.unit, LinearSrgb::WHITE));
+            .push(report.ledger.report(name, run.unit, LinearSrgb::WHITE));
     }
     result.maps = run
         .targets
@@ -145,11 +152,9 @@ const PLACES: usize = 2048;
 struct Run<'a> {
     tracer: &'a Tracer,
     limits: PathLimits,
-    aiming: (ItemBufferKind, CullMode),
+    item_buffer: ItemBufferKind,
     /// Whether lights are sampled over their size.
     sizes: bool,
-    /// Whether rough surfaces scatter into lobes.
-    lobes: bool,
     unit: FluxUnit,
     targets: Vec<Option<Target>>,
     seed: u64,
@@ -165,35 +170,19 @@ struct Run<'a> {
 /// Units of progress per light.
 const OF_A_LIGHT: u64 = 1 << 30;
 
-/// A subset of a light's rays.
+/// Rays from one position of a light.
 #[derive(Clone, Copy, Debug)]
-struct RayRange {
-    /// Index of the half set; `None` for both.
-    half: Option<usize>,
-    /// Share of the light's flux.
-    share: f64,
-    /// Separates the random streams of different positions.
-    place: u64,
+struct RaySet {
+    half: usize,
+    /// Of this position in this half set, independent of all others.
+    seed: u64,
+    /// Number of positions in each half set.
+    places: usize,
 }
 
-/// The random stream of positions.
-const PLACE_STREAM: u64 = u64::MAX;
-
-/// Outcome of a subset of rays.
-#[derive(Clone, Copy, Debug, Default)]
-struct Tally {
-    ledger: LedgerSum,
-    rays: u64,
-    segments: u64,
-}
-
-impl Tally {
-    fn merged(mut self, other: Self) -> Self {
-        self.ledger.merge(&other.ledger);
-        self.rays += other.rays;
-        self.segments += other.segments;
-        self
-    }
+fn merged(mut sum: PassReport, other: PassReport) -> PassReport {
+    sum.merge(other);
+    sum
 }
 
 impl Run<'_> {
@@ -205,132 +194,89 @@ impl Run<'_> {
     }
 
     /// Traces both half sets of a light.
-    fn light(&self, light: &VisibleLight) -> Tally {
-        let source = &self.tracer.scene().lights[light.light];
-        if !(self.sizes && source.has_extent()) {
-            let whole = RayRange {
-                half: None,
-                share: 1.0 / HALVES as f64,
-                place: 0,
+    fn light(&self, light: &VisibleLight) -> PassReport {
+        let source = self.tracer.scene().lights[light.light].of_unit_strength();
+        let has_places = self.sizes && source.has_extent();
+        let places = if has_places { PLACES } else { 1 };
+        let of_place = |index: usize| {
+            let (half, place) = (index / places, index % places);
+            let of_half = mix64(self.seed ^ mix64((light.light as u64) << 1 | half as u64));
+            let rays = RaySet {
+                half,
+                seed: mix64(of_half ^ place as u64),
+                places,
             };
-            return self.part(light, whole);
-        }
-        // Each half set has its own positions, drawn like its rays.
-        let source = source.of_unit_strength();
-        (0..HALVES * PLACES)
-            .into_par_iter()
-            .map(|index| {
-                let (half, place) = (index / PLACES, index % PLACES);
-                let mut random = self.generator(light.light, (half, 0, place), PLACE_STREAM);
-                // Stratified: one position per cell of a square lattice.
-                let side = (PLACES as f64).sqrt().floor() as usize;
-                let within = DVec2::new(random(), random());
-                let square = if place < side * side {
-                    (DVec2::new((place % side) as f64, (place / side) as f64) + within) / side as f64
-                } else {
-                    within
-                };
-                let emitter = Emitter::sample(&source, self.tracer.scene(), square);
-                let there = emitter
-                    .filter(|_| !self.control.is_cancelled())
-                    .and_then(|emitter| light.from_place(self.tracer, self.aiming, &emitter));
-                let part = RayRange {
-                    half: Some(half),
-                    share: 1.0 / (HALVES * PLACES) as f64,
-                    place: place as u64 + 1,
-                };
-                let tally = there.map(|there| self.part(&there, part));
-                self.advance(HALVES * PLACES);
-                tally.unwrap_or_default()
-            })
-            .reduce(Tally::default, Tally::merged)
-    }
-
-    /// Traces rays from one position of a light, for one half set or both.
-    fn part(&self, light: &VisibleLight, part: RayRange) -> Tally {
-        let measure = light.item_buffer.marked_measure(&light.launch);
-        let halves = part.half.map_or(0..HALVES, |half| half..half + 1);
-        let places = if part.half.is_some() { PLACES } else { 1 };
-        // Rays per steradian, or per square metre for a sun.
-        let density = (self.rays_per_half / places as f64).max(1.0) / measure;
-        let size = light.launch.lattice_size(density, 1.0);
-        let faces = light.launch.face_count();
-        (halves.start * faces..halves.end * faces)
-            .into_par_iter()
-            .flat_map(|face| (0..size.1).into_par_iter().map(move |row| (face, row)))
-            .map(|(half_face, row)| {
-                if self.control.is_cancelled() {
-                    return Tally::default();
-                }
-                let (half, face) = (half_face / faces, half_face % faces);
-                let tally = self.row(light, size, (half, face, row), &part);
-                if part.half.is_none() {
-                    self.advance(faces * size.1 * HALVES);
-                }
-                tally
-            })
-            .reduce(Tally::default, Tally::merged)
-    }
-
-    /// Traces one ray, with its share of the cell's flux, per cell of a row that may see something specular.
-    fn row(
-        &self,
-        light: &VisibleLight,
-        size: (usize, usize),
-        place: (usize, usize, usize),
-        part: &RayRange,
-    ) -> Tally {
-        let (half, face, row) = place;
-        let mut paths = PathTracer::new(self.tracer, self.limits, self.unit);
-        let mut random = self.generator(light.light, place, part.place);
-        let mut tally = Tally::default();
-        let mut deposited = LedgerSum::default();
-        let strength = self.tracer.scene().lights[light.light].strength() * part.share;
-        let cell_size = DVec2::new(1.0 / size.0 as f64, 1.0 / size.1 as f64);
-        for (start, end) in light.item_buffer.lattice_spans(face, row, size) {
-            for column in start..end {
-                let low = DVec2::new(column as f64, row as f64) * cell_size;
-                let high = DVec2::new((column + 1) as f64, (row + 1) as f64) * cell_size;
-                let square = low + (high - low) * DVec2::new(random(), random());
-                let ray = light.launch.ray(face, square);
-                let flux_w = light.launch.cell_flux_w(low, high, ray.direction) * strength;
-                if self.lobes {
-                    let facets = Microfacets::new(|_| DVec2::new(random(), random()));
-                    paths.limits.microfacets = Some(facets);
-                }
-                tally.rays += 1;
-                paths.trace(ray, flux_w, light.launch.media(), |arrival| {
-                    let count = self.unit.count(arrival.flux_w);
-                    deposited.book(self.deposit(half, &arrival, count), count);
-                });
+            if !has_places {
+                return self.place(light, rays);
             }
-        }
-        tally.ledger = paths.ledger;
-        tally.ledger.merge(&deposited);
-        tally.segments = paths.segments;
-        tally
+            // Each half set has its own positions, evenly spread.
+            let square = even_point(place as u32, 0, of_half);
+            let there = Emitter::sample(&source, self.tracer.scene(), square)
+                .filter(|_| !self.control.is_cancelled())
+                .and_then(|emitter| {
+                    light.from_place(self.tracer, (self.item_buffer, CullMode::Reachable), &emitter)
+                });
+            match there {
+                Some(there) => self.place(&there, rays),
+                None => {
+                    self.advance(HALVES * places);
+                    PassReport::default()
+                }
+            }
+        };
+        (0..HALVES * places)
+            .into_par_iter()
+            .map(of_place)
+            .reduce(PassReport::default, merged)
     }
 
-    /// Uniform random numbers in [0, 1). Each row has its own generator, so that the order of rows does not matter.
-    fn generator(
-        &self,
-        light: usize,
-        (half, face, row): (usize, usize, usize),
-        place: u64,
-    ) -> impl FnMut() -> f64 {
-        let stream = (light as u64) << 40 ^ (half as u64) << 36 ^ (face as u64) << 32 ^ row as u64;
-        // Leaves the streams of lights without a size unchanged.
-        let stream = stream ^ place.wrapping_mul(0x9e37_79b9_7f4a_7c15);
-        let mut generator = Pcg64Mcg::seed_from_u64(self.seed.rotate_left(29) ^ stream);
-        move || (generator.next_u64() >> 11) as f64 * (-53_f64).exp2()
-    }
-
-    /// Adds flux to the texel that an arrival hits; returns the account to book it to.
-    fn deposit(&self, half: usize, arrival: &Arrival, count: FluxCount) -> Account {
-        match &self.targets[arrival.receiver.index()] {
-            Some(target) if target.add(half, arrival, count) => Account::Deposited,
-            _ => Account::Unresolved,
-        }
+    /// Traces a random ray, with its share of the flux, in each cell of a lattice that may see something specular.
+    fn place(&self, light: &VisibleLight, rays: RaySet) -> PassReport {
+        let share = 1.0 / (HALVES * rays.places) as f64;
+        let strength = self.tracer.scene().lights[light.light].strength() * share;
+        let launch = light.launch.clone().scaled(strength);
+        // Rays per steradian, or per square metre for a sun.
+        let density =
+            (self.rays_per_half / rays.places as f64).max(1.0) / light.item_buffer.marked_measure(&launch);
+        let lattice = Lattice {
+            tracer: self.tracer,
+            band: None,
+            launch: &launch,
+            item_buffer: &light.item_buffer,
+            size: launch.lattice_size(density, 1.0),
+            strides: (1, 1),
+            placement: RayPlacement::Jittered,
+            centre: DVec2::ZERO,
+            seed: rays.seed,
+            limits: self.limits,
+            unit: self.unit,
+        };
+        let rows = lattice.size.1;
+        let of_row = |row: usize| {
+            if self.control.is_cancelled() {
+                return PassReport::default();
+            }
+            let mut traced = lattice.trace_row(row / rows, row % rows);
+            for arrival in &traced.arrivals {
+                let count = self.unit.count(arrival.flux_w);
+                let account = match &self.targets[arrival.receiver.index()] {
+                    Some(target) if target.add(rays.half, arrival, count) => Account::Deposited,
+                    _ => Account::Unresolved,
+                };
+                traced.ledger.book(account, count);
+            }
+            self.advance(HALVES * rays.places * launch.face_count() * rows);
+            PassReport {
+                ledger: traced.ledger,
+                rays: traced.rays,
+                segments: traced.segments,
+                ..PassReport::default()
+            }
+        };
+        (0..launch.face_count() * rows)
+            .into_par_iter()
+            .map(of_row)
+            .reduce(PassReport::default, merged)
     }
 }
 
@@ -364,21 +310,16 @@ impl Target {
                 let sums = self.halves[half][texel].each_ref();
                 unit.flux_w(sums.map(|sum| sum.load(Ordering::Relaxed)))
             });
-            let texel_area_m2 = self.chart.texel_area_m2(texel);
-            let per_area = if texel_area_m2 > 0.0 {
-                1.0 / texel_area_m2
-            } else {
-                0.0
-            };
-            irradiance.push(((a + b) * per_area).to_array().map(|channel| channel as f32));
-            error.push(((a - b).luminance().abs() * per_area) as f32);
+            let [sum, difference] = [a + b, a - b].map(|flux_w| self.chart.per_area(texel, flux_w));
+            irradiance.push(sum.to_array().map(|channel| channel as f32));
+            error.push(difference.luminance().abs() as f32);
         }
         fill_gutter(&self.chart, &mut irradiance);
         let mut map = IlluminationMap {
             error: Some(error),
             ..IlluminationMap::of_layer(self.chart.clone(), LayerKind::Caustic, irradiance)
         };
-        map.estimated_relative_rmse = Some(relative_noise(std::slice::from_ref(&map))?);
+        map.estimated_relative_rmse = Some(relative_rmse(std::slice::from_ref(&map))?);
         Some(map)
     }
 }
@@ -403,69 +344,18 @@ fn targets(scene: &Scene, (width, height): (usize, usize)) -> Vec<Option<Target>
         .collect()
 }
 
+/// Of the power of all lights together.
 fn unit(scene: &Scene, lights: &[VisibleLight]) -> Result<FluxUnit> {
-    let power_w: f64 = lights
-        .iter()
-        .map(|light| {
-            let source = &scene.lights[light.light];
-            let bound_w = if source.has_extent() {
-                light.power_bound_w(scene)
-            } else {
-                light.launch.power_bound_w()
-            };
-            bound_w * source.strength().max_channel()
-        })
-        .sum();
-    if lights.is_empty() {
-        return Ok(FluxUnit::for_power(1.0));
-    }
-    if power_w.is_finite() && power_w > 0.0 {
-        return Ok(FluxUnit::for_power(power_w));
+    let of_light = |light: &VisibleLight| {
+        light.power_bound_w(scene) * scene.lights[light.light].strength().max_channel()
+    };
+    let power_w: f64 = lights.iter().map(of_light).sum();
+    if lights.is_empty() || (power_w.is_finite() && power_w > 0.0) {
+        return Ok(FluxUnit::for_power(power_w.max(f64::MIN_POSITIVE)));
     }
     Err(Error::failure(
         &scene.source,
         format!("its lights send {power_w:e} W together"),
         "give them intensities whose sum is a finite number above zero",
     ))
-}
-
-fn empty_result(plan: EffectPlan, nothing_to_do: bool) -> Bake {
-    Bake {
-        maps: Vec::new(),
-        light_layers: Vec::new(),
-        band_layers: Vec::new(),
-        plan,
-        item_buffers: Vec::new(),
-        ledgers: Vec::new(),
-        counts: BakeCounts::default(),
-        course: Vec::new(),
-        forecast: None,
-        timings_s: Timings::default(),
-        cpu_s: Timings::default(),
-        estimated_relative_rmse: None,
-        estimated_visible: None,
-        stop_reason: if nothing_to_do {
-            StopReason::NothingToDo
-        } else {
-            StopReason::Density
-        },
-        partial: false,
-        warnings: Vec::new(),
-    }
-}
-
-/// Noise of all maps together: area-weighted root mean square of their standard errors over their mean. `None` if
-/// nothing is lit, or if a map has no error.
-pub fn relative_noise(maps: &[IlluminationMap]) -> Option<f64> {
-    let (mut area_m2, mut flux_w, mut squares) = (0.0, 0.0, 0.0);
-    for map in maps {
-        let error = map.error.as_ref()?;
-        for (texel, deviation) in error.iter().enumerate() {
-            let texel_area_m2 = map.chart.texel_area_m2(texel);
-            area_m2 += texel_area_m2;
-            squares += f64::from(*deviation).powi(2) * texel_area_m2;
-        }
-        flux_w += map.flux_w(LayerKind::Caustic).luminance();
-    }
-    (flux_w > 0.0).then(|| (squares / area_m2).sqrt() * area_m2 / flux_w)
 }

@@ -15,7 +15,6 @@ use super::table::Cell;
 use crate::bake::Bake;
 use crate::error::{Error, Result};
 use crate::geometry::Ray;
-use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::path::{PathLimits, PathTracer};
 use crate::optics::LinearSrgb;
 use crate::scene::builtin::{self, parts, pool, shapes};
@@ -24,7 +23,7 @@ use crate::settings::{
     BakeSettings, ErrorMetric, Estimator, Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement,
     Sigma,
 };
-use crate::transport::{EffectSet, MediumStack, Tracer};
+use crate::transport::{MediumStack, Tracer};
 use crate::units::Flux;
 
 /// The paper's second densest lattice [1/sr].
@@ -366,13 +365,8 @@ fn nearest_hits(variant: &Variant, mut result: Bake) -> Bake {
 /// Hits of the lamps' light on the floor: position [m] and flux [W]. Directions lie on a spiral of constant density.
 fn hits(scene: &Arc<Scene>, density_per_sr: f64) -> Vec<(DVec2, f64)> {
     let tracer = Tracer::new(Arc::clone(scene));
-    let limits = PathLimits {
-        max_depth: 16,
-        branch_threshold: 1e-4,
-        effects: EffectSet::EVERYTHING,
-        microfacets: None,
-    };
-    let mut paths = PathTracer::new(&tracer, limits, FluxUnit::for_power(1e3));
+    let limits = PathLimits::smooth(16, 1e-4);
+    let mut paths = PathTracer::without_ledger(&tracer, limits);
     let golden = 0.5 * (5_f64.sqrt() - 1.0);
     let mut hits = Vec::new();
     for light in &scene.lights {
@@ -390,7 +384,7 @@ fn hits(scene: &Arc<Scene>, density_per_sr: f64) -> Vec<(DVec2, f64)> {
                 origin: position,
                 direction: DVec3::new(across.x, height, across.y),
             };
-            paths.trace(ray, flux_w, &MediumStack::default(), |arrival| {
+            paths.trace(ray, flux_w, &MediumStack::default(), |arrival, _| {
                 let place = DVec2::new(arrival.point.x, arrival.point.z);
                 hits.push((place, arrival.flux_w.luminance()));
             });

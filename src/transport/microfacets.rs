@@ -13,33 +13,6 @@ use glam::{DVec2, DVec3};
 
 use crate::optics::refraction;
 
-/// Specular events along a path with a sample of their own; later events reuse these samples, shifted.
-const POINTS: usize = 12;
-
-/// Samples that select the microfacets of rough surfaces, event by event along a path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Microfacets {
-    points: [DVec2; POINTS],
-}
-
-impl Microfacets {
-    /// `point` maps the number of a pair of dimensions to a point of the unit square.
-    pub fn new(mut point: impl FnMut(u32) -> DVec2) -> Self {
-        Self {
-            points: std::array::from_fn(|pair| point(pair as u32)),
-        }
-    }
-
-    /// Sample of the event that follows `depth` others.
-    pub fn at(&self, depth: u32) -> DVec2 {
-        let round = f64::from(depth / POINTS as u32);
-        let point = self.points[depth as usize % POINTS];
-        // Steps of the plastic number, the golden ratio's counterpart in two dimensions, fill the square evenly at any
-        // count.
-        (point + DVec2::new(0.754_877_666_246_693, 0.569_840_290_998_053_1) * round).fract()
-    }
-}
-
 /// A sampled microfacet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facet {

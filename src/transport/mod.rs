@@ -16,7 +16,7 @@ pub use crate::plan::EffectSet;
 pub use hierarchy::SceneNode;
 pub use interaction::{Branch, DiffuseResponse, Event, Interaction, Meeting, NormalSource};
 pub use medium::{MediumStack, media_at};
-pub use microfacets::{Microfacets, ggx_reflection};
+pub use microfacets::ggx_reflection;
 pub use packed::{PackedInstance, PackedMesh};
 pub use tracer::{RayHit, SurfaceHit, Tracer};
 pub use traversed::TraversedCells;

@@ -7,12 +7,12 @@ use std::sync::Arc;
 use nephroid::export::manifest::SceneSummary;
 use nephroid::export::pfm;
 use nephroid::illumination::compare::{Agreement, relative_rmse};
+use nephroid::illumination::map::relative_rmse as relative_noise;
 use nephroid::illumination::{IlluminationMap, Layer, parametrise};
 use nephroid::scene::Scene;
 use nephroid::scene::builtin::parts;
 use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::study::agreement::{caustic_luminance, pair_maps};
-use nephroid::study::brute_force::relative_noise;
 use serde::{Deserialize, Serialize};
 
 use support::hard_scenes::{self, Shading, TinyBall};

@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use super::facet::SurfacePoint;
-use super::surroundings::MediumAround;
 use crate::optics::LinearSrgb;
+use crate::scene::Scene;
 use crate::scene::emitter::Emitter;
-use crate::transport::DiffuseResponse;
+use crate::transport::{DiffuseResponse, MediumStack};
 
 /// Light that arrives at a point, whatever surface is there.
 pub struct IncidentLight {
@@ -50,20 +50,21 @@ pub struct UnshadowedLight {
 }
 
 impl UnshadowedLight {
-    /// `None` if the light comes from behind the surface or none of it is left. Its whole path lies in the medium
+    /// `None` if the light comes from behind the surface or none of it is left. Its whole path lies in the media
     /// around the source.
     pub fn from_beam(
         beam: &IncidentLight,
         point: &SurfacePoint,
         response: &DiffuseResponse,
-        medium: &MediumAround,
+        (scene, media): (&Scene, &MediumStack),
     ) -> Option<Self> {
         if beam.to_light.dot(point.geometric_normal) < 0.0 {
             return None;
         }
         let cosine = beam.to_light.dot(point.shading_normal);
         let unoccluded = beam.across_beam * cosine;
-        let strength = medium.transmittance(beam.distance_m) * (unoccluded * response.of(cosine, medium.ior));
+        let strength = media.transmittance(scene, beam.distance_m)
+            * (unoccluded * response.of(cosine, media.ior(scene)));
         (strength.max_channel() > 0.0).then(|| Self {
             irradiance: beam.strength * strength,
             to_light: beam.to_light,

@@ -10,7 +10,6 @@ pub(super) mod facet;
 mod lighting;
 mod polygon;
 mod source;
-mod surroundings;
 mod texel;
 
 use glam::DVec2;
@@ -478,7 +477,12 @@ impl<'a> Baker<'a> {
             match &source.emission {
                 Emission::Single(emitter) => {
                     let arriving = IncidentLight::new(emitter, point.position).and_then(|beam| {
-                        UnshadowedLight::from_beam(&beam, &point, &response, &source.medium)
+                        UnshadowedLight::from_beam(
+                            &beam,
+                            &point,
+                            &response,
+                            (self.tracer.scene(), &source.media),
+                        )
                     });
                     let Some(arriving) = arriving else { continue };
                     sample.shadow_rays += 1;
@@ -497,7 +501,7 @@ impl<'a> Baker<'a> {
                         self.tracer,
                         &point,
                         (self.material, &response),
-                        &source.medium,
+                        &source.media,
                         run,
                     );
                     sample.shadow_rays += gathered.shadow_rays;

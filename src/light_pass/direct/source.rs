@@ -13,13 +13,12 @@ use glam::{DVec2, DVec3};
 use super::facet::SurfacePoint;
 use super::lighting::{IncidentLight, UnshadowedLight};
 use super::polygon::Polygon;
-use super::surroundings::MediumAround;
 use super::texel::SamplingDetail;
 use crate::geometry::sampling::{even_point, mix64};
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, EmitterSampler};
 use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
-use crate::transport::{DiffuseResponse, Tracer};
+use crate::transport::{DiffuseResponse, MediumStack, Tracer, media_at};
 
 /// Number of samples that are prepared for a light: a power of 2.
 const READY: usize = 1 << 13;
@@ -38,8 +37,8 @@ const SEED: u64 = 0x6c69_6768_7473;
 /// A light prepared for sampling.
 pub struct DirectSource {
     pub emission: Emission,
-    /// Medium that the light travels through.
-    pub medium: MediumAround,
+    /// Media around its middle. Direct light crosses no surface, and so stays within them.
+    pub media: MediumStack,
 }
 
 pub enum Emission {
@@ -98,10 +97,8 @@ impl DirectSource {
     pub fn new(light: &Light, tracer: &Tracer, index: usize) -> Option<Self> {
         let scene = tracer.scene();
         let middle = Emitter::middle(light, scene);
-        let medium = middle
-            .as_ref()
-            .and_then(|middle| middle.kind.position())
-            .map_or(MediumAround::VACUUM, |place| MediumAround::at(tracer, place));
+        let place = middle.as_ref().and_then(|middle| middle.kind.position());
+        let media = place.map_or_else(MediumStack::default, |place| media_at(tracer, place));
         let emission = if light.has_extent() {
             let shape = shape(light, scene);
             let has_image =
@@ -116,7 +113,7 @@ impl DirectSource {
         } else {
             Emission::Single(middle?)
         };
-        Some(Self { emission, medium })
+        Some(Self { emission, media })
     }
 }
 
@@ -235,7 +232,7 @@ impl ExtendedLight {
         tracer: &Tracer,
         point: &SurfacePoint,
         (material, response): (&Material, &DiffuseResponse),
-        medium: &MediumAround,
+        media: &MediumStack,
         run: Range<usize>,
     ) -> Gathered {
         let count = run.len() as f64;
@@ -243,7 +240,7 @@ impl ExtendedLight {
         for index in run.clone() {
             let arriving = self
                 .beam(index, &run, point, material)
-                .and_then(|beam| UnshadowedLight::from_beam(&beam, point, response, medium));
+                .and_then(|beam| UnshadowedLight::from_beam(&beam, point, response, (tracer.scene(), media)));
             let Some(arriving) = arriving else { continue };
             sum.shadow_rays += 1;
             sum.unoccluded += arriving.unoccluded;

@@ -1,7 +1,7 @@
 //! The light paths that reach a texel, with the flux of each: found by tracing the scene, without the baked maps.
 //!
-//! The part of a light's domain that lights the texel is found by subdividing the domain's cells; its flux is the flux
-//! of the texel. Connected cells on the same path form one [`LightPath`]. It is shown by the ray of these cells that
+//! The part of a light's domain that lights the texel is found by dividing the domain into squares; its flux is the flux
+//! of the texel. Connected squares on the same path form one [`LightPath`]. It is shown by the ray of these that
 //! hits the requested point, found by Newton's method on the ray's start.
 
 mod clip;
@@ -15,19 +15,20 @@ use std::collections::{BTreeMap, HashMap};
 
 use glam::{DMat2, DVec2, DVec3};
 
-use self::search::{LitCell, TexelSearch};
+use self::search::{LitSquare, TexelSearch};
 use self::walk::{LightPathWalker, WalkedPath};
 use crate::geometry::DisjointSets;
 use crate::geometry::sampling::even_point;
 use crate::light_pass::direct::bake_direct;
-use crate::light_pass::path::PathSignature;
+use crate::light_pass::path::{PathSignature, PathVertex};
+use crate::light_pass::photon::domain::DomainPoint;
+use crate::light_pass::photon::launch::PhotonLaunch;
 use crate::light_pass::visibility::{CullMode, LightVisibility, VisibleLight};
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 use crate::scene::LightKind;
-use crate::scene::emitter::Emitter;
 use crate::settings::ItemBufferKind;
-use crate::transport::{Event, Tracer};
+use crate::transport::Tracer;
 
 /// Sample points of an extended light.
 const PLACES: u32 = 16;
@@ -38,27 +39,6 @@ const NEGLIGIBLE: f64 = 1e-5;
 /// towards that.
 const MEETS_M: f64 = 1e-9;
 const MAX_STEPS: u32 = 40;
-
-/// A specular surface on a path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PathVertex {
-    /// Index into `Scene::objects`.
-    pub object: usize,
-    /// Index within the object's mesh.
-    pub triangle: usize,
-    /// [m].
-    pub point: DVec3,
-    /// Unit vector, the direction of the incident light.
-    pub incident: DVec3,
-    /// Unit vector, the direction in which it continues.
-    pub outgoing: DVec3,
-    /// Unit normal of the surface, on the side of the incident light.
-    pub normal: DVec3,
-    /// Refractive index of the side that light leaves over that of the side it enters; 1 if it is reflected or passes
-    /// straight.
-    pub ior_ratio: f64,
-    pub event: Event,
-}
 
 /// A path on which light reaches a texel.
 #[derive(Clone, Debug)]
@@ -157,34 +137,24 @@ fn explain_light(
     control: &Control,
     found: &mut Explanation,
 ) {
-    let scene = tracer.scene();
-    let light = &scene.lights[visible_light.light];
-    let unit = light.of_unit_strength();
+    // Each sample point of the light on its own.
+    let light = &tracer.scene().lights[visible_light.light];
+    let source = light.of_unit_strength();
+    let extended = light.has_extent().then_some(&source);
+    let launch = PhotonLaunch::of(tracer, visible_light, extended, PLACES_SEED);
     let places = if light.has_extent() { PLACES } else { 1 };
     let strength = light.strength() * (1.0 / f64::from(places));
     let mut by_way: BTreeMap<PathSignature, LightPath> = BTreeMap::new();
     for place in 0..places {
-        let emitter = light
-            .has_extent()
-            .then(|| Emitter::sample(&unit, scene, even_point(place, 0, PLACES_SEED)));
-        let wavefront = match emitter {
-            Some(None) => None,
-            Some(Some(emitter)) => {
-                visible_light.from_place(tracer, (ItemBufferKind::Equal, CullMode::Reachable), &emitter)
-            }
-            None => Some(visible_light.clone()),
-        };
-        let Some(wavefront) = wavefront else { continue };
         let searcher = TexelSearch {
             walker: LightPathWalker {
                 tracer,
-                launch: &wavefront.launch,
+                launch: &launch,
+                lamp: even_point(place, 0, PLACES_SEED),
                 target,
                 limits,
             },
-            item_buffer: wavefront.visible(),
             negligible_w: negligible_w / strength.luminance().max(f64::MIN_POSITIVE),
-            most_rays: limits.most_rays,
             control,
         };
         let search = searcher.search();
@@ -198,57 +168,56 @@ fn explain_light(
             path.irradiance = path.irradiance * strength;
             if places == 1 {
                 found.paths.push(path);
-            } else if let Some(same) = by_way.get_mut(&way) {
-                // Shown from the first sample point of the light that has it.
-                same.irradiance += path.irradiance;
-            } else {
-                by_way.insert(way, path);
+                continue;
             }
+            // Shown from the first sample point of the light that has it.
+            let irradiance = path.irradiance;
+            by_way
+                .entry(way)
+                .and_modify(|same| same.irradiance += irradiance)
+                .or_insert(path);
         }
     }
     found.paths.extend(by_way.into_values());
 }
 
 /// Groups of pieces that are connected by corners and lie on the same path.
-fn connected(pieces: Vec<LitCell>) -> Vec<Vec<LitCell>> {
+fn connected(pieces: Vec<LitSquare>) -> Vec<Vec<LitSquare>> {
     let mut groups = DisjointSets::new(pieces.len());
-    let mut owner: HashMap<(usize, PathSignature, [u64; 2]), usize> = HashMap::new();
+    let mut owner: HashMap<(PathSignature, DomainPoint), usize> = HashMap::new();
     for (index, piece) in pieces.iter().enumerate() {
-        for corner in piece.corners {
-            groups.join(
-                index,
-                *owner.entry((piece.face, piece.way, corner)).or_insert(index),
-            );
+        for corner in piece.square.corners() {
+            groups.join(index, *owner.entry((piece.way, corner)).or_insert(index));
         }
     }
     groups.grouped(pieces)
 }
 
 /// The path of some pieces, for a light of unit strength.
-fn path_of(walker: &LightPathWalker<'_>, light: usize, pieces: &[LitCell]) -> Option<LightPath> {
+fn path_of(walker: &LightPathWalker<'_>, light: usize, pieces: &[LitSquare]) -> Option<LightPath> {
     let flux_w = pieces
         .iter()
         .fold(LinearSrgb::BLACK, |sum, piece| sum + piece.flux_w);
     let goal = walker.target.place;
-    let distance = |piece: &&LitCell| piece.place.distance_squared(goal);
+    let distance = |piece: &&LitSquare| piece.place.distance_squared(goal);
     let nearest = pieces.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     let way = meeting(walker, nearest)?;
     Some(LightPath {
         light,
-        start: way.start,
+        start: way.start.origin,
         vertices: way.vertices,
-        end: way.end,
+        end: way.end.point,
         irradiance: flux_w * (1.0 / walker.target.area_m2),
     })
 }
 
 /// The ray of a piece that hits the requested point; the nearest one if none does, as beyond the edge of a caustic.
-fn meeting(walker: &LightPathWalker<'_>, piece: &LitCell) -> Option<WalkedPath> {
+fn meeting(walker: &LightPathWalker<'_>, piece: &LitSquare) -> Option<WalkedPath> {
     let goal = walker.target.place;
     let texel_m = walker.target.area_m2.sqrt();
-    let way = |square: DVec2| walker.way(piece.face, square, piece.way);
-    let side = piece.side();
-    let mut square = piece.ray;
+    let way = |square: DVec2| walker.way(piece.point.root as usize, square, piece.way);
+    let side = piece.square.area().sqrt();
+    let mut square = piece.point.off_border();
     let mut best = way(square)?;
     let mut step = 1e-4 * side;
     for _ in 0..MAX_STEPS {

@@ -1,239 +1,191 @@
-//! Finds the part of a light's domain that lights one texel: cells of the domain are halved until what they light is
+//! Finds the part of a light's domain that lights one texel: squares of the domain are divided until what they light is
 //! smaller than the texel, or nothing.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::DVec2;
 use rayon::prelude::*;
 
 use super::clip::{is_in_square, share_in_square};
-use super::walk::{Arrival, LightPathWalker};
-use crate::light_pass::item_buffer::{CELLS_PER_SIDE, ItemBuffer};
+use super::walk::LightPathWalker;
 use crate::light_pass::path::PathSignature;
+use crate::light_pass::photon::domain::{DomainPoint, LitCells, POINT_BITS, PointHash, SquarePlace};
 use crate::optics::LinearSrgb;
 use crate::progress::Control;
 
-/// Subdivisions of the domain's side to the steps in which corners are counted.
-const FINEST: u32 = 30;
-/// Subdivisions to the item buffer's cells.
-const BUFFER: u32 = CELLS_PER_SIDE.trailing_zeros();
-/// Maximum number of cells at the start of the search.
-const FIRST_CELLS: u64 = 60_000;
-/// Maximum number of subdivisions of the domain's side for these.
-const MAX_FIRST: u32 = 16;
-/// A path that fills a cell is resolved if it lights no more than `FINE_TEXELS` across, and the arrival from the cell's
-/// centre lies within `STRAIGHT_TEXELS` of the mean of those from its corners.
+/// The finest level of squares.
+const FINEST: u32 = POINT_BITS - 2;
+/// Maximum number of squares at the start of the search.
+const FIRST_SQUARES: usize = 60_000;
+/// A path that fills a square is resolved if it lights no more than `FINE_TEXELS` across, and the arrival from the
+/// square's centre lies within `STRAIGHT_TEXELS` of the mean of those from its corners.
 const FINE_TEXELS: f64 = 0.25;
 const STRAIGHT_TEXELS: f64 = 0.002;
-/// Where the extent of a path is unknown: part of the map by which it may exceed its known arrivals, in cells of the
+/// Where the extent of a path is unknown: part of the map by which it may exceed its known arrivals, in squares of the
 /// first size. Glass spreads light of many internal reflections widely.
 const BEYOND: f64 = 1.0;
 
-/// Inset of rays from the border of the domain, which may coincide with the border of a surface.
-const MARGIN: f64 = 1e-9;
+/// Light that reaches the receiver over at least one specular surface.
+#[derive(Clone, Copy, Debug)]
+struct Landing {
+    way: PathSignature,
+    /// Relative to the texel's corner [texels].
+    place: DVec2,
+    /// Flux per unit square of the light's domain [W].
+    flux_w: LinearSrgb,
+}
 
-/// A cell that lights part of the texel.
+/// A square that lights part of the texel.
 #[derive(Clone, Debug)]
-pub(super) struct LitCell {
+pub(super) struct LitSquare {
     pub(super) way: PathSignature,
-    pub(super) face: usize,
-    /// Corners of the cell, in steps of 2⁻³⁰.
-    pub(super) corners: [[u64; 2]; 4],
-    /// A ray of it, in the unit square, and where that lands [texels]; one that lands on the texel if any is known.
-    pub(super) ray: DVec2,
+    pub(super) square: SquarePlace,
+    /// A point of it, whose ray lands on the texel if any is known to do, and where that is [texels].
+    pub(super) point: DomainPoint,
     pub(super) place: DVec2,
     /// Flux on the texel [W].
     pub(super) flux_w: LinearSrgb,
 }
 
-impl LitCell {
-    /// Side of the cell in the unit square.
-    pub(super) fn side(&self) -> f64 {
-        square(self.corners[3]).x - square(self.corners[0]).x
-    }
-}
-
-/// All cells that light the texel.
+/// All squares that light the texel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SearchResult {
-    pub(super) pieces: Vec<LitCell>,
+    pub(super) pieces: Vec<LitSquare>,
     pub(super) rays: u64,
     /// False if cancelled, or if more rays were needed than allowed.
     pub(super) is_complete: bool,
 }
 
-type Point = (usize, [u64; 2]);
+/// What is known of points.
+type Known = HashMap<DomainPoint, Vec<Landing>, PointHash>;
 
+/// A square, and the paths that need no further search in it.
 #[derive(Clone, Debug)]
-struct Cell {
-    face: usize,
-    level: u32,
-    at: [u64; 2],
-    /// Paths that need no further search.
+struct OpenSquare {
+    square: SquarePlace,
     done: Vec<PathSignature>,
 }
 
-impl Cell {
-    fn side(&self) -> u64 {
-        1 << (FINEST - self.level)
-    }
-
-    /// The four corners and the centre.
-    fn points(&self) -> [[u64; 2]; 5] {
-        let (side, [x, y]) = (self.side(), self.at);
-        let middle = side / 2;
-        [
-            [x, y],
-            [x + side, y],
-            [x, y + side],
-            [x + side, y + side],
-            [x + middle, y + middle],
-        ]
-    }
-
-    fn halves(&self, done: &[PathSignature]) -> [Self; 4] {
-        let half = self.side() / 2;
-        [[0, 0], [half, 0], [0, half], [half, half]].map(|[x, y]| Self {
-            face: self.face,
-            level: self.level + 1,
-            at: [self.at[0] + x, self.at[1] + y],
-            done: done.to_vec(),
-        })
-    }
+/// The four corners in order around a square, and its centre.
+fn points(square: SquarePlace) -> [DomainPoint; 5] {
+    let [a, b, c, d] = square.corners();
+    [a, b, c, d, square.node(4)]
 }
 
-fn square(point: [u64; 2]) -> DVec2 {
-    let side = (1_u64 << FINEST) as f64;
-    let at = DVec2::new(point[0] as f64, point[1] as f64) / side;
-    at.clamp(DVec2::splat(MARGIN), DVec2::splat(1.0 - MARGIN))
-}
-
-/// Verdict on one path in a cell.
-enum CellVerdict {
+/// Verdict on one path in a square.
+enum Verdict {
     /// It lights no part of the texel.
     Away,
-    /// It is resolved.
-    Done(Vec<LitCell>),
-    /// The cell has to be subdivided.
-    Halve,
+    /// It is resolved; `None` if it brings no light.
+    Done(Option<LitSquare>),
+    /// The square has to be divided.
+    Divide,
 }
 
-/// A search for one wavefront.
+/// A search for the light of one point of a lamp.
 pub(super) struct TexelSearch<'a> {
     pub(super) walker: LightPathWalker<'a>,
-    pub(super) item_buffer: &'a ItemBuffer,
     /// Flux on the texel that may be neglected [W].
     pub(super) negligible_w: f64,
-    pub(super) most_rays: u64,
     pub(super) control: &'a Control,
 }
 
 impl TexelSearch<'_> {
     pub(super) fn search(&self) -> SearchResult {
         let mut found = SearchResult::default();
-        let mut known: HashMap<Point, Vec<Arrival>> = HashMap::new();
-        let mut cells = self.first_cells();
-        let first = cells.first().map_or(0, |cell| cell.level);
-        while !cells.is_empty() {
-            if self.control.is_cancelled() || found.rays > self.most_rays {
+        let mut known = Known::default();
+        let first = LitCells::of(self.walker.launch).fine(FIRST_SQUARES);
+        let level = first.first().map_or(0, |square| square.level);
+        let open = |square: SquarePlace| OpenSquare {
+            square,
+            done: Vec::new(),
+        };
+        let mut squares: Vec<OpenSquare> = first.into_iter().map(open).collect();
+        while !squares.is_empty() {
+            if self.control.is_cancelled() || found.rays > self.walker.limits.most_rays {
                 return found;
             }
-            found.rays += self.look(&cells, &mut known);
-            let judged: Vec<(Vec<LitCell>, Vec<Cell>)> = cells
+            found.rays += self.look(&squares, &mut known);
+            let judged: Vec<(Vec<LitSquare>, Vec<OpenSquare>)> = squares
                 .par_iter()
-                .map(|cell| self.judge(cell, first, &known))
+                .map(|square| self.judge(square, level, &known))
                 .collect();
-            cells.clear();
-            for (pieces, halves) in judged {
+            squares.clear();
+            for (pieces, quarters) in judged {
                 found.pieces.extend(pieces);
-                cells.extend(halves);
+                squares.extend(quarters);
             }
         }
         found.is_complete = true;
         found
     }
 
-    /// Marked cells, as small as [`FIRST_CELLS`] allows.
-    fn first_cells(&self) -> Vec<Cell> {
-        let mut marked = Vec::new();
-        for face in 0..self.walker.launch.face_count() {
-            for row in 0..CELLS_PER_SIDE {
-                let columns =
-                    (0..CELLS_PER_SIDE).filter(|column| self.item_buffer.is_marked(face, *column, row));
-                marked.extend(columns.map(|column| Cell {
-                    face,
-                    level: BUFFER,
-                    at: [column as u64, row as u64].map(|at| at << (FINEST - BUFFER)),
-                    done: Vec::new(),
-                }));
-            }
-        }
-        while !marked.is_empty() && 4 * marked.len() as u64 <= FIRST_CELLS && marked[0].level < MAX_FIRST {
-            marked = marked.iter().flat_map(|cell| cell.halves(&[])).collect();
-        }
-        marked
-    }
-
     /// Traces the rays of all new points; returns their number.
-    fn look(&self, cells: &[Cell], known: &mut HashMap<Point, Vec<Arrival>>) -> u64 {
-        let points = cells
-            .iter()
-            .flat_map(|cell| cell.points().map(|point| (cell.face, point)));
-        let mut new: Vec<Point> = points.filter(|point| !known.contains_key(point)).collect();
+    fn look(&self, squares: &[OpenSquare], known: &mut Known) -> u64 {
+        let wanted = squares.iter().flat_map(|open| points(open.square));
+        let new: HashSet<DomainPoint, PointHash> =
+            wanted.filter(|point| !known.contains_key(point)).collect();
+        let mut new: Vec<DomainPoint> = new.into_iter().collect();
         new.par_sort_unstable();
-        new.dedup();
-        let traced: Vec<Vec<Arrival>> = new
-            .par_iter()
-            .map(|&(face, point)| self.walker.arrivals(face, square(point)))
-            .collect();
-        let rays = new.len() as u64;
-        known.extend(new.into_iter().zip(traced));
-        rays
+        let of_point = |&point: &DomainPoint| {
+            let mut found = Vec::new();
+            self.walker
+                .walk(point.root as usize, point.off_border(), |arrival, place, _| {
+                    found.push(Landing {
+                        way: arrival.signature,
+                        place,
+                        flux_w: arrival.flux_w,
+                    });
+                });
+            (point, found)
+        };
+        let traced: Vec<(DomainPoint, Vec<Landing>)> = new.par_iter().map(of_point).collect();
+        known.extend(traced);
+        new.len() as u64
     }
 
-    fn judge(
-        &self,
-        cell: &Cell,
-        first: u32,
-        known: &HashMap<Point, Vec<Arrival>>,
-    ) -> (Vec<LitCell>, Vec<Cell>) {
-        let arrivals = cell.points().map(|point| &known[&(cell.face, point)][..]);
-        let mut ways: Vec<PathSignature> = arrivals.iter().copied().flatten().map(|a| a.way).collect();
+    fn judge(&self, open: &OpenSquare, first: u32, known: &Known) -> (Vec<LitSquare>, Vec<OpenSquare>) {
+        let landings = points(open.square).map(|point| &known[&point][..]);
+        let mut ways: Vec<PathSignature> = landings.iter().copied().flatten().map(|a| a.way).collect();
         ways.sort_unstable();
         ways.dedup();
-        ways.retain(|way| !cell.done.contains(way));
-        let (mut pieces, mut halves) = (Vec::new(), Vec::new());
-        let mut done = cell.done.clone();
-        let mut must_halve = false;
+        ways.retain(|way| !open.done.contains(way));
+        let (mut pieces, mut quarters) = (Vec::new(), Vec::new());
+        let mut done = open.done.clone();
+        let mut is_divided = false;
         for way in ways {
-            let at = arrivals.map(|arrivals| arrivals.iter().find(|arrival| arrival.way == way));
-            match self.judge_way(cell, first, way, at) {
-                CellVerdict::Halve => must_halve = true,
-                CellVerdict::Away => done.push(way),
-                CellVerdict::Done(found) => {
+            let at = landings.map(|landings| landings.iter().find(|landing| landing.way == way));
+            match self.judge_way(open.square, first, way, at) {
+                Verdict::Divide => is_divided = true,
+                Verdict::Away => done.push(way),
+                Verdict::Done(found) => {
                     pieces.extend(found);
                     done.push(way);
                 }
             }
         }
-        if must_halve {
-            halves.extend(cell.halves(&done));
+        if is_divided {
+            quarters.extend(open.square.quarters().map(|square| OpenSquare {
+                square,
+                done: done.clone(),
+            }));
         }
-        (pieces, halves)
+        (pieces, quarters)
     }
 
     fn judge_way(
         &self,
-        cell: &Cell,
+        square: SquarePlace,
         first: u32,
         way: PathSignature,
-        at: [Option<&Arrival>; 5],
-    ) -> CellVerdict {
-        let there: Vec<&Arrival> = at.into_iter().flatten().collect();
+        at: [Option<&Landing>; 5],
+    ) -> Verdict {
+        // Where it lands, and how far that may be from where it lands between its points.
+        let there: Vec<&Landing> = at.into_iter().flatten().collect();
         let is_whole = there.len() == at.len();
         let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
-        let (low, high) = there.iter().fold(start, |(low, high), arrival| {
-            (low.min(arrival.place), high.max(arrival.place))
+        let (low, high) = there.iter().fold(start, |(low, high), landing| {
+            (low.min(landing.place), high.max(landing.place))
         });
         let extent = (high - low).max_element();
         let bend = match at {
@@ -242,81 +194,64 @@ impl TexelSearch<'_> {
                     .abs()
                     .max_element()
             }
-            // The extent is unknown, but smaller with each subdivision.
+            // The extent is unknown, but smaller with each division.
             _ => {
                 let chart = &self.walker.target.chart;
                 let map_texels = chart.width.max(chart.height) as f64 / self.walker.target.size as f64;
-                (BEYOND * map_texels * (-f64::from(cell.level - first)).exp2()).max(extent)
+                (BEYOND * map_texels * (-f64::from(square.level - first)).exp2()).max(extent)
             }
         };
         let margin = DVec2::splat(2.0 * bend + 0.25 * extent);
         let is_near = (low - margin).cmplt(DVec2::ONE).all() && (high + margin).cmpgt(DVec2::ZERO).all();
         if !(is_near || extent.is_nan()) {
-            return CellVerdict::Away;
+            return Verdict::Away;
         }
-        let side = cell.side() as f64 / (1_u64 << FINEST) as f64;
+
+        // What of it is as fine as it has to be.
         let brightest = there
             .iter()
-            .map(|arrival| arrival.flux_w.luminance())
+            .map(|landing| landing.flux_w.luminance())
             .fold(0.0, f64::max);
-        let is_negligible = brightest * side * side <= self.negligible_w || cell.level + 2 > FINEST;
+        let is_negligible = brightest * square.area() <= self.negligible_w || square.level >= FINEST;
         let is_smooth = is_whole && extent <= FINE_TEXELS && bend <= STRAIGHT_TEXELS;
-        if is_smooth {
-            CellVerdict::Done(self.whole(cell, way, at, side))
-        } else if is_negligible {
-            CellVerdict::Done(self.parts(cell, way, at, side))
-        } else {
-            CellVerdict::Halve
-        }
-    }
-
-    /// The light of a cell that one path fills: four triangles around its centre.
-    fn whole(&self, cell: &Cell, way: PathSignature, at: [Option<&Arrival>; 5], side: f64) -> Vec<LitCell> {
-        let [Some(a), Some(b), Some(c), Some(d), Some(middle)] = at else {
-            return Vec::new();
-        };
-        let mut flux_w = LinearSrgb::BLACK;
-        for (from, to) in [(a, b), (b, d), (d, c), (c, a)] {
-            let share = share_in_square([from.place, to.place, middle.place]);
-            let density = (from.flux_w + to.flux_w + middle.flux_w) * (1.0 / 3.0);
-            flux_w += density * (0.25 * side * side * share);
-        }
-        self.piece(cell, way, (4, middle.place), flux_w)
-    }
-
-    /// The light of a cell that a path fills in part, estimated from its points.
-    fn parts(&self, cell: &Cell, way: PathSignature, at: [Option<&Arrival>; 5], side: f64) -> Vec<LitCell> {
-        let (mut flux_w, mut ray) = (LinearSrgb::BLACK, None);
-        for (point, arrival) in at.into_iter().enumerate() {
-            if let Some(arrival) = arrival.filter(|arrival| is_in_square(arrival.place)) {
-                flux_w += arrival.flux_w * (0.2 * side * side);
-                ray = Some((point, arrival.place));
+        let (flux_w, point) = match at {
+            [Some(a), Some(b), Some(c), Some(d), Some(middle)] if is_smooth => {
+                (whole([a, b, c, d], middle), 4)
             }
-        }
-        ray.map_or_else(Vec::new, |ray| self.piece(cell, way, ray, flux_w))
-    }
-
-    fn piece(
-        &self,
-        cell: &Cell,
-        way: PathSignature,
-        (point, place): (usize, DVec2),
-        flux_w: LinearSrgb,
-    ) -> Vec<LitCell> {
-        let points = cell.points();
-        let [a, b, c, d, _] = points;
-        let piece = LitCell {
-            way,
-            face: cell.face,
-            corners: [a, b, c, d],
-            ray: square(points[point]),
-            place,
-            flux_w,
+            _ if is_negligible => part(at),
+            _ => return Verdict::Divide,
         };
-        if flux_w.max_channel() > 0.0 {
-            vec![piece]
-        } else {
-            Vec::new()
+        let piece = at[point].map(|landing| LitSquare {
+            way,
+            square,
+            point: points(square)[point],
+            place: landing.place,
+            flux_w: flux_w * square.area(),
+        });
+        Verdict::Done(piece.filter(|_| flux_w.max_channel() > 0.0))
+    }
+}
+
+/// Flux on the texel per unit square, of a square that one path fills: four triangles around its centre.
+fn whole(corners: [&Landing; 4], middle: &Landing) -> LinearSrgb {
+    let mut flux_w = LinearSrgb::BLACK;
+    for (number, from) in corners.into_iter().enumerate() {
+        let to = corners[(number + 1) % 4];
+        let share = share_in_square([from.place, to.place, middle.place]);
+        flux_w += (from.flux_w + to.flux_w + middle.flux_w) * (share / 12.0);
+    }
+    flux_w
+}
+
+/// The same of a square that a path fills in part, estimated from its points, with the number of one that lands on the
+/// texel.
+fn part(at: [Option<&Landing>; 5]) -> (LinearSrgb, usize) {
+    let (mut flux_w, mut point) = (LinearSrgb::BLACK, 0);
+    for (number, landing) in at.into_iter().enumerate() {
+        if let Some(landing) = landing.filter(|landing| is_in_square(landing.place)) {
+            flux_w += landing.flux_w * 0.2;
+            point = number;
         }
     }
+    (flux_w, point)
 }

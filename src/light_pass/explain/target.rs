@@ -6,6 +6,7 @@ use glam::{DVec2, DVec3};
 
 use crate::geometry::Ray;
 use crate::illumination::{Chart, Receiver, Side};
+use crate::light_pass::path::Arrival;
 use crate::transport::{SurfaceHit, Tracer};
 
 /// Distance from a ray's hit to its intersection with the texel's plane [texels] above which the surface is not flat
@@ -70,19 +71,20 @@ impl Target {
         })
     }
 
-    /// Where a ray that hits the receiver lands, relative to the texel's corner [texels]: by the texel's plane near by,
-    /// by the chart elsewhere.
-    pub(super) fn landing(&self, ray: &Ray, hit: &SurfaceHit) -> DVec2 {
+    /// Where light that arrives at the receiver along a ray lands, relative to the texel's corner [texels]: by the
+    /// texel's plane near by, by the chart elsewhere.
+    pub(super) fn landing(&self, ray: &Ray, arrival: &Arrival) -> DVec2 {
         let slope = ray.direction.dot(self.geometric_normal);
         let distance_m = (self.point - ray.origin).dot(self.geometric_normal) / slope;
         let on_plane = ray.origin + ray.direction * distance_m;
         let step = on_plane - self.point;
         let place = self.place + DVec2::new(self.rows[0].dot(step), self.rows[1].dot(step));
-        if on_plane.distance(hit.point) < FLAT_TEXELS * self.area_m2.sqrt() {
+        if on_plane.distance(arrival.point) < FLAT_TEXELS * self.area_m2.sqrt() {
             return place;
         }
         let size = DVec2::new(self.chart.width as f64, self.chart.height as f64);
-        let at = self.chart.uv(hit.triangle, hit.barycentric) * size;
+        let [b, c] = arrival.barycentric.to_array();
+        let at = self.chart.uv(arrival.triangle as usize, [1.0 - b - c, b, c]) * size;
         (at - corner_of(self.corner)) / self.size as f64
     }
 

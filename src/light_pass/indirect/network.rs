@@ -6,13 +6,13 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::grid::Grid;
-use super::path::{Follower, Limits};
+use super::path::Follower;
 use super::trace::{Batch, ElementPoints, GatherPass, Link, LinkRange, TraceCounts};
 use crate::geometry::enclosure;
-use crate::illumination::{Chart, Receiver, Side};
+use crate::illumination::{Chart, Receiver};
 use crate::progress::{Control, Progress};
 use crate::scene::Scene;
-use crate::transport::{SurfaceHit, Tracer};
+use crate::transport::Tracer;
 
 /// Rays per element in the first pass. The second has as many, and each further one as many as all before it.
 const FIRST_RAYS: u32 = 16;
@@ -23,25 +23,12 @@ pub const MIN_PASSES: u8 = 3;
 /// Maximum number of passes per element: 4,096 rays.
 pub const MAX_PASSES: u8 = 9;
 
-/// The grid of each receiver.
-#[derive(Clone, Debug)]
-pub struct SurfaceGrids {
-    /// Number of the grid, by receiver.
-    by_receiver: Vec<Option<u32>>,
-}
-
-impl SurfaceGrids {
-    /// The grid of the surface that a ray hits.
-    pub fn grid_of(&self, hit: &SurfaceHit, side: Side) -> Option<usize> {
-        self.by_receiver[Receiver::new(hit.object, side).index()].map(|grid| grid as usize)
-    }
-}
-
 /// Elements and the rays between them.
 #[derive(Clone, Debug)]
 pub struct Network {
     grids: Vec<Grid>,
-    places: SurfaceGrids,
+    /// The grid of each receiver.
+    by_receiver: Vec<Option<u32>>,
     stances: Vec<ElementPoints>,
     closed: Vec<bool>,
     /// Whether the inside of each object is drawn and holds another object.
@@ -92,7 +79,7 @@ impl Network {
         Self {
             grids,
             rooms: (0..scene.objects.len()).into_par_iter().map(is_room).collect(),
-            places: SurfaceGrids { by_receiver },
+            by_receiver,
             stances: vec![ElementPoints::Unknown; first],
             closed: (0..scene.objects.len()).into_par_iter().map(is_closed).collect(),
             batches: Vec::new(),
@@ -173,12 +160,9 @@ impl Network {
             }
             let rays = if pass == 0 { 0 } else { Self::rays_after(pass) };
             let work = GatherPass {
-                follower: Follower {
-                    tracer,
-                    limits: Limits { max_depth },
-                },
+                follower: Follower { tracer, max_depth },
                 grids: &self.grids,
-                places: &self.places,
+                by_receiver: &self.by_receiver,
                 stances: &self.stances,
                 closed: &self.closed,
                 rooms: &self.rooms,

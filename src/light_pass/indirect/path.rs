@@ -11,12 +11,6 @@ use crate::transport::{Branch, EffectSet, Interaction, MediumStack, SurfaceHit, 
 /// Weight below which rays are truncated.
 const MIN_WEIGHT: f64 = 1e-4;
 
-#[derive(Clone, Copy, Debug)]
-pub struct Limits {
-    /// Maximum number of specular surfaces on a path.
-    pub max_depth: u32,
-}
-
 /// Result of tracing a ray.
 #[derive(Clone, Debug, Default)]
 pub struct PathEnd {
@@ -31,7 +25,8 @@ pub struct PathEnd {
 /// Traces rays through a scene.
 pub struct Follower<'a> {
     pub tracer: &'a Tracer,
-    pub limits: Limits,
+    /// Maximum number of specular surfaces on a path.
+    pub max_depth: u32,
 }
 
 impl Follower<'_> {
@@ -49,7 +44,7 @@ impl Follower<'_> {
         let scene = self.tracer.scene();
         let mut found = PathEnd::default();
         let mut weight = LinearSrgb::WHITE;
-        for depth in 0..=self.limits.max_depth {
+        for depth in 0..=self.max_depth {
             found.segments += 1;
             let Some(hit) = self.tracer.closest_hit(&ray) else {
                 return found;

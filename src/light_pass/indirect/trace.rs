@@ -5,9 +5,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use rayon::prelude::*;
 
 use super::grid::{Grid, cosine_direction};
-use super::network::SurfaceGrids;
 use super::path::Follower;
 use crate::geometry::sampling::{GOLDEN_64, even_point, mix64};
+use crate::illumination::Receiver;
 use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Mesh;
@@ -87,7 +87,8 @@ const MAX_HALVINGS: u32 = 3;
 pub struct GatherPass<'a> {
     pub follower: Follower<'a>,
     pub grids: &'a [Grid],
-    pub places: &'a SurfaceGrids,
+    /// The grid of each receiver.
+    pub by_receiver: &'a [Option<u32>],
     pub stances: &'a [ElementPoints],
     /// Whether each object's mesh is closed.
     pub closed: &'a [bool],
@@ -220,10 +221,10 @@ impl GatherPass<'_> {
             media,
             |choice| even_point(index, 2 + choice, seed),
             |hit, side, weight| {
-                let Some(sender) = self.places.grid_of(hit, side) else {
+                let Some(sender) = self.by_receiver[Receiver::new(hit.object, side).index()] else {
                     return;
                 };
-                match self.grids[sender].element_at(hit.triangle, hit.barycentric) {
+                match self.grids[sender as usize].element_at(hit.triangle, hit.barycentric) {
                     Some(element) if weight != LinearSrgb::BLACK => links.push(Link {
                         element: element as u32,
                         weight: (weight * share).to_array().map(|channel| channel as f32),

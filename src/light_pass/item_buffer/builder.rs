@@ -96,6 +96,7 @@ impl Builder<'_> {
             let doubtful = cells.doubtful().clone();
             search.visit(self.roots(), &doubtful, |object, corners| {
                 tests += cells.add_caster(object, corners);
+                false
             });
             self.count(tests + search.tests());
             let found = cells.find();

@@ -94,16 +94,14 @@ impl<'a> Search<'a> {
             cells.set(column, row);
         }
         let nearness = self.nearest(bounds);
-        let mut found = false;
         self.visit(roots, &cells, |_, corners| {
             let facet = Facet::new(self.launch, self.face, corners);
             let behind = |&(column, row): &(usize, usize)| {
                 let farthest = facet.farthest_in(self.grid.cell(column, row));
                 farthest.is_none_or(|farthest| farthest < nearness)
             };
-            found = found || self.touched(corners, &cells).iter().any(behind);
-        });
-        found
+            self.touched(corners, &cells).iter().any(behind)
+        })
     }
 
     /// Largest nearness of a box that lies in front of the light.
@@ -122,23 +120,28 @@ impl<'a> Search<'a> {
         corners.fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Passes the wanted triangles, with their objects, of nodes that may touch a cell of the set to `take`.
+    /// Passes the wanted triangles, with their objects, of nodes that may touch a cell of the set to `take`, until that is
+    /// true; returns whether it was.
     pub(super) fn visit(
         &self,
         mut waiting: Vec<SceneNode>,
         cells: &CellBits,
-        mut take: impl FnMut(usize, &[DVec3; 3]),
-    ) {
+        mut take: impl FnMut(usize, &[DVec3; 3]) -> bool,
+    ) -> bool {
         while let Some(node) = waiting.pop() {
             let bounds = node.bounds();
             if !self.may_touch(bounds, cells) || !overlaps(bounds, self.boxes) {
                 continue;
             }
             waiting.extend(node.children().into_iter().flatten());
-            for (object, corners) in self.wanted_of(&node) {
-                take(object, &corners);
+            if self
+                .wanted_of(&node)
+                .any(|(object, corners)| take(object, &corners))
+            {
+                return true;
             }
         }
+        false
     }
 
     /// Clears the bits of all cells in `open` that a wanted triangle touches.
@@ -209,21 +212,8 @@ impl<'a> Search<'a> {
     }
 
     /// Whether any wanted triangle touches a cell of `lit`.
-    pub(super) fn finds(&self, mut waiting: Vec<SceneNode>, lit: &CellBits) -> bool {
-        while let Some(node) = waiting.pop() {
-            let bounds = node.bounds();
-            if !self.may_touch(bounds, lit) || !overlaps(bounds, self.boxes) {
-                continue;
-            }
-            waiting.extend(node.children().into_iter().flatten());
-            if self
-                .wanted_of(&node)
-                .any(|(_, corners)| self.touches(&corners, lit))
-            {
-                return true;
-            }
-        }
-        false
+    pub(super) fn finds(&self, roots: Vec<SceneNode>, lit: &CellBits) -> bool {
+        self.visit(roots, lit, |_, corners| self.touches(corners, lit))
     }
 
     /// Wanted triangles of a leaf, with their object.

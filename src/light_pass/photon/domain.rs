@@ -10,8 +10,11 @@ use crate::geometry::sampling::{GOLDEN_64, mix64};
 use crate::light_pass::item_buffer::CELLS_PER_SIDE;
 
 /// Coordinates of points are multiples of 2⁻²⁴ of a root's side.
-const POINT_BITS: u32 = 24;
+pub(in crate::light_pass) const POINT_BITS: u32 = 24;
 const WHOLE: u32 = 1 << POINT_BITS;
+
+/// Inset of [`DomainPoint::off_border`].
+const MARGIN: f64 = 1e-9;
 
 /// Level of the item buffer's cells.
 const CELL_LEVEL: u32 = CELLS_PER_SIDE.ilog2();
@@ -27,7 +30,7 @@ pub(super) const LAST_LEVEL: u32 = 14;
 
 /// Hashes points: they are few bits, evenly mixed.
 #[derive(Default)]
-pub(super) struct PointHasher(u64);
+pub(in crate::light_pass) struct PointHasher(u64);
 
 impl Hasher for PointHasher {
     fn finish(&self) -> u64 {
@@ -49,12 +52,12 @@ impl Hasher for PointHasher {
     }
 }
 
-pub(super) type PointHash = BuildHasherDefault<PointHasher>;
+pub(in crate::light_pass) type PointHash = BuildHasherDefault<PointHasher>;
 
 /// A point of a root's square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) struct DomainPoint {
-    pub(super) root: u32,
+pub(in crate::light_pass) struct DomainPoint {
+    pub(in crate::light_pass) root: u32,
     pub(super) x: u32,
     pub(super) y: u32,
 }
@@ -64,13 +67,19 @@ impl DomainPoint {
     pub(super) fn square(self) -> DVec2 {
         DVec2::new(f64::from(self.x), f64::from(self.y)) / f64::from(WHOLE)
     }
+
+    /// The same, off the border of the root, which may coincide with that of a surface.
+    pub(in crate::light_pass) fn off_border(self) -> DVec2 {
+        self.square()
+            .clamp(DVec2::splat(MARGIN), DVec2::splat(1.0 - MARGIN))
+    }
 }
 
 /// Position of a square in the tree: in the root's square, its first corner and level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub(super) struct SquarePlace {
-    pub(super) corner: DomainPoint,
-    pub(super) level: u32,
+pub(in crate::light_pass) struct SquarePlace {
+    pub(in crate::light_pass) corner: DomainPoint,
+    pub(in crate::light_pass) level: u32,
 }
 
 impl SquarePlace {
@@ -79,7 +88,7 @@ impl SquarePlace {
     }
 
     /// Unit squares.
-    pub(super) fn area(self) -> f64 {
+    pub(in crate::light_pass) fn area(self) -> f64 {
         0.25_f64.powi(self.level as i32)
     }
 
@@ -94,8 +103,13 @@ impl SquarePlace {
     }
 
     /// One of its nine points, row by row.
-    pub(super) fn node(self, node: usize) -> DomainPoint {
+    pub(in crate::light_pass) fn node(self, node: usize) -> DomainPoint {
         self.point(node as u32 % 3, node as u32 / 3, 2)
+    }
+
+    /// In order around the square.
+    pub(in crate::light_pass) fn corners(self) -> [DomainPoint; 4] {
+        [0, 2, 8, 6].map(|node| self.node(node))
     }
 
     /// A point of the root's square within this one.
@@ -108,7 +122,7 @@ impl SquarePlace {
         (point - self.corner.square()) * (f64::from(WHOLE) / f64::from(self.side()))
     }
 
-    pub(super) fn quarters(self) -> [Self; 4] {
+    pub(in crate::light_pass) fn quarters(self) -> [Self; 4] {
         [0, 1, 2, 3].map(|quarter| Self {
             corner: self.point(quarter % 2, quarter / 2, 2),
             level: self.level + 1,
@@ -117,7 +131,7 @@ impl SquarePlace {
 }
 
 /// Which squares light may start in.
-pub(super) enum LitCells {
+pub(in crate::light_pass) enum LitCells {
     /// Squares that hold a marked cell of the item buffer, at its level and coarser ones.
     Marked(HashSet<SquarePlace, PointHash>),
     /// All: light from an extended lamp.
@@ -125,7 +139,7 @@ pub(super) enum LitCells {
 }
 
 impl LitCells {
-    pub(super) fn of(launch: &PhotonLaunch) -> Self {
+    pub(in crate::light_pass) fn of(launch: &PhotonLaunch) -> Self {
         let Some(cells) = launch.marked_cells() else {
             return Self::All {
                 roots: launch.root_count(),
@@ -162,8 +176,19 @@ impl LitCells {
         marked.contains(&SquarePlace { corner, level })
     }
 
-    /// The first squares.
+    /// The first squares of a light whose bundles are to be found.
     pub(super) fn first(&self) -> Vec<SquarePlace> {
+        self.divided(|level, places, _| level < FIRST_LEVEL || places < FIRST_SQUARES)
+    }
+
+    /// The smallest squares of one level of which there are no more than `most`.
+    pub(in crate::light_pass) fn fine(&self, most: usize) -> Vec<SquarePlace> {
+        self.divided(|_, _, quarters| quarters <= most)
+    }
+
+    /// Squares of one level: the whole domain, divided as long as `is_wanted`, by the level, the number of squares, and
+    /// that after the division.
+    fn divided(&self, is_wanted: impl Fn(u32, usize, usize) -> bool) -> Vec<SquarePlace> {
         let whole = |root: usize| SquarePlace {
             corner: DomainPoint {
                 root: root as u32,
@@ -182,11 +207,12 @@ impl LitCells {
             }
         };
         for level in 0..LAST_LEVEL {
-            if level >= FIRST_LEVEL && places.len() >= FIRST_SQUARES {
+            let quarters = places.iter().flat_map(|place| place.quarters());
+            let quarters: Vec<SquarePlace> = quarters.filter(|place| self.has(*place)).collect();
+            if !is_wanted(level, places.len(), quarters.len()) {
                 break;
             }
-            let quarters = places.iter().flat_map(|place| place.quarters());
-            places = quarters.filter(|place| self.has(*place)).collect();
+            places = quarters;
         }
         places
     }

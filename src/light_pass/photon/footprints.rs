@@ -3,7 +3,6 @@
 use glam::{DVec2, DVec3};
 
 use super::bundle::Bundle;
-use super::domain::LitCells;
 use super::edge;
 use super::launch::PhotonLaunch;
 use super::paths::{PathFinder, Route};
@@ -55,12 +54,7 @@ impl FootprintPass<'_> {
             rules: self.rules,
             receivers: &receivers,
         };
-        let surveyor = Surveyor {
-            finder,
-            control,
-            lit: LitCells::of(self.launch),
-            sought: None,
-        };
+        let surveyor = Surveyor::new(finder, control, None);
         let mut squares = Squares::default();
         surveyor.refine(&mut squares, GOAL);
         edge::finish(&finder, &mut squares, control, &mut report);

@@ -31,7 +31,7 @@ const MIDDLE_PROBES: u32 = 16;
 pub(super) const LAMP_DIMENSION: u32 = 0;
 
 /// In a lamp's unit square.
-pub(super) const LAMP_MIDDLE: DVec2 = DVec2::splat(0.5);
+pub(in crate::light_pass) const LAMP_MIDDLE: DVec2 = DVec2::splat(0.5);
 
 /// A photon at its light.
 #[derive(Clone, Copy, Debug)]
@@ -84,6 +84,19 @@ struct Cell {
 }
 
 impl<'a> PhotonLaunch<'a> {
+    /// The domain of a light: `extended`, of unit strength, if its size matters.
+    pub fn of(
+        tracer: &'a Tracer,
+        visible_light: &'a VisibleLight,
+        extended: Option<&'a Light>,
+        seed: u64,
+    ) -> Self {
+        match extended {
+            Some(light) => Self::of_places(tracer, light, visible_light.spheres(tracer, light), seed),
+            None => Self::of_cells(visible_light),
+        }
+    }
+
     /// The domain of a light from one point or direction: the cells that its item buffer marks.
     pub fn of_cells(visible_light: &'a VisibleLight) -> Self {
         let side = CELLS_PER_SIDE;
@@ -112,7 +125,7 @@ impl<'a> PhotonLaunch<'a> {
     }
 
     /// The domain of an extended light; `light` has unit strength.
-    pub fn of_places(tracer: &'a Tracer, light: &'a Light, spheres: &'a Spheres, seed: u64) -> Self {
+    fn of_places(tracer: &'a Tracer, light: &'a Light, spheres: &'a Spheres, seed: u64) -> Self {
         let scene: &Scene = tracer.scene();
         let places = EmitterSampler::new(light, scene);
         let mut media = (0..MEDIUM_PROBES).filter_map(|probe| {
@@ -215,7 +228,7 @@ impl<'a> PhotonLaunch<'a> {
 
     /// The light that starts at a point of a root and a point of its lamp's unit square, with its flux per unit square;
     /// `None` if none does.
-    pub(super) fn start_at(&self, root: usize, square: DVec2, lamp: DVec2) -> Option<Start> {
+    pub(in crate::light_pass) fn start_at(&self, root: usize, square: DVec2, lamp: DVec2) -> Option<Start> {
         match &self.domain {
             Domain::Cells { launch, .. } => {
                 let ray = launch.ray(root, square);

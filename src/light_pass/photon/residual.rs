@@ -14,7 +14,6 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::bundle_deposit::plan_deposits;
-use super::domain::LitCells;
 use super::edge;
 use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE, PhotonLaunch, Start};
 use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed};
@@ -119,12 +118,7 @@ impl ResidualPass<'_> {
             rules: self.rules,
             receivers: &receivers,
         };
-        let surveyor = Surveyor {
-            finder,
-            control: listener.control,
-            lit: LitCells::of(self.launch),
-            sought: self.sought,
-        };
+        let surveyor = Surveyor::new(finder, listener.control, self.sought);
         let before = squares.points.len();
         surveyor.refine(squares, goal);
         let least = if self.is_rough {

@@ -289,14 +289,27 @@ pub(super) struct Squares {
 
 /// Builds squares.
 pub(super) struct Surveyor<'a> {
-    pub(super) finder: PathFinder<'a>,
-    pub(super) control: &'a Control,
-    pub(super) lit: LitCells,
+    finder: PathFinder<'a>,
+    control: &'a Control,
+    lit: LitCells,
     /// What the first squares might miss.
-    pub(super) sought: Option<&'a SubcellFeatures>,
+    sought: Option<&'a SubcellFeatures>,
 }
 
-impl Surveyor<'_> {
+impl<'a> Surveyor<'a> {
+    pub(super) fn new(
+        finder: PathFinder<'a>,
+        control: &'a Control,
+        sought: Option<&'a SubcellFeatures>,
+    ) -> Self {
+        Self {
+            lit: LitCells::of(finder.launch),
+            finder,
+            control,
+            sought,
+        }
+    }
+
     /// Divides squares for a goal, the relative root mean square error of all maps together.
     pub(super) fn refine(&self, squares: &mut Squares, goal: f64) {
         if squares.squares.is_empty() {

@@ -3,6 +3,7 @@
 use glam::DVec2;
 use rayon::prelude::*;
 
+use super::deposit::RowContext;
 use super::lattice::{Lattice, Points, TracedRow};
 use crate::illumination::Receiver;
 use crate::light_pass::ledger_sum::LedgerSum;
@@ -60,11 +61,16 @@ impl ArrivalCache {
     }
 
     /// Appends the next traced rows.
-    pub fn push(&mut self, traced: &[TracedRow]) {
-        let rows: Vec<KeptRow> = traced.par_iter().map(KeptRow::pack).collect();
+    pub fn push(&mut self, traced: &[RowContext]) {
+        let rows: Vec<KeptRow> = traced
+            .par_iter()
+            .map(|traced| KeptRow::pack(traced.row))
+            .collect();
         self.bytes += rows.iter().map(KeptRow::bytes).sum::<u64>();
         self.rows.extend(rows);
-        traced.iter().for_each(|row| self.ledger.merge(&row.ledger));
+        traced
+            .iter()
+            .for_each(|traced| self.ledger.merge(&traced.row.ledger));
     }
 
     /// A row identical to that of [`Lattice::trace_row`], bit by bit, but without its ledger. A lattice with strides

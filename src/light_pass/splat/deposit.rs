@@ -13,6 +13,7 @@ use super::window::Splat;
 use crate::illumination::Receiver;
 use crate::light_pass::footprint_statistics::FootprintStatistics;
 use crate::light_pass::ledger_sum::{Account, LedgerSum};
+use crate::light_pass::pass_report::PassReport;
 use crate::light_pass::path::Arrival;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::settings::{BakeSettings, Kernel, KernelSampling, Sigma};
@@ -65,26 +66,15 @@ impl HalfBuffers<'_> {
     }
 }
 
-/// Result of a deposit.
-#[derive(Clone, Debug, Default)]
-pub struct DepositReport {
-    /// Deposited and unresolved flux.
-    pub ledger: LedgerSum,
-    /// Kernels deposited.
-    pub splats: u64,
-    /// Sizes of their footprints.
-    pub statistics: FootprintStatistics,
-}
-
 impl Depositor<'_> {
     /// Deposits rows of one face. Maps must have been touched for every receiver of the arrivals. Half sets, if there
-    /// are two, take rays in a checkerboard pattern.
-    pub fn deposit(&self, rows: &[RowContext], halves: &mut HalfBuffers) -> DepositReport {
+    /// are two, take rays in a checkerboard pattern. Reports kernels, and deposited and unresolved flux.
+    pub fn deposit(&self, rows: &[RowContext], halves: &mut HalfBuffers) -> PassReport {
         let parts: Vec<RowSplats> = rows
             .par_iter()
             .map(|row| self.splats_of(row, halves.first))
             .collect();
-        let mut report = DepositReport::default();
+        let mut report = PassReport::default();
         let mut groups: BTreeMap<(bool, Receiver, u32), Vec<&PlacedSplat>> = BTreeMap::new();
         for part in &parts {
             report.ledger.merge(&part.ledger);

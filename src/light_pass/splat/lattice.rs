@@ -5,6 +5,7 @@ use glam::{DVec2, DVec3};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
+use crate::geometry::sampling::mix64;
 use crate::illumination::accumulator::FluxUnit;
 use crate::light_pass::item_buffer::ItemBuffer;
 use crate::light_pass::launch::Launch;
@@ -186,7 +187,9 @@ impl Lattice<'_> {
                     continue;
                 }
                 traced.rays += 1;
-                paths.trace(ray, flux_w, self.launch.media(), |mut arrival| {
+                let cell_seed = self.cell_seed(face, fine_column, fine_row);
+                paths.limits.microfacets = self.limits.microfacets.map(|seed| mix64(seed ^ cell_seed));
+                paths.trace(ray, flux_w, self.launch.media(), |mut arrival, _| {
                     arrival.point = points.of(&arrival);
                     arrival.flux_w = arrival.flux_w * self.cells_of(column, row);
                     traced.columns.push(column as u32);
@@ -199,14 +202,18 @@ impl Lattice<'_> {
         traced
     }
 
+    /// A seed per cell: independent of the order of tracing.
+    fn cell_seed(&self, face: usize, column: usize, row: usize) -> u64 {
+        let cell = (face as u64) << 60 ^ (row as u64) << 30 ^ column as u64;
+        self.seed.rotate_left(17) ^ cell
+    }
+
     /// Place of the ray within its cell, [0, 1)².
     fn place(&self, face: usize, column: usize, row: usize) -> DVec2 {
         match self.placement {
             RayPlacement::Lattice => self.centre,
             RayPlacement::Jittered => {
-                // A generator per cell: independent of the order of tracing.
-                let cell = (face as u64) << 60 ^ (row as u64) << 30 ^ column as u64;
-                let mut generator = Pcg64Mcg::seed_from_u64(self.seed.rotate_left(17) ^ cell);
+                let mut generator = Pcg64Mcg::seed_from_u64(self.cell_seed(face, column, row));
                 let unit = |bits: u64| (bits >> 11) as f64 * (-53_f64).exp2();
                 DVec2::new(unit(generator.next_u64()), unit(generator.next_u64()))
             }

@@ -1,11 +1,11 @@
-//! Runs the lattice of one light from the first row to the last: trace a band, deposit what has its neighbours.
+//! Runs the lattice of one light from the first row to the last, a band of rows at a time.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
 use super::arrival_cache::ArrivalCache;
-use super::deposit::{DepositReport, Depositor, HalfBuffers, RowContext};
+use super::deposit::{Depositor, HalfBuffers, RowContext};
 use super::lattice::{Lattice, TracedRow};
 use crate::illumination::Receiver;
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
@@ -32,11 +32,12 @@ pub enum PassInput<'a> {
     Cached(&'a ArrivalCache),
 }
 
-/// Traces the whole lattice of one light, or takes cached arrivals, and deposits it. Returns the arrivals if they were
-/// traced to the end and fit the cache.
+/// Traces the lattice of one light, or takes cached arrivals, and deposits it; or a shard of its bands, which traces
+/// their neighbouring rows too. Returns the arrivals if they were traced to the end and fit the cache.
 pub fn run(
     depositor: &Depositor,
     source: PassInput,
+    share: Option<ShardIndex>,
     halves: &mut HalfBuffers,
     chart_for: &ChartFor,
     listener: &ProgressScope,
@@ -45,40 +46,50 @@ pub fn run(
     let mut recorder = Recorder::new(source);
     let lattice = &depositor.lattice;
     let (_, rows) = lattice.traced_size();
+    let mut number = 0;
     for face in 0..lattice.launch.face_count() {
-        let mut carried: Vec<TracedRow> = Vec::new();
-        let mut first_row = 0;
-        while first_row < rows {
+        let mut held: BTreeMap<usize, TracedRow> = BTreeMap::new();
+        let mut next = 0;
+        while next < rows {
+            let band = next..band_end(lattice, face, next);
+            (next, number) = (band.end, number + 1);
+            if share.is_some_and(|share| !share.has(number - 1)) {
+                continue;
+            }
             if listener.control.is_cancelled() {
                 report.cancelled = true;
                 return (report, None);
             }
-            let end = band_end(lattice, face, first_row);
+
+            // The band's rows and their neighbours, of which the band before may have traced some.
             let watch = Stopwatch::start();
-            let traced: Vec<TracedRow> = (first_row..end)
-                .into_par_iter()
-                .map(|row| match source {
-                    PassInput::Rays { .. } => lattice.trace_row(face, row),
-                    PassInput::Cached(light) => light.row(lattice, face, row),
+            let reach = band.start.saturating_sub(1)..(band.end + 1).min(rows);
+            held.retain(|row, _| reach.contains(row));
+            let missing: Vec<usize> = reach.filter(|row| !held.contains_key(row)).collect();
+            let row_of = |row: usize| match source {
+                PassInput::Rays { .. } => lattice.trace_row(face, row),
+                PassInput::Cached(light) => light.row(lattice, face, row),
+            };
+            let traced = missing.into_par_iter().map(|row| (row, row_of(row)));
+            held.par_extend(traced);
+            let contexts: Vec<RowContext> = band
+                .map(|index| RowContext {
+                    row: &held[&index],
+                    index,
+                    before: index.checked_sub(1).and_then(|before| held.get(&before)),
+                    after: held.get(&(index + 1)),
                 })
                 .collect();
-            recorder.take(&traced);
+            recorder.take(&contexts);
+            report.count(&contexts);
             match source {
                 PassInput::Rays { .. } => report.trace_s.add(watch.elapsed()),
                 PassInput::Cached(_) => report.deposit_s.add(watch.elapsed()),
             }
-            report.count(&traced);
+
+            // Kernels of the band's own rows.
             let watch = Stopwatch::start();
-            carried = deposit_band(
-                depositor,
-                halves,
-                chart_for,
-                carried,
-                traced,
-                end,
-                end == rows,
-                &mut report,
-            );
+            deposit_rows(depositor, &contexts, halves, chart_for, &mut report);
             report.deposit_s.add(watch.elapsed());
             let done = match source {
                 PassInput::Rays { .. } => report.rays,
@@ -87,68 +98,12 @@ pub fn run(
             listener
                 .progress
                 .advance(Stage::Caustic, listener.done + done, listener.total);
-            first_row = end;
         }
     }
     if let PassInput::Cached(light) = source {
         report.ledger.merge(light.ledger());
     }
     (report, recorder.light)
-}
-
-/// Traces and deposits the bands of one shard.
-///
-/// A band needs its neighbours' rows: these are traced again for it, and booked only by their own band.
-pub fn run_share(
-    depositor: &Depositor,
-    share: ShardIndex,
-    halves: &mut HalfBuffers,
-    chart_for: &ChartFor,
-    listener: &ProgressScope,
-) -> PassReport {
-    let mut report = PassReport::default();
-    let mut number = 0;
-    let lattice = &depositor.lattice;
-    let (_, rows) = lattice.traced_size();
-    for face in 0..lattice.launch.face_count() {
-        let mut first_row = 0;
-        while first_row < rows {
-            let end = band_end(lattice, face, first_row);
-            let band = first_row..end;
-            (first_row, number) = (end, number + 1);
-            if !share.has(number - 1) {
-                continue;
-            }
-            if listener.control.is_cancelled() {
-                report.cancelled = true;
-                return report;
-            }
-            let watch = Stopwatch::start();
-            let lent_before = usize::from(band.start > 0);
-            let with_lent = band.start - lent_before..(end + 1).min(rows);
-            let traced: Vec<TracedRow> = with_lent
-                .into_par_iter()
-                .map(|row| lattice.trace_row(face, row))
-                .collect();
-            report.trace_s.add(watch.elapsed());
-            let own = lent_before..lent_before + band.len();
-            report.count(&traced[own.clone()]);
-            let watch = Stopwatch::start();
-            let context = |position: usize| RowContext {
-                row: &traced[position],
-                index: band.start + position - lent_before,
-                before: position.checked_sub(1).map(|before| &traced[before]),
-                after: traced.get(position + 1),
-            };
-            let contexts: Vec<RowContext> = own.map(context).collect();
-            deposit_rows(depositor, &contexts, halves, chart_for, &mut report);
-            report.deposit_s.add(watch.elapsed());
-            listener
-                .progress
-                .advance(Stage::Caustic, listener.done + report.rays, listener.total);
-        }
-    }
-    report
 }
 
 /// Caches arrivals until they exceed the limit.
@@ -169,9 +124,9 @@ impl Recorder {
         }
     }
 
-    fn take(&mut self, traced: &[TracedRow]) {
+    fn take(&mut self, rows: &[RowContext]) {
         if let Some(light) = &mut self.light {
-            light.push(traced);
+            light.push(rows);
             if light.bytes() > self.most_bytes {
                 self.light = None;
             }
@@ -190,40 +145,6 @@ fn band_end(lattice: &Lattice, face: usize, first_row: usize) -> usize {
     end
 }
 
-/// Deposits all rows that have a row after them (all at the end of a face). Returns the last two rows, which the next
-/// band needs. `end` is the lattice index after the last traced row.
-#[allow(
-    clippy::too_many_arguments,
-    reason = "one call site; the band's state travels through it"
-)]
-fn deposit_band(
-    depositor: &Depositor,
-    halves: &mut HalfBuffers,
-    chart_for: &ChartFor,
-    mut rows: Vec<TracedRow>,
-    traced: Vec<TracedRow>,
-    end: usize,
-    last: bool,
-    report: &mut PassReport,
-) -> Vec<TracedRow> {
-    // The carried rows: one that was deposited and only serves as a neighbour, and one that waits.
-    let lent = rows.len().saturating_sub(1);
-    rows.extend(traced);
-    let first_index = end - rows.len();
-    let ready = if last { rows.len() } else { rows.len() - 1 };
-    let contexts: Vec<RowContext> = (lent..ready)
-        .map(|position| RowContext {
-            row: &rows[position],
-            index: first_index + position,
-            before: position.checked_sub(1).map(|before| &rows[before]),
-            after: rows.get(position + 1),
-        })
-        .collect();
-    deposit_rows(depositor, &contexts, halves, chart_for, report);
-    let keep = rows.len().saturating_sub(2);
-    rows.split_off(keep)
-}
-
 /// Deposits rows, and allocates the maps that are missing.
 fn deposit_rows(
     depositor: &Depositor,
@@ -240,21 +161,15 @@ fn deposit_rows(
     for receiver in receivers {
         halves.touch(receiver, chart_for);
     }
-    report.add(&depositor.deposit(contexts, halves));
+    report.merge(depositor.deposit(contexts, halves));
 }
 
 impl PassReport {
-    fn count(&mut self, traced: &[TracedRow]) {
-        for row in traced {
+    fn count(&mut self, rows: &[RowContext]) {
+        for RowContext { row, .. } in rows {
             self.ledger.merge(&row.ledger);
             self.rays += row.rays;
             self.segments += row.segments;
         }
-    }
-
-    fn add(&mut self, deposit: &DepositReport) {
-        self.ledger.merge(&deposit.ledger);
-        self.splats += deposit.splats;
-        self.statistics.merge(&deposit.statistics);
     }
 }

@@ -1,18 +1,9 @@
-//! What carries each light, by the estimator of the settings.
+//! Lights and surfaces that not every estimator can follow.
 
 use super::caustic::CausticLayer;
 use crate::error::{Error, Result};
 use crate::light_pass::visibility::VisibleLight;
 use crate::plan::Effect;
-use crate::settings::Estimator;
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Carrier {
-    /// Photons, with bundles where these can carry the light.
-    Photons,
-    /// Kernel splats of the paper.
-    Splats,
-}
 
 impl CausticLayer<'_> {
     /// Whether the light is sampled as an area light.
@@ -33,7 +24,7 @@ impl CausticLayer<'_> {
     /// A light with an extent or on rough surfaces, with an estimator that supports neither.
     pub(super) fn refuse_soft_light(&self) -> Result<()> {
         let estimator = self.settings.estimator;
-        if matches!(estimator, Estimator::Auto | Estimator::Photon) {
+        if estimator.refines() {
             return Ok(());
         }
         let scene = self.tracer.scene();
@@ -64,13 +55,5 @@ impl CausticLayer<'_> {
             ));
         }
         Ok(())
-    }
-
-    /// The carrier of all lights.
-    pub(super) fn carrier(&self) -> Carrier {
-        match self.settings.estimator {
-            Estimator::Auto | Estimator::Photon => Carrier::Photons,
-            Estimator::Splat => Carrier::Splats,
-        }
     }
 }
