@@ -87,8 +87,4 @@ mod viewer {
     mod scene_file;
     #[cfg(target_os = "linux")]
     mod window;
-    #[cfg(target_os = "linux")]
-    mod window_edit;
-    #[cfg(target_os = "linux")]
-    mod window_files;
 }

@@ -1,14 +1,11 @@
 //! Charts that the program makes itself.
 
-use glam::DVec3;
-use nephroid::illumination::IlluminationMap;
-use nephroid::scene::Scene;
-use nephroid::scene::builtin::shapes;
 use nephroid::settings::LayerKind::{Direct, Indirect};
 
 use support::laws::Table;
 use support::laws::law::*;
 use support::laws::scenes::*;
+use support::prelude::*;
 use support::tools::{set, settings};
 
 pub fn fill(t: &mut Table) {

@@ -1,14 +1,14 @@
 //! Surfaces that meet, and bodies of several parts, as files bring them.
 
-use glam::DVec3;
 use nephroid::illumination::Side;
 use nephroid::optics::fresnel::dielectric_reflectance;
-use nephroid::scene::builtin::shapes;
-use nephroid::scene::{Mesh, Scene, contacts};
+use nephroid::scene::contacts;
 
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table};
+use support::meshes::inside_out;
+use support::prelude::*;
 use support::tools::{set, to};
 
 /// Gaps of a rounding error to single precision, one way and the other.
@@ -18,12 +18,18 @@ pub fn fill(t: &mut Table) {
     let bright_branches = || set(to(0.01, 16), |s| s.branch_threshold = Some(1e-4));
     for gap_m in GAPS_M {
         t.case("touching-glass")
-            .bake_with(slabs(&[[0.3, 0.7]], 1.5), bright_branches())
-            .bake_with(slabs(&[[0.3, 0.5], [0.5 + gap_m, 0.7]], 1.5), bright_branches())
+            .bake_with(apart(slabs(&[[0.3, 0.7]], 1.5)), bright_branches())
+            .bake_with(
+                apart(slabs(&[[0.3, 0.5], [0.5 + gap_m, 0.7]], 1.5)),
+                bright_branches(),
+            )
             .as_first("map as of one slab", 1e-6, 1.0);
         t.case("liquid-in-its-glass")
-            .bake_with(slabs(&[[0.5, 0.7], [0.3, 0.501]], 1.33), bright_branches())
-            .bake_with(slabs(&[[0.5, 0.7], [0.3, 0.5 + gap_m]], 1.33), bright_branches())
+            .bake_with(apart(slabs(&[[0.5, 0.7], [0.3, 0.501]], 1.33)), bright_branches())
+            .bake_with(
+                apart(slabs(&[[0.5, 0.7], [0.3, 0.5 + gap_m]], 1.33)),
+                bright_branches(),
+            )
             .as_first("map as where they overlap", 1e-2, 1.0);
         // Glass that rests on something has no surface below.
         t.case("glass-on-the-floor")
@@ -38,8 +44,7 @@ pub fn fill(t: &mut Table) {
             .bake(apart(before(upright()).diffuse("rug", rug)), 0.01, 32)
             .watts_as_first("watts as without it", 1e-3)
             .measure("the rug holds what falls on its place", 1e-2, on_the_rug);
-        let mut back = shapes::floor([-0.5, 0.5], [-0.5, 0.5], gap_m);
-        turn(&mut back);
+        let back = inside_out(shapes::floor([-0.5, 0.5], [-0.5, 0.5], gap_m));
         t.case("floor-of-two-nodes-back-to-back")
             .bake(before(upright()), 0.01, 32)
             .bake(apart(before(upright()).diffuse("back", back)), 0.01, 32)
@@ -61,23 +66,8 @@ fn apart(mut scene: Scene) -> Scene {
     scene
 }
 
-/// Slabs above each other, the first of glass and the others of an index, under a slanting sun.
-fn slabs(borders: &[[f64; 2]], ior: f64) -> Scene {
-    let scene = floor(0.5).sun(DVec3::new(0.1, -1.0, 0.05));
-    let all = borders.iter().enumerate();
-    apart(all.fold(scene, |scene, (index, [low, high])| {
-        scene.glass(if index == 0 { 1.5 } else { ior }, slab(*low, *high))
-    }))
-}
-
-fn turn(mesh: &mut Mesh) {
-    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-}
-
 fn back_to_back(mesh: &mut Mesh) {
-    let mut back = mesh.clone();
-    turn(&mut back);
+    let back = inside_out(mesh.clone());
     shapes::append(mesh, &back);
 }
 
@@ -86,11 +76,11 @@ fn on_the_rug(bake: &Baked) -> f64 {
     let Some(map) = map_of(bake, "rug") else {
         return f64::INFINITY;
     };
-    let held_w = map.flux_w(nephroid::settings::LayerKind::Caustic).luminance();
+    let held_w = map.flux_w(LayerKind::Caustic).luminance();
     let middles = (0..64).flat_map(|x| (0..64).map(move |z| [x, z]));
     let mean = middles.map(|place| {
         let [x, z] = place.map(|index| (f64::from(index) + 0.5) / 64.0 * 0.4 - 0.2);
-        from_lamp(DVec3::new(x, 0.0, z), MIRRORED_LAMP) / 4096.0
+        from_lamp(dvec3(x, 0.0, z), MIRRORED_LAMP) / 4096.0
     });
     off(held_w, mean.sum::<f64>() * 0.16)
 }

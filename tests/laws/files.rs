@@ -3,13 +3,11 @@
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 
 use glam::Vec3;
-use nephroid::scene::LightKind;
-use serde_json::{Value, json};
 
-use support::glb::Glb;
 use support::laws::Table;
 use support::laws::law::no;
 use support::laws::scenes::MIRRORED_LAMP;
+use support::prelude::*;
 
 const FLOOR: [[f32; 3]; 4] = [
     [-0.5, 0.0, -0.5],

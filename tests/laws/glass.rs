@@ -1,17 +1,12 @@
 //! Glass and water: every angle, every index, bodies in bodies, and what they absorb.
 
-use glam::DVec3;
-use nephroid::optics::LinearSrgb;
 use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::optics::refraction::{cos_transmitted, refract};
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Mesh, Scene, Volume};
-use nephroid::settings::{BakeSettings, LayerKind};
-use nephroid::units::Flux;
 
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table};
+use support::prelude::*;
 use support::tools::{set, settings, to};
 
 pub fn fill(t: &mut Table) {
@@ -52,7 +47,7 @@ fn slabs_and_angles(t: &mut Table) {
             .bake_with(along_an_axis(index), thoroughly(to(0.01, 8)))
             .e("(1 − R)/(1 + R)", 1e-6, |_| through_slab(1.5));
     }
-    let place = DVec3::new(0.1, 1.5, 0.05);
+    let place = dvec3(0.1, 1.5, 0.05);
     for ior in [1.0, 1.0 + 1e-6, 1.0 - 1e-6] {
         t.case("index-1")
             .bake(under_slab(ior).lamp(place), 0.01, 32)
@@ -70,7 +65,7 @@ fn slabs_and_angles(t: &mut Table) {
     for (elevation_deg, target) in [(10.0_f64, 0.02), (1.0, 0.005)] {
         let (sine, cosine) = elevation_deg.to_radians().sin_cos();
         let water = shapes::floor([-3.0, 3.0], [-3.0, 3.0], 0.5);
-        let sun = DVec3::new(cosine, -sine, 0.0);
+        let sun = dvec3(cosine, -sine, 0.0);
         t.case("grazing-sun")
             .bake(floor(0.5).glass(1.333, water).sun(sun), target, 32)
             .e("(1 − R) sin h", 1e-6, move |_| {
@@ -91,7 +86,7 @@ fn slabs_and_angles(t: &mut Table) {
 }
 
 fn bodies(t: &mut Table) {
-    let inner = shapes::sphere(DVec3::new(0.05, 0.52, 0.0), 0.15, 3);
+    let inner = shapes::sphere(dvec3(0.05, 0.52, 0.0), 0.15, 3);
     t.case("glass-in-the-same-glass")
         .bake(glass_ball(4), 0.01, 32)
         .bake(glass_ball(4).glass(1.5, inner), 0.01, 32)
@@ -99,20 +94,16 @@ fn bodies(t: &mut Table) {
         .as_first_within_errors();
     let bright_branches = || set(to(0.01, 16), |s| s.branch_threshold = Some(1e-4));
     t.case("overlapping-glass")
-        .bake_with(slabs(&[[0.3, 0.7]]), bright_branches())
-        .bake_with(slabs(&[[0.3, 0.55], [0.45, 0.7]]), bright_branches())
+        .bake_with(slabs(&[[0.3, 0.7]], 1.5), bright_branches())
+        .bake_with(slabs(&[[0.3, 0.55], [0.45, 0.7]], 1.5), bright_branches())
         .as_first("map as of one slab", 1e-6, 1.0)
-        .bake_with(slabs(&[[0.3, 0.5 + 1e-9], [0.5, 0.7]]), bright_branches())
+        .bake_with(slabs(&[[0.3, 0.5 + 1e-9], [0.5, 0.7]], 1.5), bright_branches())
         .as_first("map as of one slab", 1e-6, 1.0);
     for missing in 0..12 {
-        let mut block = shapes::cuboid(DVec3::new(-0.3, 0.2, -0.3), DVec3::new(0.3, 0.6, 0.3));
+        let mut block = shapes::cuboid(dvec3(-0.3, 0.2, -0.3), dvec3(0.3, 0.6, 0.3));
         block.triangles.remove(missing);
         t.case("open-glass")
-            .bake(
-                floor(0.5).glass(1.5, block).lamp(DVec3::new(0.1, 1.5, 0.05)),
-                0.05,
-                16,
-            )
+            .bake(floor(0.5).glass(1.5, block).lamp(dvec3(0.1, 1.5, 0.05)), 0.05, 16)
             .arrives_of_sent(1.0);
     }
     let around = |material: Material, radii_m: &[f64]| {
@@ -132,7 +123,7 @@ fn bodies(t: &mut Table) {
         ("lamp-in-tinted-glass", &[0.3][..]),
         ("lamp-in-nested-glass", &[0.15, 0.3]),
     ] {
-        let dim = tinted(1.5, LinearSrgb::grey(0.01), 1.0);
+        let dim = tinted(parts::dielectric("dim", 1.5), 1.0, LinearSrgb::grey(0.01));
         t.case(name)
             .bake_with(around(dim, radii_m), thoroughly(to(0.01, 32)))
             .e("that of the lamp, by Beer and Lambert", 0.01, move |point| {
@@ -142,7 +133,7 @@ fn bodies(t: &mut Table) {
 }
 
 /// Share of red, green and blue light that 0.7 m of this water leave.
-const WATER_COLOUR: LinearSrgb = LinearSrgb::new(0.3, 0.5, 0.8);
+const WATER_COLOUR: LinearSrgb = rgb(0.3, 0.5, 0.8);
 
 /// What absorbs takes its share by the way within, before the first surface too; by both estimators.
 fn absorption(t: &mut Table) {
@@ -151,9 +142,10 @@ fn absorption(t: &mut Table) {
     let mut stepped = shapes::floor([-0.5, 0.0], [-0.5, 0.5], 0.0);
     shapes::append(&mut stepped, &shapes::floor([0.0, 0.5], [-0.5, 0.5], 0.3));
     for (name, mesh, depths_m) in [("flat", flat, [1.0, 1.0]), ("stepped", stepped, [1.0, 0.7])] {
-        let body = shapes::cuboid(DVec3::new(-1.0, -0.4, -1.0), DVec3::new(1.0, 1.0, 1.0));
+        let body = shapes::cuboid(dvec3(-1.0, -0.4, -1.0), dvec3(1.0, 1.0, 1.0));
         let scene = Scene::default().diffuse("floor", mesh).sun(DVec3::NEG_Y);
-        let scene = scene.with("water", body, tinted(1.333, WATER_COLOUR, 0.7));
+        let water = tinted(parts::dielectric("water", 1.333), 0.7, WATER_COLOUR);
+        let scene = scene.with("water", body, water);
         let says = "E of red, green, blue is what the water leaves";
         t.case(format!("{name}-floor-in-coloured-water"))
             .bake(scene.clone(), 0.01, 16)
@@ -167,7 +159,8 @@ fn absorption(t: &mut Table) {
         .map(|c| (1.0 - r) * c / (1.0 - r * c * c))
         .luminance();
     let ball = shapes::sphere(DVec3::Y, 0.5, 4);
-    let scene = floor(2.0).with("ball", ball, tinted(1.5, WATER_COLOUR, 0.5));
+    let glass = tinted(parts::dielectric("glass", 1.5), 0.5, WATER_COLOUR);
+    let scene = floor(2.0).with("ball", ball, glass);
     let scene = scene.lit(parts::point_light("lamp", DVec3::Y, Flux(1.0)));
     for settings in [to(0.01, 16), settings(4e3, 16)] {
         t.case("coloured-glass-around-a-lamp")
@@ -181,7 +174,7 @@ fn absorption(t: &mut Table) {
 
 /// What is given up is booked by its cause, and is part of the estimated error. Photons follow every branch, however weak.
 fn truncated(t: &mut Table) {
-    let slab = shapes::cuboid(DVec3::new(-1.0, 0.5, -1.0), DVec3::new(1.0, 0.7, 1.0));
+    let slab = shapes::cuboid(dvec3(-1.0, 0.5, -1.0), dvec3(1.0, 0.7, 1.0));
     let scene = floor(0.5).sun(DVec3::NEG_Y).glass(1.5, slab);
     let r = dielectric_reflectance(1.0, 1.5);
     let at_most = |max_depth, branch_threshold, settings: BakeSettings| BakeSettings {
@@ -230,7 +223,7 @@ fn over_angles(of: impl Fn(f64, f64, [DVec3; 2]) -> f64) -> f64 {
         let near = near.flat_map(|step| [step, quarter - step, critical - step, critical + step]);
         let angles = near.chain((0..1000).map(|step| quarter * f64::from(step) / 1000.0));
         for angle in angles.filter(|angle| (0.0..quarter).contains(angle)) {
-            let incident = DVec3::new(angle.sin(), -angle.cos(), 0.0);
+            let incident = dvec3(angle.sin(), -angle.cos(), 0.0);
             let there = dielectric_reflectance(angle.cos(), eta);
             assert!((0.0..=1.0).contains(&there), "R is {there} at {angle} for {eta}");
             if let Some(refracted) = refract(incident, DVec3::Y, eta) {
@@ -250,7 +243,7 @@ fn other_side(eta: f64, there: f64, [incident, _]: [DVec3; 2]) -> f64 {
 fn out_of_glass(angle_rad: f64) -> Scene {
     let ceiling = shapes::floor([-50.0, 50.0], [-0.5, 0.5], 0.01);
     let sheet = shapes::floor([-0.5, 0.5], [-0.5, 0.5], 0.0);
-    let sun = DVec3::new(angle_rad.sin(), angle_rad.cos(), 0.0);
+    let sun = dvec3(angle_rad.sin(), angle_rad.cos(), 0.0);
     Scene::default()
         .diffuse("floor", ceiling)
         .glass(1.5, sheet)
@@ -277,25 +270,6 @@ fn along_an_axis(index: usize) -> Scene {
         .diffuse("floor", wall)
         .glass(1.5, slab)
         .sun(direction)
-}
-
-/// Slabs of glass one above the other, under a slanting sun.
-fn slabs(borders: &[[f64; 2]]) -> Scene {
-    let scene = floor(0.5).sun(DVec3::new(0.1, -1.0, 0.05));
-    borders
-        .iter()
-        .fold(scene, |scene, [low, high]| scene.glass(1.5, slab(*low, *high)))
-}
-
-/// Glass that lets a share of each channel through a distance.
-fn tinted(ior: f64, colour: LinearSrgb, distance_m: f64) -> Material {
-    Material {
-        volume: Some(Volume {
-            attenuation_distance_m: distance_m,
-            attenuation_colour: colour,
-        }),
-        ..parts::dielectric("tinted", ior)
-    }
 }
 
 fn missing_over_estimate(short: &Baked, whole: &Baked) -> f64 {

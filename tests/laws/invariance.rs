@@ -1,18 +1,13 @@
 //! What must not change a map or its ledgers, or must change them just so.
 
-use glam::{DMat3, DVec3};
-use nephroid::bake::Bake;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{LightKind, LightSize, PanelShape, Scene, Volume};
-use nephroid::settings::{
-    BakeSettings, Footprint, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement, Sigma,
-};
-use nephroid::units::{Flux, Radiance};
+use nephroid::scene::PanelShape;
+use nephroid::settings::{Footprint, Kernel, KernelSampling, RayPlacement, Sigma};
 
+use support::hard_scenes::roughened;
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, energy_residual, is_long};
+use support::prelude::*;
 use support::tools::{bake, builtin_scene, photons, set, settings, to, transformed};
 
 pub fn fill(t: &mut Table) {
@@ -50,11 +45,11 @@ pub fn fill(t: &mut Table) {
 }
 
 fn symmetries(t: &mut Table, name: &str, scene: &Scene) {
-    let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
+    let turn = DMat3::from_axis_angle(dvec3(0.6, 0.0, 0.8), 0.7);
     let moved = |rotation, offset| transformed(scene.clone(), rotation, 1.0, offset);
     t.case(format!("rigid-motion-{name}"))
         .bake(scene.clone(), 0.01, 32)
-        .bake(moved(turn, DVec3::new(3.1, -7.3, 0.9)), 0.01, 32)
+        .bake(moved(turn, dvec3(3.1, -7.3, 0.9)), 0.01, 32)
         .watts_as_first("watts", 0.01)
         .as_first_within_errors()
         // Lamps start their rays in the same directions wherever they stand.
@@ -73,31 +68,24 @@ fn symmetries(t: &mut Table, name: &str, scene: &Scene) {
 /// E of lamps is divided by the square of the size; of suns and panels it stays. Where light divides, a few of its
 /// borders are found elsewhere at another size.
 fn uniform_scale(t: &mut Table) {
-    let [mut tinted, mut sunny] = [0; 2].map(|_| glass_ball(3));
-    tinted.materials[1].volume = Some(Volume {
-        attenuation_distance_m: 0.3,
-        attenuation_colour: LinearSrgb::new(0.5, 0.8, 0.9),
-    });
+    let [mut coloured, mut sunny] = [0; 2].map(|_| glass_ball(3));
+    let glass = &mut coloured.materials[1];
+    *glass = tinted(glass.clone(), 0.3, rgb(0.5, 0.8, 0.9));
     sunny.lights.clear();
-    let panel = LightKind::Panel {
-        centre: DVec3::new(0.1, 0.5, 0.0),
-        across: DVec3::Z * 0.1,
-        down: DVec3::X * 0.1,
-        shape: PanelShape::Rectangle,
-        radiance: Radiance(1.0),
-    };
+    let (centre, sides) = (dvec3(0.1, 0.5, 0.0), [DVec3::Z * 0.1, DVec3::X * 0.1]);
+    let panel = panel(centre, sides, PanelShape::Rectangle, 1.0);
     let ceiling = shapes::rectangle(DVec3::Y, DVec3::X * 0.5, DVec3::Z * 0.5);
     for (name, scene, power, settings) in [
-        ("tinted-ball", tinted, -2, to(0.01, 32)),
+        ("tinted-ball", coloured, -2, to(0.01, 32)),
         (
             "ball-under-a-sun",
-            sunny.sun(DVec3::new(0.2, -1.0, 0.1)),
+            sunny.sun(dvec3(0.2, -1.0, 0.1)),
             0,
             to(0.01, 32),
         ),
         (
             "panel-below-a-mirror",
-            floor(0.5).mirror(ceiling).lit(light(panel)),
+            floor(0.5).mirror(ceiling).lit(panel),
             0,
             photons(1e4, 32),
         ),
@@ -124,11 +112,17 @@ fn threads(t: &mut Table) {
         map_resolution: MapResolution::Auto,
         ..settings(2e4, 0)
     };
+    let with_direct = set(to(0.01, 128), |s| {
+        s.layers = vec![LayerKind::Caustic, LayerKind::Direct]
+    });
+    let filtered = set(photons(3e5, 64), |s| s.filter = Some(true));
     let [ring, ball] = ["ring", "ball"].map(builtin_scene);
+    let rough = roughened("ball", 0.3);
     for (name, scene, settings, many) in [
         ("ring", &ring, splats(RayPlacement::Lattice), &[2, 4, 7][..]),
-        ("ball", &ball, to(0.01, 128), &[2, 4, 7, 64]),
+        ("ball", &ball, with_direct, &[2, 3, 4, 7, 64]),
         ("ball", &ball, splats(RayPlacement::Jittered), &[2, 4, 7]),
+        ("rough-ball", &rough, filtered, &[3]),
     ] {
         let same = t
             .case(format!("threads-{name}"))
@@ -157,7 +151,7 @@ fn threads(t: &mut Table) {
 fn seeds(t: &mut Table) {
     let mut soft = builtin_scene("ring");
     soft.lights[0].size = LightSize::Radius { radius_m: 0.1 };
-    let wall = shapes::rectangle(DVec3::new(-0.4, 0.4, 0.0), DVec3::Y * 0.4, DVec3::Z * 0.4);
+    let wall = shapes::rectangle(dvec3(-0.4, 0.4, 0.0), DVec3::Y * 0.4, DVec3::Z * 0.4);
     let jittered = set(settings(2e3, 16), |s| s.rays = RayPlacement::Jittered);
     let indirect = BakeSettings {
         layers: vec![LayerKind::Indirect],
@@ -186,16 +180,6 @@ fn seeds(t: &mut Table) {
             .bake_with(scene, with(1))
             .bits_as_first("the same seed gives the same map");
     }
-    // Lamps below the floor, where the mirror is not.
-    let mut cellar = builtin_scene("mirror");
-    for lamp in 0..3 {
-        let place = DVec3::new(0.1 * f64::from(lamp), -1.0, 0.0);
-        cellar = cellar.lit(parts::beam("cellar", place, DVec3::NEG_Y, 0.5, Flux(50.0)));
-    }
-    t.case("lamps-that-see-nothing-specular")
-        .splat(builtin_scene("mirror"), 1e4, 64)
-        .splat(cellar, 1e4, 64)
-        .bits_as_first("map as without them, bit for bit");
 }
 
 fn ledgers(t: &mut Table) {

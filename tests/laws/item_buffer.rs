@@ -1,19 +1,13 @@
 //! Item buffers never miss what a light sees, and what they drop, no ray could have lit.
 
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
 use nephroid::light_pass::emitter::Emitter;
 use nephroid::light_pass::item_buffer::{CELLS_PER_SIDE, HiddenCellPolicy, ItemBuffer};
 use nephroid::light_pass::launch::Launch;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Light, LightKind, Mesh, Scene};
 use nephroid::settings::ItemBufferKind;
-use nephroid::transport::Tracer;
-use nephroid::units::{Flux, RadiantIntensity};
 
 use support::laws::Table;
 use support::laws::scenes::{Build, light, random};
+use support::prelude::*;
 
 pub fn fill(t: &mut Table) {
     t.case("item-buffer")
@@ -85,7 +79,7 @@ fn points_marked() {
         for size in [1e-4, 1e-2, 0.3, 3.0] {
             let triangles = cloud(8, 300, size);
             let scene = mirrors(&triangles);
-            let launch = launch(&lamp(DVec3::new(0.01, 0.02, -0.015)), &scene, &[0], kind);
+            let launch = launch(&lamp(dvec3(0.01, 0.02, -0.015)), &scene, &[0], kind);
             let buffer = build(&launch, &scene);
             for [corner, b, c] in &triangles {
                 for _ in 0..20 {
@@ -127,7 +121,7 @@ fn marks(buffer: &ItemBuffer, faces: usize) -> Vec<(usize, usize, usize)> {
 /// Walls, an opaque ball and a box at random between a lamp and glass.
 fn hidden_scene(seed: u64) -> Scene {
     let mut random = random(0x51de ^ seed << 16);
-    let mut place = |height: f64| DVec3::new(1.4 * random() - 0.7, height, 1.4 * random() - 0.7);
+    let mut place = |height: f64| dvec3(1.4 * random() - 0.7, height, 1.4 * random() - 0.7);
     let ball = shapes::sphere(place(0.3), 0.12, 2);
     let mirror = shapes::rectangle(place(0.2), DVec3::X * 0.1, DVec3::Z * 0.1);
     let across = place(0.0).normalize();
@@ -160,8 +154,8 @@ fn dropped_cells() {
         for (face, row, column) in all.into_iter().filter(|cell| seen.binary_search(cell).is_err()) {
             dropped += 1;
             for place in 0..49 {
-                let within = DVec2::new(f64::from(place % 7), f64::from(place / 7)) / 6.0;
-                let square = (DVec2::new(column as f64, row as f64) + within) / CELLS_PER_SIDE as f64;
+                let within = dvec2(f64::from(place % 7), f64::from(place / 7)) / 6.0;
+                let square = (dvec2(column as f64, row as f64) + within) / CELLS_PER_SIDE as f64;
                 let ray = launch.ray(face, square.clamp(DVec2::splat(1e-9), DVec2::splat(1.0 - 1e-9)));
                 let met = tracer
                     .closest_hit(&ray)
@@ -180,7 +174,7 @@ fn dropped_cells() {
 fn shut_in() {
     let scene = Scene::default().glass(1.5, shapes::sphere(DVec3::X, 0.3, 3));
     let scene = scene.diffuse("round", shapes::sphere(DVec3::ZERO, 0.2, 3));
-    let lamp = parts::point_light("lamp", DVec3::new(0.01, 0.02, 0.03), Flux(1.0));
+    let lamp = parts::point_light("lamp", dvec3(0.01, 0.02, 0.03), Flux(1.0));
     let launch = equal(&lamp, &scene);
     let buffer = ItemBuffer::build(
         &launch,

@@ -1,19 +1,13 @@
 //! Lamps that are hardly any, blinding ones, and lamps where no lamp should be.
 
-use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
-
-use glam::DVec3;
 use nephroid::illumination::Side;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Environment, LightKind, Mesh, PanelShape, Scene, Volume};
-use nephroid::settings::{BakeSettings, ItemBufferKind, LayerKind};
-use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
+use nephroid::scene::{Environment, PanelShape};
+use nephroid::settings::ItemBufferKind;
 
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table, values};
+use support::prelude::*;
 use support::tools::{photons, set, settings, to};
 
 pub fn fill(t: &mut Table) {
@@ -55,15 +49,13 @@ pub fn fill(t: &mut Table) {
                     .any(|warning| warning.location == "maps")
             });
     }
-    let red = LinearSrgb::new(1.0, 0.0, 0.0);
-    let [mut lit, mut tinted, mut filled] = [0; 3].map(|_| glass_ball(3));
+    let red = rgb(1.0, 0.0, 0.0);
+    let [mut lit, mut coloured, mut filled] = [0; 3].map(|_| glass_ball(3));
     lit.lights[0].colour = red;
-    tinted.materials[1].base_colour = red;
-    filled.materials[1].volume = Some(Volume {
-        attenuation_distance_m: 1e-3,
-        attenuation_colour: LinearSrgb::new(1.0, 1e-30, 1e-30),
-    });
-    for scene in [&lit, &tinted, &filled] {
+    coloured.materials[1].base_colour = red;
+    let glass = &mut filled.materials[1];
+    *glass = tinted(glass.clone(), 1e-3, rgb(1.0, 1e-30, 1e-30));
+    for scene in [&lit, &coloured, &filled] {
         t.case("a-colour-channel-of-0")
             .bake(scene.clone(), 0.01, 32)
             .must("the channel that is there arrives", |bake| flux_w(bake).r > 0.0);
@@ -73,7 +65,7 @@ pub fn fill(t: &mut Table) {
         .measure("green and blue arrive, W", 0.0, |bake| {
             flux_w(bake).g + flux_w(bake).b
         });
-    let mut nowhere = shapes::facet([DVec3::Y, DVec3::new(0.1, 1.0, 0.0), DVec3::new(0.2, 1.0, 0.0)]);
+    let mut nowhere = shapes::facet([DVec3::Y, dvec3(0.1, 1.0, 0.0), dvec3(0.2, 1.0, 0.0)]);
     nowhere.normals.fill(DVec3::NEG_Y);
     let panel = shapes::floor([-0.1, 0.1], [-0.1, 0.1], 1.0);
     t.case("glowing-triangle-without-area")
@@ -116,7 +108,7 @@ fn of_intensity(watts: f64) -> Scene {
     let mut scene = glass_ball(3);
     scene.lights = Vec::new();
     scene.lit(light(LightKind::Point {
-        position: DVec3::new(0.1, 2.0, 0.05),
+        position: dvec3(0.1, 2.0, 0.05),
         intensity: RadiantIntensity(watts),
     }))
 }
@@ -172,29 +164,23 @@ fn front_e(bake: &Baked) -> f64 {
 
 /// What lamps send into the solid angle of a mirror, by both estimators and item buffers.
 fn sent_to_a_mirror(t: &mut Table) {
-    let place = DVec3::new(0.1, 0.8, -0.2);
+    let place = dvec3(0.1, 0.8, -0.2);
     let (inner, outer) = (0.12_f64, 0.3_f64);
     // The whole of its cone, whose edge falls off as the square of a ramp in the cosine.
     let cone_sr = TAU * (1.0 - inner.cos() + (inner.cos() - outer.cos()) / 3.0);
-    let slanting = DVec3::new(1.0, -1.0, 0.2).normalize();
+    let slanting = dvec3(1.0, -1.0, 0.2).normalize();
     let point = LightKind::Point {
         position: place,
         intensity: RadiantIntensity(3.0),
     };
-    let spot = LightKind::Spot {
-        position: place,
-        direction: DVec3::new(0.1, -1.0, 0.1).normalize(),
-        intensity: RadiantIntensity(3.0),
-        inner_cone_rad: inner,
-        outer_cone_rad: outer,
-    };
+    let spot = spot(place, dvec3(0.1, -1.0, 0.1), 3.0, [inner, outer]).kind;
     let sun = LightKind::Sun {
         direction: slanting,
         normal_irradiance: Irradiance(3.0),
     };
     let mirror = shapes::floor([-0.6, 0.6], [-0.5, 0.5], 0.0);
     let seen_sr = solid_angle_sr(&mirror, place);
-    let wall = shapes::rectangle(DVec3::new(3.0, 2.0, 0.0), DVec3::Z * 2.0, DVec3::Y * 2.0);
+    let wall = shapes::rectangle(dvec3(3.0, 2.0, 0.0), DVec3::Z * 2.0, DVec3::Y * 2.0);
     let over = Scene::default().mirror(mirror).diffuse("wall", wall);
     for (name, kind, share) in [
         ("point", point, seen_sr),
@@ -214,7 +200,7 @@ fn sent_to_a_mirror(t: &mut Table) {
     }
     // A sun's rays start before everything that may stop them: half a metre up, a shadow lies half a metre farther.
     let plate = shapes::floor([-2.0, -0.5], [-1.0, 1.0], 0.5);
-    let shaded = over.diffuse("plate", plate).sun(DVec3::new(1.0, -1.0, 0.0));
+    let shaded = over.diffuse("plate", plate).sun(dvec3(1.0, -1.0, 0.0));
     t.case("plate-before-a-mirror")
         .bake(shaded.clone(), 0.01, 16)
         .sent(0.6 * 0.5_f64.sqrt(), 5e-3)
@@ -224,7 +210,7 @@ fn sent_to_a_mirror(t: &mut Table) {
 
 /// Direct light of lamps with extent that are hardly any, on a floor below a ball of glass.
 fn direct(t: &mut Table) {
-    let below = || floor(0.6).glass(1.5, shapes::sphere(DVec3::new(0.0, 0.4, 0.0), 0.2, 2));
+    let below = || floor(0.6).glass(1.5, shapes::sphere(dvec3(0.0, 0.4, 0.0), 0.2, 2));
     let layer = || BakeSettings {
         max_error: None,
         layers: vec![LayerKind::Direct],
@@ -232,13 +218,8 @@ fn direct(t: &mut Table) {
     };
     let sky = |pixels, radiance, scale| under_sky(below(), pixels, radiance, scale);
     let panel = |half_m: f64, radiance: f64| {
-        below().lit(light(LightKind::Panel {
-            centre: DVec3::Y,
-            across: DVec3::X * half_m,
-            down: DVec3::Z * half_m,
-            shape: PanelShape::Rectangle,
-            radiance: Radiance(radiance),
-        }))
+        let sides = [DVec3::X * half_m, DVec3::Z * half_m];
+        below().lit(panel(DVec3::Y, sides, PanelShape::Rectangle, radiance))
     };
     let glowing = |object: usize| {
         below().lit(light(LightKind::Surface {

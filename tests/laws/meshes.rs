@@ -1,12 +1,9 @@
 //! Meshes that no modeller would make, and places where they should not lie.
 
-use glam::{DVec2, DVec3};
-use nephroid::scene::builtin::shapes;
-use nephroid::scene::{Mesh, Scene};
-
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Table, is_long};
+use support::prelude::*;
 
 pub fn fill(t: &mut Table) {
     let mut doubled = upright();
@@ -52,10 +49,10 @@ pub fn fill(t: &mut Table) {
         .bake(layered, 0.01, 32)
         .as_first_within_errors();
     // Either is met, never both: the mirror sends at most what falls on it.
-    let place = DVec3::new(-0.2, 0.8, 0.1);
+    let place = dvec3(-0.2, 0.8, 0.1);
     let sheet = shapes::floor([-0.3, 0.3], [-0.3, 0.3], 0.0);
     let falls_w = solid_angle_sr(&sheet, place);
-    let wall = shapes::rectangle(DVec3::new(0.8, 0.5, 0.0), DVec3::Z * 0.6, DVec3::Y * 0.6);
+    let wall = shapes::rectangle(dvec3(0.8, 0.5, 0.0), DVec3::Z * 0.6, DVec3::Y * 0.6);
     t.case("receiver-on-the-caster")
         .bake(
             floor(0.5).mirror(sheet).diffuse("wall", wall).lamp(place),
@@ -72,7 +69,7 @@ pub fn fill(t: &mut Table) {
     }
     let mut random = random(5);
     for _ in 0..if is_long() { 200 } else { 6 } {
-        let towards = DVec3::new(random() - 0.5, random() - 0.5, random() - 0.5);
+        let towards = dvec3(random() - 0.5, random() - 0.5, random() - 0.5);
         lone_mirror(
             t,
             "caster-smaller-than-a-cell",
@@ -160,24 +157,24 @@ fn needles() -> Mesh {
 
 /// A coarse half beside a fine one, whose corners lie on an edge of the other.
 fn t_junctions() -> Mesh {
-    let mut mesh = shapes::rectangle(DVec3::new(0.6, 0.75, -0.5), DVec3::Z * 0.5, DVec3::Y * 0.75);
+    let mut mesh = shapes::rectangle(dvec3(0.6, 0.75, -0.5), DVec3::Z * 0.5, DVec3::Y * 0.75);
     mesh.uv0 = None;
-    let fine = shapes::sheet(7, 7, |u, v| (DVec3::new(0.6, 1.5 * v, u), DVec3::NEG_X));
+    let fine = shapes::sheet(7, 7, |u, v| (dvec3(0.6, 1.5 * v, u), DVec3::NEG_X));
     shapes::append(&mut mesh, &fine);
     mesh
 }
 
 fn fine_mirror(columns: u32, rows: u32) -> Mesh {
     shapes::sheet(columns, rows, |u, v| {
-        (DVec3::new(0.6, 1.5 * v, 2.0 * u - 1.0), DVec3::NEG_X)
+        (dvec3(0.6, 1.5 * v, 2.0 * u - 1.0), DVec3::NEG_X)
     })
 }
 
 /// A receiver that the mirrored light runs along.
 fn tilted_receiver(tilt_rad: f64) -> Scene {
-    let along = DVec3::new(tilt_rad.cos(), tilt_rad.sin(), 0.0);
-    let receiver = shapes::rectangle(DVec3::new(-1.0, 0.5, 0.0), along * 0.4, DVec3::Z * 0.4);
-    let mirror = shapes::rectangle(DVec3::new(0.0, 0.5, 0.0), DVec3::new(0.5, 0.5, 0.0), DVec3::Z);
+    let along = dvec3(tilt_rad.cos(), tilt_rad.sin(), 0.0);
+    let receiver = shapes::rectangle(dvec3(-1.0, 0.5, 0.0), along * 0.4, DVec3::Z * 0.4);
+    let mirror = shapes::rectangle(dvec3(0.0, 0.5, 0.0), dvec3(0.5, 0.5, 0.0), DVec3::Z);
     Scene::default()
         .diffuse("floor", receiver)
         .mirror(mirror)

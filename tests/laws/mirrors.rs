@@ -1,16 +1,9 @@
 //! Mirrors: foci, folds, halls without end, and light that hardly touches.
 
-use std::f64::consts::PI;
-
-use glam::DVec3;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Mesh, Scene};
-use nephroid::settings::{BakeSettings, LayerKind};
-
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Baked, Table};
+use support::prelude::*;
 use support::tools::{builtin_scene, photons, set, settings, to};
 
 pub fn fill(t: &mut Table) {
@@ -23,7 +16,7 @@ pub fn fill(t: &mut Table) {
     t.case("focus-on-a-corner-of-texels")
         .bake(paraboloid(), 0.01, 64)
         .watts(0.64, 1e-3);
-    let place = DVec3::new(0.8, 0.5, 0.0);
+    let place = dvec3(0.8, 0.5, 0.0);
     let seen_sr = solid_angle_sr(&ellipsoid(place), place);
     t.case("focus-ellipsoid")
         .bake(floor(0.5).mirror(ellipsoid(place)).lamp(place), 0.01, 33)
@@ -85,13 +78,13 @@ pub fn fill(t: &mut Table) {
         .ledger("light arrives, and the rest is given up", 0.0, |energy| {
             no(energy.deposited > 0.0 && energy.truncated.depth + energy.truncated.threshold > 0.0)
         });
-    let ball = |side: f64| shapes::sphere(DVec3::new(0.5 * side, 0.5, 0.0), 0.4, 4);
+    let ball = |side: f64| shapes::sphere(dvec3(0.5 * side, 0.5, 0.0), 0.4, 4);
     t.case("facing-convex-mirrors")
         .bake(
             floor(0.5)
                 .mirror(ball(-1.0))
                 .mirror(ball(1.0))
-                .lamp(DVec3::new(0.0, 0.5, 0.01)),
+                .lamp(dvec3(0.0, 0.5, 0.01)),
             0.03,
             32,
         )
@@ -115,7 +108,7 @@ pub fn fill(t: &mut Table) {
     let unlit = || floor(0.5).mirror(upright());
     for height in [0.0, 1e-12, -1e-12] {
         t.case("light-in-the-receivers-plane")
-            .bake(unlit().lamp(DVec3::new(-0.4, height, 0.1)), 0.02, 32)
+            .bake(unlit().lamp(dvec3(-0.4, height, 0.1)), 0.02, 32)
             .arrives_of_sent(1e-9);
     }
     t.case("sun-parallel-to-the-receiver")
@@ -123,26 +116,22 @@ pub fn fill(t: &mut Table) {
         .arrives(1e-12);
     // Rays towards the mirror have no way before them: they are met at no distance, or not at all.
     t.case("lamp-on-a-mirror")
-        .bake(unlit().lamp(DVec3::new(0.6, 0.75, 0.1)), 0.02, 32)
+        .bake(unlit().lamp(dvec3(0.6, 0.75, 0.1)), 0.02, 32)
         .arrives(2.0 * PI);
-    let near = DVec3::new(0.6 - 1e-9, 0.75, 0.1);
+    let near = dvec3(0.6 - 1e-9, 0.75, 0.1);
     t.case("lamp-a-nanometre-before-a-mirror")
         .bake(unlit().lamp(near), 0.01, 32)
         .e_of_lamp("that of the lamp", 0.01, near);
     let closed = shapes::sphere(DVec3::Y, 0.3, 3);
     t.case("lamp-in-a-closed-mirror")
-        .bake(
-            floor(0.5).mirror(closed).lamp(DVec3::new(0.05, 1.0, 0.02)),
-            0.05,
-            32,
-        )
+        .bake(floor(0.5).mirror(closed).lamp(dvec3(0.05, 1.0, 0.02)), 0.05, 32)
         .arrives(0.0)
         .measure("rays", 0.0, |bake| bake.result.counts.rays as f64);
     for material in [parts::dielectric("glass", 1.5), parts::mirror()] {
-        let block = shapes::cuboid(DVec3::new(0.1, 0.2, 0.1), DVec3::new(0.4, 0.6, 0.4));
+        let block = shapes::cuboid(dvec3(0.1, 0.2, 0.1), dvec3(0.4, 0.6, 0.4));
         let scene = floor(0.5).with("block", block, material.clone());
         t.case(format!("lamp-at-a-corner-of-{}", material.name))
-            .bake(scene.lamp(DVec3::new(0.1, 0.6, 0.1)), 0.02, 16)
+            .bake(scene.lamp(dvec3(0.1, 0.6, 0.1)), 0.02, 16)
             .arrives(4.0 * PI);
         t.case(format!("normals-behind-facets-of-{}", material.name))
             .bake(normals_behind_facets(material), 0.02, 16)
@@ -189,8 +178,8 @@ fn beyond_the_middle(bake: &Baked, whole_w: f64) -> f64 {
 pub fn paraboloid() -> Scene {
     let mirror = shapes::sheet(64, 64, |u, v| {
         let (x, z) = (0.8 * (u - 0.5) + 1.0, 0.8 * (v - 0.5));
-        let normal = DVec3::new(-0.5 * x, 1.0, -0.5 * z).normalize();
-        (DVec3::new(x, 0.25 * (x * x + z * z) - 1.0, z), normal)
+        let normal = dvec3(-0.5 * x, 1.0, -0.5 * z).normalize();
+        (dvec3(x, 0.25 * (x * x + z * z) - 1.0, z), normal)
     });
     floor(0.5).mirror(mirror).sun(DVec3::NEG_Y)
 }
@@ -199,7 +188,7 @@ pub fn paraboloid() -> Scene {
 fn ellipsoid(lamp_at: DVec3) -> Mesh {
     let half_distance_m = 0.5 * lamp_at.length();
     shapes::sheet(48, 48, |u, v| {
-        let direction = DVec3::new(0.6 * (u - 0.5) + 0.3, 1.0, 0.6 * (v - 0.5)).normalize();
+        let direction = dvec3(0.6 * (u - 0.5) + 0.3, 1.0, 0.6 * (v - 0.5)).normalize();
         let cosine = direction.dot(-lamp_at.normalize());
         let reach = (1.0 - half_distance_m * half_distance_m) / (1.0 - half_distance_m * cosine);
         let point = lamp_at + direction * reach;
@@ -213,16 +202,13 @@ fn fold_on_a_texel_border() -> Scene {
     let mirror = shapes::sheet(256, 1, |u, v| {
         let x = u - 0.5;
         let turn = 0.5 * (x * x - x).atan();
-        (
-            DVec3::new(x, 0.0, 0.5 + v),
-            DVec3::new(turn.sin(), turn.cos(), 0.0),
-        )
+        (dvec3(x, 0.0, 0.5 + v), dvec3(turn.sin(), turn.cos(), 0.0))
     });
     let ceiling = shapes::floor([-0.25, 0.25], [-0.25, 0.25], 1.0);
     Scene::default()
         .diffuse("floor", ceiling)
         .mirror(mirror)
-        .sun(DVec3::new(0.0, -1.0, -1.0))
+        .sun(dvec3(0.0, -1.0, -1.0))
 }
 
 /// The mean of E over a quarter of a texel: 1/√x has a pole, its integral has none.
@@ -243,11 +229,11 @@ fn dark_side(bake: &Baked) -> f64 {
 
 /// Two parallel mirrors above a floor.
 fn hall() -> Scene {
-    let wall = |x: f64| shapes::rectangle(DVec3::new(x, 1.0, 0.0), DVec3::Z * 3.0, DVec3::Y * 1.0);
+    let wall = |x: f64| shapes::rectangle(dvec3(x, 1.0, 0.0), DVec3::Z * 3.0, DVec3::Y * 1.0);
     floor(0.5).mirror(wall(-0.5)).mirror(wall(0.5))
 }
 
-const HALL_LAMP: DVec3 = DVec3::new(0.1, 1.0, 0.0);
+const HALL_LAMP: DVec3 = dvec3(0.1, 1.0, 0.0);
 
 fn all_mirrored(point: DVec3) -> f64 {
     let image = |n: i32| {
@@ -263,22 +249,22 @@ fn box_of_mirrors(reflectance: f64) -> Scene {
         base_colour: LinearSrgb::grey(reflectance),
         ..parts::mirror()
     };
-    let hall = shapes::cuboid(DVec3::new(-0.5, -0.2, -0.5), DVec3::new(0.5, 1.0, 0.5));
+    let hall = shapes::cuboid(dvec3(-0.5, -0.2, -0.5), dvec3(0.5, 1.0, 0.5));
     floor(0.1).with("hall", hall, silver).lamp(BOX_LAMP)
 }
 
-const BOX_LAMP: DVec3 = DVec3::new(-0.2, 0.7, 0.1);
+const BOX_LAMP: DVec3 = dvec3(-0.2, 0.7, 0.1);
 
 fn ball_in_the_box(levels: u32) -> Mesh {
-    shapes::sphere(DVec3::new(0.1, 0.5, 0.0), 0.2, levels)
+    shapes::sphere(dvec3(0.1, 0.5, 0.0), 0.2, levels)
 }
 
 fn hall_with_a_ball() -> Scene {
-    let hall = shapes::cuboid(DVec3::new(-0.5, -0.1, -0.5), DVec3::new(0.5, 1.0, 0.5));
+    let hall = shapes::cuboid(dvec3(-0.5, -0.1, -0.5), dvec3(0.5, 1.0, 0.5));
     floor(0.4)
         .mirror(hall)
         .glass(1.5, ball_in_the_box(3))
-        .lamp(DVec3::new(-0.2, 0.8, 0.1))
+        .lamp(dvec3(-0.2, 0.8, 0.1))
 }
 
 /// A sun on a flat mirror that lights a ceiling, with something opaque in its way.
@@ -288,7 +274,7 @@ fn blocked(blockers: &[Mesh]) -> Scene {
     let open = Scene::default()
         .diffuse("floor", ceiling)
         .mirror(mirror)
-        .sun(DVec3::new(0.0, -1.0, -1.0));
+        .sun(dvec3(0.0, -1.0, -1.0));
     let black = || parts::matte("black", LinearSrgb::BLACK);
     blockers
         .iter()
@@ -310,14 +296,14 @@ fn plates_around_a_hole() -> [Mesh; 4] {
 /// Vertex normals that point away from the light that the facet sees.
 fn normals_behind_facets(material: Material) -> Scene {
     let mut random = random(3);
-    let mut sheet = shapes::sheet(6, 6, |u, v| (DVec3::new(u - 0.5, 0.6, v - 0.5), DVec3::Y));
+    let mut sheet = shapes::sheet(6, 6, |u, v| (dvec3(u - 0.5, 0.6, v - 0.5), DVec3::Y));
     for normal in &mut sheet.normals {
-        *normal = DVec3::new(random() - 0.5, 0.4 * (random() - 0.5), random() - 0.5).normalize();
+        *normal = dvec3(random() - 0.5, 0.4 * (random() - 0.5), random() - 0.5).normalize();
     }
     let lamps = floor(0.5)
         .with("sheet", sheet, material)
-        .lamp(DVec3::new(0.1, 1.5, 0.2));
-    lamps.lamp(DVec3::new(0.1, 0.2, 0.2))
+        .lamp(dvec3(0.1, 1.5, 0.2));
+    lamps.lamp(dvec3(0.1, 0.2, 0.2))
 }
 
 /// A rough mirror under a sun a degree above it: some of its micro-facets would send light through it.
@@ -326,11 +312,11 @@ fn rough_at_grazing() -> Scene {
         roughness: 0.5,
         ..parts::mirror()
     };
-    let wall = shapes::rectangle(DVec3::new(0.8, 0.5, 0.0), DVec3::Z * 0.6, DVec3::Y * 0.6);
+    let wall = shapes::rectangle(dvec3(0.8, 0.5, 0.0), DVec3::Z * 0.6, DVec3::Y * 0.6);
     let (sine, cosine) = 1.0_f64.to_radians().sin_cos();
     let sheet = shapes::floor([-0.5, 0.5], [-0.5, 0.5], 0.3);
     floor(0.5)
         .with("sheet", sheet, rough)
         .diffuse("wall", wall)
-        .sun(DVec3::new(cosine, -sine, 0.0))
+        .sun(dvec3(cosine, -sine, 0.0))
 }

@@ -1,16 +1,14 @@
 //! Sizes, counts, densities and maps at the ends of what numbers bear.
 
-use glam::{DMat3, DVec3};
 use nephroid::illumination::accumulator::{FluxAccumulator, FluxUnit};
 use nephroid::illumination::smoothing::spread;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::shapes;
-use nephroid::settings::{MapResolution, Sigma};
+use nephroid::settings::Sigma;
 
 use crate::mirrors::paraboloid;
 use support::laws::law::*;
 use support::laws::scenes::*;
 use support::laws::{Table, is_long};
+use support::prelude::*;
 use support::tools::{set, settings, to, transformed};
 
 pub fn fill(t: &mut Table) {
@@ -81,7 +79,7 @@ pub fn fill(t: &mut Table) {
 fn units_of_flux() {
     for power_w in [1e-30, 1e-9, 1.0, 683.0, 1e12, 1e30] {
         let unit = FluxUnit::for_power(power_w);
-        let colour = LinearSrgb::new(power_w, 0.5 * power_w, 1e-9 * power_w);
+        let colour = rgb(power_w, 0.5 * power_w, 1e-9 * power_w);
         let back = unit.flux_w(unit.count(colour));
         assert!(
             off(back.r, colour.r) < 1e-15 && off(back.b, colour.b) < 1e-8,

@@ -1,20 +1,15 @@
 //! Casters, slits and pinholes far narrower than a cell: all the light that meets them or goes through is found.
 
-use std::f64::consts::{PI, TAU};
-
-use glam::DVec3;
 use nephroid::light_pass::item_buffer::CELLS_PER_SIDE;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Mesh, Scene};
 
 use support::laws::Table;
 use support::laws::law::*;
 use support::laws::scenes::*;
+use support::prelude::*;
 
 /// The widest openings are 1.5 times, the narrowest 0.005 times as wide [m].
 const OPENING_M: f64 = 0.0063;
-const LAMP: DVec3 = DVec3::new(0.013, -0.021, 0.034);
+const LAMP: DVec3 = dvec3(0.013, -0.021, 0.034);
 
 pub fn fill(t: &mut Table) {
     for (seed, (least, most)) in [
@@ -42,10 +37,7 @@ pub fn fill(t: &mut Table) {
     for index in 0..40 {
         let (scene, border) = plate_with_an_opening(&mut random);
         let triangles = border[1..].windows(2).map(|pair| [border[0], pair[0], pair[1]]);
-        let (lamp, sun) = (
-            DVec3::new(0.013, 2.0, 0.007),
-            DVec3::new(0.01, -1.0, 0.03).normalize(),
-        );
+        let (lamp, sun) = (dvec3(0.013, 2.0, 0.007), dvec3(0.01, -1.0, 0.03).normalize());
         let seen = |[a, b, c]: [DVec3; 3]| match index % 2 {
             0 => solid_angle_sr(&shapes::facet([a, b, c]), lamp),
             _ => 0.5 * (b - a).cross(c - a).dot(sun).abs(),
@@ -75,7 +67,7 @@ fn tiny_mirrors(seed: u64, (least, most): (f64, f64)) -> Vec<Mesh> {
     let mut mirror = || {
         let z = 2.0 * random() - 1.0;
         let (sine, cosine) = (TAU * random()).sin_cos();
-        let towards = DVec3::new((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z);
+        let towards = dvec3((1.0 - z * z).sqrt() * cosine, (1.0 - z * z).sqrt() * sine, z);
         let half_m = 0.5 * cell_rad * least * (most / least).powf(random());
         let (x, y) = towards.any_orthonormal_pair();
         let (s, c) = (TAU * random()).sin_cos();
@@ -106,11 +98,11 @@ fn plate_with_an_opening(random: &mut impl FnMut() -> f64) -> (Scene, Vec<DVec3>
             1.0 + 30.0 * random()
         };
     let sides = 3 + (random() * 10.0) as usize;
-    let centre = DVec3::new(0.05 * random() - 0.02, 1.0, 0.05 * random() - 0.02);
+    let centre = dvec3(0.05 * random() - 0.02, 1.0, 0.05 * random() - 0.02);
     let (sine, cosine) = (TAU * random()).sin_cos();
     let tilt = random() * 0.7;
-    let across = DVec3::new(cosine, 0.0, sine);
-    let along = DVec3::new(-sine * tilt.cos(), tilt.sin(), cosine * tilt.cos());
+    let across = dvec3(cosine, 0.0, sine);
+    let along = dvec3(-sine * tilt.cos(), tilt.sin(), cosine * tilt.cos());
     let corner = |side: usize| {
         let (s, c) = (TAU * (side as f64 / sides as f64)).sin_cos();
         centre + across * (0.5 * width_m * c) + along * (0.5 * length_m * s)
@@ -123,7 +115,7 @@ fn plate_with_an_opening(random: &mut impl FnMut() -> f64) -> (Scene, Vec<DVec3>
         let corner = border[(u * sides as f64).round() as usize % sides];
         (middle + (corner - middle) * (1.0 + (scale - 1.0) * v), DVec3::Y)
     });
-    let mirror = shapes::rectangle(DVec3::Y * 0.7, DVec3::Z * 0.15, DVec3::new(0.15, 0.02, 0.0));
+    let mirror = shapes::rectangle(DVec3::Y * 0.7, DVec3::Z * 0.15, dvec3(0.15, 0.02, 0.0));
     let black = parts::matte("plate", LinearSrgb::BLACK);
     (floor(0.5).mirror(mirror).with("plate", plate, black), border)
 }

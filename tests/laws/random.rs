@@ -1,15 +1,13 @@
 //! Random scenes by both estimators: each is held to one law of symmetry or proportion.
 
 use std::collections::BTreeSet;
-use std::sync::{Arc, Mutex};
+use std::sync::Mutex;
 
-use glam::{DMat3, DVec3};
-use nephroid::illumination::{IlluminationMap, Receiver, UvSet};
-use nephroid::scene::{LightKind, Scene};
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::illumination::{Receiver, UvSet};
 
 use support::laws::law::*;
 use support::laws::{Baked, Table, is_long};
+use support::prelude::*;
 use support::random_scenes::{MAX_LAMPS, scene};
 use support::tools::{photons, set, settings, to, transformed};
 
@@ -74,11 +72,11 @@ pub fn fill(t: &mut Table) {
             roundings_apart,
         );
     }
-    let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
-    let mirror = DMat3::from_diagonal(DVec3::new(-1.0, 1.0, 1.0));
+    let turn = DMat3::from_axis_angle(dvec3(0.6, 0.0, 0.8), 0.7);
+    let mirror = DMat3::from_diagonal(dvec3(-1.0, 1.0, 1.0));
     for (change, name, rotation, scale, offset) in [
-        (4, "moved", DMat3::IDENTITY, 1.0, DVec3::new(64.0, -32.0, 16.0)),
-        (5, "turned", turn, 1.0, DVec3::new(3.1, -7.3, 0.9)),
+        (4, "moved", DMat3::IDENTITY, 1.0, dvec3(64.0, -32.0, 16.0)),
+        (5, "turned", turn, 1.0, dvec3(3.1, -7.3, 0.9)),
         (6, "mirrored", mirror, 1.0, DVec3::ZERO),
         (7, "eight-times-the-size", DMat3::IDENTITY, 8.0, DVec3::ZERO),
     ] {

@@ -1,17 +1,14 @@
 //! Rays against triangles where rounding decides, the bodies around a point, and chains of known radiance.
 
-use std::sync::Arc;
-
-use glam::{DMat3, DVec3};
-use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings, render};
-use nephroid::geometry::Ray;
-use nephroid::scene::builtin::shapes;
-use nephroid::scene::{Material, Mesh, Object, Scene};
-use nephroid::transport::{Tracer, media_at};
+use nephroid::eye_pass::reference::{ReferenceSettings, render};
+use nephroid::scene::Object;
+use nephroid::transport::media_at;
 
 use support::chain_laws;
 use support::laws::Table;
 use support::laws::scenes::Build;
+use support::prelude::*;
+use support::scenes::limited;
 use support::tools::builtin_scene;
 
 pub fn fill(t: &mut Table) {
@@ -34,14 +31,9 @@ pub fn fill(t: &mut Table) {
 fn keeps_to_law(index: usize) {
     let law = chain_laws::all().swap_remove(index);
     let tracer = Tracer::new(Arc::new(law.scene.clone()));
-    let limits = ChainLimits {
-        branch_threshold: 1e-10,
-        ..Default::default()
-    };
     let settings = ReferenceSettings {
         samples_per_side: 1,
-        limits,
-        ..Default::default()
+        ..limited(|limits| limits.branch_threshold = 1e-10)
     };
     let picture = render(&tracer, &[], &law.view, &settings, &(), &Default::default());
     law.assert_kept(&picture.expect("nobody cancels"), 1e-6);
@@ -79,8 +71,8 @@ fn towards(origin: DVec3, target: DVec3) -> Ray {
 }
 
 fn no_ray_slips_through() {
-    let rotation = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
-    let far = DVec3::new(3.1, -7.3, 0.9);
+    let rotation = DMat3::from_axis_angle(dvec3(0.6, 0.0, 0.8), 0.7);
+    let far = dvec3(3.1, -7.3, 0.9);
     for (scale, offset) in [
         (1.0, DVec3::ZERO),
         (1.0, far),
@@ -91,7 +83,7 @@ fn no_ray_slips_through() {
         let place = |p: DVec3| rotation * p * scale + offset;
         let triangles: Vec<_> = sphere(5).into_iter().map(|corners| corners.map(place)).collect();
         let tracer = tracer(&triangles);
-        let origin = place(DVec3::new(0.21, -0.13, 0.34));
+        let origin = place(dvec3(0.21, -0.13, 0.34));
         for [a, b, c] in &triangles {
             for target in [*a, *b, (*a + *b) * 0.5, *b * 0.7 + *c * 0.3] {
                 let ray = towards(origin, target);
@@ -111,14 +103,13 @@ fn no_ray_slips_through() {
 
 fn close_hits() {
     let square = |y: f64| {
-        let [a, b, c, d] =
-            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, z)| DVec3::new(x, y, z));
+        let [a, b, c, d] = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)].map(|(x, z)| dvec3(x, y, z));
         [[a, b, c], [a, c, d]]
     };
     for gap in [1e-3, 1e-6, 1e-9, 1e-12] {
         let tracer = tracer(&[square(0.0), square(gap)].concat());
         let ray = Ray {
-            origin: DVec3::new(0.3, 0.5 * gap, 0.2),
+            origin: dvec3(0.3, 0.5 * gap, 0.2),
             direction: DVec3::Y,
         };
         let hit = tracer.intersect(&ray).expect("the upper square");
@@ -168,10 +159,6 @@ fn nested_bodies() {
     let scene = Scene::default().glass(1.5, ball(0.5)).glass(1.5, ball(0.3));
     let expected: [(f64, &[u32]); 5] = [(0.0, &[0, 1]), (-0.4, &[0]), (0.4, &[0]), (-1.0, &[]), (1.0, &[])];
     for (y, objects) in expected {
-        assert_eq!(
-            objects_around(&scene, DVec3::new(0.01, y, 0.02)),
-            objects,
-            "at {y} m"
-        );
+        assert_eq!(objects_around(&scene, dvec3(0.01, y, 0.02)), objects, "at {y} m");
     }
 }

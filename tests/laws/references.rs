@@ -2,22 +2,19 @@
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
-use std::sync::Arc;
 
 use nephroid::export::manifest::SceneSummary;
 use nephroid::export::pfm;
 use nephroid::illumination::compare::{Agreement, relative_rmse};
 use nephroid::illumination::map::relative_rmse as relative_noise;
-use nephroid::illumination::{IlluminationMap, Layer, parametrise};
-use nephroid::scene::Scene;
-use nephroid::scene::builtin::parts;
-use nephroid::settings::{BakeSettings, LayerKind};
+use nephroid::illumination::{Layer, parametrise};
 use nephroid::study::agreement::{caustic_luminance, pair_maps};
 use serde::{Deserialize, Serialize};
 
 use support::hard_scenes::{self, Shading, TinyBall};
 use support::laws::law::deposited_w;
 use support::laws::{Baked, Table};
+use support::prelude::*;
 use support::project_file;
 use support::tools::{bake, brute, builtin_scene, energy_fault, map_of, settings, to};
 

@@ -30,7 +30,8 @@ mod gpu {
 
 mod laws;
 mod physics;
-mod prelude;
 mod scene;
 #[cfg(feature = "viewer")]
 mod viewer;
+
+use support::prelude;

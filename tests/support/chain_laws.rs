@@ -1,11 +1,9 @@
 //! Scenes in which the radiance of every chain is known: from within glass and water, and between mirrors.
 
-use glam::DVec3;
-use nephroid::eye_pass::{Picture, ToneMap, View};
-use nephroid::optics::LinearSrgb;
+use nephroid::eye_pass::ToneMap;
 use nephroid::optics::fresnel::{dielectric_reflectance, metal_reflectance};
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Camera, Material, Mesh, Scene};
+
+use crate::prelude::*;
 
 /// Refractive indices.
 pub const WATER: f64 = 1.333;
@@ -128,7 +126,7 @@ fn over_a_shining_floor(name: &str, height_m: f64, mesh: Mesh, material: Materia
 
 /// The view straight up from under water, with a vertical field of view of 120°.
 fn looking_up(name: &'static str, water: Mesh) -> Law {
-    let eye = DVec3::new(0.2, 0.5, 0.1);
+    let eye = dvec3(0.2, 0.5, 0.1);
     let critical = (1.0 / WATER).asin();
     Law {
         name,
@@ -152,7 +150,7 @@ pub fn under_a_sheet_of_water() -> Law {
 
 /// A closed body that contains the eye and the floor.
 pub fn within_a_body_of_water() -> Law {
-    let body = shapes::cuboid(DVec3::new(-90.0, -0.5, -90.0), DVec3::new(90.0, 1.0, 90.0));
+    let body = shapes::cuboid(dvec3(-90.0, -0.5, -90.0), dvec3(90.0, 1.0, 90.0));
     looking_up("within a body of water", body)
 }
 
@@ -166,7 +164,7 @@ fn plate(cos_incident: f64, eta: f64) -> (f64, f64) {
 fn through_a_prism() -> Law {
     // The front face is at z = 1/2, the bottom at y = 0; the long face runs from the front's top edge to the bottom's
     // back edge.
-    let corner = |x: f64, y: f64, z: f64| DVec3::new(x, y, z);
+    let corner = |x: f64, y: f64, z: f64| dvec3(x, y, z);
     let [front_low, front_high, back] = [(0.0, 0.5), (1.0, 0.5), (0.0, -0.5)];
     let at = |x: f64, (y, z): (f64, f64)| corner(x, y, z);
     let mut prism = Mesh::default();
@@ -195,7 +193,7 @@ fn through_a_prism() -> Law {
     Law {
         name: "through a prism",
         scene: over_a_shining_floor("prism", -0.5, prism, parts::dielectric("glass", GLASS)),
-        view: square_view(DVec3::new(0.0, 0.5, 2.5), DVec3::new(0.0, 0.5, 0.0), 0.03, 24),
+        view: square_view(dvec3(0.0, 0.5, 2.5), dvec3(0.0, 0.5, 0.0), 0.03, 24),
         // Unfolded at its long face, the prism is a plate. Light that the plate reflects continues in the view's
         // direction; it reaches the floor if it falls by more than 1 m in 100 m.
         expected: Box::new(|direction| {
@@ -214,8 +212,8 @@ fn through_a_prism() -> Law {
 /// The view down from within a glass plate: beyond the critical angle light never leaves the plate, and the chain
 /// ends black.
 fn within_a_plate() -> Law {
-    let mesh = shapes::cuboid(DVec3::new(-90.0, 0.4, -90.0), DVec3::new(90.0, 0.7, 90.0));
-    let eye = DVec3::new(0.1, 0.6, 0.2);
+    let mesh = shapes::cuboid(dvec3(-90.0, 0.4, -90.0), dvec3(90.0, 0.7, 90.0));
+    let eye = dvec3(0.1, 0.6, 0.2);
     Law {
         name: "within a plate",
         scene: over_a_shining_floor("plate", 0.0, mesh, parts::dielectric("glass", GLASS)),
@@ -236,15 +234,15 @@ fn within_a_plate() -> Law {
 
 /// Within a ball under a uniform sky, the radiance is n² times that of the sky.
 fn within_a_ball() -> Law {
-    let centre = DVec3::new(0.4, 2.0, -0.3);
+    let centre = dvec3(0.4, 2.0, -0.3);
     let mut scene = Scene::default();
     let ball = shapes::sphere(centre, 0.5, 4);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", GLASS));
-    let eye = centre + DVec3::new(0.1, -0.05, 0.08);
+    let eye = centre + dvec3(0.1, -0.05, 0.08);
     Law {
         name: "within a ball",
         scene,
-        view: square_view(eye, eye + DVec3::new(1.0, 0.3, -0.4), 1.0, 60),
+        view: square_view(eye, eye + dvec3(1.0, 0.3, -0.4), 1.0, 60),
         expected: Box::new(|_| Some(SKY * GLASS * GLASS)),
         most: SKY * GLASS * GLASS,
         left_out: 0.0005,
@@ -262,12 +260,12 @@ fn between_mirrors() -> Law {
         ..parts::mirror()
     };
     let (up, along) = (DVec3::Y * 1.25, DVec3::Z * 60.0);
-    let place = |x: f64| DVec3::new(x, TOP - 1.25, 0.0);
+    let place = |x: f64| dvec3(x, TOP - 1.25, 0.0);
     let right = shapes::rectangle(place(1.0), along, up);
     let mut scene = over_a_shining_floor("right mirror", 0.0, right, metal());
     let left = shapes::rectangle(place(-1.0), up, along);
     parts::add(&mut scene, "left mirror", left, metal());
-    let eye = DVec3::new(0.1, 1.0, 0.0);
+    let eye = dvec3(0.1, 1.0, 0.0);
     Law {
         name: "between mirrors",
         scene,

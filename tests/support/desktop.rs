@@ -7,11 +7,9 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-use glam::DVec3;
 use image::RgbImage;
 use nephroid::viewer::navigation::Navigator;
 use nephroid::viewer::panel::WIDTH;
-use serde_json::Value;
 use x11rb::connection::Connection as _;
 use x11rb::protocol::Event;
 use x11rb::protocol::xproto::{
@@ -19,6 +17,7 @@ use x11rb::protocol::xproto::{
 };
 use x11rb::rust_connection::RustConnection;
 
+use crate::prelude::*;
 use crate::keep_bytes;
 use crate::program::program;
 use crate::skip;
@@ -33,12 +32,6 @@ pub const SIZE: (u32, u32) = (1280, 720);
 /// Fraction of the pixels that may differ visibly between two pictures of the same view at rest. Each picture is the
 /// mean of as many samples as time allowed, which shows at edges seen in mirrors.
 pub const ALIKE: f64 = 0.005;
-
-/// Upper bound of the height of the header below the button *Re-bake* [pixels].
-const BELOW_BAKE: f64 = 160.0;
-
-/// Prefixes of the names of controls in the header, which does not scroll.
-const ABOVE: [&str; 5] = ["Re-bake", "Cancel", "automatic", "Undo", "Redo"];
 
 /// [`wait_until`] with a message computed at the timeout.
 #[track_caller]
@@ -311,13 +304,6 @@ impl<'a> Viewer<'a> {
         (self.wait_for("done", |_| true), self.wait_for("rest", |_| true))
     }
 
-    /// Waits for the next maps that are shown: of the first level, or of the whole bake if it ended too soon for the
-    /// first level to be shown. Does not consume the event.
-    pub fn wait_for_maps(&mut self) -> Value {
-        let is_shown = |event: &Value| event["event"] == "done" || event["shown"] == true;
-        self.next("maps", is_shown).1
-    }
-
     /// Moves the camera by a key for half a second; returns the position where it comes to rest.
     pub fn fly(&mut self, key: &str, from: DVec3) -> DVec3 {
         self.hands("mousemove 900 300");
@@ -344,13 +330,13 @@ impl<'a> Viewer<'a> {
             .collect()
     }
 
-    /// Left, top, right and bottom of the first control with that name, and with that role if one is given [pixels].
-    /// Waits until it exists and does not move.
-    fn control(&self, role: Option<&str>, name: &str) -> [f64; 4] {
+    /// Left, top, right and bottom of the first control of that role and name [pixels]. Waits until it exists and does not
+    /// move.
+    fn control(&self, role: &str, name: &str) -> [f64; 4] {
         let mut last = None;
         poll(&|| format!("no {name} in {:?}", self.controls()), || {
             let mut all = self.controls().into_iter();
-            let found = all.find(|(r, n, _)| n == name && role.is_none_or(|role| r == role));
+            let found = all.find(|(r, n, _)| r == role && n == name);
             let rect = found.map(|(.., rect)| rect);
             if rect.is_some() && last == rect {
                 return last;
@@ -362,82 +348,30 @@ impl<'a> Viewer<'a> {
         })
     }
 
-    /// Centre of a control [pixels], after scrolling it into the window.
-    pub fn centre(&self, role: &str, name: &str) -> (i32, i32) {
-        let mut last_top = None;
-        let mut unmoved = 0;
-        for _ in 0..60 {
-            let [left, top, right, bottom] = self.control(Some(role), name);
-            let [.., bake] = self.control(None, "Re-bake");
-            // The header and controls over the picture do not scroll.
-            let is_fixed = ABOVE.iter().any(|above| name.starts_with(above)) || left >= f64::from(WIDTH);
-            let highest = if is_fixed { 0.0 } else { bake + BELOW_BAKE };
-            unmoved = if last_top == Some(top) { unmoved + 1 } else { 0 };
-            // A control at the very top cannot be scrolled down any further.
-            let is_at_top = unmoved >= 3 && top > 0.0;
-            if bottom < f64::from(SIZE.1) && (top > highest || is_at_top) {
-                return ((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32);
-            }
-            last_top = Some(top);
-            let wheel = if top > highest { 5 } else { 4 };
-            self.hands("mousemove 20 300");
-            self.hands(&format!("click {wheel}"));
-        }
-        panic!("{role} {name} cannot be scrolled to");
-    }
-
     /// Positions on a slider, by fractions of its length [pixels].
     pub fn on_slider<const N: usize>(&self, name: &str, shares: [f64; N]) -> [(i32, i32); N] {
-        let [left, top, _, bottom] = self.control(Some("Slider"), name);
+        let [left, top, _, bottom] = self.control("Slider", name);
         shares.map(|share| ((left + 4.0 + share * 104.0) as i32, (0.5 * (top + bottom)) as i32))
     }
 
     /// Clicks at a position [pixels].
-    pub fn click_at(&self, (x, y): (i32, i32)) {
+    fn click_at(&self, (x, y): (i32, i32)) {
         self.hands(&format!("mousemove {x} {y}"));
         self.hands("mousedown 1");
         self.hands("mouseup 1");
     }
 
-    /// Clicks a control of the panel.
+    /// Clicks a control of the panel, after scrolling down to it.
     pub fn click(&self, role: &str, name: &str) {
-        self.click_at(self.centre(role, name));
-    }
-
-    /// Opens sections of the panel that are closed.
-    pub fn open_sections(&self, names: &[&str]) {
-        names.iter().for_each(|name| self.set_section(name, true));
-    }
-
-    /// Closes sections of the panel that are open, which moves the sections below into view.
-    pub fn close_sections(&self, names: &[&str]) {
-        names.iter().for_each(|name| self.set_section(name, false));
-    }
-
-    fn set_section(&self, name: &str, is_open: bool) {
-        if self.is_open(name) != is_open {
-            self.click("DisclosureTriangle", name);
+        for _ in 0..60 {
+            let [left, top, right, bottom] = self.control(role, name);
+            if bottom < f64::from(SIZE.1) {
+                return self.click_at(((0.5 * (left + right)) as i32, (0.5 * (top + bottom)) as i32));
+            }
+            self.hands("mousemove 20 300");
+            self.hands("click 5");
         }
-        poll(&|| format!("{name} stays: {:?}", self.controls()), || {
-            (self.is_open(name) == is_open).then_some(())
-        });
-    }
-
-    /// Whether the control below a section's title belongs to the section instead of being the next title.
-    fn is_open(&self, section: &str) -> bool {
-        let [_, top, ..] = self.control(Some("DisclosureTriangle"), section);
-        let controls = self.controls();
-        let is_below = |[left, its_top, ..]: [f64; 4]| left < f64::from(WIDTH) && its_top > top + 1.0;
-        let mut below = controls.iter().filter(|(.., rect)| is_below(*rect));
-        below.next().is_some_and(|(role, ..)| role != "DisclosureTriangle")
-    }
-
-    /// Replaces the content of a text field and confirms.
-    pub fn type_into(&self, role: &str, name: &str, text: &str) {
-        self.click_at(self.centre(role, name));
-        self.hands("key ctrl+a");
-        self.screen.xdotool(&["type", "--delay", "20", text]);
-        self.hands("key Return");
+        panic!("{role} {name} cannot be scrolled to");
     }
 
     /// Presses the mouse at the first position and drags to the others [pixels]; it stays pressed.
@@ -552,7 +486,7 @@ fn event(line: &str) -> Value {
 /// Position of the camera in an event [m].
 pub fn position(rest: &Value) -> DVec3 {
     let coordinate = |axis: usize| rest["position_m"][axis].as_f64().expect("a number");
-    DVec3::new(coordinate(0), coordinate(1), coordinate(2))
+    dvec3(coordinate(0), coordinate(1), coordinate(2))
 }
 
 /// Window position of a point in the initial view of a built-in scene [pixels].

@@ -1,18 +1,12 @@
 //! Small scenes that need different effects; and the pool as one quad with a normal map.
 
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
 use nephroid::effect::Effect;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, pool, shapes};
-use nephroid::scene::texture::Wrap;
-use nephroid::scene::{Camera, LightSize, Material, Mesh, NormalMap, Scene, Texture, Volume, Waves};
-use nephroid::settings::LayerKind;
-use nephroid::units::Flux;
+use nephroid::scene::builtin::pool;
+use nephroid::scene::NormalMap;
 
+use crate::prelude::*;
 use crate::floors::{image, texture_reference};
-use crate::scenes::wave;
+use crate::scenes::{tinted, wave};
 
 /// A scene and the effects that its light pass needs.
 pub struct EffectScene {
@@ -49,7 +43,7 @@ pub fn all() -> Vec<EffectScene> {
     let mut wide = mirrored(parts::mirror());
     wide.lights[0].size = LightSize::Radius { radius_m: 0.2 };
     let mut turned_away = mirrored(parts::mirror());
-    turned_away.cameras = vec![camera(DVec3::new(0.0, 1.0, 3.0), DVec3::new(0.0, 1.0, 9.0))];
+    turned_away.cameras = vec![camera(dvec3(0.0, 1.0, 3.0), dvec3(0.0, 1.0, 9.0))];
     let mut everything = mirrored(textured_mirror());
     everything.textures = vec![Arc::new(stripes())];
     add_ball(&mut everything, coloured_glass());
@@ -120,14 +114,14 @@ pub fn all() -> Vec<EffectScene> {
     ]
 }
 
-const BALL: DVec3 = DVec3::new(0.35, 0.6, 0.0);
+const BALL: DVec3 = dvec3(0.35, 0.6, 0.0);
 
 /// A floor under a lamp, seen from the side.
 fn room() -> Scene {
     let mut scene = parts::reference_scene(1.0);
-    let lamp = parts::point_light("lamp", DVec3::new(0.2, 2.0, 0.1), Flux(10.0));
+    let lamp = parts::point_light("lamp", dvec3(0.2, 2.0, 0.1), Flux(10.0));
     scene.lights.push(lamp);
-    scene.cameras = vec![camera(DVec3::new(0.0, 1.5, 3.0), DVec3::new(0.0, 0.5, 0.0))];
+    scene.cameras = vec![camera(dvec3(0.0, 1.5, 3.0), dvec3(0.0, 0.5, 0.0))];
     scene
 }
 
@@ -137,9 +131,9 @@ fn camera(from: DVec3, to: DVec3) -> Camera {
 
 /// Upright, so that it reflects light to the floor.
 fn add_mirror(scene: &mut Scene, material: Material) {
-    let mut mesh: Mesh = shapes::rectangle(DVec3::new(-0.6, 0.4, 0.0), DVec3::Y * 0.3, DVec3::Z * 0.3);
+    let mut mesh: Mesh = shapes::rectangle(dvec3(-0.6, 0.4, 0.0), DVec3::Y * 0.3, DVec3::Z * 0.3);
     mesh.uv0.get_or_insert_with(|| {
-        let corner = |place: &DVec3| DVec2::new(place.z, place.y) * 2.0;
+        let corner = |place: &DVec3| dvec2(place.z, place.y) * 2.0;
         mesh.positions.iter().map(corner).collect()
     });
     parts::add(scene, "mirror", mesh, material);
@@ -155,13 +149,8 @@ fn add_box(scene: &mut Scene, name: &str, centre: DVec3, half: f64) {
 }
 
 fn coloured_glass() -> Material {
-    Material {
-        volume: Some(Volume {
-            attenuation_distance_m: 0.3,
-            attenuation_colour: LinearSrgb::new(0.9, 0.4, 0.2),
-        }),
-        ..parts::dielectric("coloured glass", 1.5)
-    }
+    let glass = parts::dielectric("coloured glass", 1.5);
+    tinted(glass, 0.3, rgb(0.9, 0.4, 0.2))
 }
 
 fn wavy_mirror() -> Material {
@@ -212,14 +201,14 @@ pub fn by_image(mirrored: bool) -> Scene {
     let waves = scene.materials[1].waves.take().expect("they are there");
     let flip = if mirrored { -1.0 } else { 1.0 };
     let mesh = scene.objects[1].mesh_in_scene_mut();
-    let uv = |place: &DVec3| DVec2::new(flip * place.x, place.z) / WIDTH_M + 0.5;
+    let uv = |place: &DVec3| dvec2(flip * place.x, place.z) / WIDTH_M + 0.5;
     mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());
     let texel = |index: u32| {
         let (u, v) = (f64::from(index % SIDE) + 0.5, f64::from(index / SIDE) + 0.5);
-        let place = (DVec2::new(u, v) / f64::from(SIDE) - 0.5) * WIDTH_M;
-        let slope = waves.gradient(DVec3::new(flip * place.x, 1.0, place.y)) * STEEPER;
+        let place = (dvec2(u, v) / f64::from(SIDE) - 0.5) * WIDTH_M;
+        let slope = waves.gradient(dvec3(flip * place.x, 1.0, place.y)) * STEEPER;
         // +X along u, +Y against v.
-        let normal = DVec3::new(-flip * slope.x, slope.z, 1.0).normalize();
+        let normal = dvec3(-flip * slope.x, slope.z, 1.0).normalize();
         let [red, green, blue] = (normal * 127.5 + 127.5).to_array().map(|x| x.round() as u8);
         [red, green, blue, 255]
     };

@@ -2,9 +2,7 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use serde_json::{Value, json};
-
-use crate::glb::Glb;
+use crate::prelude::*;
 
 /// A horizontal triangle with legs of 1 m, without lights.
 pub fn dark_triangle() -> Vec<u8> {
@@ -28,7 +26,7 @@ pub fn lamps_with_extent() -> Vec<u8> {
     let file = with_triangle(Glb::empty(), json!({ "name": "floor" }), glow);
     let ball = json!({ "type": "point", "extras": { "radius_m": 0.05 } });
     let sun = json!({ "type": "directional", "extras": { "angular_diameter_deg": 0.53 } });
-    let mut file = with_lamp(file, ball, [0.0, 1.0, 0.0]).with_light("sun", sun);
+    let mut file = file.with_light_at("lamp", ball, [0.0, 1.0, 0.0]).with_light("sun", sun);
     file.json["extensions"]["EXT_lights_area"] = json!({ "lights": [
         { "type": "rect", "intensity": 683.0, "size": 0.5, "rect": { "aspect": 2.0 } },
     ] });
@@ -45,10 +43,12 @@ pub fn mirror_under_lamps() -> Vec<u8> {
     let ceiling = json!({ "name": "ceiling", "translation": [-1.0, 1.5, -1.0], "scale": [4.0, 4.0, 4.0] });
     let file = with_triangle(Glb::empty(), json!({ "name": "ground" }), mirror);
     let file = with_triangle(file, ceiling, plaster);
-    let file = with_lamp(file, json!({ "type": "point", "intensity": 683.0 }), [0.2, 0.7, 0.2]);
+    let file = file.with_light_at("lamp", json!({ "type": "point", "intensity": 683.0 }), [0.2, 0.7, 0.2]);
     let green = json!({ "type": "point", "intensity": 300.0, "color": [0.2, 1.0, 0.1] });
     let ball = json!({ "type": "point", "intensity": 500.0, "extras": { "radius_m": 0.05 } });
-    with_lamp(with_lamp(file, green, [0.6, 0.6, 0.1]), ball, [0.3, 0.8, 0.4]).bytes()
+    file.with_light_at("lamp", green, [0.6, 0.6, 0.1])
+        .with_light_at("lamp", ball, [0.3, 0.8, 0.4])
+        .bytes()
 }
 
 /// A triangle of N-SF11 and one of gold, under a lamp with a spectrum and one without.
@@ -61,8 +61,8 @@ pub fn glasses(spectrum: &str) -> Vec<u8> {
     let file = with_triangle(Glb::empty(), json!({ "name": "pane" }), flint);
     let file = with_triangle(file, json!({ "name": "leaf", "translation": [0.0, 0.5, 0.0] }), gold);
     let coloured = json!({ "type": "point", "extras": { "spectrum": spectrum } });
-    let file = with_lamp(file, coloured, [0.0, 1.0, 0.0]);
-    with_lamp(file, json!({ "type": "point" }), [0.0, 2.0, 0.0]).bytes()
+    let file = file.with_light_at("lamp", coloured, [0.0, 1.0, 0.0]);
+    file.with_light_at("lamp", json!({ "type": "point" }), [0.0, 2.0, 0.0]).bytes()
 }
 
 /// A Radiance image of 2 × 1 pixels of 1 W/(m² sr): 128 · 2^(129 − 136) in each channel.
@@ -79,12 +79,5 @@ fn with_triangle(mut file: Glb, mut node: Value, material: Value) -> Glb {
     let attributes = json!({ "POSITION": positions });
     node["mesh"] = json!(file.push_mesh(json!({ "attributes": attributes, "material": material })));
     file.push_root(node);
-    file
-}
-
-fn with_lamp(file: Glb, light: Value, place: [f64; 3]) -> Glb {
-    let mut file = file.with_light("lamp", light);
-    let nodes = file.json["nodes"].as_array_mut().expect("a list");
-    nodes.last_mut().expect("the lamp's")["translation"] = json!(place);
     file
 }

@@ -1,9 +1,7 @@
 //! FLIP, the perceived difference of two pictures, for low dynamic range (Andersson et al., "FLIP: A Difference
 //! Evaluator for Alternating Images", HPG 2020), with separable filters as in <https://github.com/NVlabs/flip>.
 
-use std::f64::consts::PI;
-
-use nephroid::optics::LinearSrgb;
+use crate::prelude::*;
 
 /// Pixels per degree of a display 0.7 m wide with 3840 pixels, seen from 0.7 m: the authors' default.
 const PIXELS_PER_DEGREE: f64 = 0.7 * 3840.0 / 0.7 * PI / 180.0;

@@ -1,21 +1,17 @@
 //! Scenes simple enough that every pixel is known.
 
-use std::f64::consts::PI;
-use glam::{DMat3, DVec2, DVec3};
-use nephroid::eye_pass::View;
-use nephroid::illumination::{Chart, IlluminationMap, Receiver, UvSet};
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::texture::Wrap;
-use nephroid::scene::{Camera, Material, Mesh, Object, Scene, Texture, TextureRef};
+use nephroid::illumination::{Chart, Receiver, UvSet};
+use nephroid::scene::{Object, TextureRef};
 
-use crate::scenes::{map_of, view_of};
+use crate::prelude::*;
+use crate::scenes::{chart_of, map_of, view_of};
 
 /// Corners of the unit floor, both as (x, z) and as (u, v).
 const CORNERS: [DVec2; 4] = [
-    DVec2::new(0.0, 0.0),
-    DVec2::new(1.0, 0.0),
-    DVec2::new(1.0, 1.0),
-    DVec2::new(0.0, 1.0),
+    dvec2(0.0, 0.0),
+    dvec2(1.0, 0.0),
+    dvec2(1.0, 1.0),
+    dvec2(0.0, 1.0),
 ];
 const TRIANGLES: [[u32; 3]; 2] = [[0, 2, 1], [0, 3, 2]];
 
@@ -23,7 +19,7 @@ const TRIANGLES: [[u32; 3]; 2] = [[0, 2, 1], [0, 3, 2]];
 pub fn floor(name: &str, material: usize, height_m: f64) -> Object {
     let mesh = Mesh {
         positions: CORNERS
-            .map(|corner| DVec3::new(corner.x, height_m, corner.y))
+            .map(|corner| dvec3(corner.x, height_m, corner.y))
             .to_vec(),
         normals: vec![DVec3::Y; 4],
         uv0: Some(CORNERS.to_vec()),
@@ -46,17 +42,12 @@ pub fn floor_scene(material: Material) -> Scene {
 
 /// A map of a floor, with uv = (x, z).
 pub fn floor_map(object: usize, width: usize, height: usize, irradiance: Vec<[f32; 3]>) -> IlluminationMap {
+    let corner_uvs = TRIANGLES.map(|triangle| triangle.map(|corner| CORNERS[corner as usize]));
+    let areas_m2 = vec![1.0 / (width * height) as f64];
     let chart = Chart {
         receiver: Receiver::front(object),
         uv_set: UvSet::TexCoord0,
-        corner_uvs: TRIANGLES.map(|triangle| triangle.map(|corner| CORNERS[corner as usize])).to_vec(),
-        width,
-        height,
-        texel_areas_m2: vec![1.0 / (width * height) as f64],
-        layout: None,
-        beyond: Vec::new(),
-        joints: Vec::new(),
-        islands: std::sync::OnceLock::new(),
+        ..chart_of(corner_uvs.to_vec(), (width, height), areas_m2)
     };
     map_of(chart, irradiance)
 }
@@ -66,7 +57,7 @@ pub fn floor_map(object: usize, width: usize, height: usize, irradiance: Vec<[f3
 pub fn from_above(size: u32) -> View {
     let camera = Camera {
         name: "above".into(),
-        position: DVec3::new(0.5, 1.0, 0.5),
+        position: dvec3(0.5, 1.0, 0.5),
         forward: DVec3::NEG_Y,
         up: DVec3::NEG_Z,
         vertical_fov_rad: 2.0 * 0.5_f64.atan(),

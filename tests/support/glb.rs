@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use nephroid::error::Result;
-use nephroid::scene::{LoadOptions, Scene};
-use serde_json::{Value, json};
+
+use crate::prelude::*;
+use crate::project_file;
 
 /// JSON and binary data of a file.
 #[derive(Clone)]
@@ -79,6 +80,12 @@ impl Glb {
         )
     }
 
+    /// Adds an accessor of vectors.
+    pub fn push_vectors(&mut self, vectors: &[DVec3]) -> usize {
+        let floats: Vec<f32> = vectors.iter().flat_map(|vector| vector.as_vec3().to_array()).collect();
+        self.push_floats(&floats, 3)
+    }
+
     /// Adds a mesh with one primitive.
     pub fn push_mesh(&mut self, primitive: Value) -> usize {
         self.push("meshes", json!({ "primitives": [primitive] }))
@@ -124,6 +131,22 @@ impl Glb {
         let index = lights.len() - 1;
         self.push_root(json!({ "name": name, "extensions": { "KHR_lights_punctual": { "light": index } } }));
         self
+    }
+
+    /// The same light at a place.
+    pub fn with_light_at(self, name: &str, light: Value, place: [f64; 3]) -> Self {
+        let mut file = self.with_light(name, light);
+        let nodes = file.json["nodes"].as_array_mut().expect("a list");
+        nodes.last_mut().expect("the light's")["translation"] = json!(place);
+        file
+    }
+
+    /// Adds an image of these bytes, a texture of it, and a material with that texture, for the first mesh.
+    pub fn with_texture(mut self, bytes: &[u8], mut image: Value, texture: Value) -> Self {
+        image["bufferView"] = json!(self.push_view(bytes));
+        self.push("images", image);
+        self.push("textures", texture);
+        self.with_material(json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }))
     }
 
     /// The bytes of the `.glb` file.
@@ -186,6 +209,11 @@ pub fn parts_of(file: &[u8]) -> Option<(&[u8], &[u8])> {
     let word = |at: usize| Some(u32::from_le_bytes(file.get(at..at + 4)?.try_into().ok()?) as usize);
     let json_end = 20 + word(12)?;
     Some((file.get(20..json_end)?, file.get(json_end + 8..).unwrap_or_default()))
+}
+
+/// A file of the folder of files that others packed.
+pub fn golden(name: &str) -> Vec<u8> {
+    std::fs::read(project_file(&format!("tests/goldens/gltf/{name}"))).expect("the file is part of the project")
 }
 
 /// Loads bytes as a `.glb` file.

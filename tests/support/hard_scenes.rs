@@ -2,14 +2,10 @@
 //! light, small casters, several receivers. Metres, watts, y up; each has one light, and receivers named `floor`,
 //! `wall`, `blocker`, …
 
-use std::f64::consts::{PI, TAU};
+use nephroid::scene::PanelShape;
 
-use glam::{DMat3, DVec3};
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{LightKind, LightSize, Material, Mesh, PanelShape, Scene};
-use nephroid::units::{Flux, Irradiance, Radiance};
-
+use crate::prelude::*;
+use crate::scenes::panel;
 use crate::tools::builtin_scene;
 
 /// Normals of a mesh.
@@ -27,7 +23,7 @@ pub fn ring(segments: u32, shading: Shading) -> Scene {
     let mut scene = named(&name, parts::reference_scene(1.0));
     let smooth = shapes::sheet(segments, 1, |u, v| {
         let (sine, cosine) = (TAU * u.fract()).sin_cos();
-        let outward = DVec3::new(cosine, 0.0, sine);
+        let outward = dvec3(cosine, 0.0, sine);
         (outward + DVec3::Y * (0.5 * v), -outward)
     });
     let mesh = match shading {
@@ -35,7 +31,7 @@ pub fn ring(segments: u32, shading: Shading) -> Scene {
         Shading::Flat => flat(&smooth),
     };
     parts::add(&mut scene, "ring", mesh, parts::mirror());
-    lamp(&mut scene, DVec3::new(-0.7, 1.2, 0.0));
+    lamp(&mut scene, dvec3(-0.7, 1.2, 0.0));
     scene
 }
 
@@ -44,8 +40,8 @@ pub fn ring_with_blocker() -> Scene {
     let mut scene = ring(256, Shading::Smooth);
     blocker(
         &mut scene,
-        DVec3::new(0.05, 0.6, -0.15),
-        DVec3::new(0.2, 0.8, 0.1),
+        dvec3(0.05, 0.6, -0.15),
+        dvec3(0.2, 0.8, 0.1),
     );
     scene.name = "ring_with_blocker".into();
     scene
@@ -54,8 +50,8 @@ pub fn ring_with_blocker() -> Scene {
 /// Built-in `ball` (oracle S2) with 20,480 triangles.
 pub fn ball() -> Scene {
     let mut scene = named("ball", parts::reference_scene(0.6));
-    glass_ball(&mut scene, DVec3::new(0.0, 0.8, 0.0), 0.5, 5);
-    lamp(&mut scene, DVec3::new(0.0, 3.0, 0.0));
+    glass_ball(&mut scene, dvec3(0.0, 0.8, 0.0), 0.5, 5);
+    lamp(&mut scene, dvec3(0.0, 3.0, 0.0));
     scene
 }
 
@@ -64,8 +60,8 @@ pub fn ball_with_blocker() -> Scene {
     let mut scene = ball();
     blocker(
         &mut scene,
-        DVec3::new(0.03, 0.1, -0.06),
-        DVec3::new(0.15, 0.14, 0.05),
+        dvec3(0.03, 0.1, -0.06),
+        dvec3(0.15, 0.14, 0.05),
     );
     scene.name = "ball_with_blocker".into();
     scene
@@ -80,13 +76,13 @@ pub fn torus(material: Material) -> Scene {
     let mesh = shapes::sheet(128, 64, |u, v| {
         let ((sine_u, cosine_u), (sine_v, cosine_v)) =
             ((TAU * u.fract()).sin_cos(), (TAU * v.fract()).sin_cos());
-        let outward = DVec3::new(cosine_u, 0.0, sine_u);
+        let outward = dvec3(cosine_u, 0.0, sine_u);
         let normal = outward * cosine_v + DVec3::Y * sine_v;
         let point = outward * ring_m + normal * tube_m;
-        (DVec3::new(0.0, 0.6, 0.0) + tilt * point, tilt * normal)
+        (dvec3(0.0, 0.6, 0.0) + tilt * point, tilt * normal)
     });
     parts::add(&mut scene, "torus", mesh, material);
-    lamp(&mut scene, DVec3::new(0.5, 2.0, 0.3));
+    lamp(&mut scene, dvec3(0.5, 2.0, 0.3));
     scene
 }
 
@@ -105,13 +101,13 @@ pub fn grazing_pool() -> Scene {
             slope_z -= 0.02 * kz * sine;
         }
         (
-            DVec3::new(x, height, z),
-            DVec3::new(-slope_x, 1.0, -slope_z).normalize(),
+            dvec3(x, height, z),
+            dvec3(-slope_x, 1.0, -slope_z).normalize(),
         )
     });
     parts::add(&mut scene, "water", water, parts::dielectric("water", 1.333));
     let (sine, cosine) = 10.0_f64.to_radians().sin_cos();
-    sun(&mut scene, DVec3::new(cosine, -sine, 0.0));
+    sun(&mut scene, dvec3(cosine, -sine, 0.0));
     scene
 }
 
@@ -119,19 +115,19 @@ pub fn grazing_pool() -> Scene {
 pub fn mirror_bowl() -> Scene {
     let mut scene = named("mirror_bowl", parts::reference_scene(1.0));
     let tilt = DMat3::from_rotation_z(2.2);
-    let centre = DVec3::new(-0.2, 0.8, 0.0);
+    let centre = dvec3(-0.2, 0.8, 0.0);
     let inside = cap(96, 48, |direction| {
         (centre + tilt * direction * 0.5, -(tilt * direction))
     });
     parts::add(&mut scene, "bowl", inside, parts::mirror());
-    lamp(&mut scene, centre + DVec3::new(0.1, -0.05, 0.07));
+    lamp(&mut scene, centre + dvec3(0.1, -0.05, 0.07));
     scene
 }
 
 /// A glass bowl, open at the top, with the lamp above its rim.
 pub fn glass_bowl() -> Scene {
     let mut scene = named("glass_bowl", parts::reference_scene(1.0));
-    let (centre, outer_m, inner_m) = (DVec3::new(0.0, 0.65, 0.0), 0.5, 0.44);
+    let (centre, outer_m, inner_m) = (dvec3(0.0, 0.65, 0.0), 0.5, 0.44);
     let mut bowl = cap(96, 48, |direction| (centre + direction * outer_m, direction));
     shapes::append(
         &mut bowl,
@@ -140,20 +136,20 @@ pub fn glass_bowl() -> Scene {
     let rim = shapes::sheet(96, 1, |u, v| {
         let (sine, cosine) = (TAU * u.fract()).sin_cos();
         let radius = inner_m + (outer_m - inner_m) * v;
-        (centre + DVec3::new(cosine, 0.0, sine) * radius, DVec3::Y)
+        (centre + dvec3(cosine, 0.0, sine) * radius, DVec3::Y)
     });
     shapes::append(&mut bowl, &rim);
     parts::add(&mut scene, "bowl", bowl, parts::dielectric("glass", 1.5));
-    lamp(&mut scene, centre + DVec3::new(0.15, 0.6, 0.1));
+    lamp(&mut scene, centre + dvec3(0.15, 0.6, 0.1));
     scene
 }
 
 /// A glass ball cut into 320 flat facets.
 pub fn cut_glass() -> Scene {
     let mut scene = named("cut_glass", parts::reference_scene(1.0));
-    let facets = flat(&shapes::sphere(DVec3::new(0.0, 0.7, 0.0), 0.4, 2));
+    let facets = flat(&shapes::sphere(dvec3(0.0, 0.7, 0.0), 0.4, 2));
     parts::add(&mut scene, "gem", facets, parts::dielectric("glass", 1.5));
-    lamp(&mut scene, DVec3::new(0.3, 2.5, 0.1));
+    lamp(&mut scene, dvec3(0.3, 2.5, 0.1));
     scene
 }
 
@@ -175,36 +171,36 @@ pub fn tiny_ball(parts_of: TinyBall) -> Scene {
     };
     let mut scene = named(name, parts::reference_scene(0.6));
     if parts_of != TinyBall::Mirror {
-        glass_ball(&mut scene, DVec3::new(-0.3, 0.3, 0.0), 0.000_225, 4);
+        glass_ball(&mut scene, dvec3(-0.3, 0.3, 0.0), 0.000_225, 4);
     }
     if parts_of != TinyBall::Ball {
         let mirror = shapes::rectangle(
-            DVec3::new(0.55, 0.35, 0.0),
-            DVec3::new(0.03, 0.2, 0.0),
+            dvec3(0.55, 0.35, 0.0),
+            dvec3(0.03, 0.2, 0.0),
             DVec3::Z * 0.2,
         );
         parts::add(&mut scene, "mirror", mirror, parts::mirror());
     }
-    sun(&mut scene, DVec3::new(0.5, -1.0, 0.05));
+    sun(&mut scene, dvec3(0.5, -1.0, 0.05));
     scene
 }
 
 /// A ball that is lit through another.
 pub fn balls_in_series() -> Scene {
     let mut scene = named("balls_in_series", parts::reference_scene(0.6));
-    glass_ball(&mut scene, DVec3::new(0.02, 1.4, 0.0), 0.3, 4);
-    glass_ball(&mut scene, DVec3::new(-0.03, 0.6, 0.02), 0.25, 4);
-    lamp(&mut scene, DVec3::new(0.1, 3.0, 0.05));
+    glass_ball(&mut scene, dvec3(0.02, 1.4, 0.0), 0.3, 4);
+    glass_ball(&mut scene, dvec3(-0.03, 0.6, 0.02), 0.25, 4);
+    lamp(&mut scene, dvec3(0.1, 3.0, 0.05));
     scene
 }
 
 /// The ball above a floor, in front of a wall, with a table below part of it.
 pub fn ball_in_a_room() -> Scene {
     let mut scene = ball();
-    let wall = shapes::rectangle(DVec3::new(-0.6, 0.6, 0.0), DVec3::Z * -0.6, DVec3::Y * 0.6);
+    let wall = shapes::rectangle(dvec3(-0.6, 0.6, 0.0), DVec3::Z * -0.6, DVec3::Y * 0.6);
     let matte = |name| parts::matte(name, LinearSrgb::grey(0.5));
     parts::add(&mut scene, "wall", wall, matte("wall"));
-    let table = shapes::cuboid(DVec3::new(0.05, 0.15, -0.4), DVec3::new(0.5, 0.19, 0.3));
+    let table = shapes::cuboid(dvec3(0.05, 0.15, -0.4), dvec3(0.5, 0.19, 0.3));
     parts::add(&mut scene, "table", table, matte("table"));
     scene.name = "ball_in_a_room".into();
     scene
@@ -212,7 +208,7 @@ pub fn ball_in_a_room() -> Scene {
 
 /// The scene with its floor rotated by 30° about a horizontal axis through its centre.
 pub fn with_tilted_floor(mut scene: Scene) -> Scene {
-    let tilt = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), PI / 6.0);
+    let tilt = DMat3::from_axis_angle(dvec3(0.6, 0.0, 0.8), PI / 6.0);
     for object in scene.objects.iter_mut().filter(|object| object.name == "floor") {
         let mesh = object.mesh_in_scene_mut();
         mesh.positions.iter_mut().for_each(|p| *p = tilt * *p);
@@ -289,7 +285,7 @@ fn cap(columns: u32, rows: u32, surface: impl Fn(DVec3) -> (DVec3, DVec3)) -> Me
     shapes::sheet(columns, rows, |u, v| {
         let (sine_u, cosine_u) = (TAU * u.fract()).sin_cos();
         let (sine_v, cosine_v) = (0.5 * PI * v).sin_cos();
-        surface(DVec3::new(sine_v * cosine_u, -cosine_v, sine_v * sine_u))
+        surface(dvec3(sine_v * cosine_u, -cosine_v, sine_v * sine_u))
     })
 }
 
@@ -297,13 +293,9 @@ fn cap(columns: u32, rows: u32, surface: impl Fn(DVec3) -> (DVec3, DVec3)) -> Me
 /// intensity on the axis does not depend on the side.
 pub fn under_square_lamp(name: &str, side_m: f64) -> Scene {
     let mut scene = builtin_scene(name);
-    scene.lights[0].kind = LightKind::Panel {
-        centre: scene.lights[0].kind.position().expect("a point light"),
-        across: DVec3::X * (0.5 * side_m),
-        down: DVec3::Z * (0.5 * side_m),
-        shape: PanelShape::Rectangle,
-        radiance: Radiance(8.0 / (side_m * side_m)),
-    };
+    let centre = scene.lights[0].kind.position().expect("a point light");
+    let sides = [DVec3::X, DVec3::Z].map(|side| side * (0.5 * side_m));
+    scene.lights[0].kind = panel(centre, sides, PanelShape::Rectangle, 8.0 / (side_m * side_m)).kind;
     scene
 }
 

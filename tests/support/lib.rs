@@ -14,6 +14,7 @@ pub mod glb;
 pub mod hard_scenes;
 pub mod laws;
 pub mod meshes;
+pub mod prelude;
 pub mod program;
 pub mod random_scenes;
 pub mod references;

@@ -1,7 +1,7 @@
 //! Meshes shared by the tests.
 
-use glam::{DMat3, DVec2, DVec3};
-use nephroid::scene::Mesh;
+use crate::prelude::*;
+
 pub use nephroid::scene::builtin::shapes::cuboid;
 
 /// A parallelogram with a corner and two sides. It faces −(side_u × side_v), so that u × v = −normal as on the floors
@@ -21,7 +21,7 @@ pub fn quad(corner: DVec3, side_u: DVec3, side_v: DVec3) -> Mesh {
 /// The square |x|, |z| ≤ half in the plane y = height, facing up.
 pub fn floor(half: f64, height: f64) -> Mesh {
     quad(
-        DVec3::new(-half, height, -half),
+        dvec3(-half, height, -half),
         DVec3::X * 2.0 * half,
         DVec3::Z * 2.0 * half,
     )
@@ -63,7 +63,7 @@ pub fn grid(columns: usize, rows: usize, place: impl Fn(f64, f64) -> DVec3) -> M
 pub fn sphere(centre: DVec3, radius: f64, columns: usize, rows: usize) -> Mesh {
     let mut mesh = grid(columns, rows, |s, t| {
         let (phi, theta) = (s * std::f64::consts::TAU, (1.0 - t) * std::f64::consts::PI);
-        centre + radius * DVec3::new(theta.sin() * phi.cos(), -theta.cos(), theta.sin() * phi.sin())
+        centre + radius * dvec3(theta.sin() * phi.cos(), -theta.cos(), theta.sin() * phi.sin())
     });
     // Watertight: vertices at the seam and at the poles are equal bit for bit.
     let stride = columns + 1;
@@ -96,6 +96,13 @@ pub fn joined(mut a: Mesh, b: Mesh) -> Mesh {
             .map(|triangle| triangle.map(|vertex| vertex + offset)),
     );
     a
+}
+
+/// The mesh inside out.
+pub fn inside_out(mut mesh: Mesh) -> Mesh {
+    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
+    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    mesh
 }
 
 /// The mesh rotated about the origin, then translated.

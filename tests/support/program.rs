@@ -3,8 +3,9 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
-use serde_json::Value;
 use tempfile::TempDir;
+
+use crate::prelude::*;
 
 /// An empty working folder for the program, and a cache folder for it and its drivers. Both are removed at the end.
 pub struct Sandbox {

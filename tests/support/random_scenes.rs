@@ -1,12 +1,7 @@
 //! Random scenes: a floor, one to three casters, some of them enclosed, up to three walls, one to three lamps.
 
-use glam::{DQuat, DVec3};
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Light, LightKind, Material, Scene, SurfaceKind, Volume};
-use nephroid::units::{Flux, Irradiance, RadiantIntensity};
-
-use crate::laws::scenes::{Build, floor, light, random};
+use crate::prelude::*;
+use crate::laws::scenes::{Build, floor, random, spot, tinted};
 
 /// Largest number of lamps in a scene.
 pub const MAX_LAMPS: u32 = 3;
@@ -46,7 +41,7 @@ impl<F: FnMut() -> f64> Dice<F> {
 
     fn place(&mut self, height: [f64; 2]) -> DVec3 {
         let x = self.between(-0.8, 0.8);
-        DVec3::new(x, self.between(height[0], height[1]), self.between(-0.8, 0.8))
+        dvec3(x, self.between(height[0], height[1]), self.between(-0.8, 0.8))
     }
 
     fn turn(&mut self) -> DQuat {
@@ -54,12 +49,9 @@ impl<F: FnMut() -> f64> Dice<F> {
     }
 
     fn glass(&mut self) -> Material {
-        let mut glass = parts::dielectric("glass", self.between(1.2, 1.9));
+        let glass = parts::dielectric("glass", self.between(1.2, 1.9));
         if self.below(3) == 0 {
-            glass.volume = Some(Volume {
-                attenuation_distance_m: self.between(0.05, 1.0),
-                attenuation_colour: LinearSrgb::new(0.9, 0.5, 0.3),
-            });
+            return tinted(glass, self.between(0.05, 1.0), rgb(0.9, 0.5, 0.3));
         }
         glass
     }
@@ -93,16 +85,10 @@ impl<F: FnMut() -> f64> Dice<F> {
         let place = self.place([0.8, 2.2]);
         match self.below(4) {
             0 => {
-                let direction = DVec3::new(self.between(-1.0, 1.0), -1.0, self.between(-1.0, 1.0));
+                let direction = dvec3(self.between(-1.0, 1.0), -1.0, self.between(-1.0, 1.0));
                 parts::sun("sun", direction, Irradiance(2.0))
             }
-            1 => light(LightKind::Spot {
-                position: place,
-                direction: (self.place([0.0, 0.6]) - place).normalize(),
-                intensity: RadiantIntensity(2.0),
-                inner_cone_rad: 0.2,
-                outer_cone_rad: self.between(0.3, 1.0),
-            }),
+            1 => spot(place, self.place([0.0, 0.6]) - place, 2.0, [0.2, self.between(0.3, 1.0)]),
             _ => parts::point_light("lamp", place, Flux(10.0)),
         }
     }

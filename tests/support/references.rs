@@ -1,11 +1,10 @@
 //! Built-in scenes with maps of an independent solver (`assets/reference`), and the required agreement of bakes.
 
 use nephroid::illumination::compare::{average_relative_difference, relative_rmse};
-use nephroid::scene::Scene;
-use nephroid::bake::Bake;
 
+use crate::prelude::*;
 use crate::tools::{bake, builtin_scene, caustic, energy_fault, map_of, to};
-use crate::{assert_close, reference_map};
+use crate::reference_map;
 
 /// Largest relative RMSE of a bake, over its target.
 const MOST: f64 = 1.2;

@@ -1,18 +1,12 @@
 //! Small scenes and pictures shared by the tests.
 
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
-use nephroid::eye_pass::reference::{EyeRays, ReferenceSettings, render_counted};
-use nephroid::eye_pass::{Picture, ToneMap, View};
-use nephroid::illumination::{Chart, IlluminationMap, Layer, parametrise};
+use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings, render_counted};
+use nephroid::eye_pass::ToneMap;
+use nephroid::illumination::{Chart, Layer, Receiver, UvSet, parametrise};
 use nephroid::light_pass::direct::{DirectLayer, bake_direct};
-use nephroid::optics::LinearSrgb;
-use nephroid::progress::Control;
-use nephroid::scene::{Camera, Light, LightKind, LightSize, Material, Mesh, Object, PanelShape, Scene, SurfaceKind, Wave};
-use nephroid::settings::LayerKind;
-use nephroid::transport::Tracer;
-use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
+use nephroid::scene::{Environment, Object, PanelShape, Volume};
+
+use crate::prelude::*;
 
 /// A scene of meshes, each with its own material.
 pub fn scene(parts: Vec<(Mesh, Material)>, lights: Vec<Light>) -> Scene {
@@ -75,25 +69,58 @@ pub fn sun(direction: DVec3, normal_irradiance: f64) -> Light {
     })
 }
 
-/// A wave that stands still.
+/// A spot, with the angles of its inner and its outer cone [rad].
+pub fn spot(position: DVec3, direction: DVec3, intensity: f64, cones_rad: [f64; 2]) -> Light {
+    light(LightKind::Spot {
+        position,
+        direction: direction.normalize(),
+        intensity: RadiantIntensity(intensity),
+        inner_cone_rad: cones_rad[0],
+        outer_cone_rad: cones_rad[1],
+    })
+}
+
+/// A panel, with its half sides.
+pub fn panel(centre: DVec3, [across, down]: [DVec3; 2], shape: PanelShape, radiance: f64) -> Light {
+    light(LightKind::Panel {
+        centre,
+        across,
+        down,
+        shape,
+        radiance: Radiance(radiance),
+    })
+}
+
+/// A scene in the light of a sky alone.
+pub fn under_sky(mut scene: Scene, sky: Option<Environment>, scale: f64) -> Scene {
+    scene.environment = Some(Arc::new(sky.expect("a sound image")));
+    scene.lights = vec![light(LightKind::Environment { scale })];
+    scene
+}
+
+/// A material of which a body keeps a colour over a distance [m].
+pub fn tinted(material: Material, attenuation_distance_m: f64, attenuation_colour: LinearSrgb) -> Material {
+    Material {
+        volume: Some(Volume {
+            attenuation_distance_m,
+            attenuation_colour,
+        }),
+        ..material
+    }
+}
+
 /// A bulb, a sun and panels of both outlines: small ones, which shine down and towards +z.
 pub fn lamps_of_all_kinds(place: DVec3) -> Vec<Light> {
-    let panel = |shape| {
-        light(LightKind::Panel {
-            centre: place,
-            across: DVec3::X * 0.06,
-            down: DVec3::new(0.0, 0.05, 0.06),
-            shape,
-            radiance: Radiance(40.0),
-        })
-    };
+    let sides = [DVec3::X * 0.06, dvec3(0.0, 0.05, 0.06)];
+    let panel = |shape| panel(place, sides, shape, 40.0);
     let mut bulb = point_light(place, 2.0);
     bulb.size = LightSize::Radius { radius_m: 0.04 };
-    let mut sun = sun(DVec3::new(0.0, -0.6, 0.8), 3.0);
+    let mut sun = sun(dvec3(0.0, -0.6, 0.8), 3.0);
     sun.size = LightSize::Angle { diameter_rad: 0.05 };
     vec![bulb, sun, panel(PanelShape::Rectangle), panel(PanelShape::Disc)]
 }
 
+/// A wave that stands still.
 pub fn wave(amplitude_m: f64, wavelength_m: f64, direction: DVec3, phase_rad: f64) -> Wave {
     Wave {
         amplitude_m,
@@ -131,6 +158,26 @@ pub fn flux_w(chart: &Chart, layer: &DirectLayer) -> f64 {
         .sum()
 }
 
+/// A chart of object 0 by generated coordinates of its triangles.
+pub fn chart_of(
+    corner_uvs: Vec<[DVec2; 3]>,
+    (width, height): (usize, usize),
+    texel_areas_m2: Vec<f64>,
+) -> Chart {
+    Chart {
+        receiver: Receiver::front(0),
+        uv_set: UvSet::Generated,
+        corner_uvs,
+        width,
+        height,
+        texel_areas_m2,
+        layout: None,
+        beyond: Vec::new(),
+        joints: Vec::new(),
+        islands: std::sync::OnceLock::new(),
+    }
+}
+
 /// A map with one layer.
 pub fn map_of(chart: impl Into<Arc<Chart>>, irradiance: Vec<[f32; 3]>) -> IlluminationMap {
     IlluminationMap {
@@ -158,6 +205,21 @@ pub fn view_of(camera: Camera, size: [u32; 2]) -> View {
     }
 }
 
+/// Settings of the CPU eye pass with other limits of chains.
+pub fn limited(change: impl FnOnce(&mut ChainLimits)) -> ReferenceSettings {
+    let mut settings = ReferenceSettings::default();
+    change(&mut settings.limits);
+    settings
+}
+
+/// Settings that follow every chain to its end: what is left out is below a billionth.
+pub fn to_the_end(samples_per_side: u32) -> ReferenceSettings {
+    ReferenceSettings {
+        samples_per_side,
+        ..limited(|limits| (limits.max_depth, limits.branch_threshold) = (64, 1e-10))
+    }
+}
+
 /// The picture of the CPU eye pass and the rays traced for it.
 pub fn seen(
     tracer: &Tracer,
@@ -177,5 +239,5 @@ pub fn bits(picture: &Picture) -> Vec<u32> {
 /// Centres of the pixels of a square picture, or of the texels of a square map, in the unit square, row by row.
 pub fn middles(side: usize) -> impl Iterator<Item = DVec2> {
     let at = move |index: usize| (index as f64 + 0.5) / side as f64;
-    (0..side * side).map(move |index| DVec2::new(at(index % side), at(index / side)))
+    (0..side * side).map(move |index| dvec2(at(index % side), at(index / side)))
 }

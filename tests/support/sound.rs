@@ -1,6 +1,8 @@
 //! Validity of loaded scenes.
 
-use nephroid::scene::{Camera, Light, LightKind, Material, Object, Scene, Texture};
+use nephroid::scene::Object;
+
+use crate::prelude::*;
 
 /// Whether a condition holds, and what is wrong if not.
 type Promise = (bool, &'static str);

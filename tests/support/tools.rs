@@ -1,15 +1,10 @@
 //! Short forms for bakes, and checks that are themselves tested with wrong input.
 
-use std::sync::Arc;
-
-use glam::{DMat3, DVec3};
-use nephroid::illumination::IlluminationMap;
-use nephroid::progress::Control;
-use nephroid::scene::{Camera, LightKind, Scene, builtin};
-use nephroid::bake::{Bake, Baker};
-use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, MapResolution};
+use nephroid::bake::Baker;
+use nephroid::settings::{ErrorMetric, Estimator};
 use nephroid::study::brute_force::brute_force;
-use nephroid::transport::Tracer;
+
+use crate::prelude::*;
 
 /// A built-in scene, which must exist.
 pub fn builtin_scene(name: &str) -> Scene {
@@ -77,7 +72,7 @@ pub fn caustic(map: &IlluminationMap) -> Vec<f64> {
         .irradiance
         .iter()
         .map(|&[r, g, b]| {
-            nephroid::optics::LinearSrgb::new(f64::from(r), f64::from(g), f64::from(b)).luminance()
+            rgb(f64::from(r), f64::from(g), f64::from(b)).luminance()
         })
         .collect()
 }

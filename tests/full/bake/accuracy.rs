@@ -1,13 +1,13 @@
 //! Errors without a reference, against errors against one: a bake of the same mesh with many times the rays.
 
+use nephroid::bake::StopReason;
 use nephroid::bake::forecast::{forecast, stood_at};
-use nephroid::bake::{Bake, StopReason};
 use nephroid::illumination::visible::visible_error;
-use nephroid::scene::{LoadOptions, Scene};
-use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind, RayPlacement};
+use nephroid::settings::{ErrorMetric, Estimator, RayPlacement};
 
 use crate::bake::common::{caustic_like, same_map};
 use support::glb::load_path;
+use support::prelude::*;
 use support::tools::{bake, builtin_scene, caustic, photons, set, settings, to};
 use support::{or_skip, random_scenes, shared_or_skip};
 

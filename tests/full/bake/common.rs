@@ -1,16 +1,9 @@
 //! Sessions, settings and comparisons that tests of bakes share.
 
-use std::sync::Arc;
-
-use glam::{DQuat, DVec3};
-use nephroid::bake::{Bake, Baker};
-use nephroid::illumination::IlluminationMap;
+use nephroid::bake::Baker;
 use nephroid::illumination::compare::relative_rmse;
-use nephroid::progress::Control;
-use nephroid::scene::builtin::shapes;
-use nephroid::scene::{Edit, Mesh, Scene};
-use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 
+use support::prelude::*;
 use support::tools::{bake, bits, brute, caustic, map_of, set, settings};
 
 pub fn session(scene: &Scene) -> Baker {
@@ -139,7 +132,7 @@ pub fn off_brute_force(result: &Bake, scene: &Scene, rays: u64, most_noise: f64)
 pub fn torus(centre: DVec3, turn: DQuat, size: f64) -> Mesh {
     shapes::sheet(96, 48, |u, v| {
         let ((sine_u, cosine_u), (sine_v, cosine_v)) = (turned(u), turned(v));
-        let outward = DVec3::new(cosine_u, 0.0, sine_u);
+        let outward = dvec3(cosine_u, 0.0, sine_u);
         let normal = outward * cosine_v + DVec3::Y * sine_v;
         let place = centre + turn * (outward + normal * 0.4) * (0.7 * size);
         (place, turn * normal)
@@ -148,5 +141,5 @@ pub fn torus(centre: DVec3, turn: DQuat, size: f64) -> Mesh {
 
 /// Sine and cosine of so many turns.
 pub fn turned(turns: f64) -> (f64, f64) {
-    (std::f64::consts::TAU * turns.fract()).sin_cos()
+    (TAU * turns.fract()).sin_cos()
 }

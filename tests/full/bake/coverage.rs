@@ -1,15 +1,13 @@
 //! Flux-carrying triangles on a map, against clipping texel by texel.
 
-use std::sync::Arc;
-
-use glam::DVec2;
 use nephroid::illumination::accumulator::{FluxAccumulator, FluxCount};
-use nephroid::illumination::{Chart, Receiver, UvSet};
+use nephroid::illumination::{Chart, Receiver};
 use nephroid::light_pass::coverage::{CoverageReport, FluxTriangle, deposit_triangles};
 use nephroid::light_pass::receiver_maps::ReceiverMaps;
-use proptest::prelude::*;
 
 use crate::bake::tiles;
+use support::prelude::*;
+use support::scenes::chart_of;
 
 /// Counts of a triangle in most tests: enough for the counts to be as good as real numbers.
 const FLUX: i64 = 1_000_000_000_000;
@@ -33,19 +31,8 @@ fn strip(left: f64, right: f64) -> [[DVec2; 3]; 2] {
 }
 
 /// A chart of two triangles that fills its map.
-pub(super) fn full_chart((width, height): (usize, usize)) -> Chart {
-    Chart {
-        receiver: Receiver::front(0),
-        uv_set: UvSet::Generated,
-        corner_uvs: strip(0.0, 1.0).to_vec(),
-        width,
-        height,
-        texel_areas_m2: vec![1.0],
-        layout: None,
-        beyond: Vec::new(),
-        joints: Vec::new(),
-        islands: std::sync::OnceLock::new(),
-    }
+pub(super) fn full_chart(size: (usize, usize)) -> Chart {
+    chart_of(strip(0.0, 1.0).to_vec(), size, vec![1.0])
 }
 
 /// A chart of two islands: the left and the right third of the map.
@@ -135,7 +122,7 @@ fn area(polygon: &[DVec2]) -> f64 {
 /// The part of a triangle in a texel, of its whole area.
 fn share(corners: [DVec2; 3], column: usize, row: usize) -> f64 {
     // Relative to the texel, so that the cuts are as exact as can be.
-    let corner = DVec2::new(column as f64, row as f64);
+    let corner = dvec2(column as f64, row as f64);
     let mut part: Vec<DVec2> = corners.iter().map(|point| point - corner).collect();
     part = clip(&part, |point| point.x);
     part = clip(&part, |point| 1.0 - point.x);

@@ -1,22 +1,13 @@
 //! Light between diffuse surfaces against closed forms.
 
-use std::f64::consts::PI;
-use std::sync::Arc;
-
-use glam::DVec3;
-use nephroid::bake::{Bake, Baker};
-use nephroid::illumination::{Chart, IlluminationMap, Receiver};
+use nephroid::bake::Baker;
+use nephroid::illumination::{Chart, Receiver};
 use nephroid::light_pass::indirect::{MIN_PASSES, Network};
-use nephroid::optics::LinearSrgb;
-use nephroid::progress::Control;
-use nephroid::scene::{Light, LightKind, Material, Mesh, Scene, SurfaceKind, Volume};
-use nephroid::settings::{BakeSettings, LayerKind};
-use nephroid::transport::Tracer;
-use nephroid::units::Radiance;
 
 use crate::bake::common::{self, all_bits, run, with_layers};
-use support::meshes::{cuboid, floor, quad, sphere};
-use support::scenes::{diffuse, light, point_light, scene, sun, surface};
+use support::meshes::{cuboid, floor, inside_out, quad, sphere};
+use support::prelude::*;
+use support::scenes::{diffuse, light, point_light, scene, sun, surface, tinted};
 use support::tools::{bake, set, to};
 
 fn settings(layers: &[LayerKind], side: usize, max_error: f64) -> BakeSettings {
@@ -40,15 +31,9 @@ fn smooth(kind: SurfaceKind) -> Material {
     }
 }
 
-fn inwards(mut mesh: Mesh) -> Mesh {
-    mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-    mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-    mesh
-}
-
 /// A box whose walls face inwards.
 fn room() -> Mesh {
-    inwards(cuboid(DVec3::ZERO, DVec3::new(1.0, 1.5, 2.0)))
+    inside_out(cuboid(DVec3::ZERO, dvec3(1.0, 1.5, 2.0)))
 }
 
 fn map(result: &Bake, object: usize) -> &IlluminationMap {
@@ -102,7 +87,7 @@ fn a_furnace_is_even() {
 #[test]
 fn walls_take_all_that_a_lamp_sends() {
     let all = [LayerKind::Caustic, LayerKind::Direct, LayerKind::Indirect];
-    let ball = sphere(DVec3::new(0.5, 0.5, 1.0), 0.3, 96, 48);
+    let ball = sphere(dvec3(0.5, 0.5, 1.0), 0.3, 96, 48);
     for (albedo, ball, settings, tolerance) in [
         (0.5, None, settings(&LIT, 128, 0.03), 0.005),
         (0.8, None, settings(&LIT, 128, 0.03), 0.005),
@@ -111,7 +96,7 @@ fn walls_take_all_that_a_lamp_sends() {
         let has_ball = ball.is_some();
         let mut parts = vec![(room(), one_sided(albedo))];
         parts.extend(ball.map(|ball| (ball, smooth(SurfaceKind::Dielectric))));
-        let lamp = point_light(DVec3::new(0.3, 1.2, 0.7), 5.0);
+        let lamp = point_light(dvec3(0.3, 1.2, 0.7), 5.0);
         let result = bake(scene(parts, vec![lamp]), &settings);
         let all = result.maps.iter().flat_map(texels);
         let flux_w: f64 = all.map(|(e, area_m2)| e * area_m2).sum();
@@ -146,7 +131,7 @@ fn anything_clear_changes_no_even_light() {
         SurfaceKind::ThinWall,
         SurfaceKind::Mirror,
     ] {
-        let ball = sphere(DVec3::new(0.5, 0.6, 1.0), 0.3, 48, 24);
+        let ball = sphere(dvec3(0.5, 0.6, 1.0), 0.3, 48, 24);
         let parts = vec![(room(), one_sided(albedo)), (ball, smooth(kind))];
         let expected = albedo / (1.0 - albedo);
         for e in under_even_light(parts, &[(0, 16)], 16) {
@@ -161,13 +146,9 @@ fn anything_clear_changes_no_even_light() {
 #[test]
 fn water_takes_its_share_between_walls() {
     let (albedo, radius_m) = (0.6, 0.8);
-    let colour = LinearSrgb::new(0.3, 0.6, 0.95);
-    let mut water = smooth(SurfaceKind::Dielectric);
-    water.volume = Some(Volume {
-        attenuation_distance_m: 1.0,
-        attenuation_colour: colour,
-    });
-    let wall = inwards(sphere(DVec3::ZERO, radius_m, 96, 48));
+    let colour = rgb(0.3, 0.6, 0.95);
+    let water = tinted(smooth(SurfaceKind::Dielectric), 1.0, colour);
+    let wall = inside_out(sphere(DVec3::ZERO, radius_m, 96, 48));
     let parts = vec![
         (wall, one_sided(albedo)),
         (cuboid(-DVec3::ONE, DVec3::ONE), water),
@@ -178,7 +159,7 @@ fn water_takes_its_share_between_walls() {
     for (found, colour) in mean.to_array().into_iter().zip(colour.to_array()) {
         let x = -2.0 * radius_m * colour.ln();
         let arriving = albedo * 2.0 * (1.0 - (1.0 + x) * (-x).exp()) / (x * x);
-        support::assert_close(found, arriving / (1.0 - arriving), 0.005, "indirect light");
+        assert_close(found, arriving / (1.0 - arriving), 0.005, "indirect light");
     }
 }
 
@@ -187,9 +168,9 @@ fn water_takes_its_share_between_walls() {
 #[test]
 fn radiance_in_glass_grows_by_index_squared() {
     let (albedo, ior) = (0.7, 1.5);
-    let (middle, half) = (DVec3::new(0.5, 0.6, 1.0), 0.01);
+    let (middle, half) = (dvec3(0.5, 0.6, 1.0), 0.01);
     let ball = (sphere(middle, 0.3, 192, 96), smooth(SurfaceKind::Dielectric));
-    let corner = middle - DVec3::new(half, 0.0, half);
+    let corner = middle - dvec3(half, 0.0, half);
     let plate = quad(corner, DVec3::Z * 2.0 * half, DVec3::X * 2.0 * half);
     let parts = vec![(room(), one_sided(albedo)), ball, (plate, diffuse(0.0))];
     let irradiance = under_even_light(parts, &[(0, 16), (2, 8)], 64);
@@ -197,7 +178,7 @@ fn radiance_in_glass_grows_by_index_squared() {
     let mean = on_plate.iter().map(|e| e.g).sum::<f64>() / on_plate.len() as f64;
     let reflected = ((ior - 1.0_f64) / (ior + 1.0)).powi(2);
     let expected = ior * ior * (1.0 - reflected) * albedo / (1.0 - albedo);
-    support::assert_close(mean, expected, 0.02, "on the plate");
+    assert_close(mean, expected, 0.02, "on the plate");
 }
 
 /// E at a point from a polygon of radiance 1/π, so of exitance 1, that faces it wholly above its horizon (Lambert 1760).
@@ -236,12 +217,12 @@ fn errors(found: &[f64], expected: &[f64]) -> (f64, f64) {
 /// One plate lit by the sun lights another: over it, and beside it at a right angle.
 #[test]
 fn plates_light_each_other_by_form_factors() {
-    let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, z)| DVec3::new(x, 0.0, z));
+    let corners = [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)].map(|(x, z)| dvec3(x, 0.0, z));
     // Corner, then sides along u and v; a quad faces v × u.
-    let over = [DVec3::new(-0.5, 1.0, 0.5), DVec3::X, DVec3::NEG_Z];
-    let beside = [DVec3::new(-0.5, 0.0, 0.5), DVec3::Y, DVec3::NEG_Z];
+    let over = [dvec3(-0.5, 1.0, 0.5), DVec3::X, DVec3::NEG_Z];
+    let beside = [dvec3(-0.5, 0.0, 0.5), DVec3::Y, DVec3::NEG_Z];
     for (name, plate, slope) in [("parallel", over, 1.6), ("perpendicular", beside, 0.0)] {
-        let sunlight = sun(DVec3::new(slope, -1.0, 0.0), 3.0);
+        let sunlight = sun(dvec3(slope, -1.0, 0.0), 3.0);
         let mesh = quad(plate[0], plate[1], plate[2]);
         let parts = vec![(floor(0.5, 0.0), one_sided(0.7)), (mesh, one_sided(0.0))];
         let result = bake(scene(parts, vec![sunlight]), &settings(&LIT, 32, 0.015));
@@ -263,14 +244,14 @@ fn plates_light_each_other_by_form_factors() {
 /// A patch that is seen in a mirror alone lights like its image behind it.
 #[test]
 fn a_mirror_shows_the_patch_behind_it() {
-    let patch = |x: f64| quad(DVec3::new(x, 0.0, -0.5), DVec3::X, DVec3::Z);
-    let mirror = quad(DVec3::new(-4.0, 1.0, 4.0), DVec3::X * 8.0, DVec3::NEG_Z * 8.0);
+    let patch = |x: f64| quad(dvec3(x, 0.0, -0.5), DVec3::X, DVec3::Z);
+    let mirror = quad(dvec3(-4.0, 1.0, 4.0), DVec3::X * 8.0, DVec3::NEG_Z * 8.0);
     let silver = Material {
         double_sided: false,
         base_colour: LinearSrgb::grey(0.9),
         ..smooth(SurfaceKind::Mirror)
     };
-    let sunlight = sun(DVec3::new(6.0, -1.0, 0.0), 30.0);
+    let sunlight = sun(dvec3(6.0, -1.0, 0.0), 30.0);
     let parts = vec![
         (patch(-1.0), one_sided(0.6)),
         (patch(0.0), one_sided(0.0)),
@@ -280,8 +261,8 @@ fn a_mirror_shows_the_patch_behind_it() {
     let result = bake(scene(parts, vec![sunlight]), &settings(&all, 64, 0.01));
     let sender = texels(map(&result, 0));
     let lit = sender.iter().map(|(e, _)| e).sum::<f64>() / sender.len() as f64;
-    let image = [(-1.0, -0.5), (0.0, -0.5), (0.0, 0.5), (-1.0, 0.5)].map(|(x, z)| DVec3::new(x, 2.0, z));
-    let plate = [DVec3::new(0.0, 0.0, -0.5), DVec3::X, DVec3::Z];
+    let image = [(-1.0, -0.5), (0.0, -0.5), (0.0, 0.5), (-1.0, 0.5)].map(|(x, z)| dvec3(x, 2.0, z));
+    let plate = [dvec3(0.0, 0.0, -0.5), DVec3::X, DVec3::Z];
     let factors = expected_factors(64, plate, &image);
     // Metal reflects a little more at a slant (Schlick): up to a percent of what it reflects, within 45°.
     let expected: Vec<f64> = factors.iter().map(|factor| 0.6 * 0.9 * lit * factor).collect();
@@ -291,8 +272,8 @@ fn a_mirror_shows_the_patch_behind_it() {
 }
 
 fn small_room() -> Scene {
-    let ball = sphere(DVec3::new(0.5, 0.3, 1.0), 0.3, 24, 12);
-    let lamp = point_light(DVec3::new(0.3, 1.1, 0.7), 5.0);
+    let ball = sphere(dvec3(0.5, 0.3, 1.0), 0.3, 24, 12);
+    let lamp = point_light(dvec3(0.3, 1.1, 0.7), 5.0);
     scene(vec![(room(), one_sided(0.5)), (ball, diffuse(0.8))], vec![lamp])
 }
 
@@ -308,7 +289,7 @@ fn same_bits_for_any_threads_and_any_past() {
     let finer = run(&mut session, &settings(&LIT, 32, 0.02));
     assert!(finer.counts.gather_rays > 0);
     let mut dimmed = Scene::clone(session.scene());
-    dimmed.lights[0].colour = LinearSrgb::new(1.0, 0.5, 0.25);
+    dimmed.lights[0].colour = rgb(1.0, 0.5, 0.25);
     session.set_scene(Arc::new(dimmed.clone())).expect("an edit");
     let coarser = run(&mut session, &settings(&LIT, 32, 0.06));
     assert_eq!(coarser.counts.gather_rays, 0, "dimming a lamp needs no ray");
@@ -321,8 +302,8 @@ fn same_bits_for_any_threads_and_any_past() {
 fn lights_add_up_to_the_layer() {
     let mut scene = small_room();
     scene.lights.push(Light {
-        colour: LinearSrgb::new(0.2, 0.5, 1.0),
-        ..point_light(DVec3::new(0.8, 0.4, 1.7), 2.0)
+        colour: rgb(0.2, 0.5, 1.0),
+        ..point_light(dvec3(0.8, 0.4, 1.7), 2.0)
     });
     let settings = set(settings(&LIT, 32, 0.1), |s| s.per_light = true);
     let result = bake(scene, &settings);

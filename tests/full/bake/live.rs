@@ -1,30 +1,20 @@
 //! Sessions that live: what a change takes, and that the result is that of a new one, to the last bit. So are shards of a
 //! bake that are added up.
 
-use std::sync::Arc;
-
-use glam::DVec3;
-use nephroid::bake::{Bake, ShardSource, ShardSums, StopReason};
+use nephroid::bake::{ShardSource, ShardSums, StopReason};
 use nephroid::error::Result;
 use nephroid::light_pass::shard_index::ShardIndex;
-use nephroid::optics::LinearSrgb;
-use nephroid::progress::Control;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::edit::{Edit, LightEdit, MaterialEdit};
-use nephroid::scene::{LightKind, LightSize, Motion, Scene};
 use nephroid::settings::{
-    BakeSettings, Footprint, ItemBufferKind, Kernel, KernelSampling, LayerKind, MapResolution, RayPlacement,
-    Sigma, Wavelengths,
+    Footprint, ItemBufferKind, Kernel, KernelSampling, RayPlacement, Sigma, Wavelengths,
 };
-use nephroid::units::{Flux, Radiance};
-use rand_pcg::Pcg64Mcg;
-use rand_pcg::rand_core::{Rng, SeedableRng};
 
 use crate::bake::common::{
     CAUSTIC_AND_DIRECT, assert_fresh, assert_same, automatic, difference, edit, run, session, sized,
     with_layers,
 };
 use support::hard_scenes::under_square_lamp;
+use support::laws::scenes::random;
+use support::prelude::*;
 use support::tools::{bake, builtin_scene, energy_fault, photons, set, settings, to};
 
 fn moved(object: usize, translation: DVec3) -> Edit {
@@ -69,7 +59,7 @@ fn another_deposit_of_splats_takes_no_ray() {
     ] {
         let mut scene = builtin_scene(name);
         if name == "ring" {
-            scene.lights[0].colour = LinearSrgb::new(1.0, 0.7, 0.2);
+            scene.lights[0].colour = rgb(1.0, 0.7, 0.2);
         }
         let base = set(settings(1e4, 48), |s| s.rays = rays);
         let mut session = session(&scene);
@@ -149,7 +139,7 @@ fn dimming_and_smoothing_take_no_work() {
         panic!("the ring has a point light")
     };
     let dimmer = Edit::Light(0, LightEdit::Strength(0.37 * intensity.0));
-    let colour = LinearSrgb::new(1.0, 0.6, 0.2);
+    let colour = rgb(1.0, 0.6, 0.2);
     let warmer = Edit::Light(0, LightEdit::Colour(colour, None));
     for (sigma, change) in [(0.0, Some(dimmer)), (0.0, Some(warmer)), (2.5, None)] {
         if let Some(change) = &change {
@@ -167,12 +157,12 @@ fn dimming_and_smoothing_take_no_work() {
 fn two_casters() -> Scene {
     let mut scene = parts::reference_scene(2.0);
     for (name, x) in [("left", -0.8), ("right", 0.8)] {
-        let ball = shapes::sphere(DVec3::new(x, 0.5, 0.0), 0.3, 3);
+        let ball = shapes::sphere(dvec3(x, 0.5, 0.0), 0.3, 3);
         parts::add(&mut scene, name, ball, parts::dielectric(name, 1.5));
     }
     scene
         .lights
-        .push(parts::point_light("lamp", DVec3::new(0.0, 3.0, 0.0), Flux(12.0)));
+        .push(parts::point_light("lamp", dvec3(0.0, 3.0, 0.0), Flux(12.0)));
     scene.name = "two casters".into();
     scene
 }
@@ -183,11 +173,11 @@ fn an_edit_traces_only_what_it_touches() {
     let mut scene = two_casters();
     scene
         .lights
-        .push(parts::point_light("other", DVec3::new(0.5, 2.5, 0.6), Flux(25.0)));
+        .push(parts::point_light("other", dvec3(0.5, 2.5, 0.6), Flux(25.0)));
     let settings = to(0.03, 64);
     let mut session = session(&scene);
     run(&mut session, &settings);
-    let change = Edit::Light(1, LightEdit::Position(DVec3::new(0.49, 2.5, 0.6)));
+    let change = Edit::Light(1, LightEdit::Position(dvec3(0.49, 2.5, 0.6)));
     edit(&mut session, &change);
     let (now, whole) = assert_fresh(&mut session, &settings, "a lamp moved");
     let share = now.counts.rays as f64 / whole.counts.rays as f64;
@@ -229,22 +219,22 @@ fn a_resized_lamp_and_a_moved_glow_are_seen() {
 
 /// Edits and settings in a random order, each bake cancelled at a random place.
 struct Storm {
-    random: Pcg64Mcg,
+    random: Box<dyn FnMut() -> f64>,
     settings: BakeSettings,
 }
 
 impl Storm {
     fn below(&mut self, count: usize) -> usize {
-        (self.random.next_u64() % count as u64) as usize
+        (self.unit() * count as f64) as usize
     }
 
     fn unit(&mut self) -> f64 {
-        (self.random.next_u64() >> 11) as f64 * (-53_f64).exp2()
+        (self.random)()
     }
 
     /// The next change: of the settings, or an edit.
     fn change(&mut self, scene: &Scene) -> Option<Edit> {
-        let spread = DVec3::new(self.unit(), self.unit(), self.unit()) * 0.2 - 0.1;
+        let spread = dvec3(self.unit(), self.unit(), self.unit()) * 0.2 - 0.1;
         let light = self.below(scene.lights.len());
         let object = 1 + self.below(2);
         match self.below(8) {
@@ -279,7 +269,7 @@ impl Storm {
 fn edits_while_baking_leave_nothing_behind() {
     let mut session = session(&two_casters());
     let mut storm = Storm {
-        random: Pcg64Mcg::seed_from_u64(7),
+        random: Box::new(random(7)),
         settings: to(0.03, 64),
     };
     let (mut cancelled, mut complete) = (0, 0);
@@ -316,17 +306,14 @@ fn edits_while_baking_leave_nothing_behind() {
 fn hard_edits_and_back_lose_no_watt() {
     let scene = two_casters();
     let material = material_of(&scene, "left");
-    let lamp = |x, y, z| Edit::Light(0, LightEdit::Position(DVec3::new(x, y, z)));
+    let lamp = |x, y, z| Edit::Light(0, LightEdit::Position(dvec3(x, y, z)));
     let hard = [
         ("a lamp within glass", lamp(-0.8, 0.5, 0.0)),
         ("a lamp in the floor", lamp(0.3, 0.0, 0.2)),
-        ("a ball through the other", moved(1, DVec3::new(1.3, 0.1, 0.05))),
-        (
-            "a ball half under the floor",
-            moved(1, DVec3::new(0.0, -0.5, 0.0)),
-        ),
-        ("a ball beyond all light", moved(1, DVec3::new(0.0, 0.0, 1e6))),
-        ("the floor above the lamp", moved(0, DVec3::new(0.0, 5.0, 0.0))),
+        ("a ball through the other", moved(1, dvec3(1.3, 0.1, 0.05))),
+        ("a ball half under the floor", moved(1, dvec3(0.0, -0.5, 0.0))),
+        ("a ball beyond all light", moved(1, dvec3(0.0, 0.0, 1e6))),
+        ("the floor above the lamp", moved(0, dvec3(0.0, 5.0, 0.0))),
         ("glass like air", Edit::Material(material, MaterialEdit::Ior(1.0))),
         (
             "glass of index 40",
@@ -406,66 +393,57 @@ fn merge(scene: &Scene, settings: &BakeSettings, shards: Vec<ShardSums>) -> Resu
 }
 
 #[track_caller]
-fn assert_adds_up(scene: &Scene, settings: &BakeSettings, counts: &[u32]) {
+fn assert_adds_up(what: &str, scene: &Scene, settings: &BakeSettings, counts: &[u32]) {
     let whole = bake(scene.clone(), settings);
-    assert!(whole.counts.rays > 0 && !whole.maps.is_empty());
+    assert!(whole.counts.rays > 0 && !whole.maps.is_empty(), "{what}");
     for &count in counts {
+        let what = format!("{what} in {count} shards");
         let merged = merge(scene, settings, shards(scene, settings, count));
         let merged = merged.expect("they belong together");
-        assert_same(&merged, &whole, &format!("{count} shards"));
-        assert_eq!(merged.warnings, whole.warnings, "{count} shards");
+        assert_same(&merged, &whole, &what);
+        assert_eq!(merged.warnings, whole.warnings, "{what}");
         // Layers of lights and bands, as text: numbers with all their digits.
         let parts = |result: &Bake| format!("{:?} {:?}", result.light_layers, result.band_layers);
         assert!(
             parts(&merged) == parts(&whole),
-            "{count} shards: layers of lights or bands"
+            "{what}: layers of lights or bands"
         );
     }
 }
 
 #[test]
-fn photons_add_up() {
+fn shards_add_up_to_the_whole() {
     let per_light = set(with_layers(&LayerKind::ALL, photons(1e5, 24)), |s| {
         s.per_light = true
     });
     let mut scene = builtin_scene("mirror");
     let mut other = scene.lights[0].clone();
-    other.colour = LinearSrgb::new(0.2, 1.0, 3.0);
-    other.kind = other.kind.moved(DVec3::new(0.1, 0.2, 0.05));
+    other.colour = rgb(0.2, 1.0, 3.0);
+    other.kind = other.kind.moved(dvec3(0.1, 0.2, 0.05));
     scene.lights.push(other);
-    assert_adds_up(&scene, &per_light, &[3]);
-    assert_adds_up(&builtin_scene("ball"), &photons(1e5, 24), &[1, 5]);
-}
-
-#[test]
-fn splats_add_up() {
-    assert_adds_up(&builtin_scene("ball"), &settings(15_000.0, 32), &[4]);
     let adaptive = set(settings(10_000.0, 32), |s| s.sigma = Sigma::Adaptive);
-    assert_adds_up(&builtin_scene("ring"), &adaptive, &[2]);
-}
-
-/// Rays of the first bands are kept, the others are traced again.
-#[test]
-fn too_little_memory_to_keep_rays_adds_up() {
+    // Rays of the first bands are kept, the others are traced again.
     let scarce = set(settings(20_000.0, 16), |s| s.memory_bytes = 1 << 20);
-    assert_adds_up(&builtin_scene("ball"), &scarce, &[3]);
-}
-
-#[test]
-fn wavelengths_add_up() {
     let bands = BakeSettings {
         wavelengths: Wavelengths::Fixed(3),
         keep_spectrum: true,
         ..photons(1e6, 32)
     };
-    for settings in [photons(1e6, 32), bands, settings(1e6, 32)] {
-        assert_adds_up(&builtin_scene("prism"), &settings, &[3]);
+    let [ring, ball, prism] = ["ring", "ball", "prism"].map(builtin_scene);
+    let soft = under_square_lamp("ball", 0.1);
+    for (what, scene, settings, counts) in [
+        ("each light", &scene, per_light, &[3][..]),
+        ("photons", &ball, photons(1e5, 24), &[1, 5]),
+        ("splats", &ball, settings(15_000.0, 32), &[4]),
+        ("adaptive splats", &ring, adaptive, &[2]),
+        ("little memory", &ball, scarce, &[3]),
+        ("photons of a spectrum", &prism, photons(1e6, 32), &[3]),
+        ("kept bands", &prism, bands, &[3]),
+        ("splats of a spectrum", &prism, settings(1e6, 32), &[3]),
+        ("soft light", &soft, photons(1e6, 24), &[3]),
+    ] {
+        assert_adds_up(what, scene, &settings, counts);
     }
-}
-
-#[test]
-fn soft_light_adds_up() {
-    assert_adds_up(&under_square_lamp("ball", 0.1), &photons(1e6, 24), &[3]);
 }
 
 #[test]

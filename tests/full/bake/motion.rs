@@ -1,16 +1,7 @@
 //! Light that moves: where the closed form has it, without flicker, and baked again only where something moves.
 
-use std::sync::Arc;
-
-use glam::DVec3;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::edit::Edit;
-use nephroid::scene::{Material, Motion, Scene, Wave, Waves};
-use nephroid::settings::BakeSettings;
-use nephroid::units::Flux;
-
 use crate::bake::common::{assert_fresh, floor, rmse, run, session};
+use support::prelude::*;
 use support::tools::{bake, builtin_scene, photons, set, settings, to};
 
 /// Seconds from one moment to the next.
@@ -19,7 +10,7 @@ const STEP_S: f64 = 0.04;
 /// A ball of glass and a sheet of running water with a lamp above each, and a screen between them.
 fn ball_and_water() -> Scene {
     let mut scene = parts::reference_scene(2.0);
-    let ball = shapes::sphere(DVec3::new(-0.9, 0.5, 0.0), 0.3, 3);
+    let ball = shapes::sphere(dvec3(-0.9, 0.5, 0.0), 0.3, 3);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
     let wave = Wave::on_water(0.01, [9.0, 4.0], 0.3, 0.5);
     let water = Material {
@@ -36,7 +27,7 @@ fn ball_and_water() -> Scene {
         parts::matte("screen", LinearSrgb::grey(0.5)),
     );
     for (name, x) in [("over ball", -0.9), ("over water", 0.9)] {
-        let place = DVec3::new(x, 1.9, 0.0);
+        let place = dvec3(x, 1.9, 0.0);
         let lamp = parts::beam(name, place, DVec3::NEG_Y, 0.2, Flux(10.0));
         scene.lights.push(lamp);
     }
@@ -95,7 +86,7 @@ fn what_comes_into_the_light_of_a_lamp_is_seen() {
         let mut session = session(&scene);
         run(&mut session, &settings);
         for (x, y, z) in places {
-            let motion = Motion::turned(x, DVec3::new(x, y, z));
+            let motion = Motion::turned(x, dvec3(x, y, z));
             let moved = Edit::Place(1, motion).apply(&scene).expect("a sound edit");
             session.set_scene(Arc::new(moved)).expect("a sound scene");
             let what = format!("{:?}, ball moved by {x} {y} {z}", settings.estimator);

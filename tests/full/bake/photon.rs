@@ -1,12 +1,10 @@
 //! Photons against brute force, and filtered ones against many.
 
-use nephroid::bake::Bake;
-use nephroid::illumination::IlluminationMap;
-use nephroid::scene::Scene;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::settings::{BakeSettings, Estimator};
+use nephroid::settings::Estimator;
 
 use support::hard_scenes::{cut_glass, roughened, under_square_lamp, under_the_suns_disc};
+use support::prelude::*;
+use support::scenes::tinted;
 use support::tools::{bake, brute, builtin_scene, caustic, energy_fault, map_of, photons};
 
 const SIDE: usize = 64;
@@ -19,11 +17,8 @@ fn lamp_in_green_glass() -> Scene {
     let mut scene = builtin_scene("mirror");
     scene.objects.truncate(1);
     let lamp = scene.lights[0].kind.position().expect("a point light");
-    let mut glass = parts::dielectric("green glass", 1.5);
-    glass.volume = Some(nephroid::scene::Volume {
-        attenuation_colour: nephroid::optics::LinearSrgb::new(0.2, 0.8, 0.3),
-        attenuation_distance_m: 0.3,
-    });
+    let glass = parts::dielectric("green glass", 1.5);
+    let glass = tinted(glass, 0.3, rgb(0.2, 0.8, 0.3));
     parts::add(&mut scene, "bulb", shapes::sphere(lamp, 0.2, 3), glass);
     scene
 }

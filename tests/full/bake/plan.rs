@@ -1,17 +1,12 @@
 //! What can send no light to a diffuse surface costs nothing after the plan, and changes not a bit.
 
-use glam::DVec3;
-use nephroid::bake::Bake;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
-use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Light, LightKind, LightSize, Mesh, Scene};
-use nephroid::settings::{BakeSettings, Estimator, LayerKind};
-use nephroid::units::{Flux, RadiantIntensity};
+use nephroid::settings::Estimator;
 
 use crate::bake::common::{all_bits, caustic_like, floor, rmse, same_map};
+use support::prelude::*;
 use support::random_scenes;
+use support::scenes::spot;
 use support::tools::{bake, builtin_scene, settings, to};
 
 fn add_matte(scene: &mut Scene, name: &str, mesh: Mesh) {
@@ -33,7 +28,7 @@ fn add_lamp(scene: &mut Scene, name: &str, place: DVec3, power_w: f64) {
 
 /// A hundred small glass balls behind a wall, which stands across the way from the light.
 fn add_hidden_balls(scene: &mut Scene) {
-    let (from, middle) = (DVec3::new(-0.7, 1.2, 0.0), DVec3::new(-0.86, 0.3, -0.86));
+    let (from, middle) = (dvec3(-0.7, 1.2, 0.0), dvec3(-0.86, 0.3, -0.86));
     let away = (middle - from).normalize();
     let (across, down) = away.any_orthonormal_pair();
     let wall = shapes::rectangle(middle - away * 0.03, across * 0.1, down * 0.1);
@@ -45,40 +40,27 @@ fn add_hidden_balls(scene: &mut Scene) {
     }
 }
 
-fn spot(name: &str, position: DVec3, direction: DVec3) -> Light {
-    Light {
-        name: name.into(),
-        colour: LinearSrgb::WHITE,
-        spectrum: None,
-        kind: LightKind::Spot {
-            position,
-            direction: direction.normalize(),
-            intensity: RadiantIntensity(5.0),
-            inner_cone_rad: 0.1,
-            outer_cone_rad: 0.3,
-        },
-        size: LightSize::None,
-    }
+fn narrow(position: DVec3, direction: DVec3) -> Light {
+    spot(position, direction, 5.0, [0.1, 0.3])
 }
 
 /// Lamps that see nothing specular: in opaque boxes, aimed away, and close above a plate that hides the rest.
 fn add_useless_lights(scene: &mut Scene) {
     for index in 0..4 {
-        let centre = DVec3::new(0.86, 0.05 + 0.1 * f64::from(index), 0.92);
+        let centre = dvec3(0.86, 0.05 + 0.1 * f64::from(index), 0.92);
         add_box(scene, &format!("lantern{index}"), centre, 0.02);
         add_lamp(scene, &format!("sealed{index}"), centre, 10.0);
     }
     for index in 0..4 {
-        let place = DVec3::new(0.9, 0.35, -0.95 + 0.02 * f64::from(index));
-        let away = DVec3::new(1.0, 0.2 * f64::from(index), 0.0);
-        scene.lights.push(spot(&format!("away{index}"), place, away));
+        let place = dvec3(0.9, 0.35, -0.95 + 0.02 * f64::from(index));
+        let away = dvec3(1.0, 0.2 * f64::from(index), 0.0);
+        scene.lights.push(narrow(place, away));
     }
     for index in 0..2 {
-        let place = DVec3::new(0.93, 0.38, -0.75 - 0.12 * f64::from(index));
+        let place = dvec3(0.93, 0.38, -0.75 - 0.12 * f64::from(index));
         let plate = shapes::rectangle(place - DVec3::X * 0.005, DVec3::Y * 0.04, DVec3::Z * 0.04);
         add_matte(scene, &format!("plate{index}"), plate);
-        let shut = spot(&format!("shut{index}"), place, DVec3::NEG_X);
-        scene.lights.push(shut);
+        scene.lights.push(narrow(place, DVec3::NEG_X));
     }
 }
 
@@ -86,7 +68,7 @@ fn add_useless_lights(scene: &mut Scene) {
 fn crowded() -> Scene {
     let mut scene = builtin_scene("ring");
     let bounds = scene.bounds().expect("surfaces");
-    let centre = DVec3::new(-0.88, 0.38, 0.88);
+    let centre = dvec3(-0.88, 0.38, 0.88);
     add_box(&mut scene, "box", centre, 0.06);
     add_ball(&mut scene, "sealed", centre, 0.04);
     add_hidden_balls(&mut scene);
@@ -137,16 +119,16 @@ fn check_item_buffers(alone: &Bake, among: &Bake) {
 /// A wall with a crack between its halves, wide enough for light or not there at all.
 fn behind_a_wall(crack_m: f64) -> Scene {
     let mut scene = parts::reference_scene(1.0);
-    add_ball(&mut scene, "ball", DVec3::new(0.3, 0.4, 0.0), 0.2);
+    add_ball(&mut scene, "ball", dvec3(0.3, 0.4, 0.0), 0.2);
     for (name, side) in [("left", -1.0), ("right", 1.0)] {
-        let centre = DVec3::new(-0.3, 0.45, side * (0.5 + 0.5 * crack_m));
+        let centre = dvec3(-0.3, 0.45, side * (0.5 + 0.5 * crack_m));
         add_matte(
             &mut scene,
             name,
             shapes::rectangle(centre, DVec3::Y * 0.45, DVec3::Z * 0.5),
         );
     }
-    add_lamp(&mut scene, "lamp", DVec3::new(-0.8, 0.4, 0.0), 10.0);
+    add_lamp(&mut scene, "lamp", dvec3(-0.8, 0.4, 0.0), 10.0);
     scene
 }
 
@@ -174,9 +156,9 @@ fn mirror_over_floor(faces_up: bool) -> Scene {
     } else {
         (DVec3::Y, DVec3::Z)
     };
-    let mesh = shapes::rectangle(DVec3::new(0.2, 0.3, 0.0), across * 0.25, down * 0.25);
+    let mesh = shapes::rectangle(dvec3(0.2, 0.3, 0.0), across * 0.25, down * 0.25);
     parts::add(&mut scene, "mirror", mesh, parts::mirror());
-    add_lamp(&mut scene, "lamp", DVec3::new(-0.2, 1.5, 0.0), 10.0);
+    add_lamp(&mut scene, "lamp", dvec3(-0.2, 1.5, 0.0), 10.0);
     scene
 }
 
@@ -206,9 +188,9 @@ fn a_mirror_facing_nothing_is_not_traced() {
 fn glass_lit_by_a_mirror_alone_is_found() {
     let mut scene = mirror_over_floor(true);
     // Over the lamp's plate, which hides it from the lamp, and in the mirror's light.
-    let plate = shapes::rectangle(DVec3::new(0.45, 1.3, 0.0), DVec3::X * 0.5, DVec3::Z * 0.8);
+    let plate = shapes::rectangle(dvec3(0.45, 1.3, 0.0), DVec3::X * 0.5, DVec3::Z * 0.8);
     add_matte(&mut scene, "plate", plate);
-    add_ball(&mut scene, "ball", DVec3::new(0.5, 0.9, 0.0), 0.15);
+    add_ball(&mut scene, "ball", dvec3(0.5, 0.9, 0.0), 0.15);
     let result = bake(scene, &to(0.02, 64));
     let (on, reason) = why(&result, Effect::Refraction);
     assert!(on, "{reason}");
@@ -221,7 +203,7 @@ fn dim_lamps_leave_rays_to_the_bright_one() {
     let mut scene = builtin_scene("ring");
     for lamp in 0..49 {
         let angle = f64::from(lamp) * 2.4;
-        let place = DVec3::new(0.6 * angle.cos(), 1.0 + 0.01 * f64::from(lamp), 0.6 * angle.sin());
+        let place = dvec3(0.6 * angle.cos(), 1.0 + 0.01 * f64::from(lamp), 0.6 * angle.sin());
         add_lamp(&mut scene, &format!("lamp {lamp}"), place, 0.02);
     }
     let one = bake(builtin_scene("ring"), &to(target, 64));
@@ -265,7 +247,17 @@ fn noise_w(result: &Bake, settings: &BakeSettings) -> f64 {
     2.0 * result.estimated_relative_rmse.unwrap_or(0.0) * flux_w
 }
 
-/// What the plan leaves out of random scenes changes no map by more than is booked, and noise.
+/// What the plan leaves out of random scenes changes no map by more than is booked, and noise; by bundles and by splats.
+#[test]
+fn the_plan_changes_no_map() {
+    for (base, seeds) in [
+        (to(0.03, 32), (0..200).step_by(4)),
+        (settings(2_000.0, 32), (1..200).step_by(2)),
+    ] {
+        assert_plan_changes_nothing(&base, seeds);
+    }
+}
+
 fn assert_plan_changes_nothing(base: &BakeSettings, seeds: impl Iterator<Item = u64>) {
     let everything = EffectSwitches::all_on()
         .with(Effect::Direct, EffectSwitch::Auto)
@@ -293,14 +285,4 @@ fn assert_plan_changes_nothing(base: &BakeSettings, seeds: impl Iterator<Item = 
     }
     assert!(cut > 10, "{cut} scenes have something that can be left out");
     assert!(rays[0] < rays[1]);
-}
-
-#[test]
-fn the_plan_changes_no_map_of_bundles() {
-    assert_plan_changes_nothing(&to(0.03, 32), (0..200).step_by(4));
-}
-
-#[test]
-fn the_plan_changes_no_map_of_splats() {
-    assert_plan_changes_nothing(&settings(2_000.0, 32), (1..200).step_by(2));
 }

@@ -1,18 +1,11 @@
 //! The light paths of single texels: each obeys the laws of reflection and refraction, and together they bring what was
 //! baked.
 
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
-use nephroid::illumination::IlluminationMap;
 use nephroid::light_pass::explain::{Explanation, LightPath, Limits, Target, explain};
-use nephroid::optics::LinearSrgb;
-use nephroid::progress::Control;
-use nephroid::scene::{LightKind, Scene};
-use nephroid::settings::LayerKind;
-use nephroid::transport::{Event, RayHit, Tracer};
+use nephroid::transport::{Event, RayHit};
 
 use crate::bake::common::{CAUSTIC_AND_DIRECT, floor, with_layers};
+use support::prelude::*;
 use support::tools::{bake, builtin_scene, map_of, to};
 
 const LIMITS: Limits = Limits {
@@ -24,7 +17,7 @@ const LIMITS: Limits = Limits {
 /// The middle of a texel of a map without tiles.
 fn target(tracer: &Tracer, map: &IlluminationMap, texel: usize) -> Target {
     let chart = &map.chart;
-    let uv = DVec2::new(
+    let uv = dvec2(
         ((texel % chart.width) as f64 + 0.5) / chart.width as f64,
         ((texel / chart.width) as f64 + 0.5) / chart.height as f64,
     );
@@ -165,7 +158,7 @@ fn check_normals(found: &[(f64, Explanation)], normal: impl Fn(DVec3) -> DVec3, 
 fn paths_over_a_mirror_ring() {
     let found = explained("ring");
     assert!(found[0].0 > 0.0 && !found[0].1.paths.is_empty());
-    check_normals(&found, |point| DVec3::new(point.x, 0.0, point.z), 1e-4);
+    check_normals(&found, |point| dvec3(point.x, 0.0, point.z), 1e-4);
 }
 
 #[test]
@@ -219,7 +212,7 @@ fn shares_add_up_to_the_solvers_texels() {
             let target = target(&tracer, map, texel);
             let told = explain(&tracer, &target, LIMITS, expected[texel], &Control::default());
             let sum = told.caustic().luminance();
-            support::assert_close(sum, expected[texel], tolerance, &format!("{name} {texel}"));
+            assert_close(sum, expected[texel], tolerance, &format!("{name} {texel}"));
         }
     }
 }

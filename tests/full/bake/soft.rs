@@ -1,24 +1,17 @@
 //! Soft caustics, and bodies within bodies: against brute force, against their limits, and against the law of energy.
 
-use std::f64::consts::TAU;
-
-use glam::DVec3;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
-use nephroid::optics::LinearSrgb;
-use nephroid::progress::Control;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Mesh, Scene};
-use nephroid::units::Flux;
 
 use crate::bake::common::{off_brute_force, session};
 use support::hard_scenes::{roughened, under_square_lamp};
+use support::prelude::*;
 use support::tools::{bake, energy_fault, photons, set, settings, to};
 
 /// All that leaves it arrives somewhere: a closed white room.
 #[test]
 fn a_rough_white_mirror_loses_nothing() {
     let mut scene = roughened("mirror", 0.6);
-    let walls = shapes::cuboid(DVec3::new(-1.0, -0.001, -1.0), DVec3::new(1.0, 2.0, 1.0));
+    let walls = shapes::cuboid(dvec3(-1.0, -0.001, -1.0), dvec3(1.0, 2.0, 1.0));
     let white = parts::matte("walls", LinearSrgb::WHITE);
     parts::add(&mut scene, "walls", walls, white);
     let result = bake(scene, &photons(1e6, 16));
@@ -62,7 +55,7 @@ fn lathe(profile: &[(f64, f64)], segments: u32) -> Mesh {
         let first = mesh.positions.len() as u32;
         for segment in 0..=segments {
             let (sine, cosine) = (TAU * f64::from(segment % segments) / f64::from(segments)).sin_cos();
-            let outwards = DVec3::new(cosine, 0.0, sine);
+            let outwards = dvec3(cosine, 0.0, sine);
             let normal = (outwards * (y1 - y0) - DVec3::Y * (r1 - r0)).normalize();
             for (r, y) in [(r0, y0), (r1, y1)] {
                 mesh.positions.push(outwards * r + DVec3::Y * y);
@@ -101,7 +94,7 @@ fn glass_of_water(overlap_m: f64) -> Scene {
         (side, 0.65),
         (0.0, 0.65),
     ];
-    let ball = shapes::sphere(DVec3::new(0.05, 0.42, -0.02), 0.1, 5);
+    let ball = shapes::sphere(dvec3(0.05, 0.42, -0.02), 0.1, 5);
     for (name, mesh, ior) in [
         ("glass", lathe(&cup, 256), 1.5),
         ("water", lathe(&water, 256), 1.333),
@@ -109,7 +102,7 @@ fn glass_of_water(overlap_m: f64) -> Scene {
     ] {
         parts::add(&mut scene, name, mesh, parts::dielectric(name, ior));
     }
-    let lamp = DVec3::new(0.25, 2.2, 0.15);
+    let lamp = dvec3(0.25, 2.2, 0.15);
     scene.lights.push(parts::point_light("lamp", lamp, Flux(100.0)));
     scene
 }

@@ -2,14 +2,13 @@
 //! (`../shared/scenes`, where it is there), baked without a fault.
 
 use nephroid::effect::Effect;
-use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::{LoadOptions, Scene};
 
 use crate::bake::common::floor;
+use support::prelude::*;
 use support::references::references;
+use support::sound::scene_fault;
 use support::tools::{bake, energy_fault, map_of, photons};
-use support::{assert_close, or_skip, project_file, shared_or_skip};
+use support::{or_skip, project_file, shared_or_skip};
 
 /// The others are in the quick tests.
 #[test]
@@ -70,7 +69,7 @@ fn check_far_field(image: &[f64], texel_m: f64) {
 /// that a channel may be negative where wavelengths part; its luminance may not, but for what single precision rounds off.
 fn impossible_texel(map: &IlluminationMap, wavelengths_part: bool) -> Option<[f32; 3]> {
     let fits = |&[r, g, b]: &[f32; 3]| {
-        let light = LinearSrgb::new(f64::from(r), f64::from(g), f64::from(b));
+        let light = rgb(f64::from(r), f64::from(g), f64::from(b));
         let most = r.abs().max(g.abs()).max(b.abs());
         let is_light = if wavelengths_part {
             light.luminance() >= -f64::from(4.0 * f32::EPSILON * most)
@@ -100,6 +99,10 @@ fn real_files_bake() {
     for file in files {
         let scene = Scene::load(file.to_str().expect("a readable path"), &options).expect("a valid file");
         let name = scene.name.clone();
+        assert!(
+            scene_fault(&scene).is_none() && scene.triangle_count() > 0,
+            "{name}"
+        );
         let result = bake(scene, &photons(3e4, 64));
         assert_eq!(energy_fault(&result), None, "{name}");
         let parts = result.plan.is_on(Effect::Dispersion);

@@ -1,20 +1,12 @@
 //! Maps in tiles: how much memory they save and what that costs; direct light beside caustics, and levels on the way.
 
-use std::f64::consts::TAU;
-
-use glam::{DQuat, DVec3};
-use nephroid::bake::{BYTES_PER_TEXEL, Bake};
-use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
-use nephroid::progress::Control;
-use nephroid::scene::Scene;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::settings::{BakeSettings, ErrorMetric, LayerKind};
-use nephroid::units::{Flux, Irradiance};
+use nephroid::bake::BYTES_PER_TEXEL;
+use nephroid::settings::{ErrorMetric, Preset};
 
 use crate::bake::common::{
     CAUSTIC_AND_DIRECT, all_bits, assert_same, automatic, estimate, rmse, session, sized, torus, with_layers,
 };
+use support::prelude::*;
 use support::tools::{bake, builtin_scene, caustic, energy_fault, map_of, set, to};
 
 fn auto(target: f64) -> BakeSettings {
@@ -27,7 +19,7 @@ fn torus_over_a_wide_floor() -> Scene {
     let tilt = DQuat::from_rotation_x(0.5) * DQuat::from_rotation_z(0.3);
     let torus = torus(DVec3::Y * 0.6, tilt, 0.5);
     parts::add(&mut scene, "torus", torus, parts::dielectric("glass", 1.5));
-    let lamp = parts::point_light("lamp", DVec3::new(0.5, 2.0, 0.3), Flux(100.0));
+    let lamp = parts::point_light("lamp", dvec3(0.5, 2.0, 0.3), Flux(100.0));
     scene.lights.push(lamp);
     scene
 }
@@ -110,7 +102,7 @@ fn a_tenth_of_the_memory_costs_what_it_says() {
 fn lamps_around_a_ball(count: usize) -> Scene {
     let mut scene = builtin_scene("ball");
     let lamp = |index: usize| {
-        let place = DQuat::from_rotation_y(index as f64 * TAU / count as f64) * DVec3::new(0.6, 2.5, 0.0);
+        let place = DQuat::from_rotation_y(index as f64 * TAU / count as f64) * dvec3(0.6, 2.5, 0.0);
         parts::point_light(&format!("lamp{index}"), place, Flux(100.0))
     };
     scene.lights = (0..count).map(lamp).collect();
@@ -194,7 +186,7 @@ fn ball_in_the_sun(ground_m: Option<f64>) -> Scene {
             parts::matte("soil", LinearSrgb::grey(0.3)),
         );
     }
-    let direction = DVec3::new(0.3, -1.0, 0.2).normalize();
+    let direction = dvec3(0.3, -1.0, 0.2).normalize();
     scene.lights.push(parts::sun("sun", direction, Irradiance(1.0)));
     scene
 }
@@ -262,4 +254,25 @@ fn whole_pictures_come_before_the_last() {
     let errors: Vec<f64> = errors.collect();
     assert_eq!(errors.len(), levels.len(), "all have an estimate");
     assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
+}
+
+/// Direct and indirect light come before any caustic.
+#[test]
+fn a_room_is_lit_before_its_caustics() {
+    let scene = builtin_scene("gallery");
+    let layers = [LayerKind::Caustic, LayerKind::Direct, LayerKind::Indirect];
+    let draft = set(BakeSettings::default(), |s| {
+        s.max_error = Some(Preset::Draft.max_error())
+    });
+    let settings = with_layers(&layers, automatic(draft));
+    let mut levels = Vec::new();
+    let last = session(&scene).bake_levels(&settings, &(), &Control::default(), &mut |level| {
+        levels.push(level)
+    });
+    let lit = |result: &Bake, kind| result.maps.iter().any(|map| map.flux_w(kind).luminance() > 0.0);
+    let first = levels.first().expect("a level before the last");
+    assert_eq!(first.counts.rays, 0);
+    assert!(lit(first, LayerKind::Direct) && lit(first, LayerKind::Indirect));
+    let last = last.expect("a bake");
+    assert!(last.counts.rays > 0 && layers.iter().all(|kind| lit(&last, *kind)));
 }

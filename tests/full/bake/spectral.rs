@@ -1,19 +1,12 @@
 //! Light by wavelength: a prism's spectrum against exact rays, and laws that glass, metals and lamps keep.
 
-use std::sync::Arc;
-
-use glam::DVec3;
-use nephroid::bake::Bake;
 use nephroid::illumination::Side;
 use nephroid::optics::glass::Glass;
 use nephroid::optics::spectrum::{Spectrum, Xyz, illuminant};
-use nephroid::optics::{LinearSrgb, Nanometres};
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{LoadOptions, Scene};
-use nephroid::settings::{BakeSettings, Estimator, LayerKind, Wavelengths};
-use nephroid::units::{Flux, Irradiance};
+use nephroid::settings::{Estimator, Wavelengths};
 
 use crate::bake::common::sized;
+use support::prelude::*;
 use support::tools::{bake, builtin_scene, energy_fault, set, to};
 
 fn settings(side: usize) -> BakeSettings {
@@ -41,7 +34,7 @@ fn glass(text: &str) -> Arc<Glass> {
 
 /// Caustic light on the upper side of the object of a name, row by row.
 fn caustic(result: &Bake, scene: &Scene, name: &str) -> Vec<[f32; 3]> {
-    let is_wanted = |map: &&nephroid::illumination::IlluminationMap| {
+    let is_wanted = |map: &&IlluminationMap| {
         scene.objects[map.chart.object()].name == name && map.chart.receiver.side() == Side::Front
     };
     let map = result.maps.iter().find(is_wanted).expect("its map");
@@ -98,9 +91,9 @@ fn dispersion_parts_colours_not_their_sum() {
 #[test]
 fn a_beam_recombines_behind_a_slab() {
     let mut scene = parts::reference_scene(1.0);
-    let pane = shapes::cuboid(DVec3::new(-0.6, 0.5, -0.6), DVec3::new(0.6, 0.7, 0.6));
+    let pane = shapes::cuboid(dvec3(-0.6, 0.5, -0.6), dvec3(0.6, 0.7, 0.6));
     parts::add(&mut scene, "slab", pane, parts::glass("635577"));
-    let direction = DVec3::new(0.5, -1.0, 0.0).normalize();
+    let direction = dvec3(0.5, -1.0, 0.0).normalize();
     scene.lights.push(parts::sun("sun", direction, Irradiance(1.0)));
     scene.lights[0].set_spectrum(lamp("A"));
     let texels = floor(&scene, &settings(64));

@@ -1,37 +1,27 @@
 //! Receivers of every shape: bent ones, ones cut into charts, both sides of sheets, masks; and waves that only bend
 //! normals, against the same waves as a shape.
 
-use std::f64::consts::{PI, TAU};
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
-use nephroid::bake::Bake;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
-use nephroid::geometry::Ray;
 use nephroid::illumination::lookup::bilinear;
 use nephroid::illumination::parametrisation::coverage::{for_each_texel_in_row, rows};
-use nephroid::illumination::{Chart, IlluminationMap, Side, UvSet};
-use nephroid::optics::LinearSrgb;
+use nephroid::illumination::{Chart, Side, UvSet};
 use nephroid::scene::builtin::pool::{AMPLITUDE_M, bumped, displaced, meshed};
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::texture::Wrap;
-use nephroid::scene::{Adjacency, AlphaMask, LightKind, Material, Mesh, Scene, Wave, Waves};
-use nephroid::settings::{BakeSettings, LayerKind};
-use nephroid::transport::Tracer;
-use nephroid::units::Flux;
+use nephroid::scene::{Adjacency, AlphaMask};
 
 use crate::bake::common::{
     CAUSTIC_AND_DIRECT, all_bits, estimate, floor, rmse, run, session, sized, with_layers,
 };
 use support::effect_scenes::{by_image, by_waves};
 use support::floors::{image, texture_reference};
+use support::meshes::inside_out;
+use support::prelude::*;
 use support::scenes::wave;
 use support::tools::{bake, builtin_scene, caustic, energy_fault, map_of, set, settings, to};
 
 /// 1 W/sr.
 const POWER: Flux = Flux(4.0 * PI);
 
-const LAMP: DVec3 = DVec3::new(-0.3, 1.4, -0.2);
+const LAMP: DVec3 = dvec3(-0.3, 1.4, -0.2);
 
 /// Half a side of the mirror, which lies in y = 0 [m].
 const MIRROR_M: f64 = 2.5;
@@ -54,7 +44,7 @@ fn scene_with(receiver: Mesh) -> Scene {
 
 /// E [W/m²] of the lamp's image in the mirror at a point of a facet.
 fn virtual_irradiance(tracer: &Tracer, point: DVec3, normal: DVec3) -> f64 {
-    let image = LAMP * DVec3::new(1.0, -1.0, 1.0);
+    let image = LAMP * dvec3(1.0, -1.0, 1.0);
     let way = point - image;
     let cosine = -way.normalize().dot(normal);
     let on_mirror = image + way * (image.y / (image.y - point.y));
@@ -80,7 +70,7 @@ const SAMPLES: usize = 4;
 /// Means over the texels of a chart of what a function says of points and unit normals of facets.
 fn texel_means(chart: &Chart, mesh: &Mesh, value: impl Fn(DVec3, DVec3) -> f64) -> Vec<f64> {
     let (width, height) = (chart.width, chart.height);
-    let size = DVec2::new(width as f64, height as f64);
+    let size = dvec2(width as f64, height as f64);
     let mut sums = vec![(0.0, 0.0); width * height];
     for (triangle, uvs) in chart.corner_uvs.iter().enumerate() {
         let [a, b, c] = uvs.map(|uv| uv * size);
@@ -98,12 +88,12 @@ fn texel_means(chart: &Chart, mesh: &Mesh, value: impl Fn(DVec3, DVec3) -> f64) 
         };
         for row in rows([a, b, c], height) {
             for_each_texel_in_row([a, b, c], row, width, |column, part| {
-                let corner = DVec2::new(column as f64, row as f64);
+                let corner = dvec2(column as f64, row as f64);
                 let texel = row * width + column;
                 let mut found = false;
                 for index in 0..SAMPLES * SAMPLES {
-                    let step = DVec2::new((index % SAMPLES) as f64, (index / SAMPLES) as f64) + 0.5;
-                    let place = corner + step / SAMPLES as f64 + DVec2::new(0.6e-6, 1.1e-6);
+                    let step = dvec2((index % SAMPLES) as f64, (index / SAMPLES) as f64) + 0.5;
+                    let place = corner + step / SAMPLES as f64 + dvec2(0.6e-6, 1.1e-6);
                     if part.contains(place) {
                         add(texel, place);
                         found = true;
@@ -176,28 +166,28 @@ fn stretched(columns: u32, rows: u32, surface: impl Fn(f64, f64) -> (DVec3, DVec
             f64::from(index % (columns + 1)) / f64::from(columns),
             f64::from(index / (columns + 1)) / f64::from(rows),
         );
-        DVec2::new(u + 0.04 * (TAU * u).sin(), 0.7 * v + 0.3 * v * v)
+        dvec2(u + 0.04 * (TAU * u).sin(), 0.7 * v + 0.3 * v * v)
     };
     let uvs = (0..(columns + 1) * (rows + 1)).map(stretch).collect();
     mesh.uv0 = Some(uvs);
     mesh
 }
 
-const MIDDLE: DVec3 = DVec3::new(0.35, 0.8, 0.25);
+const MIDDLE: DVec3 = dvec3(0.35, 0.8, 0.25);
 
 fn ball() -> Mesh {
     stretched(192, 96, |u, v| {
         let (sine, cosine) = (PI * v).sin_cos();
         let around = DVec2::from_angle(TAU * u);
-        let normal = DVec3::new(around.x * sine, cosine, around.y * sine);
+        let normal = dvec3(around.x * sine, cosine, around.y * sine);
         (MIDDLE + normal * 0.3, normal)
     })
 }
 
 fn cylinder() -> Mesh {
     let (axis, x) = (
-        DVec3::new(1.0, 0.4, 0.2).normalize(),
-        DVec3::new(-0.4, 1.0, 0.0).normalize(),
+        dvec3(1.0, 0.4, 0.2).normalize(),
+        dvec3(-0.4, 1.0, 0.0).normalize(),
     );
     let y = axis.cross(x).normalize();
     let x = y.cross(axis);
@@ -214,10 +204,8 @@ fn torus() -> Mesh {
     stretched(192, 96, |u, v| {
         let around = DVec2::from_angle(TAU * u);
         let across = DVec2::from_angle(TAU * v);
-        let out = DVec3::new(around.x, 0.3 * around.x, around.y).normalize();
-        let up = out
-            .cross(DVec3::new(-around.y, -0.3 * around.y, around.x))
-            .normalize();
+        let out = dvec3(around.x, 0.3 * around.x, around.y).normalize();
+        let up = out.cross(dvec3(-around.y, -0.3 * around.y, around.x)).normalize();
         let normal = out * across.x + up * across.y;
         (MIDDLE + out * 0.3 + normal * 0.12, normal)
     })
@@ -272,10 +260,10 @@ fn turned(piece: usize, place: DVec2) -> DVec2 {
     let DVec2 { x, y } = place;
     let (x, y) = if piece / 4 % 2 == 1 { (1.0 - x, y) } else { (x, y) };
     match piece % 4 {
-        0 => DVec2::new(x, y),
-        1 => DVec2::new(y, 1.0 - x),
-        2 => DVec2::new(1.0 - x, 1.0 - y),
-        _ => DVec2::new(1.0 - y, x),
+        0 => dvec2(x, y),
+        1 => dvec2(y, 1.0 - x),
+        2 => dvec2(1.0 - x, 1.0 - y),
+        _ => dvec2(1.0 - y, x),
     }
 }
 
@@ -283,9 +271,9 @@ fn turned(piece: usize, place: DVec2) -> DVec2 {
 fn cut_uv(piece: usize, place: DVec2) -> DVec2 {
     // Neighbours on the floor are none in the map.
     let cell = piece * 17 % (PIECES[0] * PIECES[1]);
-    let corner = DVec2::new((cell % PIECES[0]) as f64, (cell / PIECES[0]) as f64) * CELL_TEXELS as f64;
+    let corner = dvec2((cell % PIECES[0]) as f64, (cell / PIECES[0]) as f64) * CELL_TEXELS as f64;
     let texel = corner + 1.0 + turned(piece, place) * PIECE_TEXELS as f64;
-    texel / (DVec2::new(PIECES[0] as f64, PIECES[1] as f64) * CELL_TEXELS as f64)
+    texel / (dvec2(PIECES[0] as f64, PIECES[1] as f64) * CELL_TEXELS as f64)
 }
 
 /// The scene with its floor in pieces that lie pell-mell in the map.
@@ -295,11 +283,11 @@ fn with_floor_in_pieces(mut scene: Scene) -> Scene {
     let (low, high) = floor.mesh_in_scene().bounds().expect("corners");
     let (mut mesh, mut uvs) = (Mesh::default(), Vec::new());
     for piece in 0..PIECES[0] * PIECES[1] {
-        let corner = DVec2::new((piece % PIECES[0]) as f64, (piece / PIECES[0]) as f64);
+        let corner = dvec2((piece % PIECES[0]) as f64, (piece / PIECES[0]) as f64);
         let first = mesh.positions.len() as u32;
         for place in [DVec2::ZERO, DVec2::X, DVec2::ONE, DVec2::Y] {
-            let share = (corner + place) / DVec2::new(PIECES[0] as f64, PIECES[1] as f64);
-            let at = low + (high - low) * DVec3::new(share.x, 0.0, share.y);
+            let share = (corner + place) / dvec2(PIECES[0] as f64, PIECES[1] as f64);
+            let at = low + (high - low) * dvec3(share.x, 0.0, share.y);
             mesh.positions.push(at);
             mesh.normals.push(DVec3::Y);
             uvs.push(cut_uv(piece, place));
@@ -352,12 +340,7 @@ enum Sheet {
 }
 
 fn scene_under_a(sheet: Sheet) -> Scene {
-    let turned = |mut mesh: Mesh| {
-        mesh.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-        mesh.normals.iter_mut().for_each(|normal| *normal = -*normal);
-        mesh
-    };
-    let mut scene = scene_with(turned(shapes::floor([-1.0, 1.0], [-1.0, 1.0], 1.9)));
+    let mut scene = scene_with(inside_out(shapes::floor([-1.0, 1.0], [-1.0, 1.0], 1.9)));
     let z = [-0.4, 0.5];
     let (mesh, cutoff) = match sheet {
         Sheet::None => return scene,
@@ -456,7 +439,7 @@ fn floor_of(scene: Scene, settings: &BakeSettings) -> Vec<f64> {
 /// order. So the maps' difference must halve, and quarter, with the amplitude.
 #[test]
 fn bumps_differ_from_a_shape_by_its_height() {
-    let suns = [(DVec3::new(0.3, -1.0, 0.2), 2.0, 4e5), (DVec3::NEG_Y, 4.0, 4e6)];
+    let suns = [(dvec3(0.3, -1.0, 0.2), 2.0, 4e5), (DVec3::NEG_Y, 4.0, 4e6)];
     for (towards, law, density_per_sr) in suns {
         let under_sun = |mut scene: Scene| {
             if let LightKind::Sun { direction, .. } = &mut scene.lights[0].kind {
@@ -525,10 +508,7 @@ fn rippled(wavelength_m: f64, slope: f64) -> Scene {
             part,
         )
     };
-    let waves = vec![
-        of(DVec3::new(1.0, 0.0, 0.3), 1.0),
-        of(DVec3::new(-0.4, 0.0, 1.0), 0.8),
-    ];
+    let waves = vec![of(dvec3(1.0, 0.0, 0.3), 1.0), of(dvec3(-0.4, 0.0, 1.0), 0.8)];
     scene.materials[1].waves = Some(Waves::new(waves).expect("gentle waves"));
     scene
 }

@@ -1,8 +1,5 @@
 //! Flux on maps in tiles, against the same map row by row: deposits and smoothing.
 
-use std::sync::Arc;
-
-use glam::DVec2;
 use nephroid::illumination::accumulator::{FluxAccumulator, FluxCount};
 use nephroid::illumination::lookup::{bilinear, in_chart};
 use nephroid::illumination::smoothing::smooth;
@@ -11,6 +8,8 @@ use nephroid::illumination::{Chart, tiles};
 use nephroid::light_pass::coverage::{CoverageReport, FluxTriangle};
 
 use crate::bake::coverage::{deposit_on, full_chart, sum};
+use support::laws::scenes::random;
+use support::prelude::*;
 
 /// Tiles of which none is square but the first.
 pub(super) const SIZE: (usize, usize) = (5 * SIDE + 32, 3 * SIDE + 48);
@@ -39,27 +38,15 @@ pub(super) fn mixed() -> TileLayout {
     layout_of(|tile| (tile * 9 % 7) as u8)
 }
 
-/// Numbers from 0 to 1, always the same.
-fn numbers() -> impl Iterator<Item = f64> {
-    let mut state = 0x2545_f491_4f6c_dd1d_u64;
-    std::iter::from_fn(move || {
-        state ^= state << 13;
-        state ^= state >> 7;
-        state ^= state << 17;
-        Some((state >> 11) as f64 / (1_u64 << 53) as f64)
-    })
-}
-
 /// Small and large ones, slivers, some past the borders, some with a corner on the border of a tile.
 fn triangles(count: usize) -> Vec<FluxTriangle> {
-    let mut numbers = numbers();
-    let mut next = || numbers.next().expect("no end");
-    let size = DVec2::new(SIZE.0 as f64, SIZE.1 as f64);
+    let mut next = random(1);
+    let size = dvec2(SIZE.0 as f64, SIZE.1 as f64);
     (0..count)
         .map(|index| {
-            let middle = DVec2::new(next(), next()) * (size + 40.0) - 20.0;
+            let middle = dvec2(next(), next()) * (size + 40.0) - 20.0;
             let extent = [0.3, 3.0, 30.0, 150.0][index % 4];
-            let mut corner = || middle + (DVec2::new(next(), next()) - 0.5) * extent;
+            let mut corner = || middle + (dvec2(next(), next()) - 0.5) * extent;
             let mut corners = [corner(), corner(), corner()];
             match index % 7 {
                 0 => corners[1] = corners[0] + (corners[2] - corners[0]) * 0.4,
@@ -145,17 +132,17 @@ fn look_ups_run_on_across_tiles() {
         }
     }
     let tiled = chart(Some(layout.clone()));
-    let size = DVec2::new(SIZE.0 as f64, SIZE.1 as f64);
-    let mut numbers = numbers();
+    let size = dvec2(SIZE.0 as f64, SIZE.1 as f64);
+    let mut next = random(1);
     let mut alike = 0;
     for _ in 0..2_000 {
-        let uv = DVec2::new(numbers.next().expect("no end"), numbers.next().expect("no end"));
+        let uv = dvec2(next(), next());
         let found = in_chart(&tiled, &slope, uv);
         let at = uv * size;
         // A neighbour that is coarser has one value for all of its texel, and beyond the map the border goes on.
         let levels = [-64.0, 0.0, 64.0].map(|y| {
             [-64.0, 0.0, 64.0].map(|x| {
-                let place = (at + DVec2::new(x, y)).clamp(DVec2::ZERO, size - 1.0);
+                let place = (at + dvec2(x, y)).clamp(DVec2::ZERO, size - 1.0);
                 layout.level_at(place.x as usize, place.y as usize)
             })
         });
@@ -173,7 +160,7 @@ fn look_ups_run_on_across_tiles() {
     assert!(alike > 0, "no place has tiles of one level around it");
     // Without tiles it is the plain look-up.
     let values = layout.dense(&slope);
-    let uv = DVec2::new(0.31, 0.77);
+    let uv = dvec2(0.31, 0.77);
     let plain = bilinear(&values, SIZE.0, SIZE.1, uv);
     assert_eq!(in_chart(&chart(None), &values, uv).to_array(), plain.to_array());
 }
@@ -277,7 +264,7 @@ fn points_spread_by_the_variance() {
                 "{variance} at {spread}"
             );
         }
-        let gaussian = 1.0 / (std::f64::consts::TAU * spread * spread);
+        let gaussian = 1.0 / (TAU * spread * spread);
         assert!(
             spread < 3.0 || (peak / gaussian - 1.0).abs() < if places == 1 { 0.04 } else { 0.06 },
             "{peak} {gaussian}"

@@ -8,8 +8,8 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 use nephroid::export::FloatImage;
-use serde_json::Value;
 
+use support::prelude::*;
 use support::program::{Run, Sandbox};
 
 const QUICK: &str = "--density 1e3 --map-resolution 64";

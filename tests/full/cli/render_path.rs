@@ -1,8 +1,6 @@
 //! Frames of a camera's path: timed, and kept as pictures.
 
-use serde_json::{Value, json};
-
-use nephroid::scene::builtin;
+use support::prelude::*;
 use support::program::{Run, Sandbox, number};
 use support::{or_skip, skip};
 

@@ -2,12 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
 use nephroid::export::FloatImage;
-use nephroid::scene::builtin::shapes;
-use serde_json::{Value, json};
 
-use support::glb::Glb;
+use support::prelude::*;
 use support::program::Sandbox;
 
 const S5: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/reference/S5.pfm");
@@ -405,14 +402,10 @@ fn bad_studies_are_refused_and_write_nothing() {
 
 /// A matte ball of 5,120 triangles without coordinates, and a lamp.
 fn ball() -> Vec<u8> {
-    let mesh = shapes::sphere(DVec3::new(2.0, 0.0, 0.0), 0.5, 4);
-    let numbers =
-        |vectors: &[DVec3]| -> Vec<f32> { vectors.iter().flat_map(|v| v.as_vec3().to_array()).collect() };
+    let mesh = shapes::sphere(dvec3(2.0, 0.0, 0.0), 0.5, 4);
     let mut file = Glb::empty();
-    let positions = file.push_floats(&numbers(&mesh.positions), 3);
-    let normals = file.push_floats(&numbers(&mesh.normals), 3);
-    let indices: Vec<u32> = mesh.triangles.iter().flatten().copied().collect();
-    let indices = file.push_indices(&indices);
+    let [positions, normals] = [&mesh.positions, &mesh.normals].map(|vectors| file.push_vectors(vectors));
+    let indices = file.push_indices(mesh.triangles.as_flattened());
     let attributes = json!({ "POSITION": positions, "NORMAL": normals });
     let mesh = file.push_mesh(json!({ "attributes": attributes, "indices": indices }));
     file.push_root(json!({ "name": "ball", "mesh": mesh }));

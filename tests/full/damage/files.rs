@@ -5,25 +5,22 @@
 use std::cell::Cell;
 use std::io::{Cursor, Read};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use image::ImageFormat;
-use nephroid::bake::{Bake, Baker, ShardSums};
+use nephroid::bake::{Baker, ShardSums};
 use nephroid::error::Result;
 use nephroid::export::float_image::{Channel, FloatImage};
 use nephroid::export::map_folder::MapFolder;
 use nephroid::export::map_set::MapSet;
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest, ShardSet};
-use nephroid::illumination::IlluminationMap;
 use nephroid::light_pass::shard_index::ShardIndex;
+use nephroid::optics::spectrum::Spectrum;
 use nephroid::optics::spectrum::csv::read_lamp;
-use nephroid::progress::Control;
-use nephroid::scene::{Camera, CameraPath, LoadOptions, Scene, environment};
-use nephroid::settings::{BakeSettings, LayerKind};
-use serde_json::json;
+use nephroid::scene::{CameraPath, Environment, environment};
 
-use super::mutate::{Damage, Tally, Way, alone, attack, effort};
-use support::glb::{Glb, load_bytes};
+use super::mutate::{Damage, Tally, Way, alone, attack, attack_alone, effort};
+use support::glb::load_bytes;
+use support::prelude::*;
 use support::program::{Run, Sandbox};
 use support::sound::scene_fault;
 use support::tools::{bake, builtin_scene, photons, set, to};
@@ -73,19 +70,16 @@ fn by_file<T>(read: impl Fn(&Path) -> Result<T>) -> impl Fn(&[u8]) -> Result<T> 
 
 #[test]
 fn environments() {
-    alone(|| {
-        let skies = [
-            ("sky.hdr", picture(ImageFormat::Hdr), Damage::bytes as Way),
-            ("sky.exr", picture(ImageFormat::OpenExr), Damage::bytes),
-        ];
-        let tally = Tally::default();
-        let read = by_file(|path| environment::read(path, LIMIT_BYTES));
-        attack(&tally, (1500, 48 * MIB), &skies, read, |sky| {
-            let total = sky.total_w_per_m2();
-            (!total.is_finite()).then(|| format!("{total} W/m²"))
-        });
-        tally.expect(100, 100);
-    });
+    let skies = [
+        ("sky.hdr", picture(ImageFormat::Hdr), Damage::bytes as Way),
+        ("sky.exr", picture(ImageFormat::OpenExr), Damage::bytes),
+    ];
+    let read = by_file(|path| environment::read(path, LIMIT_BYTES));
+    let fault = |sky: Environment| {
+        let total = sky.total_w_per_m2();
+        (!total.is_finite()).then(|| format!("{total} W/m²"))
+    };
+    attack_alone((1500, 48 * MIB), &skies, read, fault, (100, 100));
 }
 
 #[test]
@@ -105,11 +99,8 @@ fn textures() {
             ..LoadOptions::default()
         };
         let read = |bytes: &[u8]| {
-            let material = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
-            let mut file = Glb::tetrahedron().with_material(material);
-            let view = file.push_view(bytes);
-            file.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
-            file.push("textures", json!({ "source": 0 }));
+            let image = json!({ "mimeType": "image/png" });
+            let file = Glb::tetrahedron().with_texture(bytes, image, json!({ "source": 0 }));
             load_bytes(&file.bytes(), &options)
         };
         let (tally, grey) = (Tally::default(), Cell::new(0));
@@ -125,74 +116,57 @@ fn textures() {
 
 #[test]
 fn single_maps() {
-    alone(|| {
-        let pfm = (0..16 * 16 * 3).flat_map(|value| (value as f32).to_le_bytes());
-        let pfm = b"PF\n16 16\n-1.0\n".iter().copied().chain(pfm).collect();
-        let maps = [
-            ("a.exr", exr_map(), Damage::head as Way),
-            ("a.pfm", pfm, Damage::head),
-        ];
-        let tally = Tally::default();
-        attack(
-            &tally,
-            (1500, 32 * MIB),
-            &maps,
-            by_file(FloatImage::read),
-            |image| {
-                let texels = image.width * image.height;
-                let torn = image
-                    .channels
-                    .iter()
-                    .find(|channel| channel.values.len() != texels);
-                torn.map(|channel| format!("{} of another size", channel.name))
-            },
-        );
-        tally.expect(50, 50);
-    });
+    let pfm = (0..16 * 16 * 3).flat_map(|value| (value as f32).to_le_bytes());
+    let pfm = b"PF\n16 16\n-1.0\n".iter().copied().chain(pfm).collect();
+    let maps = [
+        ("a.exr", exr_map(), Damage::head as Way),
+        ("a.pfm", pfm, Damage::head),
+    ];
+    let fault = |image: FloatImage| {
+        let (texels, mut channels) = (image.width * image.height, image.channels.iter());
+        let torn = channels.find(|channel| channel.values.len() != texels);
+        torn.map(|channel| format!("{} of another size", channel.name))
+    };
+    let read = by_file(FloatImage::read);
+    attack_alone((1500, 32 * MIB), &maps, read, fault, (50, 50));
 }
 
 #[test]
 fn camera_paths() {
-    alone(|| {
-        let key = |x: f64| json!({ "position_m": [x, 1.0, 3.0], "target_m": [0.0, 0.5, -x] });
-        let path = json!({ "frames": 30, "vertical_fov_deg": 50, "keys": [key(0.0), key(1.5), key(-2.0)] });
-        let text = path.to_string().into_bytes();
-        let paths = [
-            ("walk", text.clone(), Damage::document as Way),
-            ("walk", text, Damage::text),
-        ];
-        let is_sound =
-            |camera: &Camera| camera.position.is_finite() && (camera.forward.length() - 1.0).abs() < 1e-12;
-        let tally = Tally::default();
-        let read = |bytes: &[u8]| CameraPath::parse(bytes, "walk.json");
-        attack(&tally, (1000, 16 * MIB), &paths, read, |path| {
-            let cameras = path.cameras(glam::DVec3::ZERO);
-            let is_path = !cameras.is_empty() && cameras.iter().all(is_sound);
-            (!is_path).then(|| format!("{cameras:?}"))
-        });
-        tally.expect(100, 100);
-    });
+    let key = |x: f64| json!({ "position_m": [x, 1.0, 3.0], "target_m": [0.0, 0.5, -x] });
+    let path = json!({ "frames": 30, "vertical_fov_deg": 50, "keys": [key(0.0), key(1.5), key(-2.0)] });
+    let text = path.to_string().into_bytes();
+    let paths = [
+        ("walk", text.clone(), Damage::document as Way),
+        ("walk", text, Damage::text),
+    ];
+    let is_sound =
+        |camera: &Camera| camera.position.is_finite() && (camera.forward.length() - 1.0).abs() < 1e-12;
+    let read = |bytes: &[u8]| CameraPath::parse(bytes, "walk.json");
+    let fault = |path: CameraPath| {
+        let cameras = path.cameras(DVec3::ZERO);
+        let is_path = !cameras.is_empty() && cameras.iter().all(is_sound);
+        (!is_path).then(|| format!("{cameras:?}"))
+    };
+    attack_alone((1000, 16 * MIB), &paths, read, fault, (100, 100));
 }
 
 #[test]
 fn tables_of_spectra() {
-    alone(|| {
-        let row = |row: u32| format!("{}, {:.3}\n", 380 + 10 * row, f64::from(row % 7) * 0.25);
-        let table = "# a lamp\nnm, W/nm\n".to_owned() + &(0..40).map(row).collect::<String>();
-        let tally = Tally::default();
-        let read = |bytes: &[u8]| {
-            let lamp = read_lamp(&String::from_utf8_lossy(bytes));
-            let lamp = lamp.and_then(|lamp| lamp.to_luminous_equivalent(1.0));
-            lamp.map_err(|error| error.at("lamp.csv"))
-        };
-        let tables = [("lamp.csv", table.into_bytes(), Damage::text as Way)];
-        attack(&tally, (2000, 16 * MIB), &tables, read, |lamp| {
-            let colour = lamp.xyz().to_linear_srgb();
-            let is_one = colour.is_finite() && (colour.luminance() - 1.0).abs() < 1e-9;
-            (!is_one).then(|| format!("{colour:?} of luminance {}", colour.luminance()))
-        });
-        tally.expect(100, 100);
-    });
+    let row = |row: u32| format!("{}, {:.3}\n", 380 + 10 * row, f64::from(row % 7) * 0.25);
+    let table = "# a lamp\nnm, W/nm\n".to_owned() + &(0..40).map(row).collect::<String>();
+    let read = |bytes: &[u8]| {
+        let lamp = read_lamp(&String::from_utf8_lossy(bytes));
+        let lamp = lamp.and_then(|lamp| lamp.to_luminous_equivalent(1.0));
+        lamp.map_err(|error| error.at("lamp.csv"))
+    };
+    let tables = [("lamp.csv", table.into_bytes(), Damage::text as Way)];
+    let fault = |lamp: Spectrum| {
+        let colour = lamp.xyz().to_linear_srgb();
+        let is_one = colour.is_finite() && (colour.luminance() - 1.0).abs() < 1e-9;
+        (!is_one).then(|| format!("{colour:?} of luminance {}", colour.luminance()))
+    };
+    attack_alone((2000, 16 * MIB), &tables, read, fault, (100, 100));
 }
 
 /// A header of some hundred bytes that claims gigabytes.
@@ -311,7 +285,7 @@ fn maps() {
 }
 
 /// The first value of a bake that is no number, if there is one.
-fn result_fault(result: &Bake) -> Option<String> {
+pub fn result_fault(result: &Bake) -> Option<String> {
     let layers = result.maps.iter().flat_map(|map| &map.layers);
     let values = layers.flat_map(|layer| layer.irradiance.as_flattened());
     let errors = result.maps.iter().filter_map(|map| map.error.as_ref()).flatten();

@@ -10,10 +10,10 @@ use cpu_time::ProcessTime;
 use nephroid::error::{Error, ErrorKind, Result};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
-use serde_json::{Value, json};
 
 use support::glb::{self, assembled};
 use support::keep_bytes;
+use support::prelude::*;
 
 /// Damage by a seed: the same for the same one.
 #[derive(Debug)]
@@ -354,6 +354,22 @@ pub fn attack<T>(
             }
         }
     }
+}
+
+/// The same in a process of its own; more have to be taken and refused than these.
+#[track_caller]
+pub fn attack_alone<T>(
+    bounds: Bounds,
+    subjects: &[Subject<'_>],
+    read: impl Fn(&[u8]) -> Result<T>,
+    fault: impl Fn(T) -> Option<String>,
+    (taken, refused): (u32, u32),
+) {
+    alone(|| {
+        let tally = Tally::default();
+        attack(&tally, bounds, subjects, read, fault);
+        tally.expect(taken, refused);
+    });
 }
 
 /// What came of `work`, or what was wrong with how it went.

@@ -2,18 +2,15 @@
 
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use nephroid::bake::{Bake, Baker};
+use nephroid::bake::Baker;
 use nephroid::error::Result;
-use nephroid::progress::Control;
-use nephroid::scene::{LoadOptions, Scene};
-use nephroid::settings::{BakeSettings, LayerKind};
-use serde_json::json;
 
-use super::mutate::{Damage, Tally, Way, alone, attack, effort};
-use support::glb::{Glb, load_bytes, load_path};
+use super::files::result_fault;
+use super::mutate::{Damage, Tally, Way, alone, attack, attack_alone, effort};
+use support::glb::{golden, load_bytes, load_path};
+use support::prelude::*;
 use support::sound::scene_fault;
 use support::tools::{energy_fault, to};
 use support::{or_skip, shared_or_skip};
@@ -67,16 +64,6 @@ fn bake(scene: Scene) -> Result<Bake> {
     session.bake(&settings, &(), &Control::default())
 }
 
-/// The first number that is none, or an open ledger, if there is one.
-fn bake_fault(result: &Bake) -> Option<String> {
-    let layers = result.maps.iter().flat_map(|map| &map.layers);
-    let mut values = layers.flat_map(|layer| layer.irradiance.as_flattened());
-    match values.find(|value| !value.is_finite()) {
-        Some(value) => Some(format!("{value} in a map")),
-        None => energy_fault(result),
-    }
-}
-
 /// Damages a scene's file, and what it names beside it. The first of each whose damage goes unnoticed is baked: what loads
 /// keeps the laws all the same. More triangles or lights take longer than there is time for.
 fn attack_scene(path: &Path, tally: &Tally, bakes: &Tally) {
@@ -118,7 +105,7 @@ fn attack_scene(path: &Path, tally: &Tally, bakes: &Tally) {
             }
             let bytes = std::fs::read(copy_of(file)).expect("it was written");
             let result = bakes.watch((&name, &bytes), MAX_BYTES_OF_BAKE, || bake(scene));
-            result.and_then(|result| bake_fault(&result))
+            result.and_then(|result| result_fault(&result).or_else(|| energy_fault(&result)))
         });
         std::fs::write(copy_of(file), whole).expect("can be written");
     }
@@ -147,41 +134,28 @@ fn files_of_the_validator() {
 /// The same where no files are shared.
 #[test]
 fn a_small_scene() {
-    alone(|| {
-        let glass = json!({ "extensions": {
-            "KHR_materials_transmission": { "transmissionFactor": 1.0 },
-            "KHR_materials_volume": { "thicknessFactor": 1.0, "attenuationDistance": 2.0 },
-        } });
-        let whole = Glb::tetrahedron()
-            .with_material(glass)
-            .with_light("lamp", json!({ "type": "spot", "spot": {} }))
-            .bytes();
-        assert!(load_bytes(&whole, &options()).is_ok());
-        let (tally, bounds) = (Tally::default(), (1_500, most_bytes(whole.len() + 10_000)));
-        let read = |bytes: &[u8]| load_bytes(bytes, &options());
-        let subject = ("small.glb", whole, Damage::scene as Way);
-        attack(&tally, bounds, &[subject], read, |scene| scene_fault(&scene));
-        tally.expect(90, 90);
-    });
+    let glass = json!({ "extensions": {
+        "KHR_materials_transmission": { "transmissionFactor": 1.0 },
+        "KHR_materials_volume": { "thicknessFactor": 1.0, "attenuationDistance": 2.0 },
+    } });
+    let whole = Glb::tetrahedron()
+        .with_material(glass)
+        .with_light("lamp", json!({ "type": "spot", "spot": {} }))
+        .bytes();
+    assert!(load_bytes(&whole, &options()).is_ok());
+    let bounds = (1_500, most_bytes(whole.len() + 10_000));
+    let read = |bytes: &[u8]| load_bytes(bytes, &options());
+    let subject = ("small.glb", whole, Damage::scene as Way);
+    attack_alone(bounds, &[subject], read, |scene| scene_fault(&scene), (90, 90));
 }
 
 /// Compressed data is unpacked by what it says of itself.
 #[test]
 fn compressed_scenes() {
-    let golden = |name: &str| {
-        let path = format!("{}/tests/goldens/gltf/{name}", env!("CARGO_MANIFEST_DIR"));
-        std::fs::read(path).expect("the file is part of the project")
-    };
     let with_image = |name: &str| {
-        let mut file = Glb::triangle();
-        let view = file.push_view(&golden(name));
-        file.push("images", json!({ "bufferView": view }));
-        file.push(
-            "textures",
-            json!({ "extensions": { "KHR_texture_basisu": { "source": 0 } } }),
-        );
-        let texture = json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } });
-        file.with_material(texture).bytes()
+        let basisu = json!({ "extensions": { "KHR_texture_basisu": { "source": 0 } } });
+        let file = Glb::triangle().with_texture(&golden(name), json!({}), basisu);
+        file.bytes()
     };
     alone(|| {
         for (name, whole) in [

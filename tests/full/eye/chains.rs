@@ -1,26 +1,18 @@
 //! When the eye's specular chains are followed, and what is left without them.
 
-use std::f64::consts::PI;
-
-use glam::DVec3;
 use nephroid::effect::{Effect, EffectSwitch};
-use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings};
-use nephroid::eye_pass::{Picture, View};
-use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
+use nephroid::eye_pass::reference::EyeRays;
 use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::plan;
-use nephroid::scene::{Camera, Material, SurfaceKind, builtin};
-use nephroid::transport::Tracer;
-use proptest::prelude::*;
 
 use support::meshes::{floor, quad, sphere};
-use support::scenes::{chart, diffuse, map_of, seen, surface, tracer, view};
+use support::prelude::*;
+use support::scenes::{chart, diffuse, limited, map_of, seen, surface, tracer, view};
 
 /// Irradiance on the first object [W/m²].
 const E: [f32; 3] = [50.0, 40.0, 20.0];
 /// Radiance of the background [W/(m² sr)].
-const SKY: LinearSrgb = LinearSrgb::new(3.0, 2.0, 1.0);
+const SKY: LinearSrgb = rgb(3.0, 2.0, 1.0);
 
 fn looking(eye: [f64; 3], target: [f64; 3], fov_rad: f64) -> View {
     View {
@@ -51,14 +43,7 @@ impl Lit {
     }
 
     fn seen(&self, view: &View, switch: EffectSwitch) -> (Picture, EyeRays) {
-        let settings = ReferenceSettings {
-            limits: ChainLimits {
-                switch,
-                ..ChainLimits::default()
-            },
-            ..ReferenceSettings::default()
-        };
-        seen(&self.0, &self.1, view, &settings)
+        seen(&self.0, &self.1, view, &limited(|limits| limits.switch = switch))
     }
 }
 
@@ -79,7 +64,7 @@ fn without_chains_clear_bodies_are_left_out() {
 
 #[test]
 fn without_chains_a_coat_shows_its_diffuse_part() {
-    let wall = quad(DVec3::new(-1.0, -1.0, 0.0), DVec3::Y * 2.0, DVec3::X * 2.0);
+    let wall = quad(dvec3(-1.0, -1.0, 0.0), DVec3::Y * 2.0, DVec3::X * 2.0);
     let coat = surface(SurfaceKind::Coated, 1.5);
     let lit = Lit::new(tracer(vec![(wall, coat)], vec![]));
     let view = looking([0.0, 0.0, 3.0], [0.0; 3], 0.01);

@@ -1,33 +1,23 @@
 //! What the eye sees through glass that parts wavelengths.
 
-use glam::{DMat3, DVec3};
 use nephroid::effect::{Effect, EffectSwitch};
-use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings};
+use nephroid::eye_pass::reference::{EyeRays, ReferenceSettings};
 use nephroid::eye_pass::wavelengths::{
     MAX_PER_PICTURE, SeenWavelength, bands, of_picture, share_below, shift_of_sample,
 };
-use nephroid::eye_pass::{Picture, View};
 use nephroid::optics::wavelength::VISIBLE;
-use nephroid::optics::{LinearSrgb, Nanometres};
 use nephroid::plan::{self, EffectLine};
 use nephroid::scene::builtin::prism::{GLASS, Prism};
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Camera, Material, Mesh, Scene};
-use nephroid::transport::Tracer;
 
 use support::meshes::sphere;
-use support::scenes::{bits, diffuse, tracer, view, view_of};
+use support::prelude::*;
+use support::scenes::{bits, diffuse, to_the_end, tracer, view, view_of};
 use support::tools::builtin_scene;
 
 fn seen(tracer: &Tracer, view: &View, wavelengths: u32, side: u32) -> (Picture, EyeRays) {
     let settings = ReferenceSettings {
-        samples_per_side: side,
-        limits: ChainLimits {
-            max_depth: 64,
-            branch_threshold: 1e-10,
-            ..ChainLimits::default()
-        },
         wavelengths,
+        ..to_the_end(side)
     };
     support::scenes::seen(tracer, &[], view, &settings)
 }
@@ -114,7 +104,7 @@ fn only_dispersive_glass_in_view_parts_rays() {
 
 #[test]
 fn white_stays_white_through_a_dispersive_slab() {
-    let slab = shapes::cuboid(DVec3::new(-1.0, -0.2, -1.0), DVec3::new(1.0, 0.2, 1.0));
+    let slab = shapes::cuboid(dvec3(-1.0, -0.2, -1.0), dvec3(1.0, 0.2, 1.0));
     let scene = tracer(vec![(slab, parts::glass("N-SF11"))], vec![]);
     let through = looking([0.7, 2.0, 1.0], [0.0; 3], [3.0; 3]);
     for (wavelengths, side) in [(1, 1), (3, 1), (16, 1), (5, 2)] {
@@ -166,9 +156,9 @@ fn prism_shows_each_wavelength_by_snells_law() {
     let (line_rad, _) = behind(look_rad, glass.ior);
     let (sine, cosine) = line_rad.sin_cos();
     let line = shapes::rectangle(
-        DVec3::new(cosine, sine, 0.0) * FAR_M,
+        dvec3(cosine, sine, 0.0) * FAR_M,
         DVec3::Z * FAR_M,
-        DVec3::new(-sine, cosine, 0.0) * (FAR_M * HALF_LINE_RAD.tan()),
+        dvec3(-sine, cosine, 0.0) * (FAR_M * HALF_LINE_RAD.tan()),
     );
     let line = (line, shining(LinearSrgb::WHITE));
     let scene = tracer(vec![(prism.mesh(0.06), glass.clone()), line], vec![]);

@@ -1,26 +1,16 @@
 //! Direct light from lamps with extent against closed forms.
 
-use std::f64::consts::PI;
-use std::sync::Arc;
-
-use glam::DVec3;
 use nephroid::illumination::Side;
-use nephroid::scene::{Environment, Light, LightKind, LightSize, Material, Mesh, PanelShape};
-use nephroid::transport::Tracer;
-use nephroid::units::Radiance;
+use nephroid::scene::{Environment, PanelShape};
 
 use support::meshes::{cuboid, floor, grid, quad, sphere};
+use support::prelude::*;
 use support::scenes::{chart, diffuse, direct, flux_w, light, middles, point_light, scene, sun, tracer};
 
 /// A panel at a height over the floor's middle that shines down.
 fn panel(half_m: f64, height_m: f64, radiance: f64, shape: PanelShape) -> Light {
-    light(LightKind::Panel {
-        centre: DVec3::Y * height_m,
-        across: DVec3::X * half_m,
-        down: DVec3::Z * half_m,
-        shape,
-        radiance: Radiance(radiance),
-    })
+    let sides = [DVec3::X * half_m, DVec3::Z * half_m];
+    support::scenes::panel(DVec3::Y * height_m, sides, shape, radiance)
 }
 
 fn ball_lamp(place: DVec3, radius_m: f64, intensity: f64) -> Light {
@@ -42,10 +32,6 @@ fn glowing(object: usize, radiance: f64) -> Light {
     light(LightKind::Surface { object, radiance })
 }
 
-fn sky_light(scale: f64) -> Light {
-    light(LightKind::Environment { scale })
-}
-
 fn sided(double_sided: bool) -> Material {
     Material {
         double_sided,
@@ -63,11 +49,10 @@ fn under(lamp: Light, half: f64, others: Vec<(Mesh, Material)>) -> Tracer {
     tracer(parts.collect(), vec![lamp])
 }
 
-fn under_sky(half: f64, others: Vec<(Mesh, Material)>, sky: Environment, scale: f64) -> Tracer {
+fn under_sky(half: f64, others: Vec<(Mesh, Material)>, sky: Option<Environment>, scale: f64) -> Tracer {
     let parts = std::iter::once((floor(half, 0.0), sided(false))).chain(others);
-    let mut scene = scene(parts.collect(), vec![sky_light(scale)]);
-    scene.environment = Some(Arc::new(sky));
-    Tracer::new(Arc::new(scene))
+    let scene = scene(parts.collect(), vec![]);
+    Tracer::new(Arc::new(support::scenes::under_sky(scene, sky, scale)))
 }
 
 fn lit(tracer: &Tracer, object: usize, n: usize) -> Vec<[f32; 3]> {
@@ -129,7 +114,7 @@ fn from_height_1([x, z]: [f64; 2]) -> f64 {
 fn even_sky_gives_pi_times_its_radiance() {
     for (width, height) in [(1, 1), (64, 32)] {
         let pixels = vec![[2.0, 1.0, 0.5]; width * height];
-        let sky = Environment::new(width, height, pixels).expect("sound");
+        let sky = Environment::new(width, height, pixels);
         let irradiance = lit(&under_sky(1.0, vec![], sky, 3.0), 0, 24);
         assert_lit(&irradiance, 1.0, [0.02, 1e-3], |_| 6.0 * PI);
         let is_coloured =
@@ -147,13 +132,13 @@ fn sun_in_a_sky_casts_its_shadow() {
     let polar = |row: f64| row / 32.0 * PI;
     let sun_sr = 2.0 * PI / 64.0 * (polar(4.0).cos() - polar(5.0).cos());
     let elevation = polar(4.5);
-    let sky = || Environment::new(64, 32, pixels.clone()).expect("sound");
+    let sky = || Environment::new(64, 32, pixels.clone());
     let expected = 0.1 * PI + 999.9 * sun_sr * elevation.cos();
     let open = lit(&under_sky(1.0, vec![], sky(), 1.0), 0, 16);
     assert_lit(&open, 1.0, [0.03, 3e-3], |_| expected);
     // A small plate high up on the way to the sun.
-    let centre = DVec3::new(1.5 * elevation.sin(), 1.5 * elevation.cos(), 0.001);
-    let plate = quad(centre - DVec3::new(0.2, 0.0, 0.2), DVec3::X * 0.4, DVec3::Z * 0.4);
+    let centre = dvec3(1.5 * elevation.sin(), 1.5 * elevation.cos(), 0.001);
+    let plate = quad(centre - dvec3(0.2, 0.0, 0.2), DVec3::X * 0.4, DVec3::Z * 0.4);
     let shadowed = under_sky(0.05, vec![matte(plate)], sky(), 1.0);
     for e in lit(&shadowed, 0, 4) {
         assert!((0.2..0.105 * PI).contains(&f64::from(e[0])), "{e:?}");
@@ -178,13 +163,13 @@ fn square_panel_follows_its_form_factor() {
 /// All that a one-sided lamp sends, πLA, lands in the closed box around it; a disc has its area.
 #[test]
 fn closed_box_takes_all_that_lamps_send() {
-    let ball = ball_lamp(DVec3::new(0.1, 0.2, -0.3), 0.2, 2.0);
+    let ball = ball_lamp(dvec3(0.1, 0.2, -0.3), 0.2, 2.0);
     for (lamp, expected) in [
         (panel(0.3, 0.2, 5.0, PanelShape::Rectangle), PI * 5.0 * 0.36),
         (panel(0.3, 0.2, 5.0, PanelShape::Disc), PI * 5.0 * PI * 0.09),
         (ball, 4.0 * PI * 2.0),
     ] {
-        let walls = cuboid(DVec3::NEG_ONE, DVec3::new(1.0, 1.3, 1.1));
+        let walls = cuboid(DVec3::NEG_ONE, dvec3(1.0, 1.3, 1.1));
         let tracer = tracer(vec![matte(walls)], vec![lamp]);
         let chart = chart(&tracer, 0, 128, 128).of_side(Side::Back);
         let flux = flux_w(&chart, &direct(&tracer, &chart));
@@ -194,11 +179,7 @@ fn closed_box_takes_all_that_lamps_send() {
 
 /// A plate over x ≤ 0 at a height.
 fn half_plate(height: f64) -> (Mesh, Material) {
-    matte(quad(
-        DVec3::new(-3.0, height, -3.0),
-        DVec3::X * 3.0,
-        DVec3::Z * 6.0,
-    ))
+    matte(quad(dvec3(-3.0, height, -3.0), DVec3::X * 3.0, DVec3::Z * 6.0))
 }
 
 /// A plate half-way up hides a panel from one side of its edge: what is left of the panel is a rectangle.
@@ -265,9 +246,9 @@ fn wide_lamps_shine_as_their_middles() {
 /// A sheet that glows between a floor and a ceiling: upwards, or both ways.
 #[test]
 fn surfaces_glow_on_the_sides_they_have() {
-    let ceiling = || matte(quad(DVec3::new(-1.0, 1.4, -1.0), DVec3::X * 2.0, DVec3::Z * 2.0));
+    let ceiling = || matte(quad(dvec3(-1.0, 1.4, -1.0), DVec3::X * 2.0, DVec3::Z * 2.0));
     for double_sided in [true, false] {
-        let sheet = quad(DVec3::new(-0.5, 0.7, -0.5), DVec3::Z, DVec3::X);
+        let sheet = quad(dvec3(-0.5, 0.7, -0.5), DVec3::Z, DVec3::X);
         let others = vec![(sheet, sided(double_sided)), ceiling()];
         let tracer = under(glowing(1, 2.0), 1.0, others);
         let normal = |object: usize| tracer.scene().objects[object].mesh_in_scene().face_normal(0);
@@ -287,8 +268,8 @@ fn surfaces_glow_on_the_sides_they_have() {
         assert_eq!(lit(&tracer, 1, 4), [[0.0; 3]; 16]);
     }
     // Of many triangles, so that it is looked for by samples alone; it faces up.
-    let sheet = grid(6, 6, |s, t| DVec3::new(t - 0.5, 0.7, s - 0.5));
-    let ceiling = quad(DVec3::new(-1.0, 1.4, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0);
+    let sheet = grid(6, 6, |s, t| dvec3(t - 0.5, 0.7, s - 0.5));
+    let ceiling = quad(dvec3(-1.0, 1.4, -1.0), DVec3::Z * 2.0, DVec3::X * 2.0);
     let others = vec![(sheet, sided(false)), matte(ceiling)];
     let tracer = under(glowing(1, 2.0), 1.0, others);
     assert!(tracer.scene().objects[1].mesh_in_scene().face_normal(0).y > 0.0);
@@ -302,7 +283,7 @@ fn surfaces_glow_on_the_sides_they_have() {
 /// Far from the world's origin too, what glows is not its own shadow: a box and a ball of many triangles.
 #[test]
 fn lamps_do_not_shadow_themselves() {
-    for offset in [DVec3::ZERO, DVec3::new(1234.5, -777.7, 4321.0)] {
+    for offset in [DVec3::ZERO, dvec3(1234.5, -777.7, 4321.0)] {
         let place = |mut mesh: Mesh| {
             mesh.positions.iter_mut().for_each(|corner| *corner += offset);
             mesh
@@ -316,7 +297,7 @@ fn lamps_do_not_shadow_themselves() {
         assert_lit(&ball, 0.5, [0.04, 0.02], |place| {
             PI * 0.01 * 5.0 * from_height_1(place)
         });
-        let body = cuboid(DVec3::new(-0.2, 0.5, -0.2), DVec3::new(0.2, 0.6, 0.2));
+        let body = cuboid(dvec3(-0.2, 0.5, -0.2), dvec3(0.2, 0.6, 0.2));
         let body = lit(&beside(0.1, body), 0, 8);
         assert_lit(&body, 0.1, [2e-3, 2e-3], |place| 5.0 * square_sr(place, 0.2, 0.5));
     }
@@ -326,7 +307,7 @@ fn lamps_do_not_shadow_themselves() {
 #[test]
 fn lamp_on_its_receiver_stays_finite() {
     for (height, double_sided) in [(0.0, false), (0.0, true), (1e-12, true), (1e-6, true)] {
-        let flat = quad(DVec3::new(-0.5, height, -0.5), DVec3::X, DVec3::Z);
+        let flat = quad(dvec3(-0.5, height, -0.5), DVec3::X, DVec3::Z);
         let ball = sphere(DVec3::Y * height, 0.5, 24, 12);
         for (lamp, most) in [(flat, PI), (ball, 2.0 * PI)] {
             let tracer = under(glowing(1, 1e30), 1.0, vec![(lamp, sided(double_sided))]);

@@ -1,30 +1,19 @@
 //! The device's pictures against the CPU's: channel by channel where both do the same, by laws of chains, and where
 //! rounding turns chains at outlines.
 
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
-use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings};
-use nephroid::eye_pass::{Picture, View};
+use nephroid::eye_pass::reference::ReferenceSettings;
+use nephroid::illumination::Chart;
 use nephroid::illumination::lookup::in_chart;
 use nephroid::illumination::tiles::{self, COARSEST, TileLayout};
-use nephroid::illumination::{Chart, IlluminationMap};
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::texture::Wrap;
-use nephroid::scene::{
-    AlphaMask, Environment, LightKind, Material, NormalMap, Scene, SurfaceKind, Variation,
-};
-use nephroid::settings::LayerKind;
-use nephroid::transport::Tracer;
-use nephroid::units::{Irradiance, RadiantIntensity};
+use nephroid::scene::{AlphaMask, Environment, NormalMap, Variation};
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
 use support::chain_laws;
 use support::floors::{
     diffuse, floor, floor_map, floor_scene, four_colours, from_above, image, lambert, texture_reference,
 };
-use support::scenes::{bits, lamps_of_all_kinds, light, map_of, middles, seen, view};
+use support::prelude::*;
+use support::scenes::{bits, lamps_of_all_kinds, light, limited, map_of, middles, seen, under_sky, view};
 
 /// Rounding of one half float; the map and the picture are one each.
 const HALF: f64 = 1.0 / 2048.0;
@@ -65,11 +54,7 @@ fn sampled(name: &'static str, map: IlluminationMap, size: u32) -> Case {
 fn on_cpu(case: &Case, samples_per_side: u32) -> Picture {
     let settings = ReferenceSettings {
         samples_per_side,
-        limits: ChainLimits {
-            branching_depth: AS_CPU.branching_depth,
-            ..Default::default()
-        },
-        ..Default::default()
+        ..limited(|limits| limits.branching_depth = AS_CPU.branching_depth)
     };
     let tracer = Tracer::new(Arc::new(case.scene.clone()));
     seen(&tracer, &case.maps, &case.view, &settings).0
@@ -86,7 +71,7 @@ fn off(case: &Case, found: &Picture, expected: &Picture) -> f64 {
     off as f64 / found.radiance.len() as f64
 }
 
-const ALBEDO: LinearSrgb = LinearSrgb::new(0.8, 0.5, 0.25);
+const ALBEDO: LinearSrgb = rgb(0.8, 0.5, 0.25);
 
 fn even(irradiance: [f32; 3]) -> Vec<IlluminationMap> {
     vec![floor_map(0, 1, 1, vec![irradiance])]
@@ -103,7 +88,7 @@ fn under(name: &'static str, surface: SurfaceKind, base_colour: LinearSrgb, heig
     });
     scene.objects.push(floor("sheet", 1, height_m));
     let mut case = case(name, scene, even([3.0, 2.0, 1.0]), 65);
-    case.view.background = LinearSrgb::new(0.5, 0.25, 2.0);
+    case.view.background = rgb(0.5, 0.25, 2.0);
     case.tolerance = 4.0 * HALF;
     case
 }
@@ -122,7 +107,7 @@ fn floors() -> Vec<Case> {
     // A width whose rows are no multiple of the copy's alignment.
     let mut empty = case("nothing", Scene::default(), vec![], 1);
     (empty.view.width, empty.view.height) = (7, 3);
-    empty.view.background = LinearSrgb::new(0.25, 3.0, 1e5);
+    empty.view.background = rgb(0.25, 3.0, 1e5);
 
     empty.tolerance = HALF;
 
@@ -149,7 +134,7 @@ fn floors() -> Vec<Case> {
     // An unlit floor half below one that glows.
     let mut glow = floor_scene(diffuse(white));
     let glowing = Material {
-        emitted_radiance: LinearSrgb::new(2.0, 0.0, 7.0),
+        emitted_radiance: rgb(2.0, 0.0, 7.0),
         ..diffuse(white)
     };
     let lamp = shapes::floor([0.0, 0.5], [0.0, 1.0], 0.1);
@@ -165,12 +150,12 @@ fn floors() -> Vec<Case> {
         case("one floor hides another", scene, vec![map(0), map(1)], 8)
     });
 
-    let metal = LinearSrgb::new(0.75, 0.5, 0.9);
+    let metal = rgb(0.75, 0.5, 0.9);
     let pane = under("pane", ThinWall, ALBEDO, 0.5);
     let glass = under("sheet of glass", Dielectric, white, 0.5);
     let mut sky = under("mirror under the background", Mirror, metal, 0.5);
     sky.tolerance = 2.0 * HALF;
-    let nearly_white = LinearSrgb::new(1.0, 1.0, 1.0 - 1e-7);
+    let nearly_white = rgb(1.0, 1.0, 1.0 - 1e-7);
     let mut tinted = under("nearly white", Dielectric, nearly_white, 0.5);
     tinted.view.camera.vertical_fov_rad = 2.5;
 
@@ -207,18 +192,13 @@ fn masks() -> Vec<Case> {
         let sheet = &mut case.scene.materials[1];
         (sheet.base_colour_texture, sheet.double_sided) = (Some(texture_reference()), true);
         sheet.alpha_mask = Some(AlphaMask { cutoff: 0.5, factor });
-        sheet.emitted_radiance = LinearSrgb::new(0.1, 0.4, 0.2);
+        sheet.emitted_radiance = rgb(0.1, 0.4, 0.2);
         if below == SurfaceKind::Mirror {
             case.maps.clear();
         }
         // From one side, so that undersides are seen in the mirror.
-        case.view = view(
-            DVec3::new(0.2, 1.3, 1.6),
-            DVec3::new(0.5, 0.2, 0.5),
-            1.0,
-            [120, 80],
-        );
-        case.view.background = LinearSrgb::new(0.5, 0.25, 2.0);
+        case.view = view(dvec3(0.2, 1.3, 1.6), dvec3(0.5, 0.2, 0.5), 1.0, [120, 80]);
+        case.view.background = rgb(0.5, 0.25, 2.0);
         (case.of_peak, case.few) = (0.01, 0.004);
         cases.push(case);
     }
@@ -230,12 +210,7 @@ fn mixtures() -> Vec<Case> {
     let mut image = four_colours();
     image.rgba[1][3] = 120;
     let of = |(transmission, coverage): (f64, Option<f64>)| {
-        let mut case = under(
-            "mixture",
-            SurfaceKind::Varied,
-            LinearSrgb::new(0.9, 0.6, 0.3),
-            0.5,
-        );
+        let mut case = under("mixture", SurfaceKind::Varied, rgb(0.9, 0.6, 0.3), 0.5);
         case.scene.textures.push(image.clone().into());
         let sheet = &mut case.scene.materials[1];
         (sheet.metallic, sheet.roughness) = (1.0, 0.25);
@@ -269,11 +244,11 @@ fn reliefs() -> Vec<Case> {
     let lamps = [
         LightKind::Environment { scale: 0.5 },
         LightKind::Point {
-            position: DVec3::new(0.3, 0.4, 0.6),
+            position: dvec3(0.3, 0.4, 0.6),
             intensity: RadiantIntensity(1.0),
         },
         LightKind::Sun {
-            direction: DVec3::new(0.8, -0.6, 0.0),
+            direction: dvec3(0.8, -0.6, 0.0),
             normal_irradiance: Irradiance(3.0),
         },
     ];
@@ -308,18 +283,18 @@ fn highlights() -> Vec<Case> {
         let mut mirror = parts::mirror();
         (mirror.base_colour, mirror.roughness) = (ALBEDO, roughness);
         let mut scene = floor_scene(mirror);
-        let ball = |x: f64| shapes::sphere(DVec3::new(x, 0.12, 0.6), 0.1, 4);
+        let ball = |x: f64| shapes::sphere(dvec3(x, 0.12, 0.6), 0.1, 4);
         parts::add(&mut scene, "mirror", ball(0.3), parts::mirror());
         parts::add(&mut scene, "glass", ball(0.75), parts::dielectric("glass", 1.5));
         for (lamp, x) in [0.2, 0.4, 0.6, 0.8].into_iter().enumerate() {
             scene
                 .lights
-                .push(lamps_of_all_kinds(DVec3::new(x, 0.7, -0.3)).swap_remove(lamp));
+                .push(lamps_of_all_kinds(dvec3(x, 0.7, -0.3)).swap_remove(lamp));
         }
         let mut case = case("highlights", scene, vec![], 1);
-        let (eye, target) = (DVec3::new(0.5, 0.6, 1.7), DVec3::new(0.5, 0.0, 0.5));
+        let (eye, target) = (dvec3(0.5, 0.6, 1.7), dvec3(0.5, 0.0, 0.5));
         case.view = view(eye, target, 0.6, [120, 80]);
-        case.view.background = LinearSrgb::new(0.2, 0.1, 0.4);
+        case.view.background = rgb(0.2, 0.1, 0.4);
         (case.tolerance, case.of_peak, case.few) = (0.01, 0.003, 0.01);
         case
     };
@@ -336,19 +311,18 @@ fn skies() -> Vec<Case> {
             [0.2 + x, 1.2 - x, 2.0 * (1.0 - y) + 0.1]
         };
         let pixels = (0..width * height).map(pixel).collect();
-        Environment::new(width, height, pixels).expect("a sound image")
+        Environment::new(width, height, pixels)
     };
     let mut cases = Vec::new();
     for (width, height) in [(64, 32), (1, 1), (7, 3)] {
         let mut scene = floor_scene(diffuse(LinearSrgb::grey(0.1)));
-        let ball = |x: f64| shapes::sphere(DVec3::new(x, 0.3, 0.5), 0.2, 4);
+        let ball = |x: f64| shapes::sphere(dvec3(x, 0.3, 0.5), 0.2, 4);
         parts::add(&mut scene, "mirror", ball(0.3), parts::mirror());
         parts::add(&mut scene, "glass", ball(0.75), parts::dielectric("glass", 1.5));
-        scene.environment = Some(Arc::new(gradient(width, height)));
-        scene.lights = vec![light(LightKind::Environment { scale: 1.5 })];
-        scene.lights[0].colour = LinearSrgb::new(1.0, 0.5, 2.0);
+        let mut scene = under_sky(scene, gradient(width, height), 1.5);
+        scene.lights[0].colour = rgb(1.0, 0.5, 2.0);
         for target in [[0.5, 0.3, 0.5], [0.4, 2.5, 1.9], [1.5, 0.2, 2.0]] {
-            let eye = DVec3::new(0.5, 0.6, 1.7);
+            let eye = dvec3(0.5, 0.6, 1.7);
             cases.push(Case {
                 view: view(eye, target.into(), 1.0, [120, 80]),
                 tolerance: 0.01,
@@ -425,17 +399,10 @@ fn peaks_and_what_is_dim_beside_them_survive() {
 fn sun_in_a_sky_leaves_surfaces_their_digits() {
     let mut pixels = vec![[0.5_f32; 3]; 32 * 16];
     pixels[3 * 32 + 17] = [1e9; 3];
-    let mut scene = skies().remove(0).scene;
-    scene.environment = Some(Arc::new(Environment::new(32, 16, pixels).expect("sound")));
+    let mut scene = under_sky(skies().remove(0).scene, Environment::new(32, 16, pixels), 1.0);
     scene.materials[0].emitted_radiance = LinearSrgb::grey(0.25);
-    scene.lights = vec![light(LightKind::Environment { scale: 1.0 })];
     let mut rig = or_skip!(Rig::new(&scene, &[]));
-    let view = view(
-        DVec3::new(0.5, 0.6, 1.7),
-        DVec3::new(0.5, 0.0, 0.9),
-        1.0,
-        [120, 80],
-    );
+    let view = view(dvec3(0.5, 0.6, 1.7), dvec3(0.5, 0.0, 0.9), 1.0, [120, 80]);
     let found = rig.picture(&view);
     let floor = found.radiance[40 * 120 + 60];
     assert!((floor[0] / 0.25 - 1.0).abs() < 1e-3, "{floor:?}");
@@ -454,9 +421,9 @@ fn tiled() -> IlluminationMap {
     let (mut values, mut texel_areas_m2) = (Vec::new(), Vec::new());
     for tile in layout.tiles() {
         let side = f64::from(1_u32 << tile.level);
-        let origin = DVec2::new(tile.origin.0 as f64, tile.origin.1 as f64);
+        let origin = dvec2(tile.origin.0 as f64, tile.origin.1 as f64);
         for index in 0..tile.texels.len() {
-            let texel = DVec2::new((index % tile.size.0) as f64, (index / tile.size.0) as f64);
+            let texel = dvec2((index % tile.size.0) as f64, (index / tile.size.0) as f64);
             let uv = (origin + (texel + 0.5) * side) / SIDE as f64;
             let value = (1.0 + 0.5 * (4.0 * uv.x).cos() * (3.0 * uv.y).sin()) as f32;
             values.push([value, 0.5 * value, 2.0 * value]);

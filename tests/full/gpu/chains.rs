@@ -1,25 +1,17 @@
 //! What is seen in mirrors and through glass: as on the CPU, as FLIP sees it, and only where a view calls for it.
 
-use std::sync::Arc;
-
-use glam::{DVec2, DVec3};
 use nephroid::effect::EffectSwitch;
-use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings, first_hits};
+use nephroid::eye_pass::ToneMap;
+use nephroid::eye_pass::reference::{EyeRays, first_hits};
 use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
-use nephroid::eye_pass::{Picture, ToneMap, View};
-use nephroid::optics::LinearSrgb;
 use nephroid::plan;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Camera, Material, Scene, SurfaceKind, Volume, Waves};
-use nephroid::settings::LayerKind;
-use nephroid::transport::Tracer;
-use nephroid::units::Flux;
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
 use support::effect_scenes::{all, by_image};
 use support::flip::mean_flip;
-use support::scenes::{bits, seen, view_of, wave};
+use support::prelude::*;
+use support::scenes::{bits, limited, seen, tinted, view_of, wave};
 use support::tools::{bake, builtin_scene, photons, set, settings};
 
 /// Largest mean FLIP between the device's picture and the CPU's of every chain.
@@ -36,16 +28,6 @@ const SIZE: [u32; 2] = [320, 213];
 
 fn both_layers() -> Vec<LayerKind> {
     vec![LayerKind::Caustic, LayerKind::Direct]
-}
-
-fn limited(branching_depth: u32) -> ReferenceSettings {
-    ReferenceSettings {
-        limits: ChainLimits {
-            branching_depth,
-            ..Default::default()
-        },
-        ..Default::default()
-    }
 }
 
 /// The picture one pixel to the left.
@@ -75,7 +57,10 @@ fn compare(scene: Scene) {
     let maps = bake(scene.clone(), &baking).maps;
     let tracer = Tracer::new(Arc::new(scene.clone()));
     let view = view_of(scene.cameras[0].clone(), SIZE);
-    let on_cpu = |depth: u32| seen(&tracer, &maps, &view, &limited(depth)).0;
+    let on_cpu = |depth: u32| {
+        let settings = limited(|limits| limits.branching_depth = depth);
+        seen(&tracer, &maps, &view, &settings).0
+    };
     let (all_chains, same_chains) = (on_cpu(u32::MAX), on_cpu(AS_CPU.branching_depth));
     let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &maps));
     let device = rig.picture(&view);
@@ -120,7 +105,7 @@ fn built_in_scenes_look_as_on_the_cpu() {
         let mut scene = builtin_scene(name);
         if name == "ball" {
             // From so high up that the floor, and the caustic on it, are seen through the ball.
-            let (eye, target) = (DVec3::new(0.35, 2.2, 1.0), DVec3::new(0.0, 0.45, 0.0));
+            let (eye, target) = (dvec3(0.35, 2.2, 1.0), dvec3(0.0, 0.45, 0.0));
             scene.cameras = vec![Camera::look_at("above", eye, target, 0.7)];
         }
         compare(scene);
@@ -130,11 +115,11 @@ fn built_in_scenes_look_as_on_the_cpu() {
 /// A lamp, a red pillar and a mirror behind it.
 fn hall(mirror: Material, pillar: [DVec3; 2]) -> Scene {
     let mut scene = parts::reference_scene(1.0);
-    let plane = shapes::rectangle(DVec3::new(0.0, 0.5, -0.7), DVec3::X * 0.9, DVec3::Y * 0.48);
+    let plane = shapes::rectangle(dvec3(0.0, 0.5, -0.7), DVec3::X * 0.9, DVec3::Y * 0.48);
     parts::add(&mut scene, "mirror", plane, mirror);
-    let red = parts::matte("red", LinearSrgb::new(0.7, 0.2, 0.1));
+    let red = parts::matte("red", rgb(0.7, 0.2, 0.1));
     parts::add(&mut scene, "pillar", shapes::cuboid(pillar[0], pillar[1]), red);
-    let lamp = DVec3::new(-0.3, 1.8, 0.7);
+    let lamp = dvec3(-0.3, 1.8, 0.7);
     scene.lights.push(parts::point_light("light", lamp, Flux(100.0)));
     scene
 }
@@ -142,18 +127,15 @@ fn hall(mirror: Material, pillar: [DVec3; 2]) -> Scene {
 /// A glass ball in a tank of greenish water, before a mirror: chains of ten surfaces and more.
 #[test]
 fn nested_glass_looks_as_on_the_cpu() {
-    let pillar = [DVec3::new(0.6, 0.0, -0.1), DVec3::new(0.75, 0.7, 0.05)];
+    let pillar = [dvec3(0.6, 0.0, -0.1), dvec3(0.75, 0.7, 0.05)];
     let mut scene = hall(parts::mirror(), pillar);
-    let mut water = parts::dielectric("water", 1.333);
-    water.volume = Some(Volume {
-        attenuation_distance_m: 1.0,
-        attenuation_colour: LinearSrgb::new(0.7, 0.95, 0.85),
-    });
-    let tank = shapes::cuboid(DVec3::new(-0.55, 0.05, -0.3), DVec3::new(0.45, 0.6, 0.35));
+    let water = parts::dielectric("water", 1.333);
+    let water = tinted(water, 1.0, rgb(0.7, 0.95, 0.85));
+    let tank = shapes::cuboid(dvec3(-0.55, 0.05, -0.3), dvec3(0.45, 0.6, 0.35));
     parts::add(&mut scene, "water", tank, water);
-    let ball = shapes::sphere(DVec3::new(-0.1, 0.32, 0.0), 0.2, 5);
+    let ball = shapes::sphere(dvec3(-0.1, 0.32, 0.0), 0.2, 5);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
-    let (eye, target) = (DVec3::new(0.35, 0.95, 2.0), DVec3::new(0.0, 0.3, -0.1));
+    let (eye, target) = (dvec3(0.35, 0.95, 2.0), dvec3(0.0, 0.3, -0.1));
     scene.cameras = vec![Camera::look_at("camera", eye, target, 0.75)];
     compare(scene);
 }
@@ -167,10 +149,10 @@ fn wavy_mirror_and_coat_look_as_on_the_cpu() {
         Waves::new(vec![of(0.3, direction), of(0.23, across)]).ok()
     };
     let wavy = Material {
-        waves: waves(DVec3::new(1.0, 1.0, 0.0)),
+        waves: waves(dvec3(1.0, 1.0, 0.0)),
         ..parts::mirror()
     };
-    let mut scene = hall(wavy, [DVec3::new(0.2, 0.0, -0.1), DVec3::new(0.4, 0.7, 0.1)]);
+    let mut scene = hall(wavy, [dvec3(0.2, 0.0, -0.1), dvec3(0.4, 0.7, 0.1)]);
     let floor = &mut scene.materials[0];
     (floor.surface, floor.roughness, floor.coat) = (SurfaceKind::Coated, 0.0, 0.6);
     floor.waves = waves(DVec3::X);
@@ -185,7 +167,7 @@ fn normal_images_bend_chains_as_on_the_cpu() {
     let floor = &mut scene.materials[0];
     (floor.surface, floor.roughness, floor.normal_map) = (SurfaceKind::Coated, 0.0, normal_map);
     let mesh = scene.objects[0].mesh_in_scene_mut();
-    let uv = |place: &DVec3| DVec2::new(place.x, place.z);
+    let uv = |place: &DVec3| dvec2(place.x, place.z);
     mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());
     compare(scene);
 }
@@ -201,7 +183,7 @@ fn chains_only_where_something_specular_is_in_view() {
         let maps = bake(scene.clone(), &baking).maps;
         let tracer = Tracer::new(Arc::new(scene.clone()));
         let view = View {
-            background: LinearSrgb::new(0.5, 0.6, 0.7),
+            background: rgb(0.5, 0.6, 0.7),
             ..view_of(scene.cameras[0].clone(), [96, 64])
         };
         // Nothing opaque hides it.
@@ -219,8 +201,7 @@ fn chains_only_where_something_specular_is_in_view() {
             assert_eq!(bits(auto) != bits(off), is_visible, "{name}");
         };
         let by_cpu = |switch| -> (Picture, EyeRays) {
-            let mut settings = limited(u32::MAX);
-            settings.limits.switch = switch;
+            let settings = limited(|limits| (limits.switch, limits.branching_depth) = (switch, u32::MAX));
             seen(&tracer, &maps, &view, &settings)
         };
         let [(auto, took), (on, forced), (off, left)] = SWITCHES.map(by_cpu);

@@ -1,14 +1,11 @@
 //! Flights over built-in scenes and over files made by others: from anywhere, no fault and no pixel that is no radiance.
 
-use glam::DVec3;
+use nephroid::eye_pass::ToneMap;
 use nephroid::eye_pass::renderer::EyeQuality;
-use nephroid::eye_pass::{ToneMap, View};
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::{Camera, LoadOptions, Scene, SurfaceKind, builtin};
-use nephroid::settings::LayerKind;
 
-use crate::gpu::rays::Numbers;
 use crate::gpu::rig::{FORMAT, Rig, gpu, or_skip};
+use support::laws::scenes::random;
+use support::prelude::*;
 use support::scenes::view_of;
 use support::shared_or_skip;
 use support::tools::{bake, builtin_scene, photons, set};
@@ -27,9 +24,9 @@ const FILES: [&str; 5] = [
 /// Around the scene, among its objects, and within what is specular.
 fn cameras(scene: &Scene) -> Vec<Camera> {
     let (low, high) = scene.bounds().expect("it has objects");
-    let mut numbers = Numbers::new(17);
+    let mut next = random(17);
     let mut within = |margin: f64| {
-        let share = DVec3::new(numbers.next(), numbers.next(), numbers.next());
+        let share = dvec3(next(), next(), next());
         let (centre, half) = (0.5 * (low + high), 0.5 * (high - low) * (1.0 + margin));
         centre + half * (share * 2.0 - 1.0)
     };
@@ -91,7 +88,7 @@ fn fly(scene: &Scene) -> Option<[f64; 2]> {
     rig.renderer.set_quality(EyeQuality::WALKING);
     let (mut sum, mut specular) = (0.0, 0);
     for camera in cameras(scene) {
-        sum += lit_share(&mut rig, &camera, LinearSrgb::new(0.02, 0.03, 0.05), 1);
+        sum += lit_share(&mut rig, &camera, rgb(0.02, 0.03, 0.05), 1);
         specular += usize::from(rig.renderer.counts().drawn_specular > 0);
     }
     assert_eq!(rig.renderer.chain_refusal(), None, "{}", scene.name);

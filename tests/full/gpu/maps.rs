@@ -2,21 +2,15 @@
 //! or the scene change, with the picture that of a fresh upload.
 
 use std::ops::Range;
-use std::sync::Arc;
 
-use glam::{DVec2, DVec3};
 use nephroid::eye_pass::renderer::{MapStyle, Uploaded};
-use nephroid::eye_pass::{Picture, View};
-use nephroid::illumination::{Chart, IlluminationMap};
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{
-    Camera, Edit, EditState, Environment, LightKind, Material, MaterialEdit, Motion, Scene, SurfaceKind,
-};
+use nephroid::illumination::Chart;
+use nephroid::scene::Environment;
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
 use support::floors::{diffuse, floor, floor_map, floor_scene, from_above, lambert};
-use support::scenes::{bits, light, map_of};
+use support::prelude::*;
+use support::scenes::{bits, map_of, under_sky};
 
 /// Bytes of a tile on the device.
 const TILE: u64 = 65 * 65 * 8;
@@ -62,7 +56,7 @@ fn two_halves(size: usize) -> (Scene, IlluminationMap) {
     let uv = |corner: u32| {
         let place = mesh.positions[corner as usize];
         let start = if corner < 4 { 0.0 } else { 1.0 - width };
-        DVec2::new(start + place.x.rem_euclid(3.0) * width, place.z)
+        dvec2(start + place.x.rem_euclid(3.0) * width, place.z)
     };
     let columns = || (0..size * size).map(|texel| texel % size);
     let is_surface = |column: usize| !(half - 2..half + 2).contains(&column);
@@ -263,7 +257,7 @@ fn assert_as_fresh(rig: &mut Rig, view: &View) {
 
 #[test]
 fn only_tiles_that_differ_are_uploaded() {
-    let scene = floor_scene(diffuse(LinearSrgb::new(0.8, 0.5, 0.2)));
+    let scene = floor_scene(diffuse(rgb(0.8, 0.5, 0.2)));
     let mut rig = or_skip!(Rig::new(&scene, &[]));
     let mut irradiance = ramp();
     assert_tiles(rig.set_maps(&[map(irradiance.clone())]), tiles(SIZE, |_, _| true));
@@ -321,26 +315,24 @@ fn another_size_and_no_map_take_new_textures() {
 /// A lit floor under a glass ball and a sky, with a glowing box beside.
 fn room() -> (Scene, Vec<IlluminationMap>) {
     let mut scene = floor_scene(diffuse(LinearSrgb::grey(0.5)));
-    let ball = shapes::sphere(DVec3::new(0.4, 0.3, 0.4), 0.2, 3);
+    let ball = shapes::sphere(dvec3(0.4, 0.3, 0.4), 0.2, 3);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
-    let cuboid = shapes::cuboid(DVec3::new(0.7, 0.0, 0.7), DVec3::new(0.9, 0.2, 0.9));
+    let cuboid = shapes::cuboid(dvec3(0.7, 0.0, 0.7), dvec3(0.9, 0.2, 0.9));
     let grey = parts::matte("box", LinearSrgb::grey(0.5));
     parts::add(&mut scene, "box", cuboid, grey);
     scene.materials[2].emitted_radiance = LinearSrgb::grey(30.0);
-    let sky = Environment::new(1, 1, vec![[20.0, 10.0, 5.0]]).expect("sound");
-    scene.environment = Some(Arc::new(sky));
-    scene.lights = vec![light(LightKind::Environment { scale: 1.0 })];
-    (scene, vec![map(ramp())])
+    let sky = Environment::new(1, 1, vec![[20.0, 10.0, 5.0]]);
+    (under_sky(scene, sky, 1.0), vec![map(ramp())])
 }
 
 #[test]
 fn edited_scene_shows_as_a_new_one() {
     let (mut scene, maps) = room();
     let mut rig = or_skip!(Rig::new(&scene, &maps));
-    let way = DVec3::new(-0.1, 0.05, 0.02);
+    let way = dvec3(-0.1, 0.05, 0.02);
     let moved = |object, yaw_rad| Edit::Place(object, Motion::turned(yaw_rad, way));
     let ior = Edit::Material(1, MaterialEdit::Ior(1.2));
-    let tint = Edit::Material(1, MaterialEdit::BaseColour(LinearSrgb::new(1.0, 0.5, 0.2)));
+    let tint = Edit::Material(1, MaterialEdit::BaseColour(rgb(1.0, 0.5, 0.2)));
     // All objects are written at once.
     let uniform = 160 * scene.objects.len() as u64;
     let ball = 32 * scene.objects[1].mesh_in_scene().positions.len() as u64;
@@ -362,7 +354,7 @@ fn edited_scene_shows_as_a_new_one() {
     // The sky as strong as its light says.
     let before = rig.picture(&from_above(64));
     scene.lights[0].kind = LightKind::Environment { scale: 8.0 };
-    scene.lights[0].colour = LinearSrgb::new(0.5, 1.0, 1.0);
+    scene.lights[0].colour = rgb(0.5, 1.0, 1.0);
     rig.set_scene(&scene);
     assert!(bits(&rig.picture(&from_above(64))) != bits(&before));
     assert_as_fresh(&mut rig, &from_above(64));
@@ -376,7 +368,7 @@ fn glass_that_turns_matte_keeps_maps_in_place() {
     let matte = rough.apply(&scene).expect("it is in range");
     let again = EditState::of(&scene).set(&matte);
     // Scenes of other objects are taken over whole.
-    let alone = floor_scene(diffuse(LinearSrgb::new(0.3, 0.6, 0.9)));
+    let alone = floor_scene(diffuse(rgb(0.3, 0.6, 0.9)));
     let mut other = alone.clone();
     *other.objects[0].mesh_in_scene_mut() = shapes::floor([0.0, 0.5], [0.0, 1.0], 0.0);
     for edited in [matte, again, alone, other] {
@@ -389,7 +381,7 @@ fn glass_that_turns_matte_keeps_maps_in_place() {
 #[test]
 fn maps_as_they_are_show_their_values() {
     let (mut scene, _) = room();
-    scene.materials[0].base_colour = LinearSrgb::new(0.1, 0.5, 0.9);
+    scene.materials[0].base_colour = rgb(0.1, 0.5, 0.9);
     scene.materials[0].emitted_radiance = LinearSrgb::WHITE;
     let value = [0.25, 0.5, 0.75];
     let mut rig = or_skip!(Rig::new(&scene, &[floor_map(0, 2, 2, vec![value; 4])]));

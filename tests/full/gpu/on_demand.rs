@@ -1,35 +1,27 @@
 //! Pipelines, and what chains are traced through, exist only once a view has called for them.
 
 use std::collections::BTreeSet;
-use std::sync::Arc;
 
-use glam::DVec3;
 use nephroid::effect::EffectSwitch;
-use nephroid::eye_pass::View;
-use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings};
 use nephroid::eye_pass::renderer::Renderer;
-use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Scene, SurfaceKind};
-use nephroid::transport::Tracer;
 
 use crate::gpu::rig::{Rig, or_skip};
 use support::floors::{diffuse, floor_map, floor_scene};
-use support::scenes::{bits, seen, view};
+use support::prelude::*;
+use support::scenes::{bits, limited, seen, view};
 
 /// A lit floor; what is specular lies far out along +x, a matte box along −x.
 fn hall() -> (Scene, Vec<IlluminationMap>) {
-    let mut scene = floor_scene(diffuse(LinearSrgb::new(0.8, 0.5, 0.2)));
+    let mut scene = floor_scene(diffuse(rgb(0.8, 0.5, 0.2)));
     let coat = Material {
         surface: SurfaceKind::Coated,
         base_colour: LinearSrgb::grey(0.5),
-        emitted_radiance: LinearSrgb::new(0.1, 0.2, 0.3),
+        emitted_radiance: rgb(0.1, 0.2, 0.3),
         ..Default::default()
     };
     let glass = parts::dielectric("glass", 1.5);
     let tinted = Material {
-        base_colour: LinearSrgb::new(0.9, 0.5, 0.2),
+        base_colour: rgb(0.9, 0.5, 0.2),
         ..glass.clone()
     };
     let white = parts::matte("box", LinearSrgb::WHITE);
@@ -53,10 +45,10 @@ fn rig() -> Option<Rig<'static>> {
 
 /// From the floor's middle along x.
 fn towards(x: f64) -> View {
-    let eye = DVec3::new(0.5, 0.4, 0.5);
+    let eye = dvec3(0.5, 0.4, 0.5);
     View {
-        background: LinearSrgb::new(0.5, 0.6, 0.7),
-        ..view(eye, DVec3::new(x, 0.3, 0.5), 1.6, [48, 32])
+        background: rgb(0.5, 0.6, 0.7),
+        ..view(eye, dvec3(x, 0.3, 0.5), 1.6, [48, 32])
     }
 }
 
@@ -122,13 +114,7 @@ fn switched_off_everything_is_given_up() {
     assert!(bits(&off) != bits(&before));
 
     // What is left is the surfaces' own light: the CPU's eye pass without chains is exact here, edges aside.
-    let settings = ReferenceSettings {
-        limits: ChainLimits {
-            switch: EffectSwitch::Off,
-            ..Default::default()
-        },
-        ..Default::default()
-    };
+    let settings = limited(|limits| limits.switch = EffectSwitch::Off);
     let tracer = Tracer::new(Arc::new(rig.scene.clone()));
     let expected = seen(&tracer, &rig.maps, &view, &settings).0;
     let differs = |(a, b): &(&[f32; 3], &[f32; 3])| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 2e-3);

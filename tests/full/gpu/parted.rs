@@ -1,23 +1,16 @@
 //! A view at rest becomes a mean of many pictures; and what glass that parts wavelengths shows, against the CPU.
 
-use std::sync::Arc;
-
-use glam::DVec3;
 use nephroid::effect::EffectSwitch;
-use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings};
+use nephroid::eye_pass::ToneMap;
+use nephroid::eye_pass::reference::ReferenceSettings;
 use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
-use nephroid::eye_pass::{Picture, ToneMap, View};
-use nephroid::illumination::IlluminationMap;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Material, Scene};
-use nephroid::transport::Tracer;
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
 use support::flip::mean_flip;
 use support::floors::{diffuse, floor_map, floor_scene};
-use support::scenes::{seen, view};
+use support::prelude::*;
+use support::scenes::{limited, seen, view};
 
 /// Largest mean FLIP between the device's picture at rest and the CPU's of the same chains. Nearly all of it is that
 /// they look through other places of the pixels: without dispersion they differ as much.
@@ -28,13 +21,13 @@ const PICTURES: u32 = 64;
 /// A ball and a lying prism over a floor of bright lines, two of them coloured.
 fn exhibit(glass: &Material) -> (Scene, Vec<IlluminationMap>) {
     let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
-    let ball = shapes::sphere(DVec3::new(0.3, 0.24, 0.55), 0.2, 5);
+    let ball = shapes::sphere(dvec3(0.3, 0.24, 0.55), 0.2, 5);
     parts::add(&mut scene, "ball", ball, glass.clone());
     let outline = [[0.62, 0.1, 0.2], [0.82, 0.1, 0.35], [0.66, 0.35, 0.3]];
-    let prism = shapes::prism(outline.map(DVec3::from), DVec3::new(0.1, 0.0, 0.4));
+    let prism = shapes::prism(outline.map(DVec3::from), dvec3(0.1, 0.0, 0.4));
     parts::add(&mut scene, "prism", prism, glass.clone());
     // Wide lines with soft edges: what differs by the places of samples is little beside what glass parts.
-    let wave = |place: usize| 0.5 + 0.5 * (std::f64::consts::TAU * (place as f64 + 0.5) / 8.0).cos();
+    let wave = |place: usize| 0.5 + 0.5 * (TAU * (place as f64 + 0.5) / 8.0).cos();
     let line = |index: usize| {
         let (across, along) = (wave(index % 32), wave(index / 32));
         let lit = 3.0 * across.max(along).powi(2);
@@ -47,12 +40,7 @@ fn exhibit(glass: &Material) -> (Scene, Vec<IlluminationMap>) {
 fn ahead() -> View {
     View {
         background: LinearSrgb::grey(0.1),
-        ..view(
-            DVec3::new(0.5, 0.9, 1.7),
-            DVec3::new(0.46, 0.2, 0.5),
-            0.26,
-            [96, 64],
-        )
+        ..view(dvec3(0.5, 0.9, 1.7), dvec3(0.46, 0.2, 0.5), 0.26, [96, 64])
     }
 }
 
@@ -78,11 +66,8 @@ fn picture_at_rest_shows_all_wavelengths() {
     let [parted, unparted] = [16, 0].map(|wavelengths| {
         let settings = ReferenceSettings {
             samples_per_side: 4,
-            limits: ChainLimits {
-                branching_depth: AS_CPU.branching_depth,
-                ..ChainLimits::default()
-            },
             wavelengths,
+            ..limited(|limits| limits.branching_depth = AS_CPU.branching_depth)
         };
         seen(&tracer, &maps, &ahead(), &settings).0
     });
@@ -124,7 +109,7 @@ fn switched_off_glass_has_one_index() {
 #[test]
 fn white_stays_white_in_every_picture() {
     let mut scene = Scene::default();
-    let slab = shapes::cuboid(DVec3::new(-2.0, 0.1, -2.0), DVec3::new(3.0, 0.4, 3.0));
+    let slab = shapes::cuboid(dvec3(-2.0, 0.1, -2.0), dvec3(3.0, 0.4, 3.0));
     parts::add(&mut scene, "slab", slab, parts::glass("N-SF11"));
     let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &[]));
     rig.renderer.set_dispersion(EffectSwitch::Off);
@@ -145,7 +130,7 @@ fn white_stays_white_in_every_picture() {
 /// A mirror ball on a floor with a coarse check.
 fn rig() -> Option<Rig<'static>> {
     let mut scene = floor_scene(diffuse(LinearSrgb::WHITE));
-    let ball = shapes::sphere(DVec3::new(0.5, 0.2, 0.5), 0.2, 4);
+    let ball = shapes::sphere(dvec3(0.5, 0.2, 0.5), 0.2, 4);
     parts::add(&mut scene, "ball", ball, parts::mirror());
     let is_bright = |index: usize| (index / 16 + index % 16).is_multiple_of(2);
     let texels = (0..256).map(|index| if is_bright(index) { [2.0; 3] } else { [0.2; 3] });
@@ -153,7 +138,7 @@ fn rig() -> Option<Rig<'static>> {
 }
 
 fn from(x: f64, target_y: f64, fov_rad: f64) -> View {
-    let (eye, target) = (DVec3::new(x, 0.8, 1.8), DVec3::new(0.5, target_y, 0.5));
+    let (eye, target) = (dvec3(x, 0.8, 1.8), dvec3(0.5, target_y, 0.5));
     View {
         background: LinearSrgb::grey(0.1),
         ..view(eye, target, fov_rad, [60, 40])

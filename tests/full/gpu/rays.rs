@@ -1,36 +1,27 @@
 //! The device's rays: its search for the nearest triangle against the CPU's and against the exact answer, and shadow rays
 //! from lamps against the baked layer.
 
-use std::f64::consts::TAU;
-use std::sync::Arc;
-
-use glam::{DMat3, DVec2, DVec3};
 use nephroid::eye_pass::renderer::{ProbedHit, probe};
-use nephroid::eye_pass::{Picture, View};
-use nephroid::geometry::Ray;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Light, LightKind, Mesh, PanelShape, Scene, Volume};
-use nephroid::settings::LayerKind;
-use nephroid::transport::Tracer;
-use nephroid::units::{Irradiance, Radiance, RadiantIntensity};
+use nephroid::scene::PanelShape;
 use rayon::prelude::*;
 
 use crate::gpu::rig::{AS_CPU, Rig, gpu, or_skip, unlike};
 use support::floors::{diffuse, floor_scene};
-use support::scenes::{light, view};
+use support::meshes::{inside_out, moved};
+use support::prelude::*;
+use support::scenes::{light, panel, point_light, spot, sun, tinted, view};
 use support::tools::{bake, builtin_scene, set, to};
 
 /// Evenly spread numbers that are the same in every run (SplitMix64).
-pub struct Numbers(u64);
+struct Numbers(u64);
 
 impl Numbers {
-    pub fn new(seed: u64) -> Self {
+    fn new(seed: u64) -> Self {
         Self(seed)
     }
 
     /// In [0, 1).
-    pub fn next(&mut self) -> f64 {
+    fn next(&mut self) -> f64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = self.0;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -41,7 +32,7 @@ impl Numbers {
     fn direction(&mut self) -> DVec3 {
         let y = 2.0 * self.next() - 1.0;
         let (sine, cosine) = (TAU * self.next()).sin_cos();
-        DVec3::new(cosine, 0.0, sine) * (1.0 - y * y).sqrt() + DVec3::Y * y
+        dvec3(cosine, 0.0, sine) * (1.0 - y * y).sqrt() + DVec3::Y * y
     }
 
     /// Within a ball.
@@ -104,7 +95,7 @@ fn awkward() -> Scene {
     let cylinder = |radius: f64, segments: u32| {
         shapes::sheet(segments, 1, |u, v| {
             let (sine, cosine) = (TAU * u.fract()).sin_cos();
-            let outward = DVec3::new(cosine, 0.0, sine);
+            let outward = dvec3(cosine, 0.0, sine);
             (outward * radius + DVec3::Y * (50.0 * v), outward)
         })
     };
@@ -124,15 +115,15 @@ fn awkward() -> Scene {
         floor(),
         cylinder(3.0, 4096),
         cylinder(12.0, 2048),
-        shapes::sphere(DVec3::new(20.0, 3.0, 5.0), 0.01, 3),
-        shapes::sphere(DVec3::new(-9.0, 0.5, 30.0), 1e-4, 2),
-        shapes::sphere(DVec3::new(-30.0, 10.0, -20.0), 8.0, 4),
+        shapes::sphere(dvec3(20.0, 3.0, 5.0), 0.01, 3),
+        shapes::sphere(dvec3(-9.0, 0.5, 30.0), 1e-4, 2),
+        shapes::sphere(dvec3(-30.0, 10.0, -20.0), 8.0, 4),
         needles,
     ]);
-    let turn = DMat3::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);
+    let turn = DMat3::from_axis_angle(dvec3(0.6, 0.0, 0.8), 0.7);
     for object in &mut scene.objects {
         for position in &mut object.mesh_in_scene_mut().positions {
-            *position = turn * *position + DVec3::new(3e5, -1e5, 7e5);
+            *position = turn * *position + dvec3(3e5, -1e5, 7e5);
         }
     }
     scene
@@ -191,7 +182,7 @@ fn no_ray_leaves_a_closed_surface() {
     assert!(hits.iter().all(Option::is_some));
 }
 
-pub type Answer = Option<ProbedHit>;
+type Answer = Option<ProbedHit>;
 /// A triangle and the distance to it in local units.
 type Met = Option<(usize, f64)>;
 type Corners = [DVec3; 3];
@@ -204,7 +195,7 @@ const EPSILON: f64 = 1.0 / (1 << 19) as f64;
 
 /// What is said of an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Verdict {
+enum Verdict {
     /// Nothing on both.
     Missed,
     /// The same triangle.
@@ -216,7 +207,7 @@ pub enum Verdict {
 }
 
 /// Tells right from wrong answers.
-pub struct Judge {
+struct Judge {
     tracer: Tracer,
     /// Of the first triangle of each object.
     firsts: Vec<usize>,
@@ -235,7 +226,7 @@ struct Across {
 
 impl Across {
     fn flat(&self, corners: &Corners) -> [DVec2; 3] {
-        let flat = |off: DVec3| DVec2::new(off.dot(self.axes[0]), off.dot(self.axes[1]));
+        let flat = |off: DVec3| dvec2(off.dot(self.axes[0]), off.dot(self.axes[1]));
         corners.map(|corner| flat(corner - self.origin))
     }
 
@@ -271,7 +262,7 @@ impl Across {
 }
 
 impl Judge {
-    pub fn new(scene: Arc<Scene>) -> Self {
+    fn new(scene: Arc<Scene>) -> Self {
         let tracer = Tracer::new(scene.clone());
         let (centre, scale) = (tracer.frame().centre, tracer.frame().scale);
         let (mut firsts, mut corners) = (Vec::new(), Vec::new());
@@ -290,13 +281,13 @@ impl Judge {
         }
     }
 
-    pub fn bounding_sphere(&self) -> (DVec3, f64) {
+    fn bounding_sphere(&self) -> (DVec3, f64) {
         let (low, high) = self.tracer.scene().bounds().expect("it has triangles");
         let centre = low * 0.5 + high * 0.5;
         (centre, (high - centre).length())
     }
 
-    pub fn all(&self, rays: &[Ray], answers: &[Answer]) -> Vec<Verdict> {
+    fn all(&self, rays: &[Ray], answers: &[Answer]) -> Vec<Verdict> {
         assert_eq!(rays.len(), answers.len());
         let pairs = rays.par_iter().zip(answers);
         pairs.map(|(ray, answer)| self.verdict(ray, answer)).collect()
@@ -387,58 +378,42 @@ impl Judge {
     }
 }
 
-fn lamp(colour: [f64; 3], kind: LightKind) -> Light {
+fn coloured(colour: [f64; 3], lamp: Light) -> Light {
     Light {
         colour: colour.into(),
-        ..light(kind)
+        ..lamp
     }
 }
 
 /// One lamp of each kind, each of a colour of its own.
 fn lamps() -> [Light; 3] {
-    let point = LightKind::Point {
-        position: DVec3::new(0.1, 0.9, 0.2),
-        intensity: RadiantIntensity(2.0),
-    };
-    let spot = LightKind::Spot {
-        position: DVec3::new(0.8, 0.7, 0.4),
-        direction: DVec3::new(-0.3, -1.0, 0.1).normalize(),
-        intensity: RadiantIntensity(3.0),
-        inner_cone_rad: 0.2,
-        outer_cone_rad: 0.5,
-    };
-    let sun = LightKind::Sun {
-        direction: DVec3::new(0.4, -1.0, -0.3).normalize(),
-        normal_irradiance: Irradiance(2.0),
-    };
+    let place = dvec3(0.8, 0.7, 0.4);
     [
-        lamp([1.0, 0.2, 0.1], point),
-        lamp([0.1, 1.0, 0.3], spot),
-        lamp([0.2, 0.3, 1.0], sun),
+        coloured([1.0, 0.2, 0.1], point_light(dvec3(0.1, 0.9, 0.2), 2.0)),
+        coloured(
+            [0.1, 1.0, 0.3],
+            spot(place, dvec3(-0.3, -1.0, 0.1), 3.0, [0.2, 0.5]),
+        ),
+        coloured([0.2, 0.3, 1.0], sun(dvec3(0.4, -1.0, -0.3), 2.0)),
     ]
 }
 
 /// A floor with a matte box, a glass ball that casts a shadow, and a mirror behind them.
 fn scene(lights: Vec<Light>) -> Scene {
     let mut scene = floor_scene(diffuse(LinearSrgb::grey(0.8)));
-    let cuboid = shapes::cuboid(DVec3::new(0.3, 0.0, 0.5), DVec3::new(0.5, 0.2, 0.7));
+    let cuboid = shapes::cuboid(dvec3(0.3, 0.0, 0.5), dvec3(0.5, 0.2, 0.7));
     let grey = parts::matte("box", LinearSrgb::grey(0.5));
     parts::add(&mut scene, "box", cuboid, grey);
-    let ball = shapes::sphere(DVec3::new(0.7, 0.15, 0.7), 0.1, 3);
+    let ball = shapes::sphere(dvec3(0.7, 0.15, 0.7), 0.1, 3);
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
-    let mirror = shapes::cuboid(DVec3::new(0.0, 0.0, -0.1), DVec3::new(1.0, 0.6, -0.05));
+    let mirror = shapes::cuboid(dvec3(0.0, 0.0, -0.1), dvec3(1.0, 0.6, -0.05));
     parts::add(&mut scene, "mirror", mirror, parts::mirror());
     scene.lights = lights;
     scene
 }
 
 fn ahead() -> View {
-    view(
-        DVec3::new(0.45, 0.7, 1.7),
-        DVec3::new(0.5, 0.1, 0.3),
-        0.8,
-        [150, 100],
-    )
+    view(dvec3(0.45, 0.7, 1.7), dvec3(0.5, 0.1, 0.3), 0.8, [150, 100])
 }
 
 fn by_layer(scene: &Scene) -> Picture {
@@ -473,7 +448,7 @@ fn shadow_rays_show_the_baked_layer() {
         let before = assert_traced(&mut rig);
         // The comparison sees that a lamp has moved.
         for light in &mut scene.lights {
-            light.kind = light.kind.moved(DVec3::new(0.1, 0.0, 0.0));
+            light.kind = light.kind.moved(dvec3(0.1, 0.0, 0.0));
             if let LightKind::Sun { direction, .. } = &mut light.kind {
                 *direction = DVec3::NEG_Y;
             }
@@ -499,12 +474,9 @@ fn moved_object_takes_its_shadow_along() {
 fn water_weakens_shadow_rays_as_the_layer() {
     let [point, ..] = lamps();
     let mut scene = floor_scene(diffuse(LinearSrgb::grey(0.8)));
-    let mut water = parts::dielectric("water", 1.33);
-    water.volume = Some(Volume {
-        attenuation_distance_m: 0.5,
-        attenuation_colour: LinearSrgb::new(0.3, 0.7, 0.9),
-    });
-    let body = shapes::cuboid(DVec3::new(-1.0, -0.5, -1.0), DVec3::new(2.0, 1.2, 2.5));
+    let water = parts::dielectric("water", 1.33);
+    let water = tinted(water, 0.5, rgb(0.3, 0.7, 0.9));
+    let body = shapes::cuboid(dvec3(-1.0, -0.5, -1.0), dvec3(2.0, 1.2, 2.5));
     parts::add(&mut scene, "water", body, water);
     scene.lights = vec![point];
     let mut rig = or_skip!(tracing(&scene));
@@ -518,28 +490,27 @@ fn water_weakens_shadow_rays_as_the_layer() {
 #[test]
 fn small_surfaces_are_traced_as_their_middles() {
     let half_m = 1e-3;
-    let (centre, colour) = (DVec3::new(0.3, 0.8, 0.6), [1.0, 0.6, 0.2]);
-    let radiance = Radiance(0.5 / (4.0 * half_m * half_m));
-    let panel = |down: DVec3| LightKind::Panel {
-        centre,
-        across: DVec3::X * half_m,
-        down: down * half_m,
-        shape: PanelShape::Rectangle,
-        radiance,
+    let (centre, colour) = (dvec3(0.3, 0.8, 0.6), [1.0, 0.6, 0.2]);
+    let radiance = 0.5 / (4.0 * half_m * half_m);
+    let small = |down: DVec3| {
+        let sides = [DVec3::X * half_m, down * half_m];
+        coloured(colour, panel(centre, sides, PanelShape::Rectangle, radiance))
     };
     // It shines up, on nothing; turned, down.
-    let mut up = or_skip!(tracing(&scene(vec![lamp(colour, panel(DVec3::NEG_Z))])));
+    let mut up = or_skip!(tracing(&scene(vec![small(DVec3::NEG_Z)])));
     let dark = up.picture(&ahead());
     assert!(dark.radiance.iter().flatten().all(|channel| *channel == 0.0));
-    up.set_scene(&scene(vec![lamp(colour, panel(DVec3::Z))]));
+    up.set_scene(&scene(vec![small(DVec3::Z)]));
     let expected = assert_traced(&mut up);
 
     // The same lamp as a surface that glows.
-    let mut glowing = scene(vec![lamp(colour, LightKind::Surface { object: 4, radiance })]);
-    let mut patch = shapes::floor([-half_m, half_m], [-half_m, half_m], 0.0);
-    patch.positions.iter_mut().for_each(|corner| *corner += centre);
-    patch.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
-    patch.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    let glow = LightKind::Surface {
+        object: 4,
+        radiance: Radiance(radiance),
+    };
+    let mut glowing = scene(vec![coloured(colour, light(glow))]);
+    let patch = shapes::floor([-half_m, half_m], [-half_m, half_m], 0.0);
+    let patch = moved(inside_out(patch), DMat3::IDENTITY, centre);
     let mut material = parts::matte("lamp", LinearSrgb::BLACK);
     material.double_sided = false;
     parts::add(&mut glowing, "lamp", patch, material);

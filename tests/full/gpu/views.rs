@@ -1,18 +1,15 @@
 //! Floors of which every pixel is known: what surfaces show instead of their light, and exposure, tone mapping and encoding
 //! as on the CPU.
 
-use glam::DVec3;
 use nephroid::eye_pass::renderer::{Inspected, MapStyle};
 use nephroid::eye_pass::tone_mapping::display_rgba8;
-use nephroid::eye_pass::{ToneMap, View, WhiteBalance};
-use nephroid::illumination::IlluminationMap;
+use nephroid::eye_pass::{ToneMap, WhiteBalance};
 use nephroid::illumination::false_colours::ColourScale;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::Scene;
 use strum::VariantArray;
 
 use crate::gpu::rig::{FORMAT, Rig, gpu, or_skip};
 use support::floors::{diffuse, floor_map, floor_scene, from_above};
+use support::prelude::*;
 use support::scenes::middles;
 
 /// Pixels and texels across.
@@ -81,7 +78,7 @@ fn irradiance_has_the_colour_of_the_scale() {
 
 #[test]
 fn normals_are_those_of_the_mesh() {
-    for normal in [DVec3::Y, DVec3::new(0.6, 0.8, 0.0), DVec3::new(-0.48, 0.6, -0.64)] {
+    for normal in [DVec3::Y, dvec3(0.6, 0.8, 0.0), dvec3(-0.48, 0.6, -0.64)] {
         let mut scene = grey_floor();
         scene.objects[0].mesh_in_scene_mut().normals = vec![normal; 4];
         // Surfaces have them with and without maps.

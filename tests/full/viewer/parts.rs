@@ -1,20 +1,19 @@
 //! Parts of the window without a display: the whole panel on small and on dense screens, lights that are added, scenes that
-//! other programs change, files of theirs that are edited and saved, and frames that are written.
+//! other programs change, frames that are written, exposure, and how long a bake is said to take still.
 
 use std::fs;
-use std::sync::Arc;
+use std::time::{Duration, Instant};
 
 use egui::accesskit::Role;
 use egui::pos2;
-use glam::{DVec2, DVec3};
+use nephroid::bake::CostPoint;
 use nephroid::effect::EffectSwitches;
-use nephroid::eye_pass::{ToneMap, View};
-use nephroid::geometry::Ray;
-use nephroid::optics::LinearSrgb;
+use nephroid::eye_pass::tone_mapping::display_rgba8;
+use nephroid::eye_pass::{self, ToneMap};
 use nephroid::optics::spectrum::xyz::IDENTITY;
-use nephroid::scene::{Camera, Edit, Light, LightEdit, LightKind, MaterialEdit, Motion, builtin, turntable};
-use nephroid::settings::{BakeSettings, Estimator, Sigma};
-use nephroid::transport::Tracer;
+use nephroid::progress::Stage;
+use nephroid::scene::turntable;
+use nephroid::settings::{ErrorMetric, Estimator, Sigma};
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::background::Wake;
 use nephroid::viewer::command::Command;
@@ -22,12 +21,16 @@ use nephroid::viewer::exporting::{ExportState, Exporter};
 use nephroid::viewer::files::FilesOptions;
 use nephroid::viewer::filming::FilmJob;
 use nephroid::viewer::new_light::{NewLight, ViewTarget};
+use nephroid::viewer::time_left::{in_words, time_left_s};
+use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
 use super::fixtures::{
     act, added, bake, change, edited, folder, model, options, read, scene, set, until, wait_for,
 };
 use super::headless::{Headless, SCREEN, splats};
 use super::scene_file;
+use support::prelude::*;
+use support::tools;
 
 fn shooting(frames: usize) -> FilmJob {
     let scene = Arc::new(scene());
@@ -41,7 +44,7 @@ fn shooting(frames: usize) -> FilmJob {
             height: 32,
             exposure_stops: 0.0,
             tone_map: ToneMap::None,
-            background: LinearSrgb::WHITE,
+            background: LinearSrgb::BLACK,
         },
         effects: EffectSwitches::default(),
         white_balance: IDENTITY,
@@ -62,7 +65,7 @@ fn filming_can_be_stopped() {
             total: 10_000
         }
     );
-    std::thread::sleep(std::time::Duration::from_millis(300));
+    std::thread::sleep(Duration::from_millis(300));
     exporter.stop();
     wait_for("the end", || exporter.poll());
     assert!(
@@ -70,6 +73,65 @@ fn filming_can_be_stopped() {
         "{:?}",
         exporter.state
     );
+}
+
+/// With the layers of a window.
+fn with_direct(settings: BakeSettings) -> BakeSettings {
+    tools::set(settings, |s| {
+        s.layers = vec![LayerKind::Caustic, LayerKind::Direct]
+    })
+}
+
+#[test]
+fn a_film_is_a_folder_of_pictures() {
+    let folder = folder();
+    let job = FilmJob {
+        maps: tools::bake(scene(), &with_direct(tools::settings(1000.0, 64))).maps,
+        ..shooting(4)
+    };
+    let mut exporter = Exporter::new(&Wake::new(|| ()));
+    exporter.film(job, folder.path().to_owned());
+    wait_for("the end", || exporter.poll());
+    let ExportState::Done(written) = &exporter.state else {
+        panic!("{:?}", exporter.state)
+    };
+    let frame = |number: usize| image::open(written.join(format!("frame-{number:05}.png")));
+    let frames: Vec<_> = (1..=4)
+        .map(|number| frame(number).expect("a PNG").to_rgb8())
+        .collect();
+    assert!(frame(5).is_err());
+    for pair in frames.windows(2) {
+        assert_eq!(pair[0].dimensions(), (48, 32));
+        let bright = pair[0].pixels().filter(|pixel| pixel.0[1] > 60).count();
+        assert!(bright > 100, "{bright} pixels of light");
+        let moved = pair[0].pixels().zip(pair[1].pixels());
+        let moved = moved.filter(|(a, b)| a.0[1].abs_diff(b.0[1]) > 20).count();
+        assert!(moved > 20, "{moved} pixels differ from frame to frame");
+    }
+}
+
+/// As the window shows it first: neither white nor dark.
+#[test]
+fn exposure_suits_a_room() {
+    let scene = builtin::build("showroom").expect("it is built in");
+    let basin = scene.cameras.iter().find(|camera| camera.name == "basin");
+    let view = View::new(basin.expect("a camera").clone(), [184, 144]);
+    let coarse = BakeSettings {
+        error_metric: ErrorMetric::default(),
+        ..tools::to(0.5, 64)
+    };
+    let maps = tools::bake(scene.clone(), &with_direct(coarse)).maps;
+    let picture = eye_pass::render(&Arc::new(scene), &maps, &view, &(), &Control::default());
+    let picture = picture.expect("a picture");
+    let stops = picture.auto_exposure_stops();
+    assert!(stops.abs() < 2.0, "{stops}");
+    let shown = display_rgba8(&picture, stops, ToneMap::default());
+    let share = |is_so: fn(&[u8]) -> bool| {
+        let pixels = shown.chunks(4).filter(|rgba| is_so(&rgba[..3]));
+        pixels.count() as f64 / (shown.len() / 4) as f64
+    };
+    let (white, dark) = (share(|rgb| *rgb == [255; 3]), share(|rgb| rgb[1] < 32));
+    assert!(white < 0.2 && dark < 0.5, "{white} of it white, {dark} dark");
 }
 
 #[test]
@@ -86,7 +148,7 @@ fn camera_settings_and_edits_stay() {
     });
     let rough = Edit::Material(1, MaterialEdit::Roughness(0.25));
     act(&mut model, change(rough));
-    model.navigator.look(DVec2::new(100.0, 30.0));
+    model.navigator.look(dvec2(100.0, 30.0));
     set(&mut model, |it| {
         (it.settings.seed, it.settings.estimator) = (7, Estimator::Photon)
     });
@@ -145,11 +207,7 @@ fn new_lights_have_room_and_suit_the_exposure() {
         let (low, high) = scene.bounds().expect("there are surfaces");
         let radius_m = 0.5 * (high - low).length();
         let middle = 0.5 * (low + high);
-        for from in [
-            DVec3::new(1.0, 1.2, 1.5),
-            DVec3::new(-2.0, 0.7, 0.1),
-            DVec3::Y * 2.0,
-        ] {
+        for from in [dvec3(1.0, 1.2, 1.5), dvec3(-2.0, 0.7, 0.1), DVec3::Y * 2.0] {
             let gaze = Ray {
                 origin: middle + from * radius_m,
                 direction: -from.normalize(),
@@ -237,7 +295,7 @@ fn nothing_is_cut_off_or_overlaps() {
             let mut panel = Headless::opened(settings, screen);
             // With what sets them back beside them.
             let edits = [
-                Edit::Light(0, LightEdit::Position(DVec3::new(-10.75, -20.125, -30.25))),
+                Edit::Light(0, LightEdit::Position(dvec3(-10.75, -20.125, -30.25))),
                 Edit::Place(0, Motion::turned(0.0, DVec3::splat(-1.125))),
             ];
             panel.tell(|model| {
@@ -249,5 +307,86 @@ fn nothing_is_cut_off_or_overlaps() {
             panel.click(Role::RadioButton, "caustic");
             panel.assert_layout();
         }
+    }
+}
+
+fn request(settings: BakeSettings) -> BakeRequest {
+    BakeRequest::new(Arc::new(tools::builtin_scene("ring")), settings)
+}
+
+/// So many seconds after the start, at a share of a stage that began then.
+fn left(wanted: &BakeRequest, level: Option<&BakedLevel>, fraction: f64, seconds: f64) -> Option<f64> {
+    let (stage, since) = (Stage::Caustic, Instant::now());
+    let state = BakeState::Baking {
+        stage,
+        fraction,
+        since,
+    };
+    time_left_s(&state, wanted, level, since + Duration::from_secs_f64(seconds))
+}
+
+#[test]
+fn a_stage_keeps_its_pace_within_a_limit() {
+    let limited = |max_time_s| request(tools::set(BakeSettings::default(), |s| s.max_time_s = max_time_s));
+    for (max_time_s, expected) in [
+        (None, 12.0),
+        (Some(10.0), 6.0),
+        (Some(100.0), 12.0),
+        (Some(3.0), 0.0),
+    ] {
+        let left = left(&limited(max_time_s), None, 0.25, 4.0).expect("it is known");
+        assert!((left - expected).abs() < 1e-9, "{left} s with {max_time_s:?}");
+    }
+    // Too little is done, or nothing is to be done.
+    assert_eq!(left(&limited(None), None, 0.01, 5.0), None);
+    assert_eq!(
+        time_left_s(&BakeState::Done, &limited(None), None, Instant::now()),
+        None
+    );
+}
+
+#[test]
+fn the_course_tells_what_is_left_of_it() {
+    let wanted = request(tools::set(BakeSettings::default(), |s| s.max_error = Some(0.01)));
+    let point = |cpu_s, error| CostPoint {
+        rays: 1000,
+        cpu_s,
+        wall_s: cpu_s / 2.0,
+        bytes: 0,
+        error,
+        is_by_photons: false,
+    };
+    let mut level = BakedLevel {
+        serial: 1,
+        request: wanted.clone(),
+        level: 1,
+        is_final: false,
+        result: tools::bake(tools::builtin_scene("ring"), &tools::to(0.05, 8)),
+        seconds: 3.0,
+    };
+    level.result.course = vec![point(2.0, 0.04), point(6.0, 0.02)];
+    let after = |level: &BakedLevel, seconds| left(&wanted, Some(level), 0.5, seconds);
+    let at_level = after(&level, 3.0).expect("it is known");
+    // Half the error takes more than nothing and, at an exponent of at most 2, at most three times as much again; two
+    // threads work.
+    assert!(at_level > 0.0 && at_level <= 0.5 * 3.0 * 6.0, "{at_level}");
+    // A second later a second less, and never less than none.
+    let later = after(&level, 4.0).expect("it is known");
+    assert!((at_level - later - 1.0).abs() < 1e-9, "{at_level}, {later}");
+    assert_eq!(after(&level, 1e6), Some(0.0));
+    // Maps of another bake say nothing of this one.
+    level.request.settings.seed = 9;
+    assert_eq!(after(&level, 3.0), None);
+}
+
+#[test]
+fn times_are_told_as_well_as_they_are_known() {
+    for (seconds, words) in [
+        (0.2, "about a second left"),
+        (41.7, "about 42 s left"),
+        (130.0, "about 3 min left"),
+        (7300.0, "about 3 h left"),
+    ] {
+        assert_eq!(in_words(seconds), words);
     }
 }

@@ -1,20 +1,23 @@
-//! The real program in a real window, used as a person would: seen only by screenshots and its event log.
+//! The real program in a real window, used as a person would, seen only by screenshots and its event log: it starts, a file
+//! is dropped on it, it is killed and comes back, it ends whatever it is at; and hands that know nothing.
 
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use image::RgbImage;
 use nephroid::export::FloatImage;
+use nephroid::eye_pass::ToneMap;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
-use nephroid::eye_pass::{Picture, ToneMap};
 use nephroid::gpu::Gpu;
-use nephroid::scene::builtin;
+use nephroid::viewer::files::config::ConfigFolder;
 use nephroid::viewer::panel::WIDTH;
-use nephroid::viewer::walking::EYE_M;
-use serde_json::Value;
 
+use super::scene_file;
+use crate::damage::mutate::{Damage, effort};
 use support::desktop::{ALIKE, SIZE, Screen, Viewer, difference, picture, position, wait_until};
+use support::file_drop::drop_file;
 use support::or_skip;
+use support::prelude::*;
 
 /// The caustic alone, coarse enough to be baked in a second, by the estimator whose sigma changes the picture most.
 const RING: &str = "builtin:ring --estimator splat --density 10000 --map-resolution 128 --layers caustic";
@@ -111,115 +114,86 @@ fn fly(viewer: &mut Viewer<'_>, seen: &RgbImage, rest: &Value) {
     viewer.screenshot_that("looks elsewhere", |shot| difference(&closer, shot) > 0.05);
 }
 
+/// Coarse enough to be baked in a second.
+const COARSE: &str = "--density 300 --map-resolution 32";
+
 #[test]
-fn kept_maps_are_shown_beside_the_present_ones() {
+fn a_dropped_file_is_opened_unless_it_is_no_scene() {
     let screen = or_skip!(Screen::start());
-    let mut viewer = Viewer::open(&screen, RING);
+    let mut viewer = Viewer::open(&screen, &format!("builtin:ring {COARSE}"));
     viewer.wait_for_bake();
-    viewer.close_sections(&["Light pass", "Accuracy"]);
-    viewer.open_sections(&["Scene", "Compare"]);
-    split(&mut viewer);
-    viewer.close();
-}
+    let ring = viewer.screenshot();
+    let folder = tempfile::tempdir().expect("a folder");
+    let exposures = viewer.all("exposure").len();
+    let dropped = scene_file::glb(folder.path(), "a dropped scene", "300");
+    drop_file(viewer.place(), &dropped.canonicalize().expect("it is there"));
+    viewer.wait_for("opened", |opened| opened["scene"] == "a dropped scene");
+    let (done, _) = viewer.wait_for_bake();
+    assert!(done["maps"].as_u64() > Some(0), "{done}");
+    assert!(viewer.title().contains("a dropped scene"), "{}", viewer.title());
+    assert!(viewer.all("exposure").len() > exposures, "it is measured anew");
+    viewer.screenshot_that("of another scene", |shot| difference(&ring, shot) > 0.05);
 
-/// Mean display value of the picture's left and right half, below what is written over it and without the line between
-/// them, wherever it is.
-fn halves(shot: &RgbImage) -> [f64; 2] {
-    let left = WIDTH as u32;
-    let middle = (left + SIZE.0) / 2;
-    [(left + 60, middle - 10), (middle + 10, SIZE.0)].map(|(from, to)| {
-        let pixels = picture(shot).filter(|(x, y, _)| (from..to).contains(x) && *y >= 150);
-        let (sum, count) = pixels.fold((0.0, 0.0), |(sum, count), (.., rgb)| {
-            (sum + f64::from(rgb[1]), count + 1.0)
-        });
-        sum / count
-    })
-}
-
-/// What was kept stays in the picture's right part while the lamp gets brighter in the left one; the line between them
-/// is dragged.
-fn split(viewer: &mut Viewer<'_>) {
-    viewer.forget();
-    viewer.click("Button", "Keep as before");
-    let against = viewer.wait_for("against", |_| true);
-    assert_eq!(against["relative_rmse"].as_f64(), Some(0.0), "{against}");
-    let before = halves(&viewer.screenshot());
-    viewer.centre("Slider", "Intensity [W/sr]");
-    let slider = viewer.on_slider("Intensity [W/sr]", [0.5, 0.65]);
-    viewer.pull(&slider);
-    viewer.wait_for("edit", |_| true);
-    viewer.let_go();
-    // Brighter by one factor everywhere: the maps differ by no less than their mean does.
-    viewer.wait_for("against", |against| against["relative_rmse"].as_f64() > Some(1.0));
-    let brighter = |shot: &RgbImage| [0, 1].map(|half| halves(shot)[half] / before[half]);
-    viewer.screenshot_that("is brighter at the left alone", |shot| {
-        let [left, right] = brighter(shot);
-        left > 1.1 && (right - 1.0).abs() < 0.02
-    });
-    // The line goes to the left, and with it the right part.
-    let (x, y) = viewer.centre("Slider", "Divider");
-    viewer.pull(&[(x, y), (WIDTH as i32 + 40, y)]);
-    viewer.let_go();
-    viewer.screenshot_that("shows the kept maps nearly everywhere", |shot| {
-        brighter(shot).iter().all(|factor| (factor - 1.0).abs() < 0.02)
-    });
-    viewer.click("Button", "End comparison");
-    viewer.screenshot_that("shows the present maps everywhere", |shot| {
-        brighter(shot).iter().all(|factor| *factor > 1.1)
-    });
-}
-
-#[test]
-fn exposure_suits_a_room_that_is_walked() {
-    let screen = or_skip!(Screen::start());
-    let mut viewer = Viewer::open(
-        &screen,
-        "builtin:showroom --map-resolution 64 --max-error 50% --camera basin",
+    // What is no scene leaves what there is, and the window goes on.
+    let broken = scene_file::no_scene(folder.path());
+    drop_file(viewer.place(), &broken.canonicalize().expect("it is there"));
+    let refused = viewer.wait_for("not_opened", |_| true);
+    assert!(
+        refused["sentence"].to_string().contains("broken.gltf"),
+        "{refused}"
     );
-    let (_, rest) = viewer.wait_for_bake();
-    let measured = viewer.all("exposure");
-    let stops: Vec<f64> = measured
-        .iter()
-        .filter_map(|event| event["exposure_stops"].as_f64())
-        .collect();
-    assert!(!stops.is_empty());
-    for of_maps in &stops {
-        assert!(
-            of_maps.abs() < 2.0 && (of_maps - stops[0]).abs() <= 0.5,
-            "{stops:?}"
-        );
-    }
-    let shot = viewer.screenshot();
-    let share = |is_so: fn([u8; 3]) -> bool| {
-        picture(&shot).filter(|(.., rgb)| is_so(*rgb)).count() as f64 / picture(&shot).count() as f64
-    };
-    let (white, dark) = (share(|rgb| rgb == [255; 3]), share(|rgb| rgb[1] < 32));
-    assert!(white < 0.2 && dark < 0.5, "{white} of it white, {dark} dark");
-    // Who walks falls to the ground: over the floor, the camera is lower than eyes are.
-    viewer.hands("mousemove 900 300");
-    viewer.hands("key v");
-    viewer.wait_for("travel", |event| event["way"] == "walk");
-    let standing = viewer.wait_for_move(position(&rest));
-    let room = builtin::build("showroom").and_then(|scene| scene.bounds());
-    let (low, _) = room.expect("a room");
-    assert!((standing.y - low.y - EYE_M).abs() < 0.01, "{standing} over {low}");
+    assert!(viewer.title().contains("a dropped scene"), "{}", viewer.title());
+
+    // Without a dialog to name it in, the scene is saved beside its file.
+    viewer.click("Button", "Save scene…");
+    let saved = viewer.wait_for("saved", |_| true);
+    let path = saved["files"][0].as_str().expect("it is named");
+    assert!(path.ends_with("a dropped scene-edited-0001.glb"), "{saved}");
+    let bytes = |path: &Path| std::fs::read(path).expect("it is there");
+    assert_eq!(bytes(Path::new(path)), bytes(&dropped), "nothing was edited");
     viewer.close();
 }
 
-const GALLERY: &str = "builtin:gallery --preset draft --layers caustic,direct,indirect";
-
-/// Direct and indirect light come before any caustic, and the exposure that suits them stays.
+/// Bookmarks, settings and camera are found again after the program was killed.
 #[test]
-fn the_room_is_lit_before_its_caustics() {
+fn killed_window_comes_back() {
     let screen = or_skip!(Screen::start());
-    let mut viewer = Viewer::open(&screen, GALLERY);
-    let first = viewer.wait_for("level", |_| true);
-    assert_eq!((&first["rays"], &first["shown"]), (&0.into(), &true.into()));
-    let stops = |event: Value| event["exposure_stops"].as_f64().expect("a number");
-    let exposed = stops(viewer.wait_for("exposure", |_| true));
-    viewer.wait_for("level", |level| level["rays"].as_u64() > Some(0));
-    let moved = stops(viewer.wait_for("exposure", |_| true)) - exposed;
-    assert!(moved.abs() <= 0.5, "{moved} stops");
+    let folder = tempfile::tempdir().expect("a folder");
+    let config = folder.path().join("config");
+    let path = scene_file::glb(folder.path(), "kept", "30");
+    let source = path.display().to_string();
+    let mut viewer = Viewer::open_with(&screen, &format!("{source} {COARSE}"), Some(&config));
+    let (_, rest) = viewer.wait_for_bake();
+    let marked = viewer.fly("w", position(&rest));
+    viewer.hands("key ctrl+3");
+    viewer.wait_for("bookmark", |event| event["kept"] == true);
+    let last = viewer.fly("s", marked);
+    viewer.click("CheckBox", "caustic");
+    viewer.wait_for("settings", |event| {
+        event["settings"]["layers"] == json!(["direct"])
+    });
+    viewer.wait_for("done", |_| true);
+    // It is written within a second, or what that is on a busy machine.
+    let kept = ConfigFolder::new(config.clone()).scene_file(&source);
+    wait_until("what was set is kept", || {
+        let kept = std::fs::read(&kept).ok()?;
+        let kept: Value = serde_json::from_slice(&kept).ok()?;
+        (kept["settings"]["layers"] == json!(["direct"])).then_some(())
+    });
+    viewer.signal("KILL");
+
+    let arguments = format!("{source} --exposure 0");
+    let mut viewer = Viewer::open_with(&screen, &arguments, Some(&config));
+    assert_eq!(viewer.all("found_again").len(), 1);
+    let baking = &viewer.all("baking")[0];
+    assert_eq!(baking["settings"]["layers"], json!(["direct"]), "{baking}");
+    let found = position(&viewer.wait_for_bake().1);
+    assert!(found.distance(last) < 1e-6, "{found}, {last}");
+    viewer.hands("mousemove 900 300 key 3");
+    viewer.wait_for("bookmark", |event| event["number"] == 3 && event["kept"] == false);
+    let back = viewer.wait_for_move(found);
+    assert!(back.distance(marked) < 1e-6, "{back}, {marked}");
+
     viewer.close();
 }
 
@@ -229,9 +203,120 @@ fn it_ends_quietly_while_it_bakes() {
     let screen = or_skip!(Screen::start());
     for what_comes_first in ["upload", "level", "exposure"] {
         for end in [Viewer::close, Viewer::destroy] {
-            let mut viewer = Viewer::open(&screen, GALLERY);
+            let gallery = "builtin:gallery --preset draft --layers caustic,direct,indirect";
+            let mut viewer = Viewer::open(&screen, gallery);
             viewer.wait_for(what_comes_first, |_| true);
             end(viewer);
         }
     }
+}
+
+/// Of one part; there are at most three.
+const PART: Duration = Duration::from_secs(20);
+const MAX_PARTS: usize = 3;
+/// Deeds between two looks at the clock.
+const DEEDS: usize = 12;
+
+/// Everything that the window has a meaning for, and some that it has none for.
+const KEYS: &str = "w a s d q e c f r h v m p k g 1 2 9 ctrl+1 ctrl+2 ctrl+z ctrl+y ctrl+shift+z Escape Tab shift+Tab space \
+    Return Up Down Left Right Page_Down Home BackSpace Delete 0 5 minus period F1 F12 x question shift+w alt+a";
+const HELD: [&str; 8] = ["w", "a", "s", "d", "q", "e", "shift", "ctrl"];
+
+/// Something to do, for xdotool.
+fn deed(random: &mut Damage, window: &str) -> String {
+    let (width, height) = (SIZE.0 as usize, SIZE.1 as usize);
+    // As often over the panel as over the picture.
+    let x = if random.below(2) == 0 {
+        random.below(360)
+    } else {
+        random.below(width)
+    };
+    let y = random.below(height);
+    match random.below(20) {
+        0..=5 => format!("key {} ", random.one_of(&KEYS.split(' ').collect::<Vec<_>>())),
+        6 | 7 => format!(
+            "{} {} ",
+            random.one_of(&["keydown", "keyup"]),
+            random.one_of(&HELD)
+        ),
+        8..=12 => format!("mousemove {x} {y} click 1 "),
+        13 => format!("mousemove {x} {y} click 3 "),
+        14 | 15 => format!(
+            "mousemove {x} {y} click --repeat 3 --delay 5 {} ",
+            4 + random.below(2)
+        ),
+        16..=18 => {
+            let button = random.one_of(&[1, 1, 3]);
+            let (to_x, to_y) = (random.below(width), y + random.below(9));
+            let way = format!(
+                "mousemove {} {to_y} sleep 0.02 mousemove {to_x} {to_y}",
+                (x + to_x) / 2
+            );
+            format!("mousemove {x} {y} mousedown {button} sleep 0.02 {way} sleep 0.02 mouseup {button} ")
+        }
+        _ => format!(
+            "windowsize {window} {} {} ",
+            300 + random.below(1000),
+            200 + random.below(600)
+        ),
+    }
+}
+
+#[test]
+fn random_input_breaks_nothing() {
+    let screen = or_skip!(Screen::start());
+    let mut viewer = Viewer::open(&screen, "builtin:ring --map-resolution 128 --max-error 0.05%");
+    let mut random = Damage::to("hands", 0);
+    let start = Instant::now();
+    while start.elapsed() < PART * effort().clamp(1, MAX_PARTS) as u32 {
+        let deeds: String = (0..DEEDS).map(|_| deed(&mut random, viewer.place().1)).collect();
+        viewer.hasty_hands(&deeds);
+        assert!(viewer.runs(), "it ended: {}", viewer.stderr());
+    }
+    // Everything is let go, and whatever is baked now is stopped.
+    let let_go: String = HELD.iter().map(|key| format!("keyup {key} ")).collect();
+    let size = format!("windowsize {} {} {}", viewer.place().1, SIZE.0, SIZE.1);
+    viewer.hands(&format!("{let_go} mouseup 1 mouseup 3 {size}"));
+    viewer.forget();
+    viewer.hands("mousemove 900 300 key Escape");
+    viewer.hands("key Escape");
+    for bad in ["fault", "device_lost"] {
+        assert!(viewer.all(bad).is_empty(), "{:?}", viewer.all(bad));
+    }
+    let (stderr, _) = viewer.close();
+    for bad in ["alidation", "overflow"] {
+        assert!(!stderr.contains(bad), "{stderr}");
+    }
+}
+
+/// Both bakes would take minutes: whoever waited for one would see it done.
+#[test]
+fn long_bake_leaves_room_for_input_and_ends() {
+    let screen = or_skip!(Screen::start());
+    let long = "builtin:ring --density 3e7";
+    let mut viewer = Viewer::open(&screen, &format!("{long} --estimator splat --layers caustic"));
+    for step in 0..40 {
+        // To and fro between the panel and the picture; every eighth time the camera is set back to where it is.
+        let (x, y) = if step % 2 == 0 {
+            (100, 200 + 5 * step)
+        } else {
+            (700 + 5 * step, 300)
+        };
+        let key = if step % 8 == 7 { "key c" } else { "" };
+        viewer.hasty_hands(&format!("mousemove {x} {y} {key} sleep 0.1"));
+    }
+    // It closes while it reads and while it bakes.
+    let folder = tempfile::tempdir().expect("a folder");
+    let dropped = scene_file::glb(folder.path(), "dropped", "300");
+    drop_file(viewer.place(), &dropped.canonicalize().expect("it is there"));
+    viewer.wait_for("opening", |_| true);
+    let (_, log) = viewer.close();
+    assert!(
+        log.iter().all(|event| event["event"] != "done"),
+        "it baked all the time"
+    );
+
+    // So it does by a signal. The bake begins before the window is there.
+    let viewer = Viewer::open(&screen, long);
+    assert_eq!(viewer.signal("TERM").code(), Some(143));
 }

@@ -2,7 +2,6 @@
 
 use nephroid::optics::Glass;
 use nephroid::scene::{Glow, Variation};
-use nephroid::units::Radiance;
 use support::floors::{image, texture_reference};
 use support::meshes::{floor, grid, quad};
 use support::scenes::{chart, direct, flux_w, light, scene};

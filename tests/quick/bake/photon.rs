@@ -2,31 +2,15 @@
 
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::optics::luminance;
-use nephroid::scene::Scene;
-use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
+use nephroid::settings::{ErrorMetric, Estimator};
 
 use support::hard_scenes::roughened;
-use support::tools::{bake, bits, builtin_scene, energy_fault, photons};
+use support::prelude::*;
+use support::tools::{bake, builtin_scene, energy_fault, photons};
 
 const SIDE: usize = 64;
 /// Fine enough that light is smooth from texel to texel.
 const FINE: usize = 256;
-
-#[test]
-fn threads_change_no_photon() {
-    let [one, three] = [1, 3].map(|threads| {
-        let settings = BakeSettings {
-            threads,
-            filter: Some(true),
-            ..photons(3e5, SIDE)
-        };
-        bake(roughened("ball", 0.3), &settings)
-    });
-    assert_eq!(one.maps.len(), three.maps.len());
-    for (a, b) in one.maps.iter().zip(&three.maps) {
-        assert_eq!(bits(a), bits(b));
-    }
-}
 
 /// Caustics are judged beside direct light, which need not be baked for that.
 #[test]

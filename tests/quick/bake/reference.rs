@@ -1,7 +1,6 @@
 //! The built-in scenes against maps of an independent solver (`assets/reference`), bits that nothing may change, and
 //! effects: simulated where a scene calls for them; left out, they change nothing; switched off, they are missing.
 
-use nephroid::bake::Bake;
 use nephroid::effect::{Effect, EffectSwitch, EffectSwitches};
 use nephroid::illumination::lookup::bilinear;
 
@@ -31,26 +30,6 @@ fn splats_agree_with_the_solver() {
         let scene = builtin_scene(reference.builtin);
         let result = bake(scene.clone(), &settings(density, 256));
         reference.check(&result, &scene, (most, 0.005));
-    }
-}
-
-#[test]
-fn threads_change_no_bit() {
-    for base in [to(0.03, 64), settings(2e4, 64)] {
-        let [one, two, three] = [1, 2, 3].map(|threads| {
-            let settings = BakeSettings {
-                threads,
-                layers: vec![LayerKind::Caustic, LayerKind::Direct],
-                ..base.clone()
-            };
-            bake(builtin_scene("ball"), &settings)
-        });
-        for other in [two, three] {
-            assert_eq!(one.ledgers, other.ledgers);
-            assert_eq!(one.counts, other.counts);
-            assert!(one.maps.iter().map(bits).eq(other.maps.iter().map(bits)));
-            assert!(one.maps[0].error == other.maps[0].error);
-        }
     }
 }
 

@@ -2,7 +2,7 @@
 //! for it.
 
 use nephroid::export::FloatImage;
-use nephroid::eye_pass::{Picture, ToneMap, WhiteBalance, tone_mapping};
+use nephroid::eye_pass::{ToneMap, WhiteBalance, tone_mapping};
 use strum::VariantArray;
 
 use super::without_card;

@@ -12,7 +12,7 @@ use nephroid::export::map_set::MapSet;
 use nephroid::export::shards::{SceneOrigin, ShardFolder, ShardManifest, ShardSet};
 use nephroid::export::textures::TextureFolder;
 use nephroid::illumination::tiles::TileLayout;
-use nephroid::illumination::{Chart, IlluminationMap, Layer, Parametrisation, parametrise};
+use nephroid::illumination::{Chart, Layer, Parametrisation, parametrise};
 use nephroid::light_pass::shard_index::ShardIndex;
 use nephroid::optics::glass::Glass;
 use nephroid::settings::Wavelengths;

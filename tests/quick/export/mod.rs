@@ -8,7 +8,6 @@ mod web;
 
 use std::path::PathBuf;
 
-use nephroid::bake::Bake;
 use nephroid::error::Error;
 use nephroid::export::map_folder::MapFolder;
 use nephroid::export::map_set::MapSet;
@@ -101,14 +100,11 @@ fn linear_of_srgb(code: u16) -> f64 {
 pub fn boxes() -> Glb {
     let mut file = Glb::empty();
     let cube = shapes::cuboid(DVec3::splat(-0.3), DVec3::splat(0.3));
-    let numbers =
-        |vectors: &[DVec3]| -> Vec<f32> { vectors.iter().flat_map(|v| v.as_vec3().to_array()).collect() };
-    let positions = numbers(&cube.positions);
-    let colours: Vec<f32> = positions.iter().map(|value| value + 0.5).collect();
+    let colours: Vec<DVec3> = cube.positions.iter().map(|place| *place + 0.5).collect();
     let attributes = json!({
-        "POSITION": file.push_floats(&positions, 3),
-        "NORMAL": file.push_floats(&numbers(&cube.normals), 3),
-        "COLOR_0": file.push_floats(&colours, 3),
+        "POSITION": file.push_vectors(&cube.positions),
+        "NORMAL": file.push_vectors(&cube.normals),
+        "COLOR_0": file.push_vectors(&colours),
     });
     let indices = file.push_indices(cube.triangles.as_flattened());
     let plaster = json!({ "name": "plaster", "pbrMetallicRoughness": { "metallicFactor": 0.0 } });
@@ -134,18 +130,11 @@ pub fn boxes() -> Glb {
     file.json["extensionsUsed"] = json!(["KHR_lights_punctual"]);
     file.json["extras"] = json!({ "note": "kept" });
     let lamp = json!({ "type": "point", "intensity": 683.0 });
-    with_lamp(file, lamp, [0.4, 2.0, 1.5])
+    file.with_light_at("lamp", lamp, [0.4, 2.0, 1.5])
 }
 
 /// The same with a second lamp of the first one's name.
 fn two_lamps() -> Glb {
     let warm = json!({ "type": "point", "intensity": 300.0, "color": [1.0, 0.5, 0.2] });
-    with_lamp(boxes(), warm, [-0.6, 1.7, 1.9])
-}
-
-fn with_lamp(file: Glb, light: Value, translation: [f64; 3]) -> Glb {
-    let mut file = file.with_light("lamp", light);
-    let nodes = file.json["nodes"].as_array_mut().expect("a list");
-    nodes.last_mut().expect("the lamp's")["translation"] = json!(translation);
-    file
+    boxes().with_light_at("lamp", warm, [-0.6, 1.7, 1.9])
 }

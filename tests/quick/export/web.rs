@@ -8,7 +8,6 @@ use nephroid::export::map_set::MapSet;
 use nephroid::export::sequence::FrameTimes;
 use nephroid::export::web::{Site, WebReport};
 use nephroid::eye_pass::renderer::WebScene;
-use nephroid::eye_pass::{Picture, View};
 
 use super::Baked;
 use crate::prelude::*;

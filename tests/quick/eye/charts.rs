@@ -1,7 +1,5 @@
 //! Which coordinates a map follows, that they give every point its own place, and the area of the surface under each texel.
 
-use std::f64::consts::TAU;
-
 use nephroid::illumination::gutter::fill_gutter;
 use nephroid::illumination::lookup::bilinear;
 use nephroid::illumination::parametrisation::coverage::{for_each_texel_in_row, rows};

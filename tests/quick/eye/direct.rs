@@ -5,12 +5,12 @@ use std::time::Instant;
 use nephroid::illumination::Side;
 use nephroid::light_pass::direct::bake_direct;
 use nephroid::optics::fresnel::dielectric_reflectance;
-use nephroid::scene::Volume;
-use nephroid::units::RadiantIntensity;
 
 use crate::prelude::*;
-use support::meshes::{cuboid, floor, joined, moved, quad, sphere};
-use support::scenes::{chart, diffuse, direct, flux_w, light, middles, point_light, sun, surface, tracer};
+use support::meshes::{cuboid, floor, inside_out, joined, moved, quad, sphere};
+use support::scenes::{
+    chart, diffuse, direct, flux_w, middles, point_light, spot, sun, surface, tinted, tracer,
+};
 
 /// The floor |x|, |z| ≤ 1 under lamps.
 fn under(lights: Vec<Light>) -> Tracer {
@@ -101,13 +101,7 @@ fn sun_gives_irradiance_times_cosine() {
 
 #[test]
 fn spot_lights_its_cone() {
-    let tracer = under(vec![light(LightKind::Spot {
-        position: DVec3::Y,
-        direction: DVec3::NEG_Y,
-        intensity: RadiantIntensity(3.0),
-        inner_cone_rad: 0.2,
-        outer_cone_rad: 0.5,
-    })]);
+    let tracer = under(vec![spot(DVec3::Y, DVec3::NEG_Y, 3.0, [0.2, 0.5])]);
     let n = 101;
     let at = |x: f64, z: f64| {
         let r2 = 1.0 + x * x + z * z;
@@ -138,9 +132,7 @@ fn spot_lights_its_cone() {
 #[test]
 fn closed_box_takes_the_whole_flux() {
     let walls = cuboid(DVec3::ZERO, dvec3(1.0, 1.5, 2.0));
-    let mut inward = walls.clone();
-    inward.triangles.iter_mut().for_each(|corners| corners.swap(1, 2));
-    inward.normals.iter_mut().for_each(|normal| *normal = -*normal);
+    let inward = inside_out(walls.clone());
     let lamp = point_light(dvec3(0.4, 0.9, 0.7), 5.0);
     for (mesh, front) in [(inward, 1.0), (walls, 0.0)] {
         let tracer = tracer(vec![(mesh, diffuse(0.5))], vec![lamp.clone()]);
@@ -252,13 +244,7 @@ fn light_stays_on_its_side_of_a_sheet() {
 #[test]
 fn water_around_a_lamp_takes_its_share() {
     let colour = [0.2, 0.5, 0.9];
-    let water = Material {
-        volume: Some(Volume {
-            attenuation_distance_m: 2.0,
-            attenuation_colour: LinearSrgb::from(colour),
-        }),
-        ..surface(SurfaceKind::Dielectric, 1.33)
-    };
+    let water = tinted(surface(SurfaceKind::Dielectric, 1.33), 2.0, colour.into());
     let body = cuboid(dvec3(-3.0, -0.5, -3.0), dvec3(3.0, 2.0, 3.0));
     let coated = surface(SurfaceKind::Coated, 1.5);
     let parts = vec![(floor(1.0, 0.0), coated), (body, water)];

@@ -1,7 +1,7 @@
 //! Tone mapping, exposure and white balance on the CPU.
 
 use nephroid::eye_pass::tone_mapping::display_rgba8;
-use nephroid::eye_pass::{Picture, ToneMap, WhiteBalance};
+use nephroid::eye_pass::{ToneMap, WhiteBalance};
 use nephroid::optics::spectrum::xyz::{IDENTITY, transformed};
 
 use crate::prelude::*;

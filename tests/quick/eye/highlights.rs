@@ -1,6 +1,5 @@
 //! Lamps in mirrors: their images keep their energy, and rough mirrors show them as sampled microfacets do.
 
-use nephroid::eye_pass::View;
 use nephroid::eye_pass::reference::ReferenceSettings;
 use nephroid::scene::PanelShape;
 use nephroid::transport::{EffectSet, NormalSource};

@@ -1,16 +1,14 @@
 //! The CPU eye pass on scenes of known radiance.
 
-use nephroid::eye_pass::reference::{ChainLimits, ReferenceSettings, first_hits, render};
-use nephroid::eye_pass::{Picture, View};
-use nephroid::illumination::IlluminationMap;
+use nephroid::eye_pass::reference::{first_hits, render};
 use nephroid::optics::fresnel::{dielectric_reflectance, thin_wall_reflectance};
-use nephroid::scene::{Environment, Volume};
+use nephroid::scene::Environment;
 
 use crate::prelude::*;
 use support::chain_laws::direction;
 use support::floors::{diffuse, image, texture_reference};
-use support::meshes::{cuboid, floor, joined, quad, sphere};
-use support::scenes::{chart, light, map_of, scene, seen, surface, tracer, view};
+use support::meshes::{cuboid, floor, inside_out, joined, quad, sphere};
+use support::scenes::{chart, map_of, scene, seen, surface, tinted, to_the_end, tracer, under_sky, view};
 
 const WATER: f64 = 1.333;
 /// Of the floors of these tests; all channels differ, so that none can stand in for another.
@@ -45,17 +43,7 @@ impl Lit {
     }
 
     fn picture(&self, view: &View, samples_per_side: u32) -> Picture {
-        // Every chain to the end: what is left out is below a billionth.
-        let settings = ReferenceSettings {
-            samples_per_side,
-            limits: ChainLimits {
-                max_depth: 64,
-                branch_threshold: 1e-10,
-                ..ChainLimits::default()
-            },
-            ..ReferenceSettings::default()
-        };
-        seen(&self.0, &self.1, view, &settings).0
+        seen(&self.0, &self.1, view, &to_the_end(samples_per_side)).0
     }
 
     #[track_caller]
@@ -106,18 +94,6 @@ fn water() -> Material {
     surface(SurfaceKind::Dielectric, WATER)
 }
 
-fn coloured(
-    material: Material,
-    attenuation_distance_m: f64,
-    attenuation_colour: LinearSrgb,
-) -> (Material, Volume) {
-    let volume = Volume {
-        attenuation_distance_m,
-        attenuation_colour,
-    };
-    (with(material, |it| it.volume = Some(volume)), volume)
-}
-
 fn layer(low: f64, high: f64) -> Mesh {
     cuboid(dvec3(-90.0, low, -90.0), dvec3(90.0, high, 90.0))
 }
@@ -126,10 +102,8 @@ fn layer(low: f64, high: f64) -> Mesh {
 #[test]
 fn a_floor_back_to_back_has_no_holes() {
     let front = floor(100.0, 0.0);
-    let mut back = front.clone();
-    back.triangles.iter_mut().for_each(|triangle| triangle.swap(1, 2));
-    back.normals.fill(-DVec3::Y);
-    let doubled = scene(vec![(joined(front, back), floor_material())], vec![]);
+    let both = joined(front.clone(), inside_out(front));
+    let doubled = scene(vec![(both, floor_material())], vec![]);
     let lit = Lit::with_map(doubled, 2, vec![E; 4]);
     let slanting = view(dvec3(0.3, 2.0, 0.1), dvec3(0.0, 0.0, 1.7), 0.9, [32, 32]);
     for radiance in lit.picture(&slanting, 1).radiance {
@@ -154,10 +128,9 @@ fn slab(cos_incident: f64, eta: f64, kept: DVec3) -> (DVec3, DVec3) {
     (r + through * r * kept, through)
 }
 
-/// Shares left after a way [m] through a volume.
-fn left_after(volume: &Volume, way_m: f64) -> DVec3 {
-    let colour = DVec3::from(volume.attenuation_colour.to_array());
-    colour.powf(way_m / volume.attenuation_distance_m)
+/// Shares left after so many times the way that leaves a colour.
+fn left_after(colour: LinearSrgb, ways: f64) -> DVec3 {
+    DVec3::from(colour.to_array()).powf(ways)
 }
 
 /// Cosine within a body of what comes in at a cosine.
@@ -195,12 +168,11 @@ fn water_from_above_dims_by_n_squared() {
 #[test]
 fn slab_of_coloured_glass_keeps_its_shares() {
     for colour in [LinearSrgb::WHITE, rgb(0.9, 0.5, 0.2)] {
-        let (material, volume) = coloured(glass(), 0.07, colour);
-        let lit = Lit::floor_and(vec![(layer(1.0, 1.1), material)]);
+        let lit = Lit::floor_and(vec![(layer(1.0, 1.1), tinted(glass(), 0.07, colour))]);
         for target in [[0.0, 1e-3], [4.0, 2.0]] {
             lit.assert_sends_up(target, |direction| {
                 let way_m = 0.1 / within(-direction.y, 1.5);
-                let (r, t) = slab(-direction.y, 1.5, left_after(&volume, way_m));
+                let (r, t) = slab(-direction.y, 1.5, left_after(colour, way_m / 0.07));
                 t * floor_sends() + r * SKY
             });
         }
@@ -224,14 +196,17 @@ fn slab_under_water_counts_by_contrast() {
 /// A sheet whose back is not drawn may lie anywhere on the way: what it lies in absorbs as without it.
 #[test]
 fn undrawn_backs_shorten_no_way_through_water() {
-    let (coloured, volume) = coloured(water(), 0.7, rgb(0.9, 0.5, 0.2));
+    let colour = rgb(0.9, 0.5, 0.2);
     let sheet = with(floor_material(), |it| it.double_sided = false);
     // It faces down, away from the eye.
     let below = quad(dvec3(-5.0, 0.6, -5.0), DVec3::Z * 10.0, DVec3::X * 10.0);
-    let lit = Lit::floor_and(vec![(layer(-0.5, 1.0), coloured), (below, sheet)]);
+    let lit = Lit::floor_and(vec![
+        (layer(-0.5, 1.0), tinted(water(), 0.7, colour)),
+        (below, sheet),
+    ]);
     lit.assert_sends_up([0.4, 0.2], |direction| {
         let r = dielectric_reflectance(-direction.y, WATER);
-        let left = left_after(&volume, 1.0 / within(-direction.y, WATER));
+        let left = left_after(colour, 1.0 / within(-direction.y, WATER) / 0.7);
         (1.0 - r) * left * floor_sends() / (WATER * WATER) + r * SKY
     });
 }
@@ -423,9 +398,8 @@ fn images_go_on_beyond_their_borders() {
 #[test]
 fn skies_lie_and_shine_as_their_light_says() {
     let pixels = [1.0, 2.0, 3.0, 4.0].map(|value| [value, 0.5 * value, 3.0]);
-    let mut scene = scene(vec![], vec![light(LightKind::Environment { scale: 2.0 })]);
+    let mut scene = under_sky(Scene::default(), Environment::new(4, 1, pixels.to_vec()), 2.0);
     scene.lights[0].colour = rgb(1.0, 0.5, 0.25);
-    scene.environment = Some(Arc::new(Environment::new(4, 1, pixels.to_vec()).expect("sound")));
     let lit = Lit(Tracer::new(Arc::new(scene)), vec![]);
     for (quarters, expected) in [
         (0.5, 1.0),

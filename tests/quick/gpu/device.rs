@@ -1,10 +1,9 @@
 //! Faults of a device, and what it is too small for: refused in a sentence, and the rest is drawn.
 
 use nephroid::effect::{EffectSwitch, EffectSwitches};
-use nephroid::eye_pass::View;
 use nephroid::eye_pass::renderer::{Renderer, render_counted};
 use nephroid::gpu::Gpu;
-use nephroid::illumination::{IlluminationMap, parametrise};
+use nephroid::illumination::parametrise;
 
 use crate::gpu::rig::{FORMAT, Rig, gpu, or_skip, own_gpu};
 use crate::prelude::*;

@@ -1,16 +1,14 @@
 //! One picture: the device against the CPU, both against a closed form, and the perceptual difference of pictures.
 
 use glam::DAffine3;
-use nephroid::eye_pass::Picture;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
-use nephroid::illumination::IlluminationMap;
 use nephroid::scene::{Environment, Glow, Object, TextureRef};
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip, unlike};
 use crate::prelude::*;
 use support::flip::mean_flip;
 use support::floors::{diffuse, floor_map, floor_scene, four_colours, lambert, texture_reference};
-use support::scenes::{light, seen, view};
+use support::scenes::{seen, under_sky, view};
 
 /// A textured floor with a lit corner of known radiance, which glows elsewhere by an image of other coordinates, a
 /// glowing wall with colours at its corners, a mirror ball and a glass ball under a sky;
@@ -50,8 +48,7 @@ fn exhibit() -> (Scene, Vec<IlluminationMap>) {
     parts::add(&mut scene, "glass", ball(0.75), glass);
     parts::add(&mut scene, "wall", wall, glowing);
     let sky = vec![[0.1, 0.2, 0.4], [0.4, 0.2, 0.1], [0.3, 0.1, 0.2], [0.1, 0.3, 0.2]];
-    scene.environment = Some(Arc::new(Environment::new(2, 2, sky).expect("sound")));
-    scene.lights = vec![light(LightKind::Environment { scale: 1.5 })];
+    let scene = under_sky(scene, Environment::new(2, 2, sky), 1.5);
     let texel = |index: usize| {
         let at = index as f32 / 64.0;
         [3.0 - at, 1.0 + at, 0.5 + 0.5 * at]

@@ -4,12 +4,10 @@ use std::sync::OnceLock;
 
 use nephroid::effect::EffectSwitch;
 use nephroid::eye_pass::renderer::{EyeQuality, Renderer, Uploaded};
-use nephroid::eye_pass::{Picture, View};
 use nephroid::gpu::{Gpu, readback};
-use nephroid::illumination::IlluminationMap;
-use nephroid::scene::Scene;
 
 pub use support::or_skip;
+use support::prelude::*;
 use support::skip;
 
 pub const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;

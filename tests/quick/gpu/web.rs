@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use nephroid::eye_pass::renderer::WebScene;
-use nephroid::illumination::{IlluminationMap, Layer};
+use nephroid::illumination::Layer;
 
 use crate::prelude::*;
 use support::floors::{diffuse, floor_map, floor_scene};

@@ -1,8 +1,6 @@
 //! What becomes of light at a floor: interfaces within other bodies, coat, micro-facets; how lamps fall off, and how
 //! units multiply.
 
-use std::f64::consts::TAU;
-
 use nephroid::light_pass::emitter::EmitterKind;
 use nephroid::optics::fresnel::dielectric_reflectance;
 use nephroid::transport::microfacets::Facet;

@@ -1,11 +1,10 @@
 //! Bodies of glass: of several parts, inside out, and open.
 
-use nephroid::scene::Volume;
 use nephroid::scene::watertight::volume_m3;
 use nephroid::transport::media_at;
 
 use crate::prelude::*;
-use support::meshes::{cuboid, quad};
+use support::meshes::{cuboid, inside_out, quad};
 
 fn glass(volume: Value) -> Value {
     let mut extensions = json!({ "KHR_materials_transmission": { "transmissionFactor": 1.0 } });
@@ -18,9 +17,7 @@ fn glass(volume: Value) -> Value {
 
 /// A primitive of some of a mesh's triangles.
 fn primitive(file: &mut Glb, mesh: &Mesh, triangles: &[[u32; 3]], material: usize) -> Value {
-    let floats = |all: &[DVec3]| -> Vec<f32> { all.iter().flat_map(|v| v.as_vec3().to_array()).collect() };
-    let positions = file.push_floats(&floats(&mesh.positions), 3);
-    let normals = file.push_floats(&floats(&mesh.normals), 3);
+    let [positions, normals] = [&mesh.positions, &mesh.normals].map(|vectors| file.push_vectors(vectors));
     let indices = file.push_indices(&triangles.concat());
     let attributes = json!({ "POSITION": positions, "NORMAL": normals });
     json!({ "attributes": attributes, "indices": indices, "material": material })
@@ -154,12 +151,7 @@ fn faces_that_a_body_has_twice_count_once() {
                 pair.copy_from_slice(&[[a, b, d], [b, c, d]]);
             }
         }
-        backs
-            .triangles
-            .iter_mut()
-            .for_each(|triangle| triangle.swap(1, 2));
-        backs.normals.iter_mut().for_each(|normal| *normal = -*normal);
-        shapes::append(&mut cube, &backs);
+        shapes::append(&mut cube, &inside_out(backs));
         let part = primitive(&mut file, &cube, &cube.triangles, material);
         let mesh = file.push_mesh(part);
         for (place, scale) in [(0.0, 1.0), (3.0, -1.0)] {
@@ -217,23 +209,9 @@ fn a_closed_mesh_has_the_interior_that_is_stated() {
     let volume =
         json!({ "thicknessFactor": 0.0, "attenuationDistance": 0.1, "attenuationColor": [0.5, 0.25, 0.75] });
     let scene = Glb::tetrahedron().with_material(glass(volume)).scene();
-    let expected = Volume {
-        attenuation_distance_m: f64::from(0.1_f32),
-        attenuation_colour: LinearSrgb::new(0.5, 0.25, 0.75),
-    };
     let found = scene.material_of(0).volume.expect("it is solid");
-    near(
-        found.attenuation_distance_m,
-        expected.attenuation_distance_m,
-        1e-6,
-        "distance",
-    );
-    near(
-        found.attenuation_colour,
-        expected.attenuation_colour,
-        1e-9,
-        "colour",
-    );
+    near(found.attenuation_distance_m, 0.1, 1e-6, "distance");
+    near(found.attenuation_colour, rgb(0.5, 0.25, 0.75), 1e-9, "colour");
 }
 
 #[test]

@@ -125,20 +125,3 @@ fn validator_files_load_or_their_faults_are_named() {
         unnoticed.join("\n")
     );
 }
-
-#[test]
-fn scenes_of_others_load_with_surfaces() {
-    let Some(folder) = shared_or_skip("scenes") else {
-        return;
-    };
-    let entries = std::fs::read_dir(folder).expect("folder can be listed");
-    let files = entries.map(|entry| entry.expect("entry can be read").path());
-    let glbs: Vec<PathBuf> = files
-        .filter(|path| path.extension().is_some_and(|kind| kind == "glb"))
-        .collect();
-    assert!(glbs.len() >= 13, "{} scenes", glbs.len());
-    for path in glbs {
-        let scene = load_soundly(&path).unwrap_or_else(|error| panic!("{error}"));
-        assert!(scene.triangle_count() > 0, "{}", path.display());
-    }
-}

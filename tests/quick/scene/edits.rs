@@ -2,11 +2,10 @@
 
 use nephroid::error::ErrorKind;
 use nephroid::scene::PanelShape;
-use nephroid::units::{Flux, Irradiance, Radiance, RadiantIntensity};
 
 use crate::prelude::*;
 use support::floors::four_colours;
-use support::scenes::wave;
+use support::scenes::{panel, spot, wave};
 
 /// A scene with a floor (object 0), a glass ball (object 1), an image, a lamp (light 0), a sun (1), a spot (2), a panel (3),
 /// the floor as a lamp (4) and an environment (5).
@@ -21,24 +20,12 @@ fn scene() -> Scene {
         kind,
         ..support::scenes::point_light(DVec3::ZERO, 1.0)
     };
-    let spot = LightKind::Spot {
-        position: dvec3(0.1, 2.0, 0.3),
-        direction: dvec3(0.3, -0.9, 0.1).normalize(),
-        intensity: RadiantIntensity(3.0),
-        inner_cone_rad: 0.1,
-        outer_cone_rad: 0.4,
-    };
-    let panel = LightKind::Panel {
-        centre: DVec3::Y * 2.0,
-        across: DVec3::X,
-        down: DVec3::Z,
-        shape: PanelShape::Disc,
-        radiance: Radiance(3.0),
-    };
+    let spot = spot(dvec3(0.1, 2.0, 0.3), dvec3(0.3, -0.9, 0.1), 3.0, [0.1, 0.4]);
+    let panel = panel(DVec3::Y * 2.0, [DVec3::X, DVec3::Z], PanelShape::Disc, 3.0);
     let radiance = Radiance(1.0);
     let glow = other("large", LightKind::Surface { object: 0, radiance });
     let sky = other("large", LightKind::Environment { scale: 1.0 });
-    let (spot, panel) = (other("spot", spot), other("large", panel));
+    let (spot, panel) = (other("spot", spot.kind), other("large", panel.kind));
     scene.lights.extend([lamp, sun, spot, panel, glow, sky]);
     scene.textures.push(Arc::new(four_colours()));
     scene

@@ -11,6 +11,5 @@ mod lights;
 mod materials;
 mod meshes;
 mod motion;
-mod oracle;
 mod refusals;
 mod spectral;

@@ -1,7 +1,6 @@
 //! Scenes that move: running waves, water that they lift, and keyframes of files.
 
 use nephroid::scene::waves::gravity_period_s;
-use support::glb::Glb;
 
 use crate::prelude::*;
 

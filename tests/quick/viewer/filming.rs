@@ -1,7 +1,7 @@
 //! The camera's path: recorded, played and written; and maps written by a thread of their own, and the picture of the window
 //! as files.
 
-use nephroid::eye_pass::{Picture, View, tone_mapping};
+use nephroid::eye_pass::tone_mapping;
 use nephroid::optics::spectrum::xyz::IDENTITY;
 use nephroid::scene::CameraPath;
 use nephroid::viewer::background::Wake;

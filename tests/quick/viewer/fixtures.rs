@@ -1,22 +1,17 @@
 //! Scenes, maps and windows without a display that several tests use.
 
 use std::path::Path;
-use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use glam::{DVec2, DVec3};
-use nephroid::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
-use nephroid::scene::builtin::{self, parts, shapes};
-use nephroid::scene::{Edit, Light, LightEdit, LightKind, LoadOptions, Scene};
-use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
-use nephroid::units::{Flux, Irradiance, RadiantIntensity};
+use nephroid::illumination::{Chart, Layer, Receiver};
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::background::Wake;
 use nephroid::viewer::command::{Choices, Command};
 use nephroid::viewer::files::FilesOptions;
 use nephroid::viewer::model::Model;
 use nephroid::viewer::worker::BakedLevel;
-use support::scenes::map_of;
+use support::prelude::*;
+use support::scenes::{chart_of, map_of, spot};
 use tempfile::TempDir;
 
 /// Only a failing test waits as long.
@@ -30,32 +25,18 @@ pub fn scene() -> Scene {
     parts::add(&mut scene, "ball", ball, parts::dielectric("glass", 1.5));
     let lamp = parts::point_light("lamp", DVec3::Y * 3.0, Flux(100.0));
     let sun = parts::sun("sun", DVec3::new(0.0, -1.0, -1.0), Irradiance(2.0));
-    let mut spot = lamp.clone();
+    let mut spot = spot(DVec3::Y, DVec3::NEG_Y, 3.0, [0.1, 0.4]);
     spot.name = "spot".into();
-    spot.kind = LightKind::Spot {
-        position: DVec3::Y,
-        direction: DVec3::NEG_Y,
-        intensity: RadiantIntensity(3.0),
-        inner_cone_rad: 0.1,
-        outer_cone_rad: 0.4,
-    };
     scene.lights.extend([lamp, sun, spot]);
     scene
 }
 
 /// A chart of one triangle, with areas [m²] of its texels.
 pub fn chart(object: usize, width: usize, height: usize, texel_areas_m2: Vec<f64>) -> Arc<Chart> {
+    let corner_uvs = vec![[DVec2::ZERO, DVec2::X, DVec2::Y]];
     Arc::new(Chart {
         receiver: Receiver::front(object),
-        uv_set: UvSet::Generated,
-        corner_uvs: vec![[DVec2::ZERO, DVec2::X, DVec2::Y]],
-        width,
-        height,
-        texel_areas_m2,
-        layout: None,
-        beyond: Vec::new(),
-        joints: Vec::new(),
-        islands: std::sync::OnceLock::new(),
+        ..chart_of(corner_uvs, (width, height), texel_areas_m2)
     })
 }
 
@@ -158,7 +139,7 @@ pub fn added(light: Light) -> Edit {
 }
 
 /// The lines of an event log.
-pub fn events(log: &Path) -> Vec<serde_json::Value> {
+pub fn events(log: &Path) -> Vec<Value> {
     let text = std::fs::read_to_string(log).expect("there is a log");
     let event = |line| serde_json::from_str(line).expect("a line is JSON");
     text.lines().map(event).collect()

@@ -2,17 +2,13 @@
 
 use std::collections::BTreeSet;
 use std::ops::{Deref, DerefMut};
-use std::sync::Arc;
 
 use egui::accesskit::Role;
 use egui::{Event, Key, Pos2, Rect, Vec2, vec2};
 use egui_kittest::kittest::NodeT as _;
 use egui_kittest::{Harness, Node};
-use nephroid::bake::{Bake, BakeCounts, StopReason, Timings};
-use nephroid::illumination::IlluminationMap;
+use nephroid::bake::{BakeCounts, StopReason, Timings};
 use nephroid::plan::EffectPlan;
-use nephroid::scene::{Edit, Scene};
-use nephroid::settings::{BakeSettings, LayerKind};
 use nephroid::viewer::ViewerOptions;
 use nephroid::viewer::command::Command;
 use nephroid::viewer::model::Model;
@@ -20,6 +16,8 @@ use nephroid::viewer::panel::{Panel, WIDTH, set_style};
 use nephroid::viewer::worker::{BakeRequest, BakeState, BakedLevel};
 
 use super::fixtures;
+
+use support::prelude::*;
 
 /// Left of the panel [points]: the harness leaves a margin.
 pub const LEFT: f32 = 8.0;

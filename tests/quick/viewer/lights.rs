@@ -4,7 +4,6 @@
 use nephroid::illumination::{Chart, Receiver};
 use nephroid::light_pass::sketch::{SketchLimits, sketch};
 use nephroid::scene::load::save;
-use nephroid::units::Flux;
 use nephroid::viewer::brightest;
 use nephroid::viewer::new_light::ViewTarget;
 

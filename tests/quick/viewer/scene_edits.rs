@@ -3,7 +3,6 @@
 use std::f64::consts::FRAC_PI_2;
 
 use nephroid::scene::PanelShape;
-use nephroid::units::Radiance;
 use nephroid::viewer::panel::PlaceTool;
 
 use super::fixtures::chosen;
@@ -18,19 +17,11 @@ fn panel_of(scene: Scene) -> Headless {
 
 fn scene() -> Scene {
     let mut scene = fixtures::scene();
-    let panel = LightKind::Panel {
-        centre: DVec3::Y * 4.0,
-        across: DVec3::X,
-        down: DVec3::Z,
-        shape: PanelShape::Rectangle,
-        radiance: Radiance(3.0),
-    };
-    for (name, kind) in [("panel", panel), ("sky", LightKind::Environment { scale: 1.0 })] {
-        scene.lights.push(Light {
-            name: name.into(),
-            kind,
-            ..scene.lights[0].clone()
-        });
+    let sides = [DVec3::X, DVec3::Z];
+    let panel = support::scenes::panel(DVec3::Y * 4.0, sides, PanelShape::Rectangle, 3.0);
+    let sky = support::scenes::light(LightKind::Environment { scale: 1.0 });
+    for (name, lamp) in [("panel", panel), ("sky", sky)] {
+        scene.lights.push(with(lamp, |it| it.name = name.into()));
     }
     scene
 }
@@ -253,6 +244,37 @@ fn mouse_holds_one_thing_and_looking_edits_nothing() {
             (held, placed)
         );
     }
+}
+
+#[test]
+fn a_placed_lamp_keeps_its_height_over_the_floor() {
+    let mut panel = panel();
+    panel.press("Place light");
+    let model = &mut panel.model;
+    let down = |x, z| Ray {
+        origin: dvec3(x, 5.0, z),
+        direction: DVec3::NEG_Y,
+    };
+    let assert_placed = |model: &mut Model, x: f64, z: f64| {
+        let mut edit = None;
+        wait_for("the surfaces", || {
+            model.poll();
+            edit = model.placed();
+            edit.is_some()
+        });
+        let Some(Edit::Light(0, LightEdit::Position(place))) = edit else {
+            panic!("{edit:?}")
+        };
+        near(place, dvec3(x, 3.0, z), 1e-9, "the lamp's place");
+    };
+    model.begin_placing(down(0.5, 0.4));
+    assert_placed(model, 0.5, 0.4);
+    model.go_on_placing(down(-0.5, 0.3));
+    model.end_placing();
+    assert_placed(model, -0.5, 0.3);
+    // The button is up.
+    model.go_on_placing(down(0.5, 0.4));
+    assert_eq!(model.placed(), None);
 }
 
 /// A window that bakes nothing by itself, with its event log.

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use serde_json::{Value, json};
 use support::glb::{assembled, parts_of};
+use support::prelude::*;
 
 /// Two squares of four corners: positions, then normals, then two triangles.
 fn binary() -> Vec<u8> {

@@ -3,7 +3,7 @@
 use std::sync::Mutex;
 use std::sync::mpsc::{Receiver, Sender, channel};
 
-use nephroid::bake::{Bake, Baker};
+use nephroid::bake::Baker;
 use nephroid::error::{Error, Result};
 use nephroid::progress::Progress;
 use nephroid::viewer::background::Wake;

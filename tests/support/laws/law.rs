@@ -1,17 +1,13 @@
 //! Measures of how far a bake deviates from a law. They are relative errors unless the wording says otherwise.
 
-use std::sync::Arc;
-
-use glam::{DMat2, DVec2, DVec3};
+use glam::DMat2;
 use nephroid::illumination::compare::{Agreement, Grid, TexelPair, relative_rmse};
-use nephroid::illumination::{IlluminationMap, Layer};
+use nephroid::illumination::Layer;
 use nephroid::light_pass::ledger::EnergyLedger;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::{Mesh, Scene};
-use nephroid::settings::LayerKind;
 use nephroid::study::agreement::pair_maps;
 
 use super::{Baked, Case, number};
+use crate::prelude::*;
 use crate::tools::bits;
 
 /// Relative error of a flux that chance allows: three standard errors for the photons that arrived, plus 2 % for
@@ -299,9 +295,9 @@ fn against_theory(bake: &Baked, theory: impl Fn(DVec3) -> f64) -> f64 {
     let (width, height) = (map.width(), map.height());
     let pair = |(texel, image): (usize, f64)| {
         let mean = (0..POINTS * POINTS).map(|point| {
-            let within = DVec2::new((point % POINTS) as f64 + 0.5, (point / POINTS) as f64 + 0.5) / POINTS as f64;
-            let texel = DVec2::new((texel % width) as f64, (texel / width) as f64);
-            theory(place(&bake.scene, map, (texel + within) / DVec2::new(width as f64, height as f64)))
+            let within = dvec2((point % POINTS) as f64 + 0.5, (point / POINTS) as f64 + 0.5) / POINTS as f64;
+            let texel = dvec2((texel % width) as f64, (texel / width) as f64);
+            theory(place(&bake.scene, map, (texel + within) / dvec2(width as f64, height as f64)))
         });
         TexelPair {
             image,

@@ -7,11 +7,9 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use nephroid::illumination::IlluminationMap;
-use nephroid::scene::Scene;
-use nephroid::bake::Bake;
-use nephroid::settings::{BakeSettings, ErrorMetric, Estimator, LayerKind};
+use nephroid::settings::{ErrorMetric, Estimator};
 
+use crate::prelude::*;
 use crate::tools::{bake, photons, settings, to};
 
 /// Largest relative error of the energy balance of ledgers and maps.

@@ -1,12 +1,8 @@
 //! A builder for scenes. Metres, watts, y up; the receiver whose irradiance E is known is the object `floor`.
 
-use std::f64::consts::PI;
-use glam::DVec3;
-use nephroid::optics::LinearSrgb;
-use nephroid::scene::builtin::{parts, shapes};
-use nephroid::scene::{Light, LightKind, LightSize, Material, Mesh, Scene};
-use nephroid::settings::BakeSettings;
-use nephroid::units::{Flux, Irradiance};
+use crate::prelude::*;
+
+pub use crate::scenes::{light, panel, spot, tinted};
 
 /// Adds parts to a scene.
 pub trait Build: Sized {
@@ -67,17 +63,6 @@ impl Build for Scene {
     }
 }
 
-/// A white light without size.
-pub fn light(kind: LightKind) -> Light {
-    Light {
-        name: "lamp".into(),
-        colour: LinearSrgb::WHITE,
-        spectrum: None,
-        kind,
-        size: LightSize::None,
-    }
-}
-
 /// A horizontal diffuse floor of |x|, |z| ≤ half.
 pub fn floor(half_m: f64) -> Scene {
     parts::reference_scene(half_m)
@@ -90,7 +75,7 @@ pub fn room(half_m: f64) -> Scene {
 
 /// A horizontal slab of |x|, |z| ≤ 3 m.
 pub fn slab(low_m: f64, high_m: f64) -> Mesh {
-    shapes::cuboid(DVec3::new(-3.0, low_m, -3.0), DVec3::new(3.0, high_m, 3.0))
+    shapes::cuboid(dvec3(-3.0, low_m, -3.0), dvec3(3.0, high_m, 3.0))
 }
 
 /// A floor of 1 × 1 m below a glass slab that covers it.
@@ -98,23 +83,32 @@ pub fn under_slab(ior: f64) -> Scene {
     floor(0.5).glass(ior, slab(0.5, 0.7))
 }
 
+/// Slabs above each other, the first of glass and the others of an index, under a slanting sun.
+pub fn slabs(borders: &[[f64; 2]], ior: f64) -> Scene {
+    let scene = floor(0.5).sun(dvec3(0.1, -1.0, 0.05));
+    let all = borders.iter().enumerate();
+    all.fold(scene, |scene, (index, [low, high])| {
+        scene.glass(if index == 0 { 1.5 } else { ior }, slab(*low, *high))
+    })
+}
+
 /// An upright mirror beside the floor.
 pub fn upright() -> Mesh {
-    shapes::rectangle(DVec3::new(0.6, 0.75, 0.0), DVec3::Z, DVec3::Y * 0.75)
+    shapes::rectangle(dvec3(0.6, 0.75, 0.0), DVec3::Z, DVec3::Y * 0.75)
 }
 
 /// A floor of 1 × 1 m in front of an upright mirror, or a substitute for it, with a lamp between them.
 pub fn before(mirror: Mesh) -> Scene {
-    floor(0.5).mirror(mirror).lamp(DVec3::new(-0.1, 1.0, 0.05))
+    floor(0.5).mirror(mirror).lamp(dvec3(-0.1, 1.0, 0.05))
 }
 
 /// Mirror image of that lamp.
-pub const MIRRORED_LAMP: DVec3 = DVec3::new(1.3, 1.0, 0.05);
+pub const MIRRORED_LAMP: DVec3 = dvec3(1.3, 1.0, 0.05);
 
 /// A glass ball above a floor, below a lamp.
 pub fn glass_ball(levels: u32) -> Scene {
-    let ball = shapes::sphere(DVec3::new(0.0, 0.5, 0.0), 0.3, levels);
-    floor(0.4).glass(1.5, ball).lamp(DVec3::new(0.1, 2.0, 0.05))
+    let ball = shapes::sphere(dvec3(0.0, 0.5, 0.0), 0.3, levels);
+    floor(0.4).glass(1.5, ball).lamp(dvec3(0.1, 2.0, 0.05))
 }
 
 /// Settings that follow every branch down to a share of 1e-9.

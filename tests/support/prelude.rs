@@ -1,11 +1,14 @@
 //! Names that most tests use, and checks that say what they found.
 
-pub use std::f64::consts::PI;
+pub use std::f64::consts::{PI, TAU};
 use std::fmt::{Debug, Display};
 pub use std::sync::Arc;
 
 pub use glam::{DMat3, DQuat, DVec2, DVec3, dvec2, dvec3};
+pub use nephroid::bake::Bake;
+pub use nephroid::eye_pass::{Picture, View};
 pub use nephroid::geometry::Ray;
+pub use nephroid::illumination::IlluminationMap;
 pub use nephroid::optics::{LinearSrgb, Nanometres};
 pub use nephroid::progress::Control;
 pub use nephroid::scene::builtin::{self, parts, shapes};
@@ -16,11 +19,12 @@ pub use nephroid::scene::{
 };
 pub use nephroid::settings::{BakeSettings, LayerKind, MapResolution};
 pub use nephroid::transport::{MediumStack, Tracer};
+pub use nephroid::units::{Flux, Irradiance, Radiance, RadiantIntensity};
 pub use proptest::prelude::*;
 pub use serde_json::{Value, json};
-pub use support::assert_close;
-pub use support::glb::{Glb, assert_warned};
-pub use support::tools::builtin_scene as built_in;
+pub use crate::assert_close;
+pub use crate::glb::{Glb, assert_warned};
+pub use crate::tools::builtin_scene as built_in;
 
 pub const fn rgb(r: f64, g: f64, b: f64) -> LinearSrgb {
     LinearSrgb::new(r, g, b)
