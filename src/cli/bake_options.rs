@@ -139,20 +139,11 @@ impl BakeOptions {
         given.map(|(_, text)| text.as_str())
     }
 
-    /// For the scene that opens by default: all layers at draft quality, unless the options say otherwise.
+    /// For the scene that opens by default: draft quality, unless the options say otherwise.
     pub fn for_a_first_look(mut self) -> Self {
-        let is_draft = !self.names_quality() && self.value("estimator") != Some("splat");
-        let added = [
-            ("preset", "draft", is_draft),
-            (
-                "layers",
-                "caustic,direct,indirect",
-                self.value("layers").is_none(),
-            ),
-        ];
-        for (name, text, _) in added.into_iter().filter(|(.., is_added)| *is_added) {
-            let option = OPTIONS.iter().find(|option| option.name == name);
-            self.0.extend(option.map(|option| (option, text.to_string())));
+        if !self.names_quality() && self.value("estimator") != Some("splat") {
+            let preset = OPTIONS.iter().find(|option| option.name == "preset");
+            self.0.extend(preset.map(|option| (option, "draft".to_string())));
         }
         self
     }

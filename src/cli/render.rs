@@ -68,8 +68,7 @@ impl RenderArguments {
     /// # Errors
     /// Bad usage; input, output, a bake or a picture that fails.
     pub fn run(&self, console: &Console) -> Result<()> {
-        let layers = [LayerKind::Caustic, LayerKind::Direct];
-        let settings = self.bake.settings(&layers, self.run.threads())?;
+        let settings = self.bake.settings(&LayerKind::ALL, self.run.threads())?;
         let options = self.scene_options.load_options(true);
         let moment = (&self.moment, &settings.effects);
         let load = || LoadedScene::load_at(&self.scene, &options, false, moment, console);

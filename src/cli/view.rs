@@ -73,8 +73,7 @@ impl ViewArguments {
             Some(_) => self.bake.clone(),
             None => self.bake.clone().for_a_first_look(),
         };
-        let layers = [LayerKind::Caustic, LayerKind::Direct];
-        let settings = bake.settings(&layers, self.run.threads())?;
+        let settings = bake.settings(&LayerKind::ALL, self.run.threads())?;
         let source = self.scene.as_deref().unwrap_or(DEFAULT_SCENE);
         let loaded = LoadedScene::load(source, &self.scene_options.load_options(true), false, console)?;
         let why = self.window(&settings, &loaded, console)?;

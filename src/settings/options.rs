@@ -278,7 +278,7 @@ pub const OPTIONS: &[OptionInfo] = &[
         what: "Which light is baked. Caustic: light that met glass, mirrors or water. Direct: straight from the lights. \
                 Indirect: light that diffuse surfaces send each other, any number of bounces",
         range: "at least one",
-        default: "caustic for bake, caustic,direct for pictures and the window",
+        default: "caustic for bake, all three for pictures and the window",
         accuracy: "a layer that is not baked is missing from the picture; indirect stops at the max error, 3 % without \
                 one",
         cost: "direct: a shadow ray per texel and light; indirect: 64 to 4,096 rays per texel of a coarser grid, and the \

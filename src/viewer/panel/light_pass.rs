@@ -21,7 +21,7 @@ const NOT_GAUSSIAN: &str = "Sigma is the spread of the gaussian kernel; the chos
 /// Defaults in the panel for an estimator.
 pub fn defaults(estimator: Estimator) -> BakeSettings {
     BakeSettings {
-        layers: vec![LayerKind::Caustic, LayerKind::Direct],
+        layers: LayerKind::ALL.to_vec(),
         ..BakeSettings::of(estimator)
     }
 }

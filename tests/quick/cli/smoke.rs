@@ -312,10 +312,9 @@ fn stored_maps_look_as_those_baked_for_it() {
     let sandbox = Sandbox::new();
     // Their coordinates are made by the bake.
     sandbox.write("boxes.glb", boxes().bytes());
-    sandbox.succeed(&format!(
-        "render boxes.glb -o fresh.exr --backend cpu {SMALL} --layers caustic,direct"
-    ));
-    sandbox.succeed("bake boxes.glb -o maps --density 1e3 --map-resolution 32 --layers caustic,direct");
+    sandbox.succeed(&format!("render boxes.glb -o fresh.exr --backend cpu {SMALL}"));
+    sandbox
+        .succeed("bake boxes.glb -o maps --density 1e3 --map-resolution 32 --layers caustic,direct,indirect");
     sandbox.succeed("render boxes.glb -o stored.exr --size 40x30 --backend cpu --maps maps");
     let [fresh, stored] = ["fresh.exr", "stored.exr"].map(|file| radiance(&sandbox, file));
     assert_eq!((fresh.width, fresh.height), (40, 30));
