@@ -19,13 +19,6 @@ use crate::scene::Mesh;
 use coverage::twice_signed_area;
 use plane::{common_normal, smallest_rectangle};
 
-/// Map sides for which generated coordinates may reserve gutters [texels]: those of the smallest of which charts fill
-/// enough.
-const NOMINAL_SIDES: [usize; 4] = [64, 128, 256, 512];
-
-/// Smallest filled share of a map with gutters, unless its side is the largest: wider gutters cost texels at all sizes.
-const MIN_FILLED: f64 = 0.6;
-
 /// Map coordinates of one object, independent of the map size.
 #[derive(Clone, Debug)]
 pub struct Parametrisation {
@@ -77,22 +70,9 @@ fn choose(mesh: &Mesh) -> Option<(UvSet, Vec<[DVec2; 3]>)> {
     let flat = normal.map(|normal| project_flat(mesh, normal));
     let generated = match flat {
         Some(set) if !given::overlaps(&set, 256) => set,
-        _ => unwrapped(mesh)?,
+        _ => unwrap::unwrap(mesh)?,
     };
     Some((UvSet::Generated, generated))
-}
-
-/// Charts with gutters for the smallest of the nominal sides that they fill well.
-fn unwrapped(mesh: &Mesh) -> Option<Vec<[DVec2; 3]>> {
-    let mut found = None;
-    for side in NOMINAL_SIDES {
-        found = unwrap::unwrap(mesh, side);
-        let filled = found.as_deref().map_or(0.0, given::covered_share);
-        if filled >= MIN_FILLED {
-            break;
-        }
-    }
-    found
 }
 
 /// Coordinate sets of a mesh that cannot be used for its map, and why.
