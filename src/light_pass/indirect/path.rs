@@ -42,6 +42,7 @@ impl Follower<'_> {
         mut land: impl FnMut(&SurfaceHit, Side, LinearSrgb),
     ) -> PathEnd {
         let scene = self.tracer.scene();
+        let ior_around = media.ior(scene);
         let mut found = PathEnd::default();
         let mut weight = LinearSrgb::WHITE;
         for depth in 0..=self.max_depth {
@@ -80,7 +81,8 @@ impl Follower<'_> {
                 break;
             }
         }
-        found.truncated = weight.luminance();
+        // Radiance within a medium is n² times what arrives from it.
+        found.truncated = weight.luminance() * (media.ior(scene) / ior_around).powi(2);
         found
     }
 }

@@ -2,7 +2,7 @@
 
 use nephroid::bake::Baker;
 use nephroid::illumination::{Chart, Receiver};
-use nephroid::light_pass::indirect::{MIN_PASSES, Network};
+use nephroid::light_pass::indirect::{MIN_PASSES, Network, TraceCounts};
 
 use crate::bake::common::{self, all_bits, run, with_layers};
 use support::meshes::{cuboid, floor, inside_out, quad, sphere};
@@ -107,9 +107,13 @@ fn walls_take_all_that_a_lamp_sends() {
     }
 }
 
-/// What comes from other surfaces where each element gets E = 1 W/m² from elsewhere; maps by object and side [texels],
-/// so many rays an element and pass.
-fn under_even_light(parts: Vec<(Mesh, Material)>, maps: &[(usize, usize)], rays: u32) -> Vec<LinearSrgb> {
+/// What comes from other surfaces where each element gets E = 1 W/m² from elsewhere, by paths over at most `max_depth`
+/// clear surfaces, and what became of the rays; maps by object and side [texels].
+fn under_even_light(
+    parts: Vec<(Mesh, Material)>,
+    maps: &[(usize, usize)],
+    max_depth: u32,
+) -> (Vec<LinearSrgb>, TraceCounts) {
     let scene = Arc::new(scene(parts, vec![]));
     let tracer = Tracer::new(Arc::clone(&scene));
     let chart =
@@ -118,8 +122,9 @@ fn under_even_light(parts: Vec<(Mesh, Material)>, maps: &[(usize, usize)], rays:
     let mut network = Network::new(&scene, &charts);
     let count = network.element_count();
     let passes = vec![MIN_PASSES; count];
-    assert!(network.trace(&tracer, &passes, (rays, 0), &(), &Control::default()));
-    network.solve(&vec![LinearSrgb::WHITE; count], &passes).irradiance
+    assert!(network.trace(&tracer, &passes, (max_depth, 0), &(), &Control::default()));
+    let solved = network.solve(&vec![LinearSrgb::WHITE; count], &passes);
+    (solved.irradiance, network.counts())
 }
 
 /// In light that is the same everywhere, what stands in it (glass, a mirror, coat) changes nothing.
@@ -134,11 +139,33 @@ fn anything_clear_changes_no_even_light() {
         let ball = sphere(dvec3(0.5, 0.6, 1.0), 0.3, 48, 24);
         let parts = vec![(room(), one_sided(albedo)), (ball, smooth(kind))];
         let expected = albedo / (1.0 - albedo);
-        for e in under_even_light(parts, &[(0, 16)], 16) {
-            let off = (e.g / expected - 1.0).abs();
-            assert!(off < 1e-3, "{kind:?}: {} for {expected}", e.g);
-        }
+        let (irradiance, counts) = under_even_light(parts, &[(0, 16)], 64);
+        let is_off = |e: &&LinearSrgb| (e.g / expected - 1.0).abs() >= 1e-3;
+        let off: Vec<&LinearSrgb> = irradiance.iter().filter(is_off).collect();
+        // In a ball of facets with smooth normals a ray may go round for ever, but then it is booked as cut off.
+        let excused = counts.truncated.round();
+        assert!(
+            off.len() as f64 <= excused && excused <= 1.0,
+            "{kind:?}: {off:?} for {expected}"
+        );
     }
+}
+
+/// Where a share t of all light is cut off within glass, ρ(1 − t)/(1 − ρ(1 − t)) is left of it: what is missing is booked.
+#[test]
+fn light_that_is_cut_off_in_glass_is_booked() {
+    let albedo = 0.7;
+    let ball = sphere(dvec3(0.5, 0.6, 1.0), 0.3, 48, 24);
+    let parts = vec![
+        (room(), one_sided(albedo)),
+        (ball, smooth(SurfaceKind::Dielectric)),
+    ];
+    let (irradiance, counts) = under_even_light(parts, &[(0, 16)], 1);
+    let cut_off = counts.truncated / counts.rays as f64;
+    let mean = irradiance.iter().map(|e| e.g).sum::<f64>() / irradiance.len() as f64;
+    let left = |cut_off: f64| albedo * (1.0 - cut_off) / (1.0 - albedo * (1.0 - cut_off));
+    let missing = left(0.0) - mean;
+    assert_close(missing, left(0.0) - left(cut_off), 0.05, "light that is missing");
 }
 
 /// In a sphere full of coloured water light goes 2R cos θ from wall to wall, so that T̄ = ∫ 2c e^(−2Rσc) dc of it arrives:
@@ -153,7 +180,7 @@ fn water_takes_its_share_between_walls() {
         (wall, one_sided(albedo)),
         (cuboid(-DVec3::ONE, DVec3::ONE), water),
     ];
-    let irradiance = under_even_light(parts, &[(0, 24)], 16);
+    let (irradiance, _) = under_even_light(parts, &[(0, 24)], 16);
     let sum = irradiance.iter().fold(LinearSrgb::BLACK, |sum, e| sum + *e);
     let mean = sum / irradiance.len() as f64;
     for (found, colour) in mean.to_array().into_iter().zip(colour.to_array()) {
@@ -173,7 +200,7 @@ fn radiance_in_glass_grows_by_index_squared() {
     let corner = middle - dvec3(half, 0.0, half);
     let plate = quad(corner, DVec3::Z * 2.0 * half, DVec3::X * 2.0 * half);
     let parts = vec![(room(), one_sided(albedo)), ball, (plate, diffuse(0.0))];
-    let irradiance = under_even_light(parts, &[(0, 16), (2, 8)], 64);
+    let (irradiance, _) = under_even_light(parts, &[(0, 16), (2, 8)], 64);
     let on_plate = &irradiance[irradiance.len() - 64..];
     let mean = on_plate.iter().map(|e| e.g).sum::<f64>() / on_plate.len() as f64;
     let reflected = ((ior - 1.0_f64) / (ior + 1.0)).powi(2);
