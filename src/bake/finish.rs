@@ -21,7 +21,7 @@ use crate::illumination::map::relative_rmse;
 use crate::illumination::resolution::variance_within;
 use crate::illumination::smoothing::smooth;
 use crate::illumination::visible::visible_error;
-use crate::illumination::{Chart, IlluminationMap, Layer, Receiver, UvSet};
+use crate::illumination::{Chart, IlluminationMap, Layer, Receiver};
 use crate::light_pass::accuracy;
 use crate::light_pass::ledger::LightLedger;
 use crate::light_pass::receiver_maps::ReceiverMap;
@@ -290,9 +290,8 @@ impl MapAssembler<'_> {
             DirectDetail::Full => self.sizes.border_doublings(chart.receiver, self.settings),
             DirectDetail::Coarse | DirectDetail::Absent => 0,
         };
-        // Unwrapped charts have another layout at every size.
-        let is_fixed = chart.uv_set == UvSet::Generated || self.direct != DirectDetail::Coarse;
-        if chart.layout.is_none() && is_fixed && doublings == 0 {
+        let is_coarse = self.direct == DirectDetail::Coarse;
+        if chart.layout.is_none() && !is_coarse && doublings == 0 {
             return Some(DirectChart {
                 map: Arc::clone(chart),
                 own: Arc::clone(chart),

@@ -173,6 +173,15 @@ pub(super) struct KeptSquares {
     pub(super) squares: LightSquares,
 }
 
+/// Wall-clock times of a level of photons.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PhotonTime {
+    /// Per photon of each half [s].
+    pub(super) photon_s: f64,
+    /// Of filtering and measuring the maps, however many photons there are [s].
+    pub(super) maps_s: f64,
+}
+
 /// What is kept of one light between bakes.
 #[derive(Debug, Default)]
 pub(super) struct LightState {
@@ -182,8 +191,8 @@ pub(super) struct LightState {
     pub(super) traversed: Option<Arc<TraversedCells>>,
     /// Levels of the last bake, from coarse to fine.
     pub(super) levels: Vec<LightLevel>,
-    /// Wall-clock time per photon of each half in the last level of photons [s].
-    pub(super) photon_s: Option<f64>,
+    /// What the last level of photons took.
+    pub(super) photon_time: Option<PhotonTime>,
     pub(super) squares: Option<KeptSquares>,
     /// Wall-clock time of the last level with a goal [s].
     pub(super) goal_s: Option<f64>,

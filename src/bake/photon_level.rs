@@ -6,7 +6,7 @@ use std::time::Instant;
 use super::band_maps::BandMaps;
 use super::bundle_level::BundleLevel;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
-use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, drop_coarse};
+use super::light_level::{LevelKey, LightLevel, LightState, PhotonAim, PhotonSums, PhotonTime, drop_coarse};
 use super::shards::PassSums;
 use crate::error::Result;
 use crate::illumination::Receiver;
@@ -47,6 +47,10 @@ const MEAN_MARGIN: f64 = 4.0;
 /// Fraction of the remaining time that a level may take, as predicted from the level before.
 pub(super) const PART_OF_TIME: f64 = 0.85;
 
+/// A level adds at least one photon per so many texels of its maps. All of them are filtered again, which takes 1.5 µs of
+/// a texel, as long as a photon of two to four segments takes.
+const TEXELS_PER_PHOTON: f64 = 4.0;
+
 /// Minimum growth that is worth another level.
 const MIN_GROWTH: f64 = 1.2;
 
@@ -67,13 +71,19 @@ const MOST_SURPRISE_FILTERED: f64 = 3.0;
 /// Limits the photons of a level to what the remaining time allows, because an interrupted level is lost. The
 /// first level is not limited.
 fn in_time(photons: u32, before: u32, state: &LightState, context: &BakeContext) -> u32 {
-    let (1.., Some(left_s), Some(photon_s)) = (before, context.control.time_left_s(), state.photon_s) else {
+    let (1.., Some(left_s), Some(time)) = (before, context.control.time_left_s(), state.photon_time) else {
         return photons;
     };
     let own_s = PART_OF_TIME * left_s / context.open_lights as f64;
-    let affordable = f64::from(before) + own_s / photon_s;
+    let affordable = f64::from(before) + (own_s - time.maps_s) / time.photon_s;
     let least = MIN_GROWTH * f64::from(before);
     (affordable.max(least) as u32).min(photons)
+}
+
+/// Minimum number of photons in each half of the level after `level`, which are few where the maps are large.
+fn least_photons(level: &LightLevel, before: u32) -> f64 {
+    let texels = level.maps.iter().map(|(_, map)| map.chart.texel_count());
+    f64::from(before) + texels.sum::<usize>() as f64 / (TEXELS_PER_PHOTON * HALVES as f64)
 }
 
 /// Squared relative error of so many photons of equal flux in each half: that of T texels in which n photons arrive is T/n.
@@ -156,7 +166,9 @@ impl CausticLayer<'_> {
             None if before >= MAX_WITHOUT_ERROR => return None,
             None => GROWTH.1,
         };
-        let wanted = (f64::from(before) * times / f64::from(FIRST_PHOTONS)).ceil() * f64::from(FIRST_PHOTONS);
+        let least = last.map_or(0.0, |level| least_photons(level, before));
+        let wanted = (f64::from(before) * times).max(least) / f64::from(FIRST_PHOTONS);
+        let wanted = wanted.ceil() * f64::from(FIRST_PHOTONS);
         (before < MAX_PHOTONS).then_some(wanted.min(f64::from(MAX_PHOTONS)) as u32)
     }
 
@@ -257,23 +269,22 @@ impl CausticLayer<'_> {
         match light.state.take(&key) {
             Some(level) => Ok(Some(level)),
             None => {
-                let began = Instant::now();
                 let made = self.make_photons(light.visible, key, last, context)?;
-                let took_s = began.elapsed().as_secs_f64();
-                light.state.photon_s = made.as_ref().map(|_| took_s / f64::from(photons - before));
-                Ok(made)
+                let (level, time) = made.unzip();
+                light.state.photon_time = time;
+                Ok(level)
             }
         }
     }
 
-    /// Traces the missing photons; `None` if it was stopped.
+    /// Traces the missing photons, and filters all of them; `None` if it was stopped.
     fn make_photons(
         &self,
         light: &VisibleLight,
         key: LevelKey,
         before: Option<&mut LightLevel>,
         context: &mut BakeContext,
-    ) -> Result<Option<LightLevel>> {
+    ) -> Result<Option<(LightLevel, PhotonTime)>> {
         let unit = self.photon_unit(light)?;
         let photons = key
             .photons
@@ -288,6 +299,7 @@ impl CausticLayer<'_> {
             .unwrap_or(0);
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
+        let began = Instant::now();
         let sums = context.pass(&chart_for, nothing, |context, share, mut sums| {
             let total = context.outcome.counts.rays + HALVES as u64 * u64::from(photons - first);
             let listener = self.listener(context, total);
@@ -304,6 +316,7 @@ impl CausticLayer<'_> {
             sums
         })?;
         context.outcome.count(&sums.report, context.clock);
+        let photon_s = began.elapsed().as_secs_f64() / f64::from(photons - first);
         if sums.report.cancelled {
             return Ok(None);
         }
@@ -320,11 +333,14 @@ impl CausticLayer<'_> {
         }
         let unit = unit.per(u64::from(photons) * HALVES as u64);
         let is_shard = context.role.is_shard();
+        let began = Instant::now();
         let level = context.clock.time(
             |clock| &mut clock.deposit,
             || self.photon_level(light, (key, unit), raw, is_shard),
         );
-        Ok(Some(LightLevel { segments, ..level }))
+        let maps_s = began.elapsed().as_secs_f64();
+        let time = PhotonTime { photon_s, maps_s };
+        Ok(Some((LightLevel { segments, ..level }, time)))
     }
 
     fn photon_level(
