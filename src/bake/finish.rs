@@ -17,7 +17,7 @@ use crate::effect::EffectSwitch;
 use crate::error::Warning;
 use crate::illumination::accumulator::FluxAccumulator;
 use crate::illumination::gutter::fill_gutter;
-use crate::illumination::map::relative_rmse;
+use crate::illumination::map::estimated_relative_rmse;
 use crate::illumination::resolution::variance_within;
 use crate::illumination::smoothing::smooth;
 use crate::illumination::visible::visible_error;
@@ -114,11 +114,11 @@ impl MapAssembler<'_> {
         let estimated_visible = self.estimate_visible(&mut maps, truncated);
         for map in &mut maps {
             map.layers.retain(|layer| is_shown(layer.kind));
-            map.estimated_relative_rmse = relative_rmse(std::slice::from_ref(map));
+            map.estimated_relative_rmse = estimated_relative_rmse(std::slice::from_ref(map));
         }
         maps.retain(|map| !map.layers.is_empty());
         light_layers.retain(|part| is_shown(part.kind));
-        let estimated_relative_rmse = relative_rmse(&maps).map(|rmse| rmse.hypot(truncated));
+        let estimated_relative_rmse = estimated_relative_rmse(&maps).map(|rmse| rmse.hypot(truncated));
         let metric = self.settings.error_metric;
         let estimated_error = metric.of(estimated_visible, estimated_relative_rmse);
         let is_scarce = outcome.warnings.iter().any(|warning| warning.location == MEMORY);

@@ -8,7 +8,7 @@ use nephroid::effect::Effect;
 use nephroid::error::{Error, Result, Warning};
 use nephroid::export::map_folder::MapFolder;
 use nephroid::files::{self, OutputFolder};
-use nephroid::illumination::map::relative_rmse;
+use nephroid::illumination::map::estimated_relative_rmse;
 use nephroid::scene::Scene;
 use nephroid::settings::{BakeSettings, Estimator, LayerKind, MapResolution, Wavelengths};
 use nephroid::study::brute_force::{RAYS, brute_force};
@@ -501,7 +501,7 @@ impl StudyRun<'_> {
         drop(bar);
         let maps = folder.write(&scene, &settings, &result)?.maps;
         let (rays, cpu_s) = (result.counts.rays, result.cpu_s.total);
-        let noise = relative_rmse(&result.maps);
+        let noise = estimated_relative_rmse(&result.maps);
         let lines = maps.iter().map(|map| {
             let noise = 100.0 * map.estimated_relative_rmse.unwrap_or(0.0);
             format!("map {} of {}, noise {noise:.3} %\n", map.file, map.surface)

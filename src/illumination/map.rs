@@ -107,7 +107,7 @@ impl IlluminationMap {
 
 /// RMSE of the caustic and indirect layers over their mean irradiance, weighted by area; `None` if the error of a map
 /// is unknown, or no light arrived.
-pub fn relative_rmse(maps: &[IlluminationMap]) -> Option<f64> {
+pub fn estimated_relative_rmse(maps: &[IlluminationMap]) -> Option<f64> {
     let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
     for map in maps {
         let estimated = [LayerKind::Caustic, LayerKind::Indirect];

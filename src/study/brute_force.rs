@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::geometry::sampling::{even_point, mix64};
 use crate::illumination::accumulator::{FluxCount, FluxUnit};
 use crate::illumination::gutter::fill_gutter;
-use crate::illumination::map::relative_rmse;
+use crate::illumination::map::estimated_relative_rmse;
 use crate::illumination::parametrisation::parametrise;
 use crate::illumination::{Chart, IlluminationMap, Receiver};
 use crate::light_pass::emitter::Emitter;
@@ -319,7 +319,7 @@ impl Target {
             error: Some(error),
             ..IlluminationMap::of_layer(self.chart.clone(), LayerKind::Caustic, irradiance)
         };
-        map.estimated_relative_rmse = Some(relative_rmse(std::slice::from_ref(&map))?);
+        map.estimated_relative_rmse = Some(estimated_relative_rmse(std::slice::from_ref(&map))?);
         Some(map)
     }
 }

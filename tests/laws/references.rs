@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use nephroid::export::manifest::SceneSummary;
 use nephroid::export::pfm;
 use nephroid::illumination::compare::{Agreement, relative_rmse};
-use nephroid::illumination::map::relative_rmse as relative_noise;
+use nephroid::illumination::map::estimated_relative_rmse;
 use nephroid::illumination::{Layer, parametrise};
 use nephroid::study::agreement::{caustic_luminance, pair_maps};
 use serde::{Deserialize, Serialize};
@@ -164,7 +164,7 @@ fn few_rays_agree(scene: &Scene) {
     assert!(noise <= LARGEST_NOISE, "{noise}");
     let few = brute(scene, &settings(1.0, SIDE), 60_000).maps;
     let agreement = Agreement::of(&pair_maps(&few, &maps).expect("maps of one size")).expect("light");
-    let of_noise = agreement.relative_rmse / relative_noise(&few).expect("light");
+    let of_noise = agreement.relative_rmse / estimated_relative_rmse(&few).expect("light");
     assert!(
         (0.6..1.5).contains(&of_noise),
         "{}: {agreement:?}, {of_noise}",
@@ -197,7 +197,7 @@ fn agrees(name: &str, file: &str, rays: u64) {
 
 fn noise_falls() {
     let scene = builtin_scene("ring");
-    let noise = |rays| relative_noise(&brute(&scene, &settings(1.0, 32), rays).maps).expect("light");
+    let noise = |rays| estimated_relative_rmse(&brute(&scene, &settings(1.0, 32), rays).maps).expect("light");
     let (few, many) = (noise(20_000), noise(320_000));
     assert!(
         many < few / 4.5,
@@ -297,7 +297,7 @@ fn write_references() {
         let entry = Entry {
             geometry_hash: SceneSummary::of(&scene).geometry_hash,
             rays: result.counts.rays,
-            noise: relative_noise(&result.maps).expect("light"),
+            noise: estimated_relative_rmse(&result.maps).expect("light"),
             maps: result.maps.iter().map(write).collect(),
         };
         index.insert(scene.name.clone(), entry);
