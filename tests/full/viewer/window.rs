@@ -170,7 +170,7 @@ fn killed_window_comes_back() {
     let last = viewer.fly("s", marked);
     viewer.click("CheckBox", "caustic");
     viewer.wait_for("settings", |event| {
-        event["settings"]["layers"] == json!(["direct"])
+        event["settings"]["layers"] == json!(["direct", "indirect"])
     });
     viewer.wait_for("done", |_| true);
     // It is written within a second, or what that is on a busy machine.
@@ -178,7 +178,7 @@ fn killed_window_comes_back() {
     wait_until("what was set is kept", || {
         let kept = std::fs::read(&kept).ok()?;
         let kept: Value = serde_json::from_slice(&kept).ok()?;
-        (kept["settings"]["layers"] == json!(["direct"])).then_some(())
+        (kept["settings"]["layers"] == json!(["direct", "indirect"])).then_some(())
     });
     viewer.signal("KILL");
 
@@ -186,7 +186,7 @@ fn killed_window_comes_back() {
     let mut viewer = Viewer::open_with(&screen, &arguments, Some(&config));
     assert_eq!(viewer.all("found_again").len(), 1);
     let baking = &viewer.all("baking")[0];
-    assert_eq!(baking["settings"]["layers"], json!(["direct"]), "{baking}");
+    assert_eq!(baking["settings"]["layers"], json!(["direct", "indirect"]), "{baking}");
     let found = position(&viewer.wait_for_bake().1);
     assert!(found.distance(last) < 1e-6, "{found}, {last}");
     viewer.hands("mousemove 900 300 key 3");
