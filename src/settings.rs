@@ -49,8 +49,8 @@ impl LayerKind {
 choices! {
     /// How the light pass turns rays into irradiance.
     pub enum Estimator {
-        /// Bundles, with photons for what these cannot carry. Photons alone without a target, on rough surfaces, and for
-        /// lamps that shine in all directions from a sphere or an environment.
+        /// Bundles, with photons for what these cannot carry. Photons alone without a target, on rough surfaces, and
+        /// for lamps that shine in all directions from a sphere or an environment.
         Auto,
         /// Photons: random paths that follow one branch at every surface; each is counted in the texel it hits.
         Photon,
@@ -118,8 +118,8 @@ choices! {
     }
 }
 
-/// Width σ of the Gaussian exp(−r²/2σ), in squared footprint radii (eq. 4.4). The other
-/// estimators smooth afterwards, with each texel's own area as the footprint; 0 disables this.
+/// Width σ of the Gaussian exp(−r²/2σ), in squared footprint radii (eq. 4.4). The other estimators smooth finished
+/// maps, by the footprint of a ray at the density of the settings; 0 disables this.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Sigma {
@@ -217,8 +217,8 @@ pub struct BakeSettings {
     /// Light rays per steradian [1/sr]; for suns density/D² rays per m², with D the distance from the casters' centre
     /// to their farthest receiver. The footprint radius that sigma refers to is that of this density, refined or not.
     pub density_per_sr: f64,
-    /// Target for the estimated error of maps, [`MIN_MAX_ERROR`] to 1: the bake refines from `density_per_sr` on until
-    /// it is met (not splat). `None`: exactly that density.
+    /// Target for the estimated error of maps, [`MIN_MAX_ERROR`] to 1: the bake refines until it is met (not splat).
+    /// `None`: exactly `density_per_sr`.
     pub max_error: Option<f64>,
     /// How that error is measured.
     #[serde(default)]
@@ -269,7 +269,7 @@ pub struct BakeSettings {
     pub memory_bytes: u64,
 }
 
-/// Minimum density that refinement starts from [rays/sr].
+/// Minimum density that goes with a target error [rays/sr].
 const COARSEST_START_PER_SR: f64 = 1_600.0;
 
 /// Branch threshold without a target: share of a light ray's flux [1].
@@ -377,8 +377,8 @@ impl BakeSettings {
         Self::of(Estimator::Splat)
     }
 
-    /// Density that refinement towards an error starts from [rays/sr]: coarse enough to leave the decisions to
-    /// refinement, fine enough to miss no caster.
+    /// Density that goes with a target error [rays/sr]. Refinement does not start from it: the footprint of sigma and
+    /// bounds on the number of rays refer to it.
     pub fn starting_density_per_sr(target: f64) -> f64 {
         if target <= MIN_MAX_ERROR {
             // This target stands for as much as time allows.
@@ -465,11 +465,16 @@ impl BakeSettings {
     /// # Errors
     /// A usage error that names the option, its value and its range.
     pub fn validate(&self) -> Result<()> {
+        // Each option has its own range; what follows relates options to each other.
         for option in options::OPTIONS {
             option.check_limits(self)?;
         }
+
+        // A splat of no width has no area for its flux. Other estimators are sharp without smoothing.
         let is_continuous = self.wavelengths == Wavelengths::Continuous;
         let least_sigma = if self.estimator.refines() { 0.0 } else { 1e-6 };
+
+        // An option that the others leave without effect is refused, since whoever gives it expects one.
         let (option, what, remedy) = match self.sigma {
             Sigma::Constant(sigma) if !(least_sigma..=1e4).contains(&sigma) => (
                 "--sigma",

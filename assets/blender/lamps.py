@@ -32,15 +32,20 @@ def gltf(lamp, scale, fault):
 
     `fault(text)` is told what is lost.
     """
+    # glTF states a colour of at most 1 apart from the intensity.
     channels = strength(lamp, fault)
     brightest = float(channels.max())
     if brightest <= 0.0:
         return None, None, None
     entry = {"name": lamp.name_full, "color": [max(float(channel), 0.0) / brightest for channel in channels]}
     extras, is_normalized = custom_properties(lamp), getattr(lamp, "normalize", True)
+
+    # Suns state W/m² across their light in Blender, and lux in glTF.
     if lamp.type == "SUN":
         extras.setdefault("angular_diameter_deg", min(math.degrees(lamp.angle), 180.0))
         return "KHR_lights_punctual", dict(entry, type="directional", intensity=brightest * LUMENS_PER_WATT), extras
+
+    # The power of a spot is that of its point without the cone: what the cone cuts off is not shared out within it.
     if lamp.type in {"POINT", "SPOT"}:
         radius_m = lamp.shadow_soft_size
         extras.setdefault("radius_m", radius_m)
@@ -51,6 +56,8 @@ def gltf(lamp, scale, fault):
             # glTF has no hard edge.
             entry["spot"] = {"outerConeAngle": outer, "innerConeAngle": outer * (1.0 - max(lamp.spot_blend, 1e-4))}
         return "KHR_lights_punctual", entry, extras
+
+    # The entry takes the scale into the size of the panel, since its node only turns and moves it.
     has_sides = lamp.shape in {"RECTANGLE", "ELLIPSE"}
     width, height = lamp.size * scale[0], (lamp.size_y if has_sides else lamp.size) * scale[1]
     is_disc = lamp.shape in {"DISK", "ELLIPSE"}
@@ -62,6 +69,8 @@ def gltf(lamp, scale, fault):
         fault("is an ellipse and was baked as a disc of the same area")
     if lamp.spread < math.pi - 1e-3:
         fault("its spread was ignored; it was baked with one of 180 degrees")
+
+    # A Lambertian panel of the power Φ and the area A has the radiance Φ/(πA).
     radiance = brightest / math.pi / (area_m2 if is_normalized else 1.0)
     kind, size, aspect = ("disk", math.sqrt(width * height), 1.0) if is_disc else ("rect", height, width / height)
     entry.update(type=kind, shape=kind, intensity=radiance * LUMENS_PER_WATT, size=size, rect={"aspect": aspect})

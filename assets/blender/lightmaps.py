@@ -30,7 +30,10 @@ def put_back(context, export, folder, keeps_lamps, fault):
 
     `fault(object name, text)` is told of surfaces that cannot show theirs.
     """
+    # What an earlier bake added goes first: a surface shows one light map.
     remove(context)
+
+    # Each texture becomes a tile, to which the coordinates of its surface and side are moved.
     shown, files = {}, []
     for texture in json.loads((folder / "textures" / "index.json").read_text())["textures"]:
         place, = texture["maps"]
@@ -45,6 +48,8 @@ def put_back(context, export, folder, keeps_lamps, fault):
         write_tile(uvs, part, place, folder, len(files))
     if not shown:
         return 0
+
+    # All materials share one node group, and each gets one node, however many objects it covers.
     group = light_map_group(load_tiles(files, folder), keeps_lamps)
     lost = {}
     for name, (part, sides) in shown.items():
@@ -56,6 +61,7 @@ def put_back(context, export, folder, keeps_lamps, fault):
                 lost[material] = add_node(material, group)
             if lost[material]:
                 fault(name, lost[material])
+
     if hasattr(context.scene, "cycles"):
         # Cycles' own caustics would be there twice.
         context.scene[CAUSTICS] = [int(getattr(context.scene.cycles, name)) for name in CAUSTIC_FLAGS]
@@ -101,7 +107,6 @@ def load_tiles(files, folder):
     image.colorspace_settings.name = "Linear Rec.709"
     image.pack()
     return image
-
 
 
 def node_group(name, kind, sockets, nodes, links):
@@ -233,8 +238,11 @@ def baked_mesh_group():
 
 def remove(context):
     """Takes away everything that `put_back` added; whether there was anything."""
+    # What refers to our data-blocks is undone first; the blocks themselves go together at the end.
     named = [(bpy.data.node_groups, LIGHT_MAP_GROUP), (bpy.data.node_groups, BAKED_MESH), (bpy.data.images, IMAGE)]
     ours = [block for blocks, name in named for block in blocks if is_ours(block, name)]
+
+    # The shader that fed the group feeds again what came behind it.
     for material in bpy.data.materials:
         tree = material.node_tree
         for node in [node for node in (tree.nodes if tree else ()) if node.type == "GROUP" and node.node_tree in ours]:
@@ -244,21 +252,28 @@ def remove(context):
                 for after in list(node.outputs["Shader"].links):
                     tree.links.new(before.from_socket, after.to_socket)
             tree.nodes.remove(node)
+
+    # The modifier goes with the copy of the baked mesh that it showed.
     for item in bpy.data.objects:
         for modifier in [one for one in item.modifiers if one.type == "NODES" and is_ours(one, BAKED_MESH)]:
             for copy in [value for value in modifier.values() if isinstance(value, bpy.types.Object)]:
                 ours += copy, copy.data
             item.modifiers.remove(modifier)
+
+    # Meshes of linked libraries have none of our layers and may not be changed.
     for mesh in bpy.data.meshes:
         for name in (UV_LAYER, BACK_UV_LAYER):
             if mesh.library is None and name in mesh.uv_layers:
                 mesh.uv_layers.remove(mesh.uv_layers[name])
+
+    # Our stand-in material is taken from where it was put and still is the only one.
     matte = bpy.data.materials.get(MATTE)
     if matte is not None:
         for owner in (*bpy.data.meshes, *bpy.data.curves, *bpy.data.metaballs):
             if owner.pop(MATTE, False) and list(owner.materials) == [matte]:
                 owner.materials.clear()
         ours.append(matte)
+
     bpy.data.batch_remove(ours)
     for name, value in zip(CAUSTIC_FLAGS, context.scene.pop(CAUSTICS, ())):
         setattr(context.scene.cycles, name, bool(value))

@@ -202,12 +202,15 @@ class Surface:
         if self.node is not None and self.node.type == "BSDF_PRINCIPLED" and transmission >= 0.5:
             # Light crosses twice, and Cycles gives each crossing the root.
             color = [math.sqrt(channel) for channel in color]
+
         pbr = {"baseColorFactor": [*color, unit(values["alpha"])], "metallicFactor": unit(values["metallic"]),
                "roughnessFactor": unit(values["roughness"])}
         extensions = {"KHR_materials_ior": {"ior": max(values["ior"], 1.0)}}
         extras = custom_properties(self.material)
         result = {"name": self.material.name_full, "pbrMetallicRoughness": pbr, "doubleSided": True,
                   "extensions": extensions, "extras": extras}
+
+        # glTF keeps alpha in the image of the colour: one from another image has no place.
         if "color" in images:
             pbr["baseColorTexture"] = texture(images["color"])
         same = "alpha" in images and "color" in images and images["alpha"].image == images["color"].image
@@ -217,9 +220,13 @@ class Surface:
             result["alphaMode"] = "BLEND"
         if "normal" in images and values["normal"]:
             result["normalTexture"] = dict(texture(images["normal"]), scale=values["normal"])
+
+        # A thickness above 0 makes a solid body, which absorbs light along the way; 0 is a thin wall.
         if transmission > 0.0:
             extensions["KHR_materials_transmission"] = {"transmissionFactor": unit(transmission)}
             extensions["KHR_materials_volume"] = {"thicknessFactor": 0.0 if own.is_thin else 1.0, **self.absorption()}
+
+        # The specular level of Principled is 0.5 where glTF's factor is 1: at the reflectance of the index.
         if values["specular"] != 0.5 and transmission == 0.0:
             extensions["KHR_materials_specular"] = {"specularFactor": unit(2.0 * values["specular"])}
         if values["coat"] > 0.0:
@@ -227,12 +234,16 @@ class Surface:
                 self.fault("its coat was read with an index of 1.5")
             extensions["KHR_materials_clearcoat"] = {"clearcoatFactor": unit(values["coat"]),
                                                      "clearcoatRoughnessFactor": unit(values["coat_roughness"])}
+
+        # Emission is a radiance in Blender; glTF states a colour of at most 1 and cd/m².
         brightest = max(values["emission"]) * values["emission_strength"]
         if brightest > 0.0:
             result["emissiveFactor"] = [unit(channel / max(values["emission"])) for channel in values["emission"]]
             extensions["KHR_materials_emissive_strength"] = {"emissiveStrength": brightest * LUMENS_PER_WATT}
             if "emission" in images:
                 result["emissiveTexture"] = texture(images["emission"])
+
+        # Names of glasses and metals have no extension of glTF, and go into extras.
         if own.glass:
             extras["glass"] = own.glass
         if own.metal != "NONE":

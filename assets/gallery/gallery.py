@@ -113,6 +113,7 @@ def add_materials():
 
 def arched_wall(name, material, place, span, height, arches):
     """A wall along s with round arches (centre, half width, spring height); place(s, y, depth) is a point of it."""
+    # Strips end at equal angles of the arches, so that their upper edges follow the rounds.
     steps, origin = 24, A(place(0, 0, 0))
     cuts = set(span)
     for centre, half, _ in arches:
@@ -124,6 +125,8 @@ def arched_wall(name, material, place, span, height, arches):
             if abs(strip - centre) < half:
                 return spring + np.sqrt(max(half**2 - (s - centre)**2, 0))
         return 0.0
+
+    # The face towards the room and the one outside: each strip reaches from its arch, or the floor, to the top.
     for depth, normal, owner in ((0.0, place(0, 0, -1), name), (WALL, place(0, 0, 1), 'outside')):
         p = [corner for a, b in zip(cuts[:-1], cuts[1:]) if b - a > 1e-9 for strip in [(a + b) / 2]
              for corner in ((a, foot(a, strip)), (b, foot(b, strip)), (b, height), (a, height))]
@@ -133,6 +136,8 @@ def arched_wall(name, material, place, span, height, arches):
         world = A([place(s, y, depth) for s, y in p])
         face = mesh(world, np.tile(A(normal) - origin, (len(p), 1)), i, p * [1, -1], uv1)
         file.add_to(owner, face, material)
+
+    # The reveals: each outline is swept through the wall, with normals into the opening and textures in metres.
     for centre, half, spring in arches:
         a = np.pi * np.arange(steps + 1) / steps
         line = np.vstack([[(centre - half, 0)], np.stack([centre - half * np.cos(a), spring + half * np.sin(a)], 1), [(centre + half, 0)]])

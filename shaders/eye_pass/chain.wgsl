@@ -206,6 +206,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
         var point: SurfacePoint;
         var arrives = false;
         loop {
+            // Lamps are no surfaces: they are seen on the way, but not by the eye directly.
             let seen = nearest(walk.gaze);
             if walk.gaze.depth > 0u {
                 let lamps = walk.gaze.weight * lamps_on(walk.gaze, seen.distance);
@@ -216,11 +217,15 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 walk.radiance += shown(beyond, walk.gaze.wavelength);
                 break;
             }
+
+            // Wavelengths part before anything of the surface is added, as the waiting ones will meet it again.
             point = surface_point(seen.hit);
             let object = objects[point.object];
             part(&walk, point.object);
             walk.gaze.weight *= medium_transmittance(walk.gaze.media, seen.distance * start.unit_m);
             walk.gaze.width += walk.gaze.spread * seen.distance;
+
+            // Emission is seen at any surface, whether the path ends on it or goes on.
             var emitted = object.emitted_radiance;
             if object.glow != NO_IMAGE {
                 let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
@@ -232,6 +237,8 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 arrives = true;
                 break;
             }
+
+            // Only smooth mirrors and clear surfaces are left, which pass the path on.
             var colour = object.base_colour;
             if HAS_TINTED_GLASS {
                 let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
@@ -241,6 +248,8 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 break;
             }
         }
+
+        // Where the path arrives, it gathers diffuse light and highlights and goes on along the surface's branches.
         var goes_on = false;
         if arrives {
             let gaze = walk.gaze;
@@ -259,6 +268,8 @@ fn chain_radiance(first: Gaze) -> vec3f {
             }
             goes_on = go_on(&walk, point, next);
         }
+
+        // The path has ended: the last one that waits goes on, until none is left.
         if !goes_on {
             if walk.count == 0u {
                 break;

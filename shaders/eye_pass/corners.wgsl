@@ -62,6 +62,7 @@ fn bend(from_place: vec3f, to_place: vec3f, from_normal: vec3f, to_normal: vec3f
 }
 
 fn surface_point(hit: Hit) -> SurfacePoint {
+    // Positions come from the hierarchy's triangles, attributes from the vertex buffers of the surface pass.
     let triangle = met(hit);
     let weight = hit.barycentric;
     let first = corner_indices[triangle.first_index];
@@ -77,6 +78,9 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     let normal_b = corner_normal(second, object);
     let normal_c = corner_normal(third, object);
     let mixed = normal_a * weight.x + normal_b * weight.y + normal_c * weight.z;
+
+    // The position is a sum of three rounded products, with the bound of its error from Pharr, Jakob and Humphreys,
+    // Physically Based Rendering, 6.8.
     var point: SurfacePoint;
     point.place = terms_a + terms_b + terms_c;
     point.error = (abs(terms_a) + abs(terms_b) + abs(terms_c)) * gamma(7.0);
@@ -84,9 +88,13 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     point.geometric_normal = across / twice_area;
     point.shading_normal = select(point.geometric_normal, normalize(mixed), dot(mixed, mixed) > 0.0);
     point.interpolated_normal = point.shading_normal;
+
+    // Mean of the three edges: by how much the surface spreads the footprint of a reflected ray.
     point.curvature = (bend(triangle.a, triangle.b, normal_a, normal_b)
         + bend(triangle.b, triangle.c, normal_b, normal_c)
         + bend(triangle.c, triangle.a, normal_c, normal_a)) / 3.0;
+
+    // Coordinates and colours are linear over the triangle.
     let uv_a = corner_uvs(first);
     let uv_b = corner_uvs(second);
     let uv_c = corner_uvs(third);
@@ -94,6 +102,8 @@ fn surface_point(hit: Hit) -> SurfacePoint {
         + corner_colour(second) * weight.y
         + corner_colour(third) * weight.z;
     point.uvs = uv_a * weight.x + uv_b * weight.y + uv_c * weight.z;
+
+    // Waves bend the normal and focus light, so that they change the curvature, too; normal maps only bend.
     if HAS_BUMPS {
         let record = object.bumps;
         if record != NO_IMAGE {
@@ -104,6 +114,8 @@ fn surface_point(hit: Hit) -> SurfacePoint {
             point.curvature -= 0.5 * bump.laplacian * start.unit_m;
         }
     }
+
+    // Rays have no screen derivatives: densities relate their footprint to texels.
     point.uv_densities = vec2f(
         area_ratio(uv_a.xy, uv_b.xy, uv_c.xy, twice_area),
         area_ratio(uv_a.zw, uv_b.zw, uv_c.zw, twice_area),

@@ -44,6 +44,8 @@ fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
     let record = map_of(objects[fragment.object], is_front);
     let level = level_of(record, across, down);
     cut_out(fragment);
+
+    // Normals and texture coordinates exist without a map.
     if INSPECTED == INSPECTED_NORMALS {
         return vec4f(linear_from_srgb(0.5 * normalize(fragment.normal) + 0.5), 1.0);
     }
@@ -55,6 +57,8 @@ fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
         }
         return vec4f(linear_from_srgb(vec3f(fract(uv), 0.0)), 1.0);
     }
+
+    // Everything else is a property of the map, whose values that are not finite show in every view.
     if record == NO_IMAGE {
         return vec4f(NO_MAP, 1.0);
     }
@@ -68,6 +72,8 @@ fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
     if INSPECTED == INSPECTED_MAP_UV {
         return vec4f(linear_from_srgb(vec3f(fragment.map_uv, 0.0)), 1.0);
     }
+
+    // Steps of one pixel, in texels of the tile at this place: tiles of a map differ in resolution.
     let texels = texels_at(record, fragment.map_uv);
     let step_across = across * texels;
     let step_down = down * texels;
@@ -75,6 +81,7 @@ fn inspected(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @loca
         let pixel_texels = abs(step_across.x * step_down.y - step_across.y * step_down.x);
         return vec4f(false_colour(sqrt(pixel_texels / max(pixel_m2, 1e-30))), 1.0);
     }
+
     // A checkerboard that fades to grey where its squares are smaller than pixels.
     let cell = floor(fragment.map_uv * texels);
     let is_odd = fract(0.5 * (cell.x + cell.y)) > 0.25;

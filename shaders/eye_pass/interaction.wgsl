@@ -111,6 +111,7 @@ fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alpha
 }
 
 fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alpha: f32) -> Interaction {
+    // The bodies that the path is inside of tell the media on both sides of the surface.
     let incident = gaze.direction;
     let media = gaze.media;
     let ior = ior_of(point.object, gaze.wavelength);
@@ -125,6 +126,8 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
         ior_near = medium_ior(media, gaze.wavelength);
         ior_far = ior;
     }
+
+    // Beyond the critical angle, by the shading normal or by the triangle's plane, all light is reflected.
     let eta = ior_far / ior_near;
     let cos_incident = -dot(incident, facing.shading);
     let cos_clamped = clamp(cos_incident, 0.0, 1.0);
@@ -134,6 +137,8 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
     if eta != 1.0 && scaled_cos2_transmitted(cos_clamped, eta) <= 0.0 {
         return whole;
     }
+
+    // A shading normal may refract the ray back to the side that it came from; the triangle's normal then refracts it.
     var direction = refracted(incident, facing.shading, eta);
     if dot(direction, facing.geometric) >= 0.0 {
         if eta != 1.0 && scaled_cos2_transmitted(cos_geometric, eta) <= 0.0 {
@@ -141,6 +146,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
         }
         direction = refracted(incident, facing.geometric, eta);
     }
+
     let reflectance = dielectric_reflectance(cos_incident, eta);
     // Radiance scales by the square of n on the ray's side over n on the far side.
     let share = tint * ((1.0 - reflectance) / (eta * eta));
@@ -193,11 +199,14 @@ fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors:
 }
 
 fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
+    // Fresnel shares follow the shading normal, which bumps perturb.
     let object = objects[point.object];
     let facing = face(point, gaze.direction);
     let cos_incident = -dot(gaze.direction, facing.shading);
     let factors = factors_at(point, gaze);
     let alpha = lobe_alpha(object.roughness * factors.y);
+
+    // `own` is what a coat lets out of the diffuse body; surfaces without such a body have none.
     switch object.surface {
         case SURFACE_MIRROR: {
             let share = metal_reflectance(cos_incident, tint);

@@ -19,6 +19,7 @@ struct LitPoint {
 fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
     var sum = vec3f(0.0);
     for (var index = 0u; index < start.light_count; index += 1u) {
+        // Suns are infinitely far: their light neither spreads nor is absorbed on its way.
         let light = lights[index];
         var to_light = -light.place;
         var distance = FAR_AWAY;
@@ -35,12 +36,16 @@ fn direct_irradiance(point: LitPoint, object: ObjectRecord) -> vec3f {
                 distance *= 1.0 - BEFORE_FACET;
             }
         }
+
+        // Light from behind the triangle's plane does not count, however the normal is bent; a coat reflects a part.
         let cosine = dot(to_light, point.shading_normal);
         var taken = select(0.0, 1.0, dot(to_light, point.geometric_normal) >= 0.0);
         taken *= point.response.share;
         if point.response.coat > 0.0 {
             taken *= 1.0 - point.response.coat * dielectric_reflectance(cosine, object.ior / light.ior);
         }
+
+        // Only light that would count is worth a shadow ray.
         let share = across_beam * cosine * taken;
         if share > 0.0 {
             let origin = point.place + point.geometric_normal * point.margin;

@@ -170,12 +170,15 @@ fn met(hit: Hit) -> Triangle {
 
 // Watertight intersection after Woop, Benthin and Wald 2013. The distance is negative for a miss.
 fn meet_triangle(ray: Sheared, index: u32, triangle: Triangle, instance: u32) -> Hit {
+    // In sheared coordinates the ray runs along z from the origin, so that the test is one of signs in the plane.
     let a = turned(triangle.a - ray.origin, ray);
     let b = turned(triangle.b - ray.origin, ray);
     let c = turned(triangle.c - ray.origin, ray);
     let pa = a.xy - ray.shear.xy * a.z;
     let pb = b.xy - ray.shear.xy * b.z;
     let pc = c.xy - ray.shear.xy * c.z;
+
+    // Triangles at a common edge evaluate the same function there, so that no ray passes between them.
     let u = edge_function(pc, pb);
     let v = edge_function(pa, pc);
     let w = edge_function(pb, pa);
@@ -188,6 +191,7 @@ fn meet_triangle(ray: Sheared, index: u32, triangle: Triangle, instance: u32) ->
         return missed;
     }
     let distance = ray.shear.z * (u * a.z + v * b.z + w * c.z) / determinant;
+
     // Rounding error of the distance: Pharr, Jakob and Humphreys, Physically Based Rendering, 6.8.7.
     let x = max(abs(pa.x), max(abs(pb.x), abs(pc.x)));
     let y = max(abs(pa.y), max(abs(pb.y), abs(pc.y)));
@@ -197,6 +201,7 @@ fn meet_triangle(ray: Sheared, index: u32, triangle: Triangle, instance: u32) ->
     let error_y = gamma(5.0) * (y + z);
     let error_edge = 2.0 * (gamma(2.0) * x * y + error_y * x + error_x * y);
     let bound = 3.0 * (gamma(3.0) * edge * z + error_edge * z + gamma(3.0) * z * edge) / abs(determinant);
+
     // If all corners lie ahead, so does the hit, which is a mean of them, however narrow the triangle looks.
     let ahead = min(a.z * ray.shear.z, min(b.z * ray.shear.z, c.z * ray.shear.z));
     if (distance > bound || ahead > gamma(8.0) * z) && distance < FAR_AWAY {
@@ -243,6 +248,7 @@ struct Search {
 // The nearest triangle before `limit`, from either side. Descends to a leaf first and then intersects its triangles, so
 // that neighbouring rays do the same at the same time.
 fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
+    // Triangles are met in local coordinates, boxes in those of the instance that is searched.
     let ray = sheared(origin, direction);
     let outside = slabs(origin, direction, 0.0);
     var boxes = outside;
@@ -252,6 +258,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
         var first = 0u;
         var end = 0u;
         loop {
+            // An instance has nodes of its own; entries of the stack above `outside` belong to it.
             let node = nodes[search.index];
             if node.count == INSTANCE {
                 search.instance = node.first;
@@ -266,6 +273,8 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
                 end = node.first + node.count;
                 break;
             }
+
+            // The nearer child is visited first; the farther one waits with its distance, by which a hit may cull it.
             let left = enter(boxes, node.first, search.best.distance);
             let right = enter(boxes, node.first + 1u, search.best.distance);
             let is_left = left <= right;
@@ -295,6 +304,8 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             // Of triangles at the same distance, the one of lowest order wins.
             var is_nearer = found.distance < search.best.distance
                 || (found.distance == search.best.distance && triangle.order < search.best_order);
+
+            // Where triangles touch back to back, their order is rounding error: the one that faces the ray is met.
             let is_near = abs(found.distance - search.best.distance) <= BOX_MARGIN;
             if found.triangle != NO_TRIANGLE && triangle.object == search.best_object && is_near {
                 is_nearer = faces_first(triangle, met(search.best), direction, is_nearer);
@@ -308,6 +319,8 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
         if search.is_over {
             break;
         }
+
+        // Goes on with the last subtree that begins before the best hit. Leaving an instance restores the local ray.
         var has_next = false;
         while search.count > 0u && !has_next {
             if search.count == search.outside {

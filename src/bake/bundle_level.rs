@@ -33,15 +33,15 @@ const USUAL_MAP_ERROR: f64 = 0.03;
 /// Density that these maps are made for [rays/sr].
 const PREVIEW_DENSITY_PER_SR: f64 = 25_000.0;
 
-/// Texels for the light of a cell of such a lattice: on the built-in scenes, 0.5 to 2 mm each, as fine as their caustics
-/// are seen to be.
+/// Texels for the light of a cell of such a lattice: on the built-in scenes, 0.5 to 2 mm each, as fine as their
+/// caustics are seen to be.
 const TEXELS_PER_CELL: f64 = 64.0;
 
 /// Goal of the first level, which gives the first picture.
 const FIRST_GOAL: f64 = 0.2;
 
-/// Root mean square of E relative to its mean up to which that goal is one for the visible error, too. Beyond, it asks for
-/// far more: it is relative to the mean.
+/// Root mean square of E relative to its mean up to which that goal is one for the visible error, too. Beyond, it asks
+/// for far more: it is relative to the mean.
 const USUAL_CONCENTRATION: f64 = 5.0;
 
 /// A level aims a little below what is asked: a near miss costs another level, and of levels that differ by chance, one
@@ -85,8 +85,8 @@ struct Carried {
 }
 
 impl CausticLayer<'_> {
-    /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way, and is of
-    /// so many wavelengths that a parabola goes through them.
+    /// Whether bundles may carry the light: it starts from a point, a direction, or a lamp that faces one way, and is
+    /// of so many wavelengths that a parabola goes through them.
     pub(super) fn has_bundles(&self, light: &VisibleLight) -> bool {
         let spectrum = self.spectra.photons(light.light);
         self.settings.estimator != Estimator::Photon
@@ -101,15 +101,20 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         context: &mut BakeContext,
     ) -> FootprintStatistics {
+        // Footprints are shares of their maps, so that charts of the smallest size do.
         let chart_for: &ChartFor = &|receiver: Receiver| {
             self.sizes
                 .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)
         };
+
+        // Texels are sized by the cells of a lattice: each cell should light about `TEXELS_PER_CELL` of them.
         let density_per_sr = self.map_density_per_sr();
         let (columns, rows) = light.launch.lattice_size(density_per_sr, light.reach_m);
         let cells = columns as f64 * rows as f64;
         // The lattice has whole cells: it is made for a smaller distance than asked for if these are few.
         let reach_m = || (density_per_sr * light.launch.cell_measure(DVec2::ZERO, DVec2::ONE) / cells).sqrt();
+
+        // Dispersion and lobes only blur the light, so that RGB rays and smooth surfaces show its finest detail.
         let pass = FootprintPass {
             launch: &PhotonLaunch::of_cells(light),
             rules: PhotonRules {
@@ -147,24 +152,30 @@ impl CausticLayer<'_> {
 
     /// Goal of the level after `last`, towards a relative RMSE; `None` if nothing is left to do.
     pub(super) fn next_goal(&self, last: Option<&LightLevel>, target: f64) -> Option<f64> {
+        // The first level gives the first picture and stays coarse, however strict the target is.
         let Some(last) = last else {
             return Some(FIRST_GOAL.max(AIM * target));
         };
+
+        // Halves that show no error may not have met the light yet: the next level looks far more closely.
         let before = last.goal;
         let error = last.error.as_ref().map(|error| error.relative_rmse);
         let Some(error) = error.filter(|error| error.is_finite() && *error > 0.0) else {
             return (before > LEAST_WITHOUT_ERROR).then_some(STEPS.0 * before);
         };
+
+        // The error of next to nothing is not worth any rays.
         let energy = last.energy();
         if energy.deposited < LEAST_ARRIVING * energy.emitted {
             return None;
         }
+
         // Finer squares do not recover truncated light.
         let truncated = accuracy::truncated_share(&energy);
         let noise2 = error * error - truncated * truncated;
         let wanted2 = (target * target - truncated * truncated).max((MIN_NOISE * target).powi(2));
-        // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the target
-        // is near.
+        // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the
+        // target is near.
         let scaled = AIM * before * (wanted2 / noise2).sqrt();
         let next = if error > SURPRISE * before {
             AIM * target
@@ -173,13 +184,14 @@ impl CausticLayer<'_> {
         } else {
             scaled.clamp(STEPS.0 * before, STEPS.1 * before)
         };
+
         // Rounded, so that what changes other lights a little leaves the goals of this one as they were.
         let rounded = ((GOALS_PER_OCTAVE * next.log2()).round() / GOALS_PER_OCTAVE).exp2();
         (noise2 > wanted2).then_some(rounded)
     }
 
-    /// Minimum goal of first levels: [`FIRST_GOAL`]; towards a visible error relative to the root mean square of the light
-    /// rather than to its mean where little of the scene is lit.
+    /// Minimum goal of first levels: [`FIRST_GOAL`]; towards a visible error relative to the root mean square of the
+    /// light rather than to its mean where little of the scene is lit.
     pub(super) fn first_goal(&self, statistics: Option<&FootprintStatistics>) -> f64 {
         let statistics = statistics.filter(|_| self.settings.error_metric == ErrorMetric::Visible);
         let concentration = statistics.map_or(1.0, |statistics| statistics.concentration());
@@ -223,6 +235,8 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> Result<BundleLevel> {
         let unit = self.photon_unit(light.visible)?;
+
+        // Squares of earlier levels are refined further if they stand for the same paths, maps and goals.
         let is_of_before = |kept: &KeptSquares| {
             let is_like_these = kept.trace == key.trace && kept.sizes == key.sizes;
             is_like_these && kept.goals.len() < goals.len() && goals.starts_with(&kept.goals)
@@ -235,8 +249,8 @@ impl CausticLayer<'_> {
             squares: LightSquares::default(),
         });
 
-        // A level depends on nothing but the goals so far: where the squares of those before it are gone, or were refined
-        // otherwise by another bake, they are made anew.
+        // A level depends on nothing but the goals so far: where the squares of those before it are gone, or were
+        // refined otherwise by another bake, they are made anew.
         let mut last = None;
         for &goal in &goals[kept.goals.len()..] {
             kept.goals.push(goal);
@@ -246,8 +260,12 @@ impl CausticLayer<'_> {
             }
             last = Some(carried);
         }
+
+        // The squares are kept for the next level as far as memory allows.
         light.state.squares = Some(kept);
         light.state.fit_squares(self.squares_bytes(context));
+
+        // Where rough surfaces scatter nearly all of the light, bundles carry too little to be worth their squares.
         let Some(Carried {
             report,
             bundles,
@@ -257,6 +275,8 @@ impl CausticLayer<'_> {
             return Ok(BundleLevel::LeftToPhotons);
         };
 
+        // Bundles stay apart from photons, which alone are noisy and filtered. Dispersed ones are in the halves
+        // already: each half samples their wavelengths anew.
         let photons = PhotonSums {
             ledger: report.pass.ledger,
             halves,
@@ -271,6 +291,8 @@ impl CausticLayer<'_> {
             }),
             bundle_square: report.deposit_square,
         };
+
+        // Flux was counted `TIMES` times in each half.
         let unit = unit.per(u64::from(TIMES) * HALVES as u64);
         let level = context.clock.time(
             |clock| &mut clock.deposit,
@@ -292,6 +314,7 @@ impl CausticLayer<'_> {
         squares: &mut LightSquares,
         context: &mut BakeContext,
     ) -> Carried {
+        // Photons go to two halves, whose difference is the noise. What bundles deposit belongs to either.
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let mut bundles = self.no_maps();
         let mut halves = vec![self.part_maps(), self.part_maps()];
@@ -303,11 +326,16 @@ impl CausticLayer<'_> {
             bundles: &mut bundles,
             halves: [first.sets_mut(), second.sets_mut()],
         };
+
+        // The points of the first squares would miss bodies and openings between them, so these are sought first, where
+        // all rays start from one point or in one direction.
         let is_of_faces = !self.has_places(light);
         let sought = (squares.is_empty() && is_of_faces).then(|| {
             let square = DVec2::splat((-f64::from(FIRST_LEVEL)).exp2());
             SubcellFeatures::find(self.tracer, &light.launch, light.visible(), square)
         });
+
+        // Refine the squares, deposit their bundles, and send photons for the residual.
         let report = self.with_launch(light, |launch| {
             let pass = ResidualPass {
                 launch,

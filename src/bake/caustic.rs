@@ -176,6 +176,7 @@ impl CausticLayer<'_> {
         (clock, role): (&mut Clock, &mut ShardRole),
         mut showing: Option<&mut Showing>,
     ) -> Result<CausticOutcome> {
+        // A shard knows only its own part of the light, so that sizes of maps must not depend on what is lit.
         if role.is_cut() && !self.fits_anyway() {
             return Err(Error::failure(
                 "--memory",
@@ -188,6 +189,8 @@ impl CausticLayer<'_> {
         }
         let mut outcome = CausticOutcome::default();
         self.refuse_soft_light()?;
+
+        // Indirect light needs the last part of the time. The first picture takes as long as it takes.
         let whole = self.control.without_deadline();
         let part = if self.plan.is_on(Effect::Indirect) {
             PART_BEFORE_INDIRECT
@@ -196,6 +199,8 @@ impl CausticLayer<'_> {
         };
         let limit_s = self.settings.max_time_s.map(|limit_s| part * limit_s);
         let limited = super::limited(self.control, limit_s, self.began);
+
+        // All lights and levels are deposited on maps of the same sizes, so that these are found first.
         let mut lights = self.begin(states);
         let mut context = BakeContext {
             control: &limited,
@@ -210,6 +215,8 @@ impl CausticLayer<'_> {
         };
         self.find_sizes(&mut states.statistics, &mut lights, &mut context)?;
         context.control = &whole;
+
+        // Each round adds a level to every light that is not done, so that every picture shows all of them.
         let mut is_first = true;
         let errors = loop {
             // Lights that are done leave their room to the others.
@@ -221,12 +228,16 @@ impl CausticLayer<'_> {
             for light in lights.iter_mut().filter(|light| !light.done) {
                 self.advance(light, &mut context)?;
             }
+
+            // The first caustics are shown before the visible error asks for direct light on all maps.
             if let Some(showing) = &mut showing
                 && std::mem::take(&mut is_first)
                 && !self.control.is_cancelled()
             {
                 showing.show_first(&shown(&lights), context.outcome, context.clock);
             }
+
+            // Light that was taken for negligible may be bright on one spot: it begins anew, and changes the errors.
             let mut terms = self.error_terms(&lights, showing.as_deref_mut());
             let mut errors = self.errors(&lights, &terms);
             let dim = self.promote_dim_lights(&errors, &lights);
@@ -238,17 +249,24 @@ impl CausticLayer<'_> {
                 terms = self.error_terms(&lights, showing.as_deref_mut());
                 errors = self.errors(&lights, &terms);
             }
+
+            // The target is divided between the lights; those that meet their part are done.
             self.decide(&mut lights, &errors);
             self.note_cost(states, &lights, &errors, &mut context);
+
             // The first picture ignores the time limit, the others respect it.
             context.control = &limited;
             if limited.is_cancelled() || lights.iter().all(|light| light.done) {
                 break errors;
             }
+
+            // The last round is not shown: the finished maps are those of its levels.
             if let Some(showing) = &mut showing {
                 showing.show(&shown(&lights), context.outcome, context.clock);
             }
         };
+
+        // Levels and squares are kept for the next bake, as far as memory allows.
         let spare_bytes = context.spare_bytes;
         outcome.stopped = self.stopped(&lights, &errors, &limited);
         for mut light in lights {
@@ -290,6 +308,8 @@ impl CausticLayer<'_> {
         if !errors.are_of_all(lights) || !error.is_finite() || is_known {
             return;
         }
+
+        // States of the lights in this bake were taken out of `states`, and are counted with their levels.
         let kept = lights.iter().map(|light| light.state.bytes());
         let held = lights
             .iter()
@@ -309,6 +329,8 @@ impl CausticLayer<'_> {
                 .is_some(),
         };
         context.outcome.course.push(point);
+
+        // Only the first forecast is kept: at the end it is compared with the actual cost.
         let Some(target) = self.settings.max_error else {
             return;
         };

@@ -224,17 +224,24 @@ impl DirectCache {
         progress: &dyn Progress,
         control: &Control,
     ) -> DirectReport {
+        // Layers light by light spare shadow rays when a light changes, but all of them have to fit into memory;
+        // otherwise only their sum is kept.
         let lights = &tracer.scene().lights;
         let texels = charts.values().map(|chart| chart.own.texel_count() as u64);
         let bytes = texels.sum::<u64>() * lights.len() as u64 * BYTES_PER_TEXEL;
         if self.most_bytes.is_some_and(|most| bytes > most) {
             return self.add_up(tracer, charts, progress, control);
         }
+
+        // Layers on charts of other sizes are of no use.
         let wanted = |(_, receiver, size): &Key| {
             let chart = charts.get(receiver);
             chart.is_some_and(|chart| chart.size() == *size)
         };
         self.layers.retain(|key, _| wanted(key));
+
+        // After the deadline only absent layers are baked: a map without a lamp is wrong, one with few samples just
+        // rough. An interrupted layer has black rows and is not kept.
         let mut report = DirectReport {
             shadow_rays: 0,
             complete: true,
@@ -268,12 +275,15 @@ impl DirectCache {
         progress: &dyn Progress,
         control: &Control,
     ) -> DirectReport {
+        // Only charts whose sum is unknown are baked, with all lights at once in double precision.
         self.layers.clear();
         let missing: Vec<&DirectChart> = charts.values().filter(|chart| !self.is_summed(chart)).collect();
         let mut report = DirectReport {
             shadow_rays: 0,
             complete: true,
         };
+
+        // The strengths of this bake are in the sums, so that each layer is needed for a moment only.
         let black = |chart: &&DirectChart| vec![LinearSrgb::BLACK; chart.map.texel_count()];
         let mut sums: Vec<Vec<LinearSrgb>> = missing.iter().map(black).collect();
         for source in &tracer.scene().lights {
@@ -284,6 +294,8 @@ impl DirectCache {
                 add(sum, &chart.on_map(&layer), source.strength());
             }
         }
+
+        // Interrupted sums lack the light of lamps and are dropped.
         if report.complete {
             let sums = missing.iter().zip(sums);
             let sums = sums.map(|(chart, sum)| {

@@ -78,7 +78,7 @@ impl DirectDetail {
         }
     }
 
-    /// Who is told of its progress: nobody, where it is done on the side.
+    /// The progress that its bake reports to: `shown`, or none where it only weighs the error or previews the layer.
     pub(super) fn progress(self, shown: &dyn Progress) -> &dyn Progress {
         match self {
             Self::Full => shown,
@@ -108,19 +108,27 @@ impl MapAssembler<'_> {
         levels: &Levels,
         outcome: &CausticOutcome,
     ) -> Bake {
+        // The visible error is relative to the light of all layers, so that it is estimated before some of them are
+        // dropped.
         let is_shown = |kind: LayerKind| plan::is_wanted(self.settings, kind);
         let ledgers = self.ledgers(levels);
         let truncated = truncated_share(&ledgers);
         let estimated_visible = self.estimate_visible(&mut maps, truncated);
+
+        // Layers that were sources of indirect light or a backdrop of the error alone are not delivered.
         for map in &mut maps {
             map.layers.retain(|layer| is_shown(layer.kind));
             map.estimated_relative_rmse = estimated_relative_rmse(std::slice::from_ref(map));
         }
         maps.retain(|map| !map.layers.is_empty());
         light_layers.retain(|part| is_shown(part.kind));
+
+        // The errors of texels do not know of truncated light: its share adds in squares.
         let estimated_relative_rmse = estimated_relative_rmse(&maps).map(|rmse| rmse.hypot(truncated));
         let metric = self.settings.error_metric;
         let estimated_error = metric.of(estimated_visible, estimated_relative_rmse);
+
+        // A target that is missed although refinement ended is due to texels that memory made too large.
         let is_scarce = outcome.warnings.iter().any(|warning| warning.location == MEMORY);
         let target = self.settings.max_error.unwrap_or(f64::INFINITY);
         let stop_reason = match outcome.stopped {
@@ -133,6 +141,8 @@ impl MapAssembler<'_> {
             }
             None => StopReason::NothingToDo,
         };
+
+        // Clipped texels and an empty caustic layer look like proper maps, so that warnings tell of them.
         let mut warnings = outcome.warnings.clone();
         warnings.extend(beyond_single(&maps));
         warnings.extend(self.empty_layer());
@@ -224,6 +234,8 @@ impl MapAssembler<'_> {
     /// Charts of all maps: those that received flux and, if direct or indirect light is requested, every receiver that
     /// a light may reach; with a warning if the memory limit makes the latter coarser.
     pub(super) fn charts(&self, levels: &Levels) -> (Charts, Option<Warning>) {
+        // Lit receivers keep the chart that their flux was deposited on. The others get one where direct or indirect
+        // light may fall on them.
         let (mut charts, mut wishes) = (Charts::new(), BTreeMap::new());
         let is_everywhere = self.direct != DirectDetail::Absent || self.plan.is_on(Effect::Indirect);
         for receiver in Receiver::all(self.scene.objects.len()) {
@@ -237,6 +249,8 @@ impl MapAssembler<'_> {
                 wishes.insert(receiver, wish);
             }
         }
+
+        // Those share the memory that lit maps and the cache of direct light leave.
         let lights = |receiver: Receiver| {
             levels
                 .iter()
@@ -251,6 +265,9 @@ impl MapAssembler<'_> {
             .map(|(&receiver, chart)| (receiver, chart.texel_count() as u64));
         let taken = memory.bytes(texels) + self.settings.direct_bytes();
         let left = self.settings.memory_bytes.saturating_sub(taken);
+
+        // If it is short, they are made coarser together. Coarse direct maps only weigh the error and are never shown,
+        // so that no one is warned.
         let requested = map_size::requested(&wishes);
         let sizes = map_size::fit(&wishes, (left, memory));
         for (&receiver, size) in &sizes {

@@ -56,9 +56,9 @@ pub struct ForecastReport {
     pub actual: CostPoint,
 }
 
-/// Typical exponents of 1/error in the growth of rays and seconds: those of bundles are fitted to eight built-in scenes.
-/// `nephroid study accuracy`, targets of 5 to 1 %: forecast over actual rays is 0.46 to 1.45. Seconds grow less, because
-/// the cost of texels does not depend on rays.
+/// Typical exponents of 1/error in the growth of rays and seconds: those of bundles are fitted to eight built-in
+/// scenes. `nephroid study accuracy`, targets of 5 to 1 %: forecast over actual rays is 0.46 to 1.45. Seconds grow
+/// less, because the cost of texels does not depend on rays.
 const BUNDLES: [f64; 2] = [0.7, 0.55];
 /// Splats: every cost is proportional to rays, and the error falls about with their square root.
 const SPLATS: [f64; 2] = [1.8; 2];

@@ -137,6 +137,7 @@ impl CausticLayer<'_> {
 
     /// Errors as shares of the relative RMSE over all maps, by area and flux.
     fn errors_by_rmse(&self, lights: &[LightProgress]) -> Errors {
+        // Area of all lit maps and flux of all lights: the mean irradiance that errors are relative to.
         let (mut areas_m2, mut all_w) = (BTreeMap::new(), 0.0);
         let of = |(index, light): (usize, &LightProgress)| {
             let level = light.levels.last()?;
@@ -154,6 +155,9 @@ impl CausticLayer<'_> {
             Some((index, error.relative_rmse, flux_w, area_m2))
         };
         let known: Vec<(usize, f64, f64, f64)> = lights.iter().enumerate().filter_map(of).collect();
+
+        // A light adds nothing to the mean on maps that it does not reach, so that its relative error grows with their
+        // area.
         let all_m2: f64 = areas_m2.values().sum();
         let of = |&(index, relative_rmse, flux_w, area_m2): &(usize, f64, f64, f64)| ErrorOfLight {
             index,

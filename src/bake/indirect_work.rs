@@ -53,14 +53,18 @@ impl IndirectWork {
         maps: &[IlluminationMap],
         better: &mut dyn FnMut(&Self, &IndirectCache),
     ) -> bool {
+        // The rays between surfaces depend on geometry alone: those of earlier bakes are used again.
         let watch = Stopwatch::start();
         let settings = bake.settings;
         cache.prepare(&bake.tracer, sizes, settings, most_texels(settings));
         self.seconds.add(watch.elapsed());
+
         // After the first passes, none starts beyond the time limit.
         let limited = super::limited(bake.control, settings.max_time_s, bake.began);
         let target = settings.max_error.unwrap_or(USUAL_TARGET);
         (self.target, self.solution) = (target, None);
+
+        // Each round doubles the rays of elements that are too noisy, and solves for all bounces anew.
         let elements = cache.network().map_or(0, Network::element_count);
         let mut passes = vec![MIN_PASSES; elements];
         loop {
@@ -131,11 +135,14 @@ impl IndirectWork {
         maps: &mut [IlluminationMap],
         light_layers: &mut Vec<LightLayer>,
     ) {
+        // The parts of lights are solved over the same rays as the whole, so that they add up to it.
         let (Some(network), Some(solution)) = (cache.network(), &self.solution) else {
             return;
         };
         let mut parts = self.parts(network, maps, light_layers);
         light_layers.append(&mut parts);
+
+        // The noise of gather rays is independent of the caustic, so that errors add in squares.
         for map in maps {
             let Some(grid) = grid_of(network, map) else {
                 continue;
@@ -164,9 +171,12 @@ impl IndirectWork {
         maps: &[IlluminationMap],
         light_layers: &[LightLayer],
     ) -> Vec<LightLayer> {
+        // Sources of a light are its parts of the other layers.
         let mut lights: Vec<usize> = light_layers.iter().map(|part| part.light).collect();
         lights.sort_unstable();
         lights.dedup();
+
+        // Light transport is linear: solved for one light after another, the parts add up to the layer.
         let mut parts = Vec::new();
         for light in lights {
             let of_light = |receiver: Receiver| {
@@ -210,6 +220,8 @@ impl IndirectWork {
             return warnings;
         };
         let percent = |share: f64| format!("{:.2} %", 100.0 * share);
+
+        // With albedos near 1, the Neumann series of bounces hardly falls.
         if !solution.converged {
             warnings.push(Warning::new(
                 "indirect layer",
@@ -219,6 +231,8 @@ impl IndirectWork {
                 "use albedos below 1",
             ));
         }
+
+        // Noise above the target matters only once no more rays follow.
         if self.is_done && solution.relative_noise > self.target {
             let rays = Network::rays_after(self.passes.iter().copied().max().unwrap_or(0));
             let remedy = if self.is_cramped {
@@ -236,6 +250,8 @@ impl IndirectWork {
                 remedy,
             ));
         }
+
+        // Rays that were given up darken the layer, which no noise shows.
         if self.loss > UNSPOKEN_LOSS {
             warnings.push(Warning::new(
                 "indirect layer",

@@ -149,6 +149,8 @@ impl CausticLayer<'_> {
         lights: &mut [LightProgress],
         context: &mut BakeContext,
     ) -> Result<()> {
+        // A thin lattice tells which maps are lit, and how finely. It is traced anew only if paths or the density of
+        // maps changed.
         if self.wants_statistics() {
             let paths = lights
                 .iter()
@@ -170,6 +172,8 @@ impl CausticLayer<'_> {
                 *known = complete.then(|| (key, Arc::new(statistics)));
             }
         }
+
+        // The first goal, the sizes and the memory that they leave follow from it.
         context.statistics = known.as_ref().map(|(_, statistics)| Arc::clone(statistics));
         let statistics = context.statistics.as_deref();
         context.first_goal = self.first_goal(statistics);

@@ -60,8 +60,8 @@ pub(super) struct LevelKey {
 pub(super) enum PhotonAim {
     /// So many photons in each half, and no bundles.
     Count(u32),
-    /// Relative RMSEs, by bundles and residual photons: that of the level, after those of the levels before it, on whose
-    /// squares it builds.
+    /// Relative RMSEs, by bundles and residual photons: that of the level, after those of the levels before it, on
+    /// whose squares it builds.
     Goals(Vec<f64>),
 }
 
@@ -266,8 +266,8 @@ impl LightState {
             + self.squares.as_ref().map_or(0, |kept| kept.squares.bytes())
     }
 
-    /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes. From then on their ways
-    /// are noted where the scene is moving.
+    /// Forgets rays that start elsewhere or went otherwise, and what is more than so many bytes. From then on their
+    /// ways are noted where the scene is moving.
     pub(super) fn begin(
         &mut self,
         light: &VisibleLight,

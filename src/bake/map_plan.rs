@@ -74,6 +74,7 @@ impl CausticLayer<'_> {
 
     /// Sizes of the maps that the coarse run found lit, and warnings about them.
     pub(super) fn map_sizes(&self, statistics: Option<&FootprintStatistics>) -> (Sizes, Vec<Warning>) {
+        // Fixed sizes that fit into memory whatever is lit need no statistics.
         let receivers = Receiver::all(self.tracer.scene().objects.len());
         if let (MapResolution::Fixed { width, height }, true) =
             (self.settings.map_resolution, self.fits_anyway())
@@ -81,6 +82,8 @@ impl CausticLayer<'_> {
             let even = |receiver| (receiver, MapSize::dense((width, height)));
             return (receivers.map(even).collect(), Vec::new());
         }
+
+        // Otherwise each lit map asks for a size by the light that was seen on it.
         let wish = |receiver: Receiver| {
             let wish = match (self.settings.map_resolution, statistics) {
                 (MapResolution::Fixed { width, height }, None) => Some(SizeRequest::dense((width, height))),
@@ -93,6 +96,8 @@ impl CausticLayer<'_> {
             wish.map(|wish| (receiver, wish))
         };
         let wishes: BTreeMap<Receiver, SizeRequest> = receivers.filter_map(wish).collect();
+
+        // If memory is short, all maps become coarser together.
         let (limit, memory) = self.map_memory(statistics);
         let requested = map_size::requested(&wishes);
         let mut sizes = map_size::fit(&wishes, (limit, &memory));
@@ -103,6 +108,8 @@ impl CausticLayer<'_> {
                 sizes.entry(receiver).or_insert(MapSize::dense((width, height)));
             }
         }
+
+        // Scarce memory makes maps coarser than their light, too, so that it is the only cause that is named.
         let warnings = if is_scarce {
             vec![memory_warning(&requested, &sizes, (limit, &memory))]
         } else if let (MapResolution::Auto, Some(statistics)) = (self.settings.map_resolution, statistics) {
@@ -133,6 +140,7 @@ impl CausticLayer<'_> {
 
     /// As fine as the light requires; tiled where that takes less memory.
     fn automatic_wish(&self, receiver: Receiver, seen: &FootprintStatistics) -> Option<SizeRequest> {
+        // The map has to resolve footprints, and the shadow borders of direct light if that shares its texels.
         let object = receiver.object();
         let mut times = self.sizes.doublings(receiver, seen, LARGEST_TILED_SIDE)?;
         let is_direct = self.plan.is_on(Effect::Direct);
@@ -145,6 +153,9 @@ impl CausticLayer<'_> {
             // Not coarser than direct light on a map of its own.
             times = times.max(self.sizes.doublings_for_direct(object, self.settings) + finer);
         }
+
+        // The finest size that is small enough is taken: by tiles, which are coarse in the dark, or else as a dense
+        // map.
         let borders = self.sizes.borders(receiver).filter(|_| finer > 0);
         for times in (0..=times).rev() {
             let size = self.sizes.doubled_size(object, times)?;

@@ -194,6 +194,7 @@ impl SizeRequest {
 
     /// A tiled map as requested, or coarser by `sparing` levels; a dense one if tiles save too little.
     fn in_tiles(&self, tiles: &[TileDemand], sparing: Option<f64>) -> MapSize {
+        // Neighbours may differ by one level only, so that fine tiles make those around them finer.
         let (columns, _) = tiles::tile_counts(self.size.0, self.size.1);
         let balanced = |level: &dyn Fn(&TileDemand) -> f64, coarsest: u8| {
             let level = |tile: &TileDemand| level(tile).clamp(0.0, f64::from(coarsest)) as u8;
@@ -206,6 +207,8 @@ impl SizeRequest {
         } else {
             balanced(&TileDemand::requested, self.coarsest)
         };
+
+        // If memory is short, all tiles miss the same amount of light.
         let mut levels = wanted.clone();
         if let Some(reduced) = sparing {
             let coarser = balanced(&|tile| tile.reduced() + reduced, COARSEST);
@@ -216,6 +219,8 @@ impl SizeRequest {
                 .map(|(own, coarser)| coarser.max(*own))
                 .collect();
         }
+
+        // Tiles that save little are not worth the look-ups through their layout.
         let layout = TileLayout::new(self.size, &levels, &wanted);
         let dense = self.size.0 * self.size.1;
         if layout.texel_count() as f64 > WORTH * dense as f64 {
@@ -286,6 +291,7 @@ pub(super) fn needs<'a>(
     size: (usize, usize),
     spots: impl Iterator<Item = &'a FootprintSample>,
 ) -> Vec<TileDemand> {
+    // Flux is sorted by place and size of footprints: one histogram for each cell of the map.
     let (columns, rows) = tiles::tile_counts(size.0, size.1);
     let (across, down) = (columns.min(MAX_CELLS), rows.min(MAX_CELLS));
     let mut cells = vec![[0.0_f64; BINS]; across * down];
@@ -299,6 +305,8 @@ pub(super) fn needs<'a>(
             }
         }
     }
+
+    // Of the light of a cell, only `FINER_PART` may have footprints smaller than its texels.
     let texels = ((size.0 * size.1) as f64).log2();
     let mean = cells.iter().flatten().sum::<f64>() / cells.len() as f64;
     let of_cell = |bins: &[f64; BINS]| {
@@ -309,6 +317,8 @@ pub(super) fn needs<'a>(
         })
     };
     let cells: Vec<TileDemand> = cells.iter().map(of_cell).collect();
+
+    // Tiles smaller than a cell share its demand.
     (0..columns * rows)
         .map(|tile| {
             let (column, row) = (tile % columns, tile / columns);

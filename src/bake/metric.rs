@@ -44,6 +44,7 @@ impl CausticLayer<'_> {
     }
 
     fn visible_counts(&self, levels: &[CompletedLevel], backdrop: &Backdrop) -> Counts {
+        // Irradiance by the caustics of all lights together, at their strengths.
         let mut charts: BTreeMap<Receiver, Arc<Chart>> = BTreeMap::new();
         let mut traced: BTreeMap<Receiver, Vec<f64>> = BTreeMap::new();
         for (light, level) in levels {
@@ -58,11 +59,15 @@ impl CausticLayer<'_> {
             let known = level.maps.iter();
             charts.extend(known.map(|(receiver, map)| (receiver, Arc::clone(&map.chart))));
         }
+
+        // Maps without caustics have no error, but help to set the exposure.
         for (&receiver, beside) in backdrop {
             charts
                 .entry(receiver)
                 .or_insert_with(|| Arc::clone(&beside.chart));
         }
+
+        // Means over blocks of texels: of caustics, and of all light that their errors are seen in.
         let lit = charts.iter().map(|(receiver, chart)| {
             let blocks = Blocks::new(chart);
             let own = traced.get(receiver);
@@ -83,10 +88,15 @@ impl CausticLayer<'_> {
             (*receiver, blocks, light)
         });
         let lit: Vec<(Receiver, Blocks, Vec<BlockLight>)> = lit.collect();
+
+        // One exposure holds for all maps, as for an eye that looks around in the scene.
         let blocks = || lit.iter().flat_map(|(_, _, light)| light.iter().copied());
         let Some(white) = visible::white(blocks()) else {
             return Counts(BTreeMap::new());
         };
+
+        // The weights and scales of the metric are folded into one factor for each texel, so that a light's error is a
+        // plain sum over its texels.
         let all_m2: f64 = blocks().map(|block| block.weight_m2(white)).sum();
         let counts = lit.iter().map(|(receiver, blocks, light)| {
             let of_block = |block: &BlockLight| {

@@ -166,12 +166,15 @@ impl Baker {
     }
 
     fn edit(&mut self, scene: Arc<Scene>, change: &SceneChange) {
+        // The hierarchy and the charts of unchanged shapes are carried over.
         self.tracer = self
             .tracer
             .take()
             .map(|tracer| Arc::new(tracer.edited(scene.clone())));
         let sizes = std::mem::replace(&mut self.sizes, ChartCache::new(scene.clone()));
         self.sizes = sizes.edited(scene.clone(), &change.shapes);
+
+        // Each cache goes with the kind of change that it depends on. Strength and colour of lights touch none.
         let is_other = change.moves_paths() || !change.shares.is_empty();
         if change.moves_shadows {
             self.direct.clear();
@@ -184,6 +187,8 @@ impl Baker {
         if change.moves_paths() || !change.lights.is_empty() {
             self.visibility = None;
         }
+
+        // Light whose paths never came near the change keeps its maps.
         let changed = change.boxes(&self.scene, &scene);
         for state in self.lights.iter_mut() {
             let is_beyond = |changed: &Vec<_>| state.is_beyond(changed, &self.scene);
@@ -191,6 +196,8 @@ impl Baker {
                 state.forget_maps();
             }
         }
+
+        // Lights that moved or shine otherwise lose everything.
         for &light in &change.lights {
             self.lights.forget(light);
             self.direct.forget(light);
@@ -360,6 +367,7 @@ impl Baker {
         level: Option<&mut LevelCallback>,
         role: &mut ShardRole,
     ) -> Result<Bake> {
+        // The first bake of a scene shows direct and indirect light before item buffers are built.
         let (whole, began) = (Stopwatch::start(), Instant::now());
         let mut clock = Clock::default();
         let mut level = level;
@@ -373,6 +381,8 @@ impl Baker {
             ..
         } = &ground;
         let item_buffer_tests = *item_buffer_tests;
+
+        // Shadow borders of direct light are sought before caustics fix the sizes of their maps, which hold both.
         let finish = MapAssembler {
             scene: &self.scene,
             sizes: &self.sizes,
@@ -385,6 +395,8 @@ impl Baker {
         if plan.is_on(Effect::Direct) {
             lamps.look_for_borders(tracer, &self.sizes, settings, control);
         }
+
+        // Direct light may take a part of the time only: it is refined while caustics and indirect light still wait.
         let direct_limit_s = match finish.direct {
             // A few samples of each texel are enough.
             DirectDetail::Coarse => Some(0.0),
@@ -393,6 +405,8 @@ impl Baker {
             }
         };
         let for_direct = limited(control, direct_limit_s, began);
+
+        // The caustic layer, level by level; each is shown with the other layers as far as they are known.
         let lights = &mut self.lights;
         let mut showing = Showing {
             for_direct: &for_direct,
@@ -415,6 +429,8 @@ impl Baker {
             mut level,
             ..
         } = showing;
+
+        // Charts of lit maps are those of their levels. Maps of direct and indirect light alone join them.
         let finished: Vec<CompletedLevel> = outcome
             .finished
             .iter()
@@ -422,6 +438,8 @@ impl Baker {
             .collect();
         let (charts, memory_warning) = finish.charts(&finished);
         outcome.warnings.extend(memory_warning);
+
+        // Direct light on the charts that no intermediate picture or earlier bake has filled.
         if finish.direct != DirectDetail::Absent {
             let direct_charts = finish.direct_charts(&charts);
             let progress = finish.direct.progress(progress);
@@ -436,12 +454,16 @@ impl Baker {
                 ));
             }
         }
+
+        // Flux of lights at unit strength becomes irradiance of the lamps as they are.
         let mut outcome = lamps.added_to(&outcome);
         outcome.counts.item_buffer_tests = item_buffer_tests;
         let mut clock = lamps.clock(&clock);
         let watch = Stopwatch::start();
         let (mut maps, mut parts) = finish.maps(&finished, &charts, direct);
         clock.deposit.add(watch.elapsed());
+
+        // Indirect light is gathered from the finished layers, and shown each time that it is less noisy.
         if plan.is_on(Effect::Indirect) {
             let mut gathered = IndirectWork::default();
             let complete = gathered.gather(&ground, &self.sizes, indirect, &maps, &mut |so_far, known| {
@@ -464,6 +486,8 @@ impl Baker {
             outcome = gathered.added_to(&outcome);
             clock = gathered.clock(&clock);
         }
+
+        // Intermediate maps went to the callback; the finished ones are returned, with the cost of all stages.
         let mut result = finish.result((maps, parts), &finished, &outcome);
         clock.total = whole.elapsed();
         account(&mut result, &finish, visibility, &clock);

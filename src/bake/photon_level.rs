@@ -47,25 +47,26 @@ const MEAN_MARGIN: f64 = 4.0;
 /// Fraction of the remaining time that a level may take, as predicted from the level before.
 pub(super) const PART_OF_TIME: f64 = 0.85;
 
-/// A level adds at least one photon per so many texels of its maps. All of them are filtered again, which takes 1.5 µs of
-/// a texel, as long as a photon of two to four segments takes.
+/// A level adds at least one photon per so many texels of its maps. All of them are filtered again, which takes 1.5 µs
+/// of a texel, as long as a photon of two to four segments takes.
 const TEXELS_PER_PHOTON: f64 = 4.0;
 
 /// Minimum growth that is worth another level.
 const MIN_GROWTH: f64 = 1.2;
 
-/// A filter of 1e5 photons that bundles guide is taken to leave one part in so many of the squared error that it removes,
-/// beside what is seen to be left; the number of parts grows with theirs. It may have removed light that few of them have
-/// found yet: without this, the true error of the scenes of `laws references`, asked for 2 %, is 1.08 times the stated one
-/// in the mean; with it, 0.98 times.
+/// A filter of 1e5 photons that bundles guide is taken to leave one part in so many of the squared error that it
+/// removes, beside what is seen to be left; the number of parts grows with theirs. It may have removed light that few
+/// of them have found yet: without this, the true error of the scenes of `laws references`, asked for 2 %, is 1.08
+/// times the stated one in the mean; with it, 0.98 times.
 const PARTS_PER_DOUBT: f64 = 5.0;
 
 /// Photons find at most so many times the squared error that was planned, unless there is light that the plan did not
 /// know: of the built-in scenes and those of the laws, a mirrored torus finds 3 to 20 times, all others at most 1.6.
 const MOST_PLANNED: f64 = 1.6;
 
-/// Largest factor by which a filter reduces the squared error that photons find beyond that: a few of them stand for much
-/// light, and what looks like their noise may be all that is seen of it. On that torus it is 4 to 6; less, for a margin.
+/// Largest factor by which a filter reduces the squared error that photons find beyond that: a few of them stand for
+/// much light, and what looks like their noise may be all that is seen of it. On that torus it is 4 to 6; less, for a
+/// margin.
 const MOST_SURPRISE_FILTERED: f64 = 3.0;
 
 /// Limits the photons of a level to what the remaining time allows, because an interrupted level is lost. The
@@ -86,7 +87,8 @@ fn least_photons(level: &LightLevel, before: u32) -> f64 {
     f64::from(before) + texels.sum::<usize>() as f64 / (TEXELS_PER_PHOTON * HALVES as f64)
 }
 
-/// Squared relative error of so many photons of equal flux in each half: that of T texels in which n photons arrive is T/n.
+/// Squared relative error of so many photons of equal flux in each half: that of T texels in which n photons arrive is
+/// T/n.
 fn square_by_count(sums: &PhotonSums, unit: FluxUnit, photons: u32) -> f64 {
     let maps = sums.halves.iter().filter_map(|half| half.sets().first());
     let texels = maps.map(|maps| maps.iter().map(|(_, map)| map.chart.texel_count()).sum::<usize>());
@@ -105,8 +107,8 @@ pub(super) struct PlannedNoise {
 }
 
 impl PlannedNoise {
-    /// Squared relative error that photons leave of `found`, which the flux of single ones tells, where `noise` is what is
-    /// seen of it after a filter.
+    /// Squared relative error that photons leave of `found`, which the flux of single ones tells, where `noise` is what
+    /// is seen of it after a filter.
     fn doubted(&self, noise: f64, found: f64) -> f64 {
         let removed = (found - noise).max(0.0);
         let doubt = removed / (PARTS_PER_DOUBT * (self.rays / 1e5).max(1.0));
@@ -136,6 +138,7 @@ impl CausticLayer<'_> {
         last: Option<&LightLevel>,
         target_rmse: Option<f64>,
     ) -> Option<u32> {
+        // Without a target, a small level gives the first picture, and a second one the density that was asked for.
         let before = last.and_then(|level| level.key.photons.as_ref()?.count());
         let Some(target) = self.settings.max_error else {
             let wanted = self.photons_at_density(light);
@@ -144,9 +147,13 @@ impl CausticLayer<'_> {
                 Some(before) => (before < wanted).then_some(wanted),
             };
         };
+
+        // With a target, the first photons tell how noisy they are.
         let Some(before) = before else {
             return Some(FIRST_PHOTONS);
         };
+
+        // The variance is inversely proportional to the number of photons: it grows by the ratio of squared errors.
         let known = last.and_then(|level| {
             let error = level.error.as_ref()?.relative_rmse;
             let truncated = accuracy::truncated_share(&level.energy());
@@ -166,6 +173,8 @@ impl CausticLayer<'_> {
             None if before >= MAX_WITHOUT_ERROR => return None,
             None => GROWTH.1,
         };
+
+        // All maps are filtered anew, so that a level has to add enough photons to be worth it.
         let least = last.map_or(0.0, |level| least_photons(level, before));
         let wanted = (f64::from(before) * times).max(least) / f64::from(FIRST_PHOTONS);
         let wanted = wanted.ceil() * f64::from(FIRST_PHOTONS);
@@ -237,8 +246,8 @@ impl CausticLayer<'_> {
         Ok(())
     }
 
-    /// The next level of a light after its last one, towards a relative RMSE; `None` if nothing is left to do, or it was
-    /// stopped.
+    /// The next level of a light after its last one, towards a relative RMSE; `None` if nothing is left to do, or it
+    /// was stopped.
     ///
     /// # Errors
     /// A power that is not finite.
@@ -249,6 +258,8 @@ impl CausticLayer<'_> {
         target_rmse: Option<f64>,
         context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
+        // A level is led by a goal of bundles or a number of photons. A light that bundles cannot carry changes to the
+        // latter, and begins with the first photons.
         let Some(aim) = self.next_aim(light.visible, last.as_deref(), target_rmse) else {
             return Ok(None);
         };
@@ -260,6 +271,8 @@ impl CausticLayer<'_> {
             },
             PhotonAim::Count(photons) => photons,
         };
+
+        // The limit of time is applied before the key is formed: levels of other numbers of photons are other levels.
         let before = last
             .as_ref()
             .and_then(|last| last.key.photons.as_ref()?.count())
@@ -286,6 +299,8 @@ impl CausticLayer<'_> {
         context: &mut BakeContext,
     ) -> Result<Option<(LightLevel, PhotonTime)>> {
         let unit = self.photon_unit(light)?;
+
+        // Photons of the level before count as well if they took the same paths to the same maps.
         let photons = key
             .photons
             .as_ref()
@@ -297,6 +312,8 @@ impl CausticLayer<'_> {
             .as_ref()
             .and_then(|level| level.key.photons.as_ref()?.count())
             .unwrap_or(0);
+
+        // Only the missing indices are traced: Owen-scrambled Sobol points fill the gaps between earlier ones.
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
         let began = Instant::now();
@@ -315,11 +332,15 @@ impl CausticLayer<'_> {
             });
             sums
         })?;
+
+        // An interrupted pass lacks parts of the launch domain and is dropped as a whole.
         context.outcome.count(&sums.report, context.clock);
         let photon_s = began.elapsed().as_secs_f64() / f64::from(photons - first);
         if sums.report.cancelled {
             return Ok(None);
         }
+
+        // Sums are integers, so that the level is the same as if all its photons were traced at once.
         let mut segments = sums.report.segments;
         let mut raw = PhotonSums {
             ledger: sums.report.ledger,
@@ -331,6 +352,9 @@ impl CausticLayer<'_> {
             raw.add(&earlier);
             segments += so_far;
         }
+
+        // Filtering costs the same however few photons are new, so that it is timed apart for the forecast of the next
+        // level.
         let unit = unit.per(u64::from(photons) * HALVES as u64);
         let is_shard = context.role.is_shard();
         let began = Instant::now();
@@ -373,10 +397,13 @@ impl CausticLayer<'_> {
         (key, unit): (LevelKey, FluxUnit),
         layers: Layers,
     ) -> LightLevel {
+        // Dispersed light was counted as XYZ. As linear sRGB it may have negative channels.
         let mut ledger = layers.photons.ledger;
         self.spectra
             .to_linear_srgb(light.light, &mut self.no_maps(), &mut ledger);
         let [first, second] = self.half_maps(light, layers.photons);
+
+        // The map is the sum of both halves.
         let bundles = layers.bundles;
         let is_signed = self.spectra.has(light.light);
         let mut maps = first.clone().into_owned();
@@ -385,6 +412,8 @@ impl CausticLayer<'_> {
         for _ in 0..HALVES {
             bundles.into_iter().for_each(|bundles| maps.add(bundles));
         }
+
+        // The difference of the halves is the noise. A filter keeps what exceeds it and tells the error that it leaves.
         let mut left = [0; 3];
         let [one, other] = [&first, &second].map(|half| accuracy::images(half, unit));
         let noise = if self.settings.filters() {
@@ -393,13 +422,21 @@ impl CausticLayer<'_> {
         } else {
             accuracy::half_set_noise(&one, &other)
         };
+
+        // Negative light is removed at the expense of all other texels. What these cannot give is booked as sampling,
+        // so that the ledger agrees with the maps.
         filter::without_negative(&mut maps, is_signed, &mut left);
         ledger.book_sum(Account::Sampling, left);
         ledger.book_sum(Account::Deposited, left.map(|count| -count));
+
+        // Bands are kept as they are, without a filter.
         let mut bands = layers.photons.halves[0].bands().to_vec();
         for (band, more) in bands.iter_mut().zip(layers.photons.halves[1].bands()) {
             band.add(more);
         }
+
+        // Halves may agree by chance and a filter may hide light, so that the error is raised to what single photons
+        // and the plan lead to expect.
         let energy = ledger.report("", unit, LinearSrgb::WHITE).energy_w;
         let light_of_maps = accuracy::images(&maps, unit);
         let mut error = accuracy::by_noise(&light_of_maps, noise, &energy);

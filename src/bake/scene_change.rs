@@ -23,6 +23,8 @@ pub(super) struct SceneChange {
 impl SceneChange {
     /// `None` if the scenes do not have the same textures and environment, or as many objects and lights.
     pub(super) fn between(old: &Scene, new: &Scene) -> Option<Self> {
+        // Objects and lights are compared by index. Textures and environment are compared by address: an edit shares
+        // them.
         let same_parts = old.objects.len() == new.objects.len()
             && old.lights.len() == new.lights.len()
             && same_sky(old, new)
@@ -35,6 +37,8 @@ impl SceneChange {
         if !same_parts {
             return None;
         }
+
+        // A glowing surface takes its light along when it moves.
         let objects = 0..new.objects.len();
         let shapes: Vec<usize> = objects
             .clone()
@@ -42,6 +46,8 @@ impl SceneChange {
             .collect();
         let is_moved_with =
             |light: &Light| glowing_object(light).is_some_and(|object| shapes.contains(&object));
+
+        // A material may change the paths of light, its shares, or shadows: different caches depend on these.
         let changed = |is_same: fn(&Material, &Material) -> bool| {
             let is_changed =
                 move |&object: &usize| !is_same(old.material_of(object), new.material_of(object));

@@ -93,6 +93,7 @@ impl Showing<'_, '_> {
 
     /// Takes a result that is not the final one.
     pub(super) fn show(&mut self, levels: &[CompletedLevel], so_far: &CausticOutcome, clock: &mut Clock) {
+        // Until direct and indirect light are baked, the coarse first look stands in for them.
         let is_first = std::mem::take(&mut self.is_first);
         if self.level.is_none() {
             return;
@@ -108,9 +109,13 @@ impl Showing<'_, '_> {
             self.hand_out(maps, levels, so_far, clock);
             return;
         }
+
+        // Assembling maps takes time, so that later levels are shown only to someone who watches.
         if !is_first && !self.bake.control.is_watched() {
             return;
         }
+
+        // Direct light that is missing on the charts of these levels is baked before they are shown.
         let (finish, plan) = (self.finish, self.finish.plan);
         let (charts, memory_warning) = finish.charts(levels);
         let direct_charts = finish.direct_charts(&charts);
@@ -119,6 +124,8 @@ impl Showing<'_, '_> {
         if !waits {
             self.bake_direct(&direct_charts);
         }
+
+        // Indirect light is solved with rays that are there already. New ones are traced after the last level.
         let mut so_far = self.lamps.added_to(so_far);
         so_far.counts.item_buffer_tests = self.bake.item_buffer_tests;
         so_far.warnings.extend(memory_warning);
@@ -133,13 +140,19 @@ impl Showing<'_, '_> {
 
     /// Light of other layers on the maps of these levels and on all other maps.
     pub(super) fn backdrop(&mut self, levels: &[CompletedLevel]) -> Backdrop {
+        // Where no other layer is wanted, errors are relative to the caustics alone.
         let finish = self.finish;
         if finish.direct == DirectDetail::Absent && !finish.plan.is_on(Effect::Indirect) {
             return Backdrop::new();
         }
+
+        // Direct light is needed on all maps: it sets the exposure, and errors show less beside bright light.
         let (charts, _) = finish.charts(levels);
         self.bake_direct(&finish.direct_charts(&charts));
         let (mut maps, _) = finish.maps(levels, &charts, self.direct);
+
+        // Coarse indirect light is good enough to weigh errors: that of the first look, of the last bake, or of a
+        // glance.
         if finish.plan.is_on(Effect::Indirect) {
             let known = match &self.first_look {
                 Some(look) => look.indirect(),
@@ -153,6 +166,8 @@ impl Showing<'_, '_> {
             };
             IndirectWork::of_known(known, &maps).add_to(known, &mut maps, &mut Vec::new());
         }
+
+        // The metric knows luminance alone.
         let beside = maps.into_iter().map(|map| {
             let of = |kind: LayerKind| {
                 let layer = map.layer(kind);

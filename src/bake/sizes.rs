@@ -258,8 +258,8 @@ impl ChartCache {
     /// footprint was seen.
     ///
     /// In a map without tiles, a detail on a small lit part costs fine texels everywhere. Of side h, they have an error
-    /// proportional to h times that part, and their number is proportional to 1/h²: the sum of both is least where h³ is
-    /// inversely proportional to the part.
+    /// proportional to h times that part, and their number is proportional to 1/h²: the sum of both is least where h³
+    /// is inversely proportional to the part.
     pub fn doublings(
         &self,
         receiver: Receiver,
@@ -309,8 +309,8 @@ impl ChartCache {
         least.map_or(0, |(own, first)| halvings(own).min(halvings(first)))
     }
 
-    /// The size of a map that holds direct light only: texels of 1/400 of the scene's diagonal, or as requested. Objects
-    /// that dwarf the others do not make those coarser.
+    /// The size of a map that holds direct light only: texels of 1/400 of the scene's diagonal, or as requested.
+    /// Objects that dwarf the others do not make those coarser.
     pub fn direct_size(&self, object: usize, settings: &BakeSettings) -> Option<(usize, usize)> {
         if let MapResolution::Fixed { width, height } = settings.map_resolution {
             return Some((width, height));
@@ -386,9 +386,12 @@ impl ChartCache {
 
     /// Finds shadow borders on surfaces whose maps can be tiled; returns the number of shadow rays traced.
     pub fn find_borders(&self, tracer: &Tracer, settings: &BakeSettings, control: &Control) -> u64 {
+        // Maps of a fixed size do not become finer at shadow borders.
         if settings.map_resolution != MapResolution::Auto {
             return 0;
         }
+
+        // A border only has to be found to within a tile: texels twice as long as those of direct light do.
         let is_tileable =
             |known: &Arc<Parametrisation>| known.is_uniform() && known.uv_set != UvSet::Generated;
         let may_be_tiled = |&receiver: &Receiver| {
@@ -401,6 +404,9 @@ impl ChartCache {
                 self.chart(receiver, map_size::halved(size, 1))
             })
             .collect();
+
+        // Borders are kept light by light, so that a light that moves leaves those of the others. Interrupted ones are
+        // not.
         let mut shadow_rays = 0;
         for (light, source) in self.scene.lights.iter().enumerate() {
             let known = || self.borders.lock().unwrap_or_else(PoisonError::into_inner);
@@ -423,9 +429,10 @@ impl ChartCache {
         shadow_rays
     }
 
-    /// Sizes of the grids of indirect light, by receiver, with at most `most_texels` texels in all if that is possible, and
-    /// for each no more than a requested map has.
+    /// Sizes of the grids of indirect light, by receiver, with at most `most_texels` texels in all if that is possible,
+    /// and for each no more than a requested map has.
     pub fn grid_sizes(&self, settings: &BakeSettings, most_texels: u64) -> Vec<(Receiver, (usize, usize))> {
+        // Indirect light is interpolated on the map, so that a grid finer than a requested map gains nothing.
         let most_side = match settings.map_resolution {
             MapResolution::Auto => (usize::MAX, usize::MAX),
             MapResolution::Fixed { width, height } => (width, height),
@@ -437,6 +444,8 @@ impl ChartCache {
                 Some((receiver, self.map_surface(object)?, self.grid_texel_m(object)?))
             })
             .collect();
+
+        // All grids grow coarser by the same factor until they fit, which keeps their relative detail.
         let coarsened = |step: u32| -> Vec<(Receiver, (usize, usize))> {
             let factor = (f64::from(step) / GRID_STEPS).exp2();
             let least = (MIN_GRID_SIDE as f64 / factor) as usize;
@@ -450,6 +459,7 @@ impl ChartCache {
             let texels = sizes.iter().map(|(_, (width, height))| (width * height) as u64);
             texels.sum()
         };
+
         // The last step is coarse enough for single texels.
         let last = 12 * GRID_STEPS as u32;
         let fitting = (0..last)
@@ -458,9 +468,9 @@ impl ChartCache {
         fitting.unwrap_or_else(|| coarsened(last))
     }
 
-    /// Texels of a grid of indirect light [m] before they are coarsened to fit: 1/200 of the diagonal of the scene's core
-    /// for an object as large as that. What is small is seen from nearer, and has finer ones by the root of the ratio; what
-    /// dwarfs the core, as a sky does, is seen from far away.
+    /// Texels of a grid of indirect light [m] before they are coarsened to fit: 1/200 of the diagonal of the scene's
+    /// core for an object as large as that. What is small is seen from nearer, and has finer ones by the root of the
+    /// ratio; what dwarfs the core, as a sky does, is seen from far away.
     fn grid_texel_m(&self, object: usize) -> Option<f64> {
         let (low, high) = self.scene.objects[object].bounds()?;
         let (own_m, core_m) = (low.distance(high), self.core_m()?);

@@ -27,6 +27,9 @@ impl CausticLayer<'_> {
         if estimator.refines() {
             return Ok(());
         }
+
+        // A splat takes its footprint from its neighbours on the lattice. Rays from many places, or scattered by
+        // roughness, have no wavefront that it could be scaled to.
         let scene = self.tracer.scene();
         for light in self.lit() {
             let source = &scene.lights[light.light];

@@ -86,6 +86,7 @@ impl Spectra {
         plan: &EffectPlan,
         settings: &BakeSettings,
     ) -> Result<Self> {
+        // All lights share the same bands, so that their maps can be added band by band.
         let scene = tracer.scene();
         let mut spectra = Self {
             bands: bands(settings),
@@ -96,9 +97,13 @@ impl Spectra {
             SpectralSampling::Split => 1.0,
             SpectralSampling::Stochastic => spectra.bands.len().max(1) as f64,
         };
+
+        // Without dispersion, light is traced in RGB, unless the files are to hold its spectrum.
         if !plan.is_on(Effect::Dispersion) && !settings.keep_spectrum {
             return Ok(spectra);
         }
+
+        // Only lights that reach dispersive glass pay for wavelengths.
         for visible_light in &visibility.lights {
             let light = &scene.lights[visible_light.light];
             let reached = &visibility.sights[visible_light.light].reached;
@@ -112,6 +117,9 @@ impl Spectra {
                     sampling: settings.ray_sampling(),
                     estimator: settings.estimator,
                 };
+
+                // Splats trace each band on a lattice of its own. Photons and bundles draw from bands of their own,
+                // finer if the whole spectrum is wanted.
                 let bands = nodes(tracer, &key.lamp, &spectra.bands);
                 let photons = matches!(settings.estimator, Estimator::Auto | Estimator::Photon).then(|| {
                     let sampled = nodes(tracer, &key.lamp, &photon_bands(settings));

@@ -47,6 +47,8 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         context: &mut BakeContext,
     ) -> Result<Option<LightLevel>> {
+        // Arrivals of the full lattice are cached for other kernels and maps. Bands would each need a cache of their
+        // own.
         let (light, state) = (progress.visible, &mut progress.state);
         let lattice = Lattice {
             strides: (key.stride, key.stride),
@@ -58,6 +60,8 @@ impl CausticLayer<'_> {
             },
             source => source,
         };
+
+        // Rays go to two half sets, whose difference is the noise.
         let chart_for = |receiver: Receiver| self.chart(receiver, &key.sizes);
         let nothing = PassSums::new(vec![self.part_maps(), self.part_maps()]);
         let mut arrived = None;
@@ -70,6 +74,8 @@ impl CausticLayer<'_> {
         if let Some(arrived) = arrived {
             state.arrivals = Some((key.trace.clone(), arrived));
         }
+
+        // Dispersed light was counted as XYZ.
         let mut report = sums.report;
         let (mut second, more) = sums.maps.swap_remove(1).into_sum();
         let (mut maps, mut bands) = sums.maps.swap_remove(0).into_sum();
@@ -78,6 +84,8 @@ impl CausticLayer<'_> {
             .to_linear_srgb(light.light, &mut maps, &mut report.ledger);
         self.spectra.to_linear_srgb(light.light, &mut second, &mut none);
         context.outcome.count(&report, context.clock);
+
+        // The halves of a shard hold a part of the light and tell nothing about the whole.
         let is_known = !report.cancelled && !context.role.is_shard();
         let noise = is_known.then(|| {
             context.clock.time(
@@ -88,6 +96,8 @@ impl CausticLayer<'_> {
                 },
             )
         });
+
+        // Only a complete lattice makes a level: rows that are missing would be black.
         maps.add(&second);
         for (band, more) in bands.iter_mut().zip(more) {
             band.add(&more);
@@ -108,6 +118,8 @@ impl CausticLayer<'_> {
         mut sums: PassSums,
         context: &BakeContext,
     ) -> (PassSums, Option<ArrivalCache>) {
+        // Each band has its own lattice, at places that fill the gaps between those of the other bands. Its shards are
+        // shifted, so that lattices of few rows do not all begin with the same shard.
         let mut kept = None;
         let (first, second) = sums.maps.split_at_mut(1);
         for (number, (band, part)) in self.spectra.parts(light.light).into_iter().enumerate() {
@@ -165,7 +177,8 @@ impl CausticLayer<'_> {
         pass::run(&depositor, source, worker.share, halves, &chart_for, &listener)
     }
 
-    /// Error of a level, estimated from a thinner one; `None` for a level that is thinned itself, and for a shard's part.
+    /// Error of a level, estimated from a thinner one; `None` for a level that is thinned itself, and for a shard's
+    /// part.
     pub(super) fn error_of_splats(
         &self,
         light: &LightProgress,
@@ -252,12 +265,15 @@ impl CausticLayer<'_> {
         unit: FluxUnit,
         context: &mut BakeContext,
     ) -> FootprintStatistics {
+        // The statistics are of the ellipses themselves, whatever footprint and width the kernels of the bake have.
         let (light, state) = (progress.visible, &progress.state);
         let settings = BakeSettings {
             footprint: Footprint::Ellipse,
             sigma: Sigma::Constant(1.0),
             ..self.settings.clone()
         };
+
+        // A thin subset of the rays does: it may use cached ones, and its footprints are larger by a known factor.
         let lattice = thinned(self.lattice(light, unit));
         let depositor = Depositor {
             lattice,
@@ -269,6 +285,8 @@ impl CausticLayer<'_> {
             progress: &(),
             ..self.listener(context, 0)
         };
+
+        // The flux itself is thrown away, so that charts of the smallest size do.
         let chart_for = |receiver: Receiver| {
             self.sizes
                 .chart(receiver, self.sizes.doubled_size(receiver.object(), 0)?)

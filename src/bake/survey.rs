@@ -48,6 +48,7 @@ impl Baker {
     /// # Errors
     /// As [`Self::bake`].
     pub fn survey(&mut self, settings: &BakeSettings, control: &Control) -> Result<Survey> {
+        // The pilot is a bake of the default preset, cut off once its course tells enough.
         let began = Instant::now();
         let estimate = self.estimate(settings)?;
         let is_on = estimate.plan.is_on(Effect::LightPass);
@@ -58,6 +59,8 @@ impl Baker {
             own: Control::default(),
         };
         let pilot = self.bake(&pilot_settings(settings), &watch, &watch.own)?;
+
+        // No forecast of memory exceeds the limit, unless the pilot itself did.
         let within_memory = |forecast: Forecast| {
             let held = pilot.course.last().map_or(0, |last| last.bytes);
             Forecast {
@@ -66,6 +69,8 @@ impl Baker {
                 ..forecast
             }
         };
+
+        // Bundles and photons are extrapolated along the course of the pilot, splats in proportion to their density.
         let of_preset = |preset: Preset| PresetForecast {
             preset,
             forecast: match settings.estimator {

@@ -105,9 +105,13 @@ impl BakeArguments {
         loaded: &LoadedScene,
         console: &Console,
     ) -> Result<()> {
+        // The folder is opened and memory is bounded before the first frame, since a film may take hours.
         let mut folder = SequenceFolder::open(&self.output, self.force, times)?;
         let affordable = within_reach(settings, console);
         let (mut worst, mut cpu_s) = (0.0_f64, 0.0);
+
+        // One baker serves all frames and keeps what does not change between them. Each frame is written once it is
+        // baked, so that memory holds the maps of one.
         loaded.session(console, |session, bar, control| {
             for frame in 0..times.frames {
                 let scene = Arc::new(loaded.scene.at(times.time_s(frame)));
@@ -121,9 +125,13 @@ impl BakeArguments {
             }
             Ok(())
         })?;
+
+        // Only a film whose frames are all there gets its manifest.
         let Some(manifest) = folder.finish()? else {
             return Ok(());
         };
+
+        // The worst frame stands for all, since a film flickers where one is noisier than its neighbours.
         let wall_s = loaded.seconds().0;
         let text = in_lines(&[
             ("folder", self.output.display().to_string()),
@@ -152,12 +160,17 @@ impl BakeArguments {
         options: LoadOptions,
         console: &Console,
     ) -> Result<()> {
+        // The folder of another shard is refused before the work, not after it.
         let folder = ShardFolder::open(&self.output, share, self.force)?;
         let affordable = within_reach(settings, console);
+
+        // A shard keeps raw sums of flux instead of maps: these add up to the same texels in any order.
         let mut sums = loaded.session(console, |session, bar, control| {
             session.bake_shard(&affordable, share, bar, control)
         })?;
         loaded.book(&mut sums.timings_s, &mut sums.cpu_s);
+
+        // The merge loads the scene in the same way, and refuses one whose hash differs.
         let origin = SceneOrigin {
             source: self.scene.clone(),
             default_light: options.default_light,
@@ -166,6 +179,7 @@ impl BakeArguments {
         };
         let manifest = ShardManifest::new(&loaded.scene, origin, settings, share, &sums);
         folder.write(&manifest, &sums)?;
+
         let size: usize = sums.passes.iter().map(Vec::len).sum();
         let (wall_s, cpu_s) = (sums.timings_s.total, sums.cpu_s.total);
         let text = in_lines(&[
@@ -185,6 +199,8 @@ impl BakeArguments {
 pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
     let mut lines = Vec::new();
     let mut line = |name, value| lines.push((name, value));
+
+    // Each file with its size in texels and the surface that it lights.
     line("folder", folder.to_string());
     for map in &manifest.maps {
         line(
@@ -192,6 +208,7 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
             format!("{} {}x{} of {}", map.file, map.width, map.height, map.surface),
         );
     }
+
     // Memory, if tiles save some of it.
     let sum = |bytes: fn(&MapEntry) -> u64| manifest.maps.iter().map(bytes).sum::<u64>();
     let (taken, dense) = (sum(|map| map.memory_bytes), sum(|map| map.dense_bytes));
@@ -205,9 +222,12 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
             ),
         );
     }
+
+    // A bake without maps states why, so that an effect that is off is not taken for an error.
     if manifest.maps.is_empty() {
         line("maps", format!("none: {}", why_nothing(result)));
     }
+
     // What was traced, and how exact that made the maps.
     let counts = &manifest.counts;
     let pieces = match result.counts.cells {
@@ -229,13 +249,16 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
             format!("{visible:.2} % visible, {rmse:.2} % relative RMSE, estimated{why}"),
         );
     }
+
+    // A forecast beside its actual cost shows how far to trust the next one.
     if let Some(report) = &result.forecast {
         line("forecast", forecast_text(report));
     }
     if let Some(next) = next_target(result, manifest.settings.estimator) {
         line("next", next.in_words());
     }
-    // Where the light went, and what carried it.
+
+    // Where the light went, and what carried it. Each account is summed on its own, so that the balance is a test.
     let energy = &manifest.energy_w;
     let mut watts = format!(
         "{:.6} emitted = {:.6} deposited + {:.6} absorbed + {:.6} escaped + {:.6} truncated",

@@ -42,10 +42,13 @@ impl CompareArguments {
     /// # Errors
     /// Bad usage; files that cannot be read or compared; a relative RMSE above the limit.
     pub fn run(&self, console: &Console) -> Result<()> {
+        // A bad name for the picture of the difference is refused before any map is read.
         self.validate()?;
         let failed = |path: &Path, what: String, remedy: &str| {
             Err(Error::failure(path.display().to_string(), what, remedy))
         };
+
+        // Luminances meet at the coarser of both sizes: means over whole blocks of texels conserve the flux.
         let (map, layer) = read_luminance(&self.map, self.layer)?;
         let (reference, reference_layer) = read_luminance(&self.reference, self.layer)?;
         let Some((map, reference)) = at_common_size(&map, &reference) else {
@@ -55,10 +58,13 @@ impl CompareArguments {
             );
             return failed(&self.map, what, "bake at a multiple of the reference's size");
         };
+
+        // Errors are relative to the mean of the reference, so that a dark one defines none.
         let Some(measures) = agreement(&map.values, &reference.values) else {
             let what = "the reference is dark, so that nothing can be measured against it".into();
             return failed(&self.reference, what, "name a reference with light in it");
         };
+
         // Report the agreement as text and JSON.
         let percent = |share: f64| format!("{:.4} %", 100.0 * share);
         let pair = |map: f64, reference: f64| format!("{map:.6} (reference {reference:.6})");
@@ -79,6 +85,7 @@ impl CompareArguments {
             "height": map.height,
         });
         extend(&mut report, &measures);
+
         // Draw the difference if a file is named for it.
         if let Some(path) = &self.difference {
             let full_colour_at = write_difference(path, &map, &reference)?;
@@ -89,6 +96,8 @@ impl CompareArguments {
             ));
             report["difference"] = json!({"file": file, "full_colour_at": full_colour_at});
         }
+
+        // The report is printed even where the limit is exceeded: its numbers explain the exit code.
         let line = |(name, value): &(&str, String)| format!("{name:<15} {value}\n");
         console.print_result(&lines.iter().map(line).collect::<String>(), &report)?;
         match self.max_rmse {
@@ -119,6 +128,8 @@ impl CompareArguments {
 /// Luminance and name of the wanted layer: by default the caustic layer if there is one, else the sum.
 pub fn read_luminance(path: &Path, wish: Option<&'static str>) -> Result<(Grid, &'static str)> {
     let image = FloatImage::read(path)?;
+
+    // A dot in a channel name marks a map with layers; other images hold one layer as plain R, G, B or Y.
     let has_layers = image.channels.iter().any(|channel| channel.name.contains('.'));
     let layer = match wish {
         // A reference has one layer without a name, which stands for any.
@@ -126,6 +137,8 @@ pub fn read_luminance(path: &Path, wish: Option<&'static str>) -> Result<(Grid, 
         None if image.channel("caustic.R").is_some() => "caustic",
         _ => "sum",
     };
+
+    // The plain channels of a map are the sum of its layers.
     let prefix = if layer == "sum" { "" } else { layer };
     let grid = image.luminance(prefix).ok_or_else(|| {
         let names: Vec<&str> = image
@@ -139,6 +152,8 @@ pub fn read_luminance(path: &Path, wish: Option<&'static str>) -> Result<(Grid, 
             "choose another --layer",
         )
     })?;
+
+    // A single NaN would turn every mean into NaN, so that its texel is named instead.
     if let Some(texel) = grid.values.iter().position(|value| !value.is_finite()) {
         return Err(Error::failure(
             path.display().to_string(),
@@ -159,6 +174,7 @@ const FULL_COLOUR_DEVIATIONS: f64 = 3.0;
 /// Writes a picture: red where the map is brighter than the reference, blue where it is darker, white where they agree.
 /// Returns the difference of full colour, in the unit of the maps.
 fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<f64> {
+    // Full colour lies at a multiple of the root mean square, so that single outliers do not pale all other texels.
     let differences: Vec<f64> = map
         .values
         .iter()
@@ -167,6 +183,8 @@ fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<f64> {
         .collect();
     let mean_square = differences.iter().map(|d| d * d).sum::<f64>() / differences.len() as f64;
     let full_colour_at = FULL_COLOUR_DEVIATIONS * mean_square.sqrt();
+
+    // White fades into red or blue in proportion to the signed difference.
     let rgba = differences
         .iter()
         .flat_map(|difference| {
@@ -183,6 +201,7 @@ fn write_difference(path: &Path, map: &Grid, reference: &Grid) -> Result<f64> {
             }
         })
         .collect();
+
     let location = path.display().to_string();
     // Cannot overflow: sides are at most 16384.
     let bytes = picture::encode(map.width as u32, map.height as u32, rgba, &location)?;

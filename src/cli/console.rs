@@ -54,10 +54,13 @@ impl Console {
             control: Arc::default(),
             exit_code: Arc::default(),
         };
+
         // Without a handler, the file size limit ends the process in the middle of a file; with one, the write fails
         // with an error.
         #[cfg(unix)]
         signal_hook::flag::register(SIGXFSZ, Arc::new(AtomicBool::new(false))).map_err(refused)?;
+
+        // The first signal asks the work to stop in order and to keep complete files; the second ends the process.
         let mut signals = Signals::new([SIGINT, SIGTERM]).map_err(refused)?;
         let (control, exit_code) = (console.control.clone(), console.exit_code.clone());
         std::thread::Builder::new()

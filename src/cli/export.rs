@@ -150,7 +150,7 @@ fn part_of_light(text: &str) -> std::result::Result<f64, String> {
         .ok_or_else(|| "give a share from 0 % to below 100 %".into())
 }
 
-/// Result of a .glb for `--json`.
+/// Result of a .glb or a page for `--json`.
 #[derive(Serialize)]
 struct WrittenFile<'a, Report> {
     file: &'a str,
@@ -204,6 +204,7 @@ impl ExportArguments {
     }
 
     fn refuse_what_does_not_apply(&self) -> Result<()> {
+        // An option that has no effect on the format is refused, since whoever gives it expects one.
         let is = |formats: &str| formats.split(' ').any(|format| format == self.format);
         let kind = match self.format {
             "glb" => "a .glb".to_string(),
@@ -212,6 +213,7 @@ impl ExportArguments {
         let takes_exposure = !is("glb web") || self.carrier == Some(Carrier::Unlit);
         let multiplied = "light that materials multiply: it is for --as unlit only";
         let mixed = "--atlas, as smaller sizes mix the maps in it";
+
         // Option, whether it is given, whether it applies, and what it does not apply to.
         let options = [
             ("--as", self.carrier.is_some(), is("glb"), &*kind),
@@ -229,6 +231,7 @@ impl ExportArguments {
             ("--cut", self.cut.is_some(), is("glb png"), &kind),
             ("--exposure", self.exposure.is_some(), takes_exposure, multiplied),
         ];
+
         match options
             .iter()
             .find(|(_, is_given, applies, _)| *is_given && !applies)
@@ -301,12 +304,14 @@ impl ExportArguments {
     #[cfg(feature = "gpu")]
     fn write_web(&self, console: &Console) -> Result<()> {
         let scene = Arc::new(self.load()?);
+
         // Refuse a bad target before any work.
         let default = if self.single_file { "site.html" } else { "site" };
         let output = self.output.clone().unwrap_or_else(|| self.maps.join(default));
         if self.single_file {
             check_target(&output, &scene)?;
         }
+
         // Read the maps of each moment; the first is drawn.
         let frames = self.frames(&scene)?;
         let moments = self.moments(&scene, &frames)?;
@@ -314,7 +319,8 @@ impl ExportArguments {
             .first()
             .map_or(Arc::clone(&scene), |first| Arc::new(first.clone()));
         let maps = moments[0].read_all()?;
-        // A machine without a graphics card is told so once.
+
+        // The first picture decides who draws the others, so that a missing graphics card is reported once.
         let backend = Cell::new(None);
         let eye = |view: &View| {
             let effects = EffectSwitches::default();
@@ -322,6 +328,7 @@ impl ExportArguments {
             backend.set((made_by == "cpu").then_some(Backend::Cpu));
             Ok(picture)
         };
+
         // Write the page with its pictures and report it.
         let site = Site::new(&scene, &moments, &eye, console.control())?;
         let report = if self.single_file {
@@ -329,6 +336,7 @@ impl ExportArguments {
         } else {
             site.write_folder(&output, self.force)?
         };
+
         console.warn(&report.warnings);
         let file = &output.display().to_string();
         let what = match self.single_file {
@@ -461,6 +469,8 @@ fn exposure_of(scene: &Scene, maps: &[IlluminationMap]) -> f64 {
 
 fn glb_text(file: &str, report: &GlbReport) -> String {
     let mut text = format!("{file}: {} bytes\n", report.bytes);
+
+    // Which light the maps hold, and what became of the lamps: with both, a surface would be lit twice.
     let layers: Vec<&str> = report.layers.iter().map(|layer| layer.name()).collect();
     let lights = match report.options.lights {
         SceneLights::Keep => "kept",
@@ -474,6 +484,8 @@ fn glb_text(file: &str, report: &GlbReport) -> String {
     if report.options.carrier == Carrier::Unlit {
         let _ = writeln!(text, "exposure {:.2} stops", report.options.exposure_stops);
     }
+
+    // A PNG has a largest code and no negative ones: what lies above white or below 0 is light that the file lost.
     for map in &report.maps {
         let _ = writeln!(
             text,
@@ -500,7 +512,11 @@ fn textures_text(folder: &str, report: &TextureReport) -> String {
         index.textures.len(),
         report.bytes
     );
+
+    // Stored values are the quantity times 2^stops, a factor that programs have to divide by.
     let _ = writeln!(text, "values are in {} x 2^{}", index.unit, index.exposure_stops);
+
+    // Losses are listed only where there are any, so that they stand out among many files.
     for texture in &index.textures {
         let lost = &texture.lost;
         let _ = write!(text, "{:<28} {}x{}", texture.file, texture.width, texture.height);

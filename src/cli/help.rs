@@ -101,8 +101,10 @@ nephroid study accuracy -o study",
 
 /// The help that a command line asks for.
 pub fn text(words: impl Iterator<Item = OsString>) -> String {
+    // Building adds `--help` to every subcommand, so that its text can be set below.
     let mut command = <Arguments as CommandFactory>::command();
     command.build();
+
     // Descend to the subcommand that the words name.
     let mut is_long = false;
     for word in words {
@@ -115,6 +117,7 @@ pub fn text(words: impl Iterator<Item = OsString>) -> String {
     }
     let name = command.get_name().to_string();
     let is_root = name == "nephroid";
+
     // Examples come first, notes about bake options last.
     let has_bake_options = command
         .get_arguments()
@@ -128,6 +131,7 @@ pub fn text(words: impl Iterator<Item = OsString>) -> String {
     let examples = examples.map_or(String::new(), |(_, lines)| {
         format!("Examples:\n  {}", lines.replace('\n', "\n  "))
     });
+
     command = command
         .help_template(TEMPLATE)
         .before_help(examples)
@@ -151,6 +155,8 @@ pub fn text(words: impl Iterator<Item = OsString>) -> String {
                 .hide(is_hidden)
                 .hide_short_help(is_rare)
         });
+
+    // The root hides the options of `view`; its usage says whose they are.
     if is_root {
         command = command.override_usage("nephroid [SCENE] [OPTIONS of view]\n       nephroid <COMMAND>");
     }

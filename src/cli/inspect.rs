@@ -67,6 +67,8 @@ impl InspectArguments {
 /// The result as JSON and as text.
 fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
     let mut lines = vec![("scene", scene.source.clone())];
+
+    // The extent in metres shows a scene that was modelled in another unit.
     let bounds = scene.bounds();
     if let Some((low, high)) = bounds {
         let [x, y, z] = (high - low).to_array();
@@ -76,6 +78,7 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
             format!("{x:.4} x {y:.4} x {z:.4} m, {triangles} triangles"),
         ));
     }
+
     // What the scene is made of; each report also adds its lines of text.
     let objects: Vec<Value> = (0..scene.objects.len())
         .map(|object| object_report(scene, object, &mut lines))
@@ -84,6 +87,8 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
         .filter(|&object| scene.body_of(object) == object && scene.material_of(object).is_solid())
         .map(|object| body_report(scene, object, &mut lines))
         .collect();
+
+    // Materials that no object uses meet no light, and are left out.
     let in_use = |index: usize| {
         scene
             .objects
@@ -96,6 +101,7 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
         .filter(|(index, _)| in_use(*index) > 0)
         .map(|(index, material)| material_report(material, in_use(index), &mut lines))
         .collect();
+
     let lights: Vec<Value> = scene
         .lights
         .iter()
@@ -103,6 +109,7 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
         .collect();
     let cameras: Vec<&String> = scene.cameras.iter().map(|camera| &camera.name).collect();
     lines.extend(cameras.iter().map(|camera| ("camera", (*camera).clone())));
+
     // The plan, with the reason for each switch.
     let switch = |on: bool| if on { "on" } else { "off" };
     for light in &plan.lights {
@@ -117,6 +124,7 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
             format!("{}: {}, {}", line.effect.name(), switch(line.on), line.reason),
         ));
     }
+
     // The pilot bake, and what it forecasts for each preset.
     let counts = &survey.pilot.counts;
     let taken = format!(
@@ -138,6 +146,8 @@ fn report(scene: &Scene, survey: &Survey, plan: &EffectPlan) -> (Value, Lines) {
         report
     });
     let presets: Vec<Value> = presets.collect();
+
+    // The document also holds the course of the pilot, to which the forecasts are fitted.
     let report = json!({
         "scene": scene.source,
         "name": scene.name,
@@ -236,10 +246,14 @@ fn material_report(material: &Material, objects: usize, lines: &mut Lines) -> Va
 
 /// Strengths are luminous-equivalent; what a light does not have is null.
 fn light_report(light: &Light, scene: &Scene, lines: &mut Lines) -> Value {
+    // The power of a beam is its axial intensity times the solid angle that its falloff weighs.
     let strength = light.strength().luminance();
     let beam_w = strength * full_beam_sr(&light.kind);
+
     // A facet's axial intensity is L·A, its power πLA.
     let glowing = || Emitter::middle(light, scene).map(|middle| middle.strength.luminance());
+
+    // Lamps state watts; sunlight and skies fill all of space, and state an irradiance.
     let (mut power_w, mut area_m2, mut across_beam, mut from_all_around) = (None, None, None, None);
     let kind = match light.kind {
         LightKind::Point { .. } => {
@@ -266,6 +280,7 @@ fn light_report(light: &Light, scene: &Scene, lines: &mut Lines) -> Value {
             "environment"
         }
     };
+
     // State what the light has, in text and in JSON.
     let (radius_m, diameter_deg) = match light.size {
         LightSize::None => (None, None),
@@ -288,6 +303,7 @@ fn light_report(light: &Light, scene: &Scene, lines: &mut Lines) -> Value {
         .chain(spectrum.as_ref().map(|(_, line)| format!(", {line}")))
         .collect();
     lines.push(("light", format!("{}: {kind}{stated}", light.name)));
+
     json!({
         "name": light.name,
         "kind": kind,
@@ -374,11 +390,13 @@ fn spectrum_report(spectrum: &Spectrum) -> (Value, String) {
 /// A map as JSON and as text: "floor, front: 512 x 512, 4.2 MB, generated (TEXCOORD_0: it overlaps itself)".
 fn map_report(map: &IlluminationMap, scene: &Scene, lines: &mut Lines) -> Value {
     let object = &scene.objects[map.chart.object()];
+
     // UV sets of the file that cannot be used, and why.
     let refused = refused_sets(object.mesh_in_scene()).into_iter();
     let refused: Vec<String> = refused
         .map(|(set, refusal)| format!("{set}: {refusal}"))
         .collect();
+
     // Memory during the bake.
     let size = map.chart.texel_count() as u64 * BYTES_PER_TEXEL;
     let report = json!({
@@ -390,6 +408,8 @@ fn map_report(map: &IlluminationMap, scene: &Scene, lines: &mut Lines) -> Value 
         "height": map.height(),
         "bytes": size,
     });
+
+    // The text takes its words from the document, so that both name side and coordinates alike.
     let word = |name: &str| report[name].as_str().unwrap_or_default();
     let mut line = format!(
         "{}, {}: {} x {}, {}, {}",

@@ -41,10 +41,13 @@ impl MergeArguments {
     /// # Errors
     /// Shards that are damaged, missing or of different bakes; another scene; output that cannot be written.
     pub fn run(&self, console: &Console) -> Result<()> {
+        // Shards are checked against each other before the scene is loaded, which takes longer.
         let threads = self.run.threads();
         let shards = ShardSet::open(&self.shards)?;
         let (shards_wall_s, shards_cpu_s) = shards.seconds();
         let manifest = shards.manifest().clone();
+
+        // The scene is loaded as it was for the shards: other glass or another light would be another scene.
         let options = LoadOptions {
             solid_glass: manifest.scene.solid_glass,
             default_light: manifest.scene.default_light,
@@ -54,6 +57,8 @@ impl MergeArguments {
         let source = self.scene.clone().unwrap_or(manifest.scene.source);
         let loaded = LoadedScene::load(&source, &options, true, console)?;
         shards.check_scene(&loaded.scene)?;
+
+        // All settings are those of the shards except for the threads, which do not change the sums.
         let folder = MapFolder::open(&self.output, self.force)?;
         let settings = BakeSettings {
             threads,
@@ -64,9 +69,11 @@ impl MergeArguments {
         })?;
         console.warn(&result.warnings);
         loaded.book(&mut result.timings_s, &mut result.cpu_s);
+
         // Total cost of the maps: the shards, side by side, then this merge.
         result.timings_s.total += shards_wall_s;
         result.cpu_s.total += shards_cpu_s;
+
         let manifest = folder.write(&loaded.scene, &settings, &result)?;
         let text = bake::summary(&manifest, &result, &self.output.display().to_string());
         console.print_result(&text, &manifest)

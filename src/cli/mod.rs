@@ -111,6 +111,7 @@ fn is_of_lost_window(_: &std::panic::PanicHookInfo<'_>) -> bool {
 
 /// A signal decides the exit code even if results could still be written.
 fn parse_and_run() -> Result<ExitCode> {
+    // clap reports help and the version as errors, but they are results, and go to stdout.
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,
         Err(error)
@@ -128,11 +129,15 @@ fn parse_and_run() -> Result<ExitCode> {
         }
         Err(error) => return Err(in_one_sentence(&error)),
     };
+
+    // Log and cache belong to the process, and are set up before any work.
     let (options, command) = arguments.command();
     env_logger::Builder::new().filter_level(options.log).init();
     if !options.no_cache {
         nephroid::files::cache::enable();
     }
+
+    // Work that a signal ended may fail or end well, but shells are told of the signal.
     let console = Console::open(options)?;
     let outcome = command(&console);
     match console.exit_code() {

@@ -68,22 +68,29 @@ impl RenderArguments {
     /// # Errors
     /// Bad usage; input, output, a bake or a picture that fails.
     pub fn run(&self, console: &Console) -> Result<()> {
+        // The scene is loaded only when the options are known to fit each other.
         let settings = self.bake.settings(&LayerKind::ALL, self.run.threads())?;
         let options = self.scene_options.load_options(true);
         let moment = (&self.moment, &settings.effects);
         let load = || LoadedScene::load_at(&self.scene, &options, false, moment, console);
+
+        // A camera that moves makes a film, a scene that moves a folder of frames, and neither a single picture.
         let Some(output) = self.output.as_ref().filter(|_| !self.moves()) else {
             return self.film(&settings, load, console);
         };
         if let Some(times) = self.moment.sequence() {
             return self.draw_moments(output, times, &settings, &load()?, console);
         }
+
+        // Format and place of the picture are checked before the bake, the longest step.
         self.refuse_what_radiance_has_not(picture::holds_radiance(output)?)?;
         let loaded = load()?;
         files::check_output_file(output)?;
         let maps = picture::maps(self.maps.maps.as_deref(), &settings, &loaded, console)?;
         let look = (&self.picture, &self.eye);
         let made = picture::make(&loaded.scene, &maps, &settings.effects, look, output, console)?;
+
+        // The automatic exposure is stated, so that other pictures can be made at the same one.
         let (view, made_by, seconds) = (&made.view, &made.made_by, loaded.seconds().0);
         let text = format!(
             "picture   {} ({}x{}, camera {}, {} maps, exposure {:+.2} stops, by {made_by})\nseconds   {seconds:.2}",
@@ -118,6 +125,8 @@ impl RenderArguments {
     ) -> Result<()> {
         let folder = FrameFolder::open(output)?;
         let mut options = self.picture.clone();
+
+        // One baker keeps what stays the same between frames; maps of a folder take its place.
         loaded.session(console, |session, bar, control| {
             for frame in 0..times.frames {
                 let scene = Arc::new(loaded.scene.at(times.time_s(frame)));
@@ -130,12 +139,15 @@ impl RenderArguments {
                         result.maps
                     }
                 };
+
+                // The exposure of the first picture holds for all: an automatic one for each would flicker.
                 let (look, path) = ((&options, &self.eye), folder.file(frame));
                 let made = picture::make(&scene, &maps, &settings.effects, look, &path, console)?;
                 options.exposure = Some(Exposure::Stops(made.view.exposure_stops));
             }
             Ok(())
         })?;
+
         let seconds = loaded.seconds().0;
         let text = format!(
             "frames    {} in {}\nseconds   {seconds:.2}",
@@ -158,6 +170,7 @@ impl RenderArguments {
         load: impl FnOnce() -> Result<LoadedScene>,
         console: &Console,
     ) -> Result<()> {
+        // Options that contradict each other are refused before the scene is loaded.
         let refused = |option: &str, what: &str, remedy: &str| Err(Error::usage(option, what, remedy));
         if self.moment.sequence().is_some() {
             return refused(
@@ -191,6 +204,8 @@ impl RenderArguments {
                 "leave one of the two out",
             );
         }
+
+        // A path brings its own number of frames, and leaves that of the orbit unused.
         let film = Film {
             // Read before the bake, so that a damaged file fails early.
             path: self.path.as_deref().map(CameraPath::read).transpose()?,
@@ -200,6 +215,7 @@ impl RenderArguments {
             maps: self.maps.maps.as_deref(),
             look: (&self.picture, &self.eye),
         };
+
         let name = self
             .path
             .as_ref()

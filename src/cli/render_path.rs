@@ -46,11 +46,13 @@ impl Film<'_> {
         loaded: &LoadedScene,
         console: &Console,
     ) -> Result<()> {
+        // A missing device or a bad folder ends the film before the bake.
         let scene = &loaded.scene;
         let gpu = Gpu::headless()?;
         let folder = self.output.map(FrameFolder::open).transpose()?;
         let maps = picture::maps(self.maps, settings, loaded, console)?;
         let (options, eye) = self.look;
+
         // Cameras of the path, or of one turn around the scene.
         let (cameras, view) = match &self.path {
             Some(path) => {
@@ -63,6 +65,7 @@ impl Film<'_> {
                 (turntable::around(scene, &view.camera, self.turntable), view)
             }
         };
+
         let mut walk = Walk {
             scene,
             maps: &maps,
@@ -71,11 +74,13 @@ impl Film<'_> {
             effects: &settings.effects,
             white_balance: eye.white_balance.unwrap_or_default().matrix(scene),
         };
-        // One exposure for all frames.
+
+        // One exposure for all frames: an automatic one for each would flicker.
         walk.view.exposure_stops = match options.exposure {
             Some(Exposure::Stops(stops)) => stops,
             _ => frame_times::auto_exposure_stops(&gpu, &walk)?,
         };
+
         // Report what is drawn, then draw and time it.
         let (view, source, adapter) = (&walk.view, &scene.source, gpu.adapter_name());
         let (width, height, stops) = (view.width, view.height, view.exposure_stops);
@@ -101,6 +106,8 @@ impl Film<'_> {
         if let Some(folder) = kept {
             let _ = writeln!(text, "frames    {folder}");
         }
+
+        // Frames are drawn, written and timed in one go. Timed in both manners, their ratio is the cost of chains.
         let times = self.times(&gpu, &walk, folder.as_ref(), console)?;
         if let [raster_alone, with_chains] = &times[..] {
             report["stats"] = stats(raster_alone, with_chains, &mut text);
@@ -153,6 +160,7 @@ fn stats(raster_alone: &MannerTimes, with_chains: &MannerTimes, text: &mut Strin
 }
 
 fn add_manner(text: &mut String, name: &str, times: &MannerTimes) {
+    // Times of the device tell the passes apart; wall time also has submission and waiting.
     let mut row = |what: &str, spread: &Spread| {
         let Spread { median, p95, max } = spread;
         let what = format!("{name}: {what}");
@@ -165,9 +173,13 @@ fn add_manner(text: &mut String, name: &str, times: &MannerTimes) {
         row("device", &device.sum);
     }
     row("wall", &times.wall_ms);
+
+    // Adapters without timestamp queries have wall times alone.
     if times.device_ms.is_none() {
         let _ = writeln!(text, "  the device cannot tell how long it takes");
     }
+
+    // Frames that created pipelines measure the start of the program, and would hide the cost of the others.
     let warm_up_ms: f64 = times.warm_up.iter().map(|drawing| drawing.wall_ms).sum();
     let _ = writeln!(
         text,

@@ -329,6 +329,7 @@ struct StudyRun<'a> {
 
 impl StudyRun<'_> {
     fn convergence(self, study: &ConvergenceArguments) -> Result<()> {
+        // Every rung of the ladder is checked before the first bake: the last one may come hours later.
         let settings = self.settings(&study.size, SIDE)?;
         let few = if self.common.quick {
             QUICK_DENSITIES
@@ -337,9 +338,13 @@ impl StudyRun<'_> {
         };
         let densities = study.densities.as_deref().unwrap_or(&DENSITIES[..few]);
         check_ladder(densities, &settings)?;
+
+        // Photons are measured beside the splats of the paper unless others are named.
         let usual = || vec![Estimator::Photon, Estimator::Splat];
         let mut estimators = study.estimators.clone().unwrap_or_else(usual);
         estimators.dedup();
+
+        // The error is that against a stated file or the analytic map of the scene, or else a denser bake.
         let scene = self.load(&study.scene, &study.scene_options)?;
         self.one_scene(CONVERGENCE.0, &study.repeat, || {
             let reference = match &study.reference {
@@ -450,6 +455,7 @@ impl StudyRun<'_> {
         output: &Path,
         make: impl FnOnce(&Bench) -> Result<Sweep>,
     ) -> Result<FinishedStudy> {
+        // The folder is opened first, since a study that took hours must not fail for its place.
         let folder = open_folder(output, self.common.force, &format!("{name}.csv"))?;
         let bar = self.console.bar();
         let bench = Bench {
@@ -460,11 +466,14 @@ impl StudyRun<'_> {
         };
         let outcome = make(&bench)?.run(&bench)?;
         drop(bar);
+
+        // Nothing is written before all is measured, so that a cancelled study leaves an earlier one whole.
         let mut files = Vec::new();
         for (file, bytes) in outcome.files()? {
             files::write_atomically(&folder.path().join(&file), |writer| writer.write_all(&bytes))?;
             files.push(file);
         }
+
         let (folder, tables) = (output.display().to_string(), outcome.tables());
         let text = format!("folder {folder}: {}\n\n{tables}", files.join(", "));
         let report = json!({
@@ -485,6 +494,8 @@ impl StudyRun<'_> {
         };
         settings.validate()?;
         let scene = self.load(&study.scene, &study.scene_options)?;
+
+        // Brute force traces one index of refraction: its maps are no reference for spectra.
         if (0..scene.objects.len()).any(|object| scene.material_of(object).is_dispersive()) {
             self.console.warn(&[Warning::new(
                 &scene.source,
@@ -492,6 +503,8 @@ impl StudyRun<'_> {
                 "compare its maps with those of a bake with --effects dispersion=off",
             )]);
         }
+
+        // Two lattices of random rays each carry half of the flux; their difference tells the noise of the sum.
         let output = &self.common.output;
         let folder = MapFolder::open(output, self.common.force)?;
         self.console.check(&scene.source)?;
@@ -499,6 +512,8 @@ impl StudyRun<'_> {
         let (bar, control) = (self.console.bar(), self.console.control());
         let result = brute_force(&tracer, &settings, study.rays, &bar, control)?;
         drop(bar);
+
+        // The noise is part of the result, since no bake can be measured below it.
         let maps = folder.write(&scene, &settings, &result)?.maps;
         let (rays, cpu_s) = (result.counts.rays, result.cpu_s.total);
         let noise = estimated_relative_rmse(&result.maps);
@@ -521,6 +536,8 @@ impl StudyRun<'_> {
             "cpu_s": cpu_s,
             "maps": maps,
         });
+
+        // Method and noise are kept beside the maps for those who compare with them later.
         let path = output.join("reference.json");
         let json = files::to_json(&report, &path.display().to_string())?;
         files::write_atomically(&path, |writer| writer.write_all(&json))?;

@@ -94,15 +94,19 @@ impl ViewArguments {
         use super::values::Exposure;
         use nephroid::{gpu, viewer};
 
+        // Without a screen there is nothing to open, and the caller writes files.
         if !has_display() {
             return Ok("no display");
         }
+
+        // Maps and camera are read first, so that a wrong name is an error on the terminal.
         let read = |folder| picture::maps(Some(folder), settings, loaded, console);
         let maps = self.maps.maps.as_deref().map(read).transpose()?;
         let camera = match &self.picture.camera {
             Some(_) => Some(picture::choose_camera(&loaded.scene, &self.picture)?.name),
             None => None,
         };
+
         let options = viewer::ViewerOptions {
             scene: loaded.scene.clone(),
             settings: settings.clone(),
@@ -123,6 +127,8 @@ impl ViewArguments {
                 settings_given: self.bake.names_any() || self.run.threads.is_some(),
             },
         };
+
+        // A window that was closed ends the process; a missing display or adapter is no error, as files can be written.
         match viewer::run(options) {
             Ok(()) => console.leave(),
             Err(error) if viewer::is_no_display(&error) => Ok("no display"),

@@ -187,6 +187,7 @@ pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
             "write the file again",
         )
     };
+
     // Sizes are checked before memory is allocated.
     let headers = exr::meta::MetaData::read_from_buffered(Cursor::new(bytes), false)
         .map_err(|error| damaged(error.to_string()))?
@@ -200,6 +201,8 @@ pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
             return Err(damaged("it ends long before its samples do".into()));
         }
     }
+
+    // Maps and pictures are flat and of one resolution: deep samples and smaller levels are left out.
     let image = oxr::read()
         .no_deep_data()
         .largest_resolution_level()
@@ -210,6 +213,8 @@ pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
         .map_err(|error| damaged(error.to_string()))?;
     let layer = image.layer_data;
     let (width, height) = (layer.size.width(), layer.size.height());
+
+    // A subsampled channel has fewer samples than texels, and would lie beside the others.
     let mut channels: Vec<Channel> = Vec::new();
     for channel in &layer.channel_data.list {
         if channel.sample_data.len() != width * height {

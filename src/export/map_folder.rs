@@ -141,11 +141,14 @@ pub fn write_map(
     map: &IlluminationMap,
     result: &Bake,
 ) -> Result<(Parts, Option<PathBuf>)> {
+    // Generated coordinates are in no other file: without them, nobody could place the map.
     let uv_path = (map.chart.uv_set == UvSet::Generated).then(|| path.with_extension("uv"));
     if let Some(uv_path) = &uv_path {
         let bytes = uv_file::encode(&map.chart.corner_uvs);
         files::write_atomically(uv_path, |writer| writer.write_all(&bytes))?;
     }
+
+    // Shares of lights and bands become channels of the same file; the manifest names them.
     let (mut lights, mut bands, mut channels) = (Vec::new(), Vec::new(), Vec::new());
     let receiver = map.chart.receiver;
     for part in result
@@ -167,6 +170,8 @@ pub fn write_map(
         channels.push((band.channel.clone(), value));
         bands.push(band);
     }
+
+    // The file appears whole or not at all, so that an interrupted bake leaves no torn map.
     let bytes = exr::encode_map(
         map,
         size(settings, map),

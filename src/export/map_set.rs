@@ -225,6 +225,7 @@ impl<'a> MapSet<'a> {
 
     /// Reads one map with the parts of some lights.
     fn read_with(&self, entry: &MapEntry, lights: &[LightChannels]) -> Result<StoredMap> {
+        // The file has to be what the manifest says of it.
         let object = self.object_of(entry)?;
         let path = self.inside(&entry.file)?;
         let location = path.display().to_string();
@@ -236,6 +237,8 @@ impl<'a> MapSet<'a> {
             );
             return Err(unusable(location, what));
         }
+
+        // Light below 0 is damage unless rounding explains it; rounded flux weighs more where texels are small.
         let chart = self.chart(entry, object)?;
         let rounding_w = self.stored.energy_w.rounding_w();
         let light = |prefix: &str, what: &str| {
@@ -250,6 +253,8 @@ impl<'a> MapSet<'a> {
             let what = format!("its {prefix} layer holds values that are not irradiance");
             Err(unusable(&location, what))
         };
+
+        // Layers are read in the order of their kinds, each once, however the manifest lists them.
         let mut kinds = entry.layers.clone();
         kinds.sort_unstable();
         kinds.dedup();
@@ -258,6 +263,8 @@ impl<'a> MapSet<'a> {
             Ok(Layer { kind, irradiance })
         });
         let layers = layers.collect::<Result<_>>()?;
+
+        // Shares of lights are as large as layers, and are read only where they are asked for.
         let lights = lights.iter().map(|stated| {
             let irradiance = light(&stated.channels, &format!("channels {}", stated.channels))?;
             Ok(StoredLight {
@@ -265,6 +272,7 @@ impl<'a> MapSet<'a> {
                 irradiance,
             })
         });
+
         Ok(StoredMap {
             entry: entry.clone(),
             lights: lights.collect::<Result<_>>()?,

@@ -22,6 +22,8 @@ pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
         )
     })?;
     check_size(header.width, header.height, location)?;
+
+    // The header fixes the number of bytes: a file of another length is cut off, or holds something else.
     let texels = header.width * header.height;
     let names: &[&str] = if header.colour { &["R", "G", "B"] } else { &["Y"] };
     let expected = texels * names.len() * size_of::<f32>();
@@ -35,6 +37,8 @@ pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
             "write the file again",
         ));
     }
+
+    // Samples lie texel by texel in the file, and channel by channel in the image.
     let values: Vec<f32> = samples
         .as_chunks::<4>()
         .0

@@ -1,12 +1,12 @@
 //! Lamps in mirrors, in glass and on glossy surfaces; twin of `shaders/eye_pass/highlights.wgsl`.
 //!
-//! A ray of a chain stands for a cone, the footprint of its pixel, and sees a lamp by the share of the cone that the lamp
-//! fills. Bulbs and suns that are smaller than the footprint are spread over a disc of its size. The image of a lamp
-//! thus holds the same energy at any resolution, and lamps without extent are seen too.
+//! A ray of a chain stands for a cone, the footprint of its pixel, and sees a lamp by the share of the cone that the
+//! lamp fills. Bulbs and suns that are smaller than the footprint are spread over a disc of its size. The image of a
+//! lamp thus holds the same energy at any resolution, and lamps without extent are seen too.
 //!
 //! At a rough surface that would show the lamp through one direction of a whole lobe. A lamp that is smaller than the
-//! lobe is a highlight there instead: the lobe times the lamp's irradiance, with a shadow ray, to which clear surfaces are
-//! opaque, as they are to direct light.
+//! lobe is a highlight there instead: the lobe times the lamp's irradiance, with a shadow ray, to which clear surfaces
+//! are opaque, as they are to direct light.
 
 use std::f64::consts::PI;
 
@@ -20,8 +20,8 @@ use crate::transport::ggx_reflection;
 
 /// Angular radius of lamps without extent where a focus leaves no footprint [rad]: a fifth of a pixel of 1 mrad.
 const POINT_RADIUS_RAD: f64 = 2e-4;
-/// A lamp lies on a ray if it is nearer than the next surface by this part of the distance: panels often lie on the glowing
-/// surface that shows them.
+/// A lamp lies on a ray if it is nearer than the next surface by this part of the distance: panels often lie on the
+/// glowing surface that shows them.
 const BEFORE_SURFACE: f64 = 1e-4;
 /// Patches across and down a panel that are highlights of their own.
 const PATCHES: u32 = 4;
@@ -144,8 +144,8 @@ impl VisibleLamp {
         self.emitter.strength
     }
 
-    /// Radiance [W/(m² sr)] that a cone sees, averaged over it, with the distance of the lamp [m]. `reach_m`: distance of
-    /// the next surface, infinite if there is none.
+    /// Radiance [W/(m² sr)] that a cone sees, averaged over it, with the distance of the lamp [m]. `reach_m`: distance
+    /// of the next surface, infinite if there is none.
     pub fn seen(&self, cone: &RayCone, reach_m: f64) -> Option<(LinearSrgb, f64)> {
         if self.alpha_from(cone.ray.origin) < cone.alpha {
             return None;
@@ -219,12 +219,16 @@ impl VisibleLamp {
 
     /// Highlights of the lamp in a lobe that is wider than it.
     pub fn highlights(&self, lobe: &Lobe, mut met: impl FnMut(&Highlight)) {
+        // A lamp that is wider than the lobe is seen by the ray of the chain, so that each lamp is counted once.
         let of_patch = self.alpha_from(lobe.point);
         if of_patch >= lobe.alpha {
             return;
         }
+
         // A lobe as wide as the real one and the patch together.
         let alpha_squared = lobe.alpha * lobe.alpha + of_patch * of_patch;
+
+        // The shadow ray ends short of the lamp, whose own glowing surface would block it.
         let mut from = |emitter: &Emitter, patch_m2: f64| {
             let Some((to_light, distance_m, across_beam)) = emitter.kind.seen_from(lobe.point, patch_m2)
             else {
@@ -241,6 +245,8 @@ impl VisibleLamp {
                 });
             }
         };
+
+        // Only panels are divided: from nearby, the directions to their patches differ by more than a lobe.
         let (EmitterKind::Facet { position, normal }, Outline::Flat { across, down, shape }) =
             (self.emitter.kind, self.outline)
         else {

@@ -100,6 +100,7 @@ struct SeenSpectrum {
 
 impl SeenSpectrum {
     fn new() -> Self {
+        // What the eye sees of daylight at each wavelength, in linear sRGB relative to the white of the whole spectrum.
         let knots = visible_knots();
         let daylight = illuminants::d65();
         let colour = |wavelength| {
@@ -107,6 +108,8 @@ impl SeenSpectrum {
             DVec3::from_array(xyz.to_linear_srgb().to_array())
         };
         let white = DVec3::from_array(integrate(&knots, |wavelength| colour(wavelength).to_array()));
+
+        // Column by column, the part of each primary's spectrum that falls into one nanometre.
         let pieces: Vec<DMat3> = knots
             .windows(2)
             .map(|piece| {
@@ -118,9 +121,12 @@ impl SeenSpectrum {
                 DMat3::from_cols_array(&columns)
             })
             .collect();
+
         // The basis has the primaries' colours up to the rounding of its table, which this removes.
         let whole: DMat3 = pieces.iter().fold(DMat3::ZERO, |sum, piece| sum + *piece);
         let exact = whole.inverse();
+
+        // The share of a band is a difference of these sums, so that adjacent bands neither overlap nor leave a gap.
         let mut below = vec![DMat3::ZERO];
         let mut sum = DMat3::ZERO;
         for piece in pieces {

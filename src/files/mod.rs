@@ -1,4 +1,5 @@
-//! Reading and writing files: reads are bounded, writes are atomic. No other module opens files.
+//! Reading and writing files: reads are bounded, writes are atomic. No other module opens files, except for the event
+//! log of the window, which grows line by line.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Cursor, Read, Seek, SeekFrom, Write};

@@ -134,12 +134,14 @@ impl WideBvh {
 
     #[inline(always)]
     fn walk(&self, mut ray: WideRay, stack: &mut [(f32, u32)], mut meet: impl FnMut(usize) -> f32) {
+        // Nodes wait with the distances of their boxes, so that those beyond a nearer hit are dropped unread.
         let slabs = Slabs::new(&ray);
         let lanes = RayLanes::new(&ray);
         let mut height = 0;
         let mut child = 0;
         loop {
             if child & LEAF != 0 {
+                // The test of four triangles is conservative: what passes it is decided exactly by `meet`.
                 for pack in &self.packs[(child & !LEAF) as usize..] {
                     // The lane of the triangle that the ray leaves; beyond all lanes in other packs.
                     let left = 1_u64 << ray.left.wrapping_sub(pack.first).min(63);
@@ -177,6 +179,8 @@ impl WideBvh {
                     continue;
                 }
             }
+
+            // The latest waiting node whose box begins before the ray's end; those skipped lie behind a hit.
             loop {
                 if height == 0 {
                     return;
@@ -248,7 +252,7 @@ impl Slabs {
     /// Distances at which the ray enters the boxes, and the bit mask of those it hits before its end.
     #[inline(always)]
     fn meet(&self, node: &Wide, end: f32) -> ([f32; 4], u32) {
-        // The mask spares the check of the index.
+        // Masked, the index needs no bounds check.
         let plane = |axis: usize, which: usize| {
             (node.planes[axis][which & 1] - self.origin[axis]) * self.inverse[axis]
         };

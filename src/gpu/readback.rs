@@ -10,6 +10,7 @@ use crate::error::Result;
 pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
     let texel_bytes = texture.format().block_copy_size(None).unwrap_or(0);
     let row_bytes = texture.width() * texel_bytes;
+
     // Copies need rows aligned to 256 bytes.
     let stride = row_bytes.next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
     let buffer = staging_buffer(gpu, u64::from(stride) * u64::from(texture.height()));
@@ -31,6 +32,8 @@ pub fn read_texture(gpu: &Gpu, texture: &wgpu::Texture) -> Result<Vec<u8>> {
         texture.size(),
     );
     gpu.queue.submit([encoder.finish()]);
+
+    // Waits for the copy, then drops the padding of each row.
     let padded = mapped(gpu, &buffer)?;
     Ok(padded
         .chunks_exact(stride as usize)

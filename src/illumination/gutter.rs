@@ -1,4 +1,4 @@
-//! Fills the texels beside a surface with their nearest neighbour on it, so that a bilinear look-up at a border does not
+//! Fills the texels beside a surface from their neighbours on it, so that a bilinear look-up at a border does not
 //! darken.
 
 use super::Chart;
@@ -22,6 +22,9 @@ pub fn fill_gutter(chart: &Chart, irradiance: &mut [[f32; 3]]) {
     if chart.is_full() {
         return;
     }
+
+    // Ring by ring outwards. A ring is read as a whole before it is written, so that no value depends on the texels'
+    // order.
     let (width, height) = (chart.width, chart.height);
     let mut known: Vec<bool> = (0..width * height)
         .map(|texel| chart.texel_area_m2(texel) > 0.0)
@@ -39,6 +42,9 @@ pub fn fill_gutter(chart: &Chart, irradiance: &mut [[f32; 3]]) {
             known[texel] = true;
         }
     }
+
+    // Beside a seam, a texel shows where the surface continues. That look-up may itself read such texels, hence the
+    // rounds.
     for _ in 0..SEAM_ROUNDS {
         let look = |uv| {
             bilinear(irradiance, width, height, uv)

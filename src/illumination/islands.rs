@@ -25,6 +25,7 @@ pub struct Islands {
 impl Islands {
     /// Finds the islands of a chart; `None` if there is only one.
     pub fn find(chart: &Chart) -> Option<Self> {
+        // A single island needs no owners of texels: no kernel can leave it.
         let of_triangle = connect(&chart.corner_uvs);
         let first = *of_triangle.first()?;
         if of_triangle.iter().all(|&island| island == first) {
@@ -35,6 +36,8 @@ impl Islands {
             Some(_) => (1, 1),
             None => (chart.width, chart.height),
         };
+
+        // A texel that several islands touch has no owner, however little each covers of it.
         let size = DVec2::new(width as f64, height as f64);
         let mut of_texel = vec![NONE; width * height];
         for (corners, &island) in chart.corner_uvs.iter().zip(&of_triangle) {

@@ -32,12 +32,15 @@ pub fn mean(
     level: u8,
     (column, row): (usize, usize),
 ) -> LinearSrgb {
+    // In a tile that is no finer than the level, one texel covers the place.
     let value = |texel: usize| LinearSrgb::from(values[texel].map(f64::from));
     let (column, row) = (column << level, row << level);
     let own = layout.level_at(column, row);
     if own >= level {
         return value(layout.texel(column, row));
     }
+
+    // Otherwise the texels beneath are averaged by area, as far as the map goes.
     let (width, height) = layout.size();
     let (right, bottom) = (
         (column + (1 << level)).min(width),

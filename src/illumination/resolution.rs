@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use super::Chart;
 
-/// Least and most of the ratio of the variance within a texel to that between it and the three others of its 2 × 2 block:
-/// a quarter on a slope, a half at a border between light and shadow, and all of it at a fold or a focus, where the
-/// irradiance has a pole.
+/// Least and most of the ratio of the variance within a texel to that between it and the three others of its 2 × 2
+/// block: a quarter on a slope, a half at a border between light and shadow, and all of it at a fold or a focus, where
+/// the irradiance has a pole.
 const PER_LEVEL: (f64, f64) = (0.25, 1.0);
 
 /// The ratio of a map too small to tell.
@@ -17,6 +17,7 @@ const USUAL_PER_LEVEL: f64 = 0.5;
 /// many times texels should be halved in length to be fine enough; tiled charts know this for each tile. Zero if texels
 /// are fine enough.
 pub fn variance_within(chart: &Chart, values: &[f64], halved: u32) -> Vec<f64> {
+    // A dense map is too coarse throughout; each tile of a tiled one knows how much it lost.
     let parts: Vec<Part> = match &chart.layout {
         None => vec![Part {
             texels: 0..values.len(),
@@ -58,6 +59,7 @@ pub fn variance_within(chart: &Chart, values: &[f64], halved: u32) -> Vec<f64> {
         USUAL_PER_LEVEL
     };
 
+    // Each missing halving would resolve a fixed part of the variance of the one before: a geometric series.
     let mut variances = vec![0.0; values.len()];
     for (part, blocks) in coarse {
         let missing: f64 = (1..=part.lost.min(64) as i32)

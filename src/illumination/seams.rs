@@ -64,6 +64,7 @@ impl Seam {
         (triangle, edge): (usize, usize),
         (beyond, second): (usize, usize),
     ) -> Option<Self> {
+        // The chart continues where both triangles give the edge the same place in the map.
         let here = mesh.corners(triangle);
         let there = mesh.corners(beyond);
         let (next, first) = ((edge + 1) % 3, (second + 1) % 3);
@@ -74,6 +75,8 @@ impl Seam {
         if goes_on {
             return None;
         }
+
+        // The edge and its perpendicular in each triangle's plane are the frame in which the surface unfolds.
         let along = (here[next] - here[edge]).try_normalize()?;
         // Perpendicular to the edge, away from the third corner.
         let away =
@@ -81,6 +84,8 @@ impl Seam {
         let inner = (edge + 2) % 3;
         let out_here = away(here[inner])?;
         let out_there = -away(there[(second + 2) % 3])?;
+
+        // Each chart maps this frame to map coordinates. Against one map and along the other leads across the seam.
         let map = |uvs, corners, out| {
             let rows = uv_from_world(uvs, corners)?;
             let column = |step: DVec3| DVec2::new(rows[0].dot(step), rows[1].dot(step));
@@ -129,6 +134,9 @@ pub fn joints(
         let inside = place.cmpge(DVec2::ZERO).all() && place.cmplt(size).all();
         inside.then(|| place.y as usize * width + place.x as usize)
     };
+
+    // Where the map has an uncovered texel half a texel outside, that one serves as gutter; elsewhere the texels on
+    // both sides of the seam are joined.
     let mut found: Vec<([usize; 2], f64)> = Vec::new();
     for seam in seams {
         let Some(SeamInTexels { a, b, along, out }) = seam.laid(size) else {
@@ -151,6 +159,8 @@ pub fn joints(
             }
         }
     }
+
+    // The lengths along which a pair touches add up, in a fixed order of the floats.
     found.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
     let pairs = found.chunk_by(|a, b| a.0 == b.0);
     let joint = |pair: &[([usize; 2], f64)]| SeamTexels {
@@ -174,6 +184,8 @@ pub fn texels(
             continue;
         };
         let length = a.distance(b);
+
+        // Uncovered texels whose centres lie outside of the edge and within reach, past its ends included.
         let low = (a.min(b) - REACH_TEXELS - 0.5).floor().max(DVec2::ZERO);
         let high = (a.max(b) + REACH_TEXELS + 0.5).ceil().min(size);
         for row in low.y as usize..(high.y.max(0.0)) as usize {
@@ -185,6 +197,8 @@ pub fn texels(
                 if !(0.0..=REACH_TEXELS).contains(&beyond) || past > REACH_TEXELS || is_covered(texel) {
                     continue;
                 }
+
+                // The displacement from the edge unfolds into the neighbour's chart.
                 let uv = seam.there + seam.steps * (step / size);
                 if uv.cmpge(DVec2::ZERO).all() && uv.cmple(DVec2::ONE).all() {
                     found.push((beyond.hypot(past), SeamTexel { texel, uv }));
@@ -192,6 +206,8 @@ pub fn texels(
             }
         }
     }
+
+    // Of several seams in reach of a texel, the nearest wins.
     found.sort_by(|a, b| a.1.texel.cmp(&b.1.texel).then(a.0.total_cmp(&b.0)));
     found.dedup_by_key(|(_, texel)| texel.texel);
     found.into_iter().map(|(_, texel)| texel).collect()

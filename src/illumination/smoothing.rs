@@ -142,6 +142,7 @@ pub fn add(sum: &mut FluxCount, more: FluxCount) {
 /// Replaces the flux of a map by that of one that is 2^level times as coarse, linearly interpolated. Remainders of
 /// rounding go to the first texel under each coarse texel.
 pub fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Option<&TileLayout>, level: u32) {
+    // Counts are divided before they are weighted: with integer weights of a fixed sum, interpolation loses no flux.
     let (across, down) = (coarse.width(), coarse.height());
     let side = 1_i64 << level;
     let whole = weight(side, 2 * side).pow(2);
@@ -150,6 +151,8 @@ pub fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Opti
         .iter()
         .map(|counts| counts.map(|count| count / whole))
         .collect();
+
+    // Each texel gathers the tents of the coarse texels that reach it, mirrored at the map's borders.
     let texels: Vec<FluxCount> = blocks(flux, layout)
         .par_iter()
         .flat_map_iter(|block| {
@@ -169,6 +172,8 @@ pub fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Opti
         })
         .collect();
     flux.texels_mut().copy_from_slice(&texels);
+
+    // Remainders of the division stay under their own coarse texel.
     let width = flux.width();
     for (index, (counts, share)) in coarse.texels().iter().zip(&shares).enumerate() {
         let (column, row) = ((index % across) << level, (index / across) << level);

@@ -144,6 +144,8 @@ pub fn visible_error(
     truncated: f64,
 ) -> (Option<f64>, Vec<Option<f64>>) {
     let none = || (None, vec![None; maps.len()]);
+
+    // For each block: the light of all layers, that of the layers in question, and its mean squared error.
     let mut lit = Vec::with_capacity(maps.len());
     for map in maps {
         let traced_of_texels = map.luminance_of(of);
@@ -161,9 +163,13 @@ pub fn visible_error(
         let light: Vec<BlockLight> = blocks.lit(&all, &traced).collect();
         lit.push((light, squares));
     }
+
+    // One exposure for all maps, as for an eye that sees the whole scene.
     let Some(white) = white(lit.iter().flat_map(|(light, _)| light.iter().copied())) else {
         return none();
     };
+
+    // Errors are relative to the luminance that makes them visible, and weigh as much as the light that they belong to.
     let sums = lit.iter().map(|(light, squares)| {
         light
             .iter()

@@ -67,10 +67,13 @@ pub enum HiddenCellPolicy {
 impl ItemBuffer {
     /// Marks the cells that may see one of the `casters` (indices of specular objects).
     pub fn build(launch: &Launch, tracer: &Tracer, casters: &[usize], hiding: HiddenCellPolicy) -> Self {
+        // Cells outside of a lamp's cone are never marked.
         let lit: Vec<CellBits> = (0..launch.face_count())
             .into_par_iter()
             .map(|face| lit::lit_cells(launch, face))
             .collect();
+
+        // Boxes of the casters and of everything else let the search skip or accept whole nodes of the hierarchy.
         let objects = &tracer.scene().objects;
         let bounds: Vec<Option<Bounds>> = objects.par_iter().map(|object| object.bounds()).collect();
         let mut wanted = vec![false; objects.len()];
@@ -88,18 +91,22 @@ impl ItemBuffer {
             tests: AtomicU64::new(0),
         };
         let mut faces = builder.mark(&lit, &boxes(false));
+
+        // Cells in which opaque faces hide every caster are dropped: no ray from there would reach one.
         let hidden = match hiding {
             HiddenCellPolicy::Keep => Vec::new(),
             HiddenCellPolicy::Drop => builder.hidden(&faces),
         };
         let mut hidden_cells = 0;
-        // Cells in which no caster is hidden; all lit cells under `HiddenCellPolicy::Keep`.
+        // Cells in which nothing can be hidden; all lit cells if no opaque face may hide a caster anywhere.
         let mut clear = lit;
         for (face, (doubtful, found)) in hidden.iter().enumerate() {
             clear[face] = faces[face].without(doubtful);
             hidden_cells += found.cells.count();
             faces[face] = faces[face].without(&found.cells);
         }
+
+        // A caster is seen if it stands out in a doubtful cell, or touches a cell that nothing could hide.
         let seen_beside = |object: usize| hidden.iter().any(|(_, found)| found.seen.contains(&object));
         let is_any = faces.iter().any(|face| face.count() > 0);
         let seen: Vec<usize> = casters

@@ -31,7 +31,8 @@ enum Domain {
     },
 }
 
-/// Sides from this length on are rounded to multiples of powers of two, so that lattices nest [cells].
+/// Sides from this length on, about 1,600 rays per steradian, are rounded to multiples of powers of two, so that
+/// lattices nest [cells].
 const FIRST_NESTED_SIDE: f64 = 58.0;
 
 /// Sides up to this length may be odd [cells].
@@ -291,6 +292,7 @@ fn frame_across(direction: DVec3) -> DMat3 {
 }
 
 fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Domain> {
+    // The part of the wavefront that can hit a caster: the casters' extent across the light.
     let scene_from_frame = frame_across(direction);
     let frame_from_scene = scene_from_frame.transpose();
     let mut low = DVec3::INFINITY;
@@ -313,6 +315,8 @@ fn sun_domain(direction: DVec3, scene: &Scene, casters: &[usize]) -> Option<Doma
     if !(size.x > 0.0 && size.y > 0.0 && before.is_finite()) {
         return None;
     }
+
+    // The plane lies well before the whole scene, so that no ray starts behind an occluder.
     let margin = size.max_element().max(high.z - before);
     Some(Domain::Plane {
         corner: scene_from_frame * DVec3::new(low.x, low.y, before - margin),

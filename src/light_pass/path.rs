@@ -12,8 +12,8 @@ use crate::illumination::{Receiver, Side};
 use crate::optics::{ColourMatrix, LinearSrgb};
 use crate::transport::{Branch, EffectSet, Event, MediumStack, SurfaceHit, Tracer};
 
-/// Hash of the sequence of (object, smoothing group, event) along a path: equal for neighbouring rays that took the same
-/// path.
+/// Hash of the sequence of (object, smoothing group, event) along a path: equal for neighbouring rays that took the
+/// same path.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct PathSignature(pub u64);
 
@@ -221,6 +221,7 @@ impl<'a> PathTracer<'a> {
     }
 
     fn step(&mut self, segment: &Segment, floor_w: f64, arrive: &mut impl FnMut(Arrival, &Segment)) {
+        // Light that meets nothing at all was never caustic light; after an event it has escaped.
         self.segments += 1;
         let Some(hit) = self.tracer.closest_hit(&segment.ray) else {
             let account = if segment.depth == 0 {
@@ -230,13 +231,15 @@ impl<'a> PathTracer<'a> {
             };
             return self.book(account, segment.flux_w);
         };
+
+        // The medium absorbs along the segment before the surface splits what is left.
         let mut flux_w = segment.flux_w;
         let effects = self.limits.effects;
         if effects.absorption && segment.media.absorbs(self.tracer.scene()) {
             flux_w = flux_w * segment.media.transmittance(self.tracer.scene(), hit.distance_m);
         }
         let path_m = segment.path_m + hit.distance_m;
-        // Independent from event to event.
+        // Each event along a path samples a microfacet of its own, independently.
         let micro = self
             .limits
             .microfacets
@@ -244,6 +247,8 @@ impl<'a> PathTracer<'a> {
         let interaction =
             self.tracer
                 .interact_with(effects, &hit, segment.ray.direction, &segment.media, micro);
+
+        // Light that has not met a specular surface belongs to the direct layer; all later deposits are caustic light.
         let deposit_w = flux_w * interaction.deposit;
         if segment.is_straight {
             // Flux deposited at the first hit is direct light, and so is what a body around the light absorbs of it.
@@ -263,6 +268,8 @@ impl<'a> PathTracer<'a> {
             let arriving_w = self.channels.apply(deposit_w);
             arrive(arrival(&hit, segment, arriving_w, path_m), segment);
         }
+
+        // What is neither deposited nor sent on is booked under its cause, so that the ledger balances.
         let on_the_way_w = segment.flux_w - flux_w;
         self.book(Account::Absorbed, on_the_way_w + flux_w * interaction.absorbed);
         self.book(Account::SwitchedOff, flux_w * interaction.switched_off);
@@ -283,6 +290,7 @@ impl<'a> PathTracer<'a> {
         from: &Segment,
         floor_w: f64,
     ) {
+        // A branch that is not traced is booked under its cause, so that no flux goes missing from the ledger.
         let flux_w = incident_w * branch.share;
         if flux_w.max_channel() <= 0.0 {
             return;
@@ -299,6 +307,8 @@ impl<'a> PathTracer<'a> {
         if flux_w.luminance() < floor_w {
             return self.book(Account::Threshold, flux_w);
         }
+
+        // Smoothing groups tell apart paths over different faces of one body.
         let group = if self.keeps_vertices {
             self.tracer.smoothing_group(hit.object, hit.triangle)
         } else {

@@ -299,6 +299,7 @@ struct ItemBufferBuilder<'a> {
 
 impl ItemBufferBuilder<'_> {
     fn look(&self, light: usize) -> (LightReach, Option<VisibleLight>, ItemBufferStats) {
+        // A light with extent looks from several of its points; further ones are tried only while no caster is seen.
         let scene = self.aimer.tracer.scene();
         let casters: Arc<[usize]> = self.reach.casters(light).into();
         let places: Vec<(u32, Emitter)> = self.places(light).collect();
@@ -315,6 +316,8 @@ impl ItemBufferBuilder<'_> {
                 all.add(view);
             }
         }
+
+        // What any point sees, the light sees.
         let AllSeen {
             first,
             mut seen,
@@ -330,6 +333,8 @@ impl ItemBufferBuilder<'_> {
             list.sort_unstable();
             list.dedup();
         }
+
+        // Without a caster in sight there is nothing to launch, but what was tested is reported all the same.
         let mut sight = self.sight(light, &casters, seen);
         let Some(view) = first else {
             return (sight, None, look);
@@ -340,6 +345,8 @@ impl ItemBufferBuilder<'_> {
         if sight.seen.is_empty() {
             return (sight, None, look);
         }
+
+        // The ray density of suns follows the distance from the visible casters to their farthest receiver.
         let near = if visibly.is_empty() { &sight.seen } else { &visibly };
         let visible_light = VisibleLight {
             light,

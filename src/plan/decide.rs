@@ -22,6 +22,7 @@ pub struct LightReach {
 
 /// Decides every effect. `sights` is in the order of `Scene::lights`.
 pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> EffectPlan {
+    // The light pass is decided first: without it, no effect on its paths is simulated.
     let decision = Decision {
         scene,
         settings,
@@ -32,6 +33,8 @@ pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> 
     let on_paths = |effect, wanted: &dyn Fn(&Material) -> bool, none: &str| {
         decision.on_paths(effect, pass.on, wanted, none)
     };
+
+    // An effect on paths is on as soon as light may reach one surface that calls for it.
     let lets_through = |material: &Material| !material.surface.is_opaque();
     let absorbs = |material: &Material| {
         let volume = material.volume.as_ref();
@@ -333,6 +336,7 @@ impl Decision<'_> {
     }
 
     fn light_reason(&self, shines: bool, sight: Option<&LightReach>) -> String {
+        // The first obstacle on the way from the lamp to a receiver is the reason: those behind it do not matter.
         let Some(sight) = sight.filter(|_| self.caustic) else {
             return "the caustic layer is not asked for".into();
         };
@@ -356,6 +360,8 @@ impl Decision<'_> {
             };
             return why.into();
         }
+
+        // A plan is read at a glance, so that a few names stand for many.
         let names: Vec<String> = sight
             .seen
             .iter()

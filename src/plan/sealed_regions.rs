@@ -25,6 +25,7 @@ pub(super) struct Compartments {
 
 impl Compartments {
     pub(super) fn of(scene: &Scene) -> Self {
+        // Boxes rule out most pairs of a container and its contents before any triangle is tested.
         let bounds: Vec<Option<Bounds>> = scene.objects.iter().map(|object| object.bounds()).collect();
         let mut compartments = Self {
             objects: vec![Some(Vec::new()); scene.objects.len()],
@@ -49,6 +50,8 @@ impl Compartments {
                 .filter_map(|(light, source)| Some((light, extent(source, &bounds)?)))
                 .filter(|(_, place)| overlap(around, *place))
                 .collect();
+
+            // Only a watertight mesh has an inside. Tests of large ones would take longer than the rays that they save.
             let mesh = object.mesh();
             if (near.is_empty() && lamps.is_empty()) || mesh.triangles.len() > MAX_TRIANGLES {
                 continue;
@@ -57,6 +60,8 @@ impl Compartments {
             if !is_closed(&mesh.positions, &mesh.triangles) {
                 continue;
             }
+
+            // Winding numbers tell which side of the surface each object and light is on.
             compartments.encloses[container] = true;
             for (other, bounds) in near {
                 // Bounding boxes often overlap where surfaces do not.

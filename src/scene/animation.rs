@@ -81,7 +81,7 @@ impl Track {
     }
 }
 
-/// A node that moves, or that has a descendant that does.
+/// A placed node of the file, moving or not.
 #[derive(Clone, Debug)]
 pub struct ClipNode {
     /// glTF index.
@@ -185,8 +185,8 @@ impl Scene {
         (!ways.is_empty()).then(|| ways.join(", "))
     }
 
-    /// The scene at a time [s] after this one: waves advanced, nodes posed by their keyframes, surfaces that now meet set
-    /// apart. Whatever does not move is shared.
+    /// The scene at a time [s] after this one: waves advanced, nodes posed by their keyframes, surfaces that now meet
+    /// set apart. Whatever does not move is shared.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Self {
         let mut scene = self.clone();

@@ -117,6 +117,7 @@ impl PathPlan {
     /// # Errors
     /// Fewer than 2 keys; frames, field of view or coordinates out of range; an eye at its target.
     pub fn path(&self, location: &str) -> Result<CameraPath> {
+        // Values come from a file; within these ranges, frames are few enough to be kept and all cameras are finite.
         let Self {
             frames,
             vertical_fov_deg,
@@ -141,6 +142,8 @@ impl PathPlan {
                 "give coordinates in metres within the scene, and an angle in degrees",
             );
         }
+
+        // Eye and target may meet between two keys that keep them apart, so that frames are checked and not keys.
         let frames: Vec<Key> = (0..frames).map(|frame| at(keys, frame, frames)).collect();
         if let Some(frame) = frames.iter().position(|key| key.position_m == key.target_m) {
             return refused(

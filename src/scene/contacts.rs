@@ -18,8 +18,8 @@ use crate::error::Warning;
 use crate::geometry::enclosure::Bounds;
 use crate::geometry::{TriangleBvh, bits, bvh};
 
-/// Largest distance of surfaces that meet, in their coordinates [1]: a few roundings to single precision, in which files
-/// keep positions.
+/// Largest distance of surfaces that meet, in their coordinates [1]: a few roundings to single precision, in which
+/// files keep positions.
 const ROUNDING: f64 = 1.0 / (1 << 21) as f64;
 
 /// Coordinates count up to this many times those of the other, smaller triangle: a table does not meet what hovers over
@@ -65,8 +65,8 @@ struct Contact {
 /// Movements of vertices [m], by body and place.
 type Steps = HashMap<(usize, [u64; 3]), Vec<DVec3>>;
 
-/// Sets apart all surfaces that meet, but for objects that both stand as `before`, where that was done. Returns a warning
-/// of those that cover others.
+/// Sets apart all surfaces that meet, but for objects that both stand as `before`, where that was done. Returns a
+/// warning of those that cover others.
 pub fn set_apart(scene: &mut Scene, before: Option<&Scene>) -> Option<Warning> {
     let faces = faces(scene, before);
     let contacts = contacts(&faces);
@@ -87,6 +87,7 @@ pub fn set_apart(scene: &mut Scene, before: Option<&Scene>) -> Option<Warning> {
 
 /// All triangles within the bounding box of another object, one of the two not standing as `before`.
 fn faces(scene: &Scene, before: Option<&Scene>) -> Vec<Face> {
+    // Two objects that both stand as before were set apart then.
     let is_new = |object: usize| {
         let was = before.and_then(|before| before.objects.get(object));
         was.is_none_or(|was| !scene.objects[object].stands_as(was))
@@ -105,8 +106,12 @@ fn faces(scene: &Scene, before: Option<&Scene>) -> Vec<Face> {
         seen.insert((mesh.triangle_count(), first, bits(*low), bits(*high)))
     };
     let is_first: Vec<bool> = scene.objects.iter().zip(&boxes).map(is_first).collect();
+
+    // The boxes of objects stand in the hierarchy as degenerate triangles along their diagonals.
     let corners: Vec<[DVec3; 3]> = boxes.iter().map(|&(low, high)| [low, high, high]).collect();
     let near = TriangleBvh::build(&corners);
+
+    // Most objects and triangles are ruled out by their boxes, before anything is compared face by face.
     let of_object = |object: usize| {
         let is_near = |&(low, high): &Bounds| {
             !all_within(&near, (low, high), |slot| {
@@ -134,6 +139,8 @@ fn faces(scene: &Scene, before: Option<&Scene>) -> Vec<Face> {
         }
         faces
     };
+
+    // Faces stay in the order of objects whatever the threads, and with them what moves.
     (0..boxes.len())
         .into_par_iter()
         .flat_map_iter(of_object)
@@ -245,10 +252,13 @@ struct Movements {
 
 impl Movements {
     fn of(scene: &Scene, faces: &[Face], contacts: &[Contact]) -> Self {
+        // On the device, coordinates are rounded in proportion to the radius of the scene.
         let mut all = Self::default();
         let (low, high) = scene.bounds().unwrap_or_default();
         let device_m = DEVICE_STEP * 0.5 * (high - low).length();
         let is_solid = |face: usize| scene.material_of(faces[face].object).is_solid();
+
+        // Objects may meet in thousands of triangles; area and closedness are found once.
         let mut areas_m2 = HashMap::new();
         let mut closed = HashMap::new();
         for contact in contacts {
@@ -265,6 +275,8 @@ impl Movements {
                 let mesh = scene.objects[faces[face].object].mesh();
                 *closed.entry(Arc::as_ptr(mesh)).or_insert_with(|| is_closed(mesh))
             };
+
+            // A solid reaches into what it touches; of two alike, the smaller one moves.
             let mover = match (is_solid(first), is_solid(second)) {
                 (true, false) => first,
                 (false, true) => second,
@@ -275,9 +287,13 @@ impl Movements {
                 }
                 (false, false) => smaller,
             };
+
+            // The step exceeds the rounding of the contact, and that of the device unless that deforms a small object.
             let object = faces[mover].object;
             let (low, high) = scene.objects[object].bounds().unwrap_or_default();
             let step_m = (STEP * contact.tolerance_m).max(device_m.min(MAX_STEP * (high - low).length()));
+
+            // Of solids that face the same way, one lies within the other and withdraws from the common face.
             let is_within = contact.is_same_side && is_solid(first) && is_solid(second);
             let known = all.of_faces.entry(mover).or_default();
             *known = if is_within { -step_m } else { known.max(step_m) };

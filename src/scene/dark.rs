@@ -17,6 +17,7 @@ const RAISED: f64 = 1e-9;
 
 /// One warning for each lamp within an opaque body, and for each surface of which only the back is lit but not drawn.
 pub fn warnings(scene: &Scene) -> Vec<Warning> {
+    // Bulbs modelled as closed, opaque bodies keep the light of their lamp.
     let enclosed = scene.lights.iter().filter_map(|light| {
         let body = enclosing(scene, light.kind.position()?)?;
         Some(Warning::new(
@@ -29,6 +30,8 @@ pub fn warnings(scene: &Scene) -> Vec<Warning> {
         ))
     });
     let mut all: Vec<Warning> = enclosed.collect();
+
+    // Normals rule out nearly all surfaces; only what is left is worth a hierarchy and rays.
     let turned_away: Vec<usize> = (0..scene.objects.len())
         .filter(|&object| faces_no_light(scene, object))
         .collect();
@@ -39,6 +42,8 @@ pub fn warnings(scene: &Scene) -> Vec<Warning> {
     let corners =
         objects.flat_map(|mesh| (0..mesh.triangle_count()).map(move |triangle| mesh.corners(triangle)));
     let tree = TriangleBvh::build(&corners.collect::<Vec<_>>());
+
+    // A front that faces nothing while light reaches the back was turned the wrong way.
     let shows_its_dark_side = |object: &usize| {
         let mut places = sampled(scene, *object).into_iter();
         places

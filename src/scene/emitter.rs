@@ -64,10 +64,10 @@ impl EmitterKind {
         }
     }
 
-    /// Unit vector from a point [m] to the source, distance [m] (infinite for parallel light), and E at unit strength on
-    /// a surface there that faces the source; `None` at the source itself. A source that represents a patch of a surface
-    /// has the irradiance of a disc of its area [m²], which stays finite close by (Wallace, Elmquist and Haines, "A ray
-    /// tracing algorithm for progressive radiosity", SIGGRAPH 1989).
+    /// Unit vector from a point [m] to the source, distance [m] (infinite for parallel light), and E at unit strength
+    /// on a surface there that faces the source; `None` at the source itself. A source that represents a patch of a
+    /// surface has the irradiance of a disc of its area [m²], which stays finite close by (Wallace, Elmquist and
+    /// Haines, "A ray tracing algorithm for progressive radiosity", SIGGRAPH 1989).
     pub fn seen_from(&self, point: DVec3, patch_m2: f64) -> Option<(DVec3, f64, f64)> {
         if let Self::Parallel { direction } = *self {
             return Some((-direction, f64::INFINITY, 1.0));
@@ -191,6 +191,7 @@ impl<'a> EmitterSampler<'a> {
     }
 
     fn at(&self, square: Option<DVec2>) -> Option<Emitter> {
+        // Each sample stands for the whole light, so that the mean over samples has the power of the light.
         let (light, scene) = (self.light, self.scene);
         let strength = light.strength();
         let whole = |kind: EmitterKind, factor: f64| Emitter {
@@ -216,6 +217,7 @@ impl<'a> EmitterSampler<'a> {
                 size,
                 square,
             ) => {
+                // Every point of the disc shines as the whole spot does: the cone keeps its axis and its angles.
                 let offset = match (size, square) {
                     (LightSize::Radius { radius_m }, Some(square)) => {
                         let (x, y) = direction.any_orthonormal_pair();
@@ -253,6 +255,7 @@ impl<'a> EmitterSampler<'a> {
                 _,
                 square,
             ) => {
+                // Radiance times area is the intensity along the normal; a facet falls off by the cosine.
                 let normal = across.cross(down).try_normalize()?;
                 let place = match (shape, square) {
                     (_, None) => DVec2::ZERO,
@@ -263,6 +266,7 @@ impl<'a> EmitterSampler<'a> {
                 Some(whole(EmitterKind::Facet { position, normal }, self.area_m2()))
             }
             (LightKind::Surface { .. }, _, square) => {
+                // Where an image varies the radiance, a sample has that of its texel; the middle has the mean.
                 let surface = self.surface.as_ref()?;
                 let (kind, brightness) = surface.facet(square.unwrap_or(DVec2::splat(0.5)))?;
                 let brightness = brightness.filter(|_| square.is_some());
@@ -272,6 +276,7 @@ impl<'a> EmitterSampler<'a> {
                 })
             }
             (LightKind::Environment { .. }, _, square) => {
+                // Radiance over the density of its direction is E as if the whole sky shone from there.
                 let sample = scene.environment.as_ref()?.sample(square?)?;
                 Some(Emitter {
                     kind: EmitterKind::Parallel {

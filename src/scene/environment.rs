@@ -60,6 +60,7 @@ impl Environment {
     /// An image of `width` × `height` pixels of radiance [W/(m² sr)]; `None` if there are no pixels, their number does
     /// not match, or a value is negative or not finite.
     pub fn new(width: usize, height: usize, radiance: Vec<[f32; 3]>) -> Option<Self> {
+        // Importance sampling needs a density, which negative or infinite radiance has not.
         let is_light = |pixel: &[f32; 3]| pixel.iter().all(|channel| channel.is_finite() && *channel >= 0.0);
         if width == 0 || height == 0 || radiance.len() != width * height || !radiance.iter().all(is_light) {
             return None;
@@ -73,8 +74,12 @@ impl Environment {
             total: 0.0,
             smooth: SmoothIrradiance::default(),
         };
+
+        // Directions of columns are the same in all rows.
         let azimuth = |column: usize| ((column as f64 + 0.5) / width as f64 * TAU).sin_cos();
         let azimuths: Vec<(f64, f64)> = (0..width).map(azimuth).collect();
+
+        // One pass gives the marginal distribution of rows, that of the columns in each, and the irradiance.
         for row in 0..height {
             let solid_angle_sr = environment.pixel_solid_angle_sr(row);
             let mut sum = 0.0;
@@ -89,11 +94,16 @@ impl Environment {
                 along[1] += pixel;
                 along[2] += pixel * -ahead;
             }
+
+            // Of the first two bands of spherical harmonics, the clamped cosine leaves ∫L dω / 4, the mean over all
+            // normals, and ∫Lω dω / 2, the change with the normal.
             let smooth = &mut environment.smooth;
             smooth.mean += along[1] * (0.25 * solid_angle_sr);
             for ((sum, along), share) in smooth.by_normal.iter_mut().zip(along).zip([sine, cosine, sine]) {
                 *sum += along * (0.5 * solid_angle_sr * share);
             }
+
+            // The solid angle is constant along a row, so that luminance alone distributes its columns.
             if sum > 0.0 {
                 environment.columns[start..]
                     .iter_mut()
@@ -102,6 +112,8 @@ impl Environment {
             environment.total += sum * solid_angle_sr;
             environment.rows.push(environment.total);
         }
+
+        // A black image has no distribution; its rows stay 0.
         let total = environment.total;
         if total > 0.0 {
             environment.rows.iter_mut().for_each(|share| *share /= total);

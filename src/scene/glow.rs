@@ -16,8 +16,8 @@ const LOOKS: f64 = 1e6;
 /// Texels that are searched for the brightest of each triangle, over a whole mesh.
 const SEARCHED_TEXELS: f64 = 1.6e7;
 
-/// Radiance of a point relative to what its triangle's weight stands for, at most: a bright spot in a dark triangle makes
-/// no photon that outshines all others.
+/// Radiance of a point relative to what its triangle's weight stands for, at most: a bright spot in a dark triangle
+/// makes no photon that outshines all others.
 const MAX_CONTRAST: f64 = 16.0;
 
 /// Minimum weight of a triangle.
@@ -36,12 +36,15 @@ pub struct Glow {
 impl Glow {
     /// `None` if the image is black or the mesh lacks its texture coordinates.
     pub fn new(mesh: InScene, image: &TextureRef, texture: &Texture) -> Option<Self> {
+        // The more triangles, the fewer samples each, so that a fine mesh takes no longer.
         let most_steps = (LOOKS / mesh.triangle_count() as f64)
             .sqrt()
             .clamp(STEPS.0, STEPS.1);
         let triangles = (0..mesh.triangle_count()).into_par_iter();
         let means = triangles.map(|triangle| triangle_mean(mesh, (image, texture), triangle, most_steps));
         let means: Vec<LinearSrgb> = means.collect::<Option<_>>()?;
+
+        // Weights by area make the mean stand for the power of the whole surface.
         let (mut sum, mut area_m2) = (LinearSrgb::BLACK, 0.0);
         for (triangle, mean) in means.iter().enumerate() {
             let triangle_m2 = mesh.triangle_area_m2(triangle);
@@ -49,11 +52,14 @@ impl Glow {
             area_m2 += triangle_m2;
         }
         let mean = sum / area_m2;
+
+        // Triangles are sampled by their mean, or more often where that would make a rare, bright photon.
         let luminance = mean.luminance();
         let brightest = Brightest::new(mesh, image, texture);
         let weight = |(triangle, mean): (usize, &LinearSrgb)| {
             let mean = mean.luminance();
-            // No texel can call for more than the triangle has, which spares the search.
+
+            // Where not even the brightest texel of the image would raise the weight, none is searched for.
             let is_bright = MAX_CONTRAST * mean >= brightest.overall;
             let peak = if is_bright {
                 None

@@ -155,8 +155,8 @@ impl Scene {
             .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
-    /// Bounding box without objects that surround all others at a distance, such as a sky dome around a house [m]; `None`
-    /// without vertices.
+    /// Bounding box without objects that surround all others at a distance, such as a sky dome around a house [m];
+    /// `None` without vertices.
     pub fn inner_bounds(&self) -> Option<Bounds> {
         self.core(|next, all| (next.1 - next.0).min_element() > DWARFING * diagonal_m(all))
     }
@@ -264,6 +264,8 @@ impl Scene {
             text,
             "{origin_world:?}\n{materials:?}\n{textures:?}\n{lights:?}\n{environment:?}"
         );
+
+        // What does not fill a word is hashed byte by byte.
         let rest = &text.word[..text.filled];
         rest.iter().for_each(|&byte| text.hash.take(u64::from(byte)));
         text.hash.value()

@@ -79,6 +79,8 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
     const fn by_scene(file: &'static str, x: &'static str) -> Plot {
         Plot::new(file, [x, "relative_rmse"], &["scene"])
     }
+
+    // A hard scene may take far longer than others to its target, so that all bakes have a limit of time.
     let towards = |target: f64, limit_s: f64| BakeSettings {
         max_time_s: Some(limit_s),
         ..bench.at(auto(target), bench.side())
@@ -88,6 +90,8 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
     } else {
         &builtin::NAMES
     };
+
+    // Each scene has a reference of its own, and thus is a group.
     let mut groups = Vec::new();
     for &name in names {
         let scene = scene(name)?;
@@ -95,10 +99,14 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
         if scene.lights.iter().any(Light::has_extent) {
             continue;
         }
+
+        // Analytic maps come from another solver. Elsewhere, a bake to a far smaller error stands for the truth.
         let against = match Reference::analytic(&scene)? {
             Some(reference) => Against::Known(reference),
             None => Against::Bake(Arc::clone(&scene), Box::new(towards(0.002, 60.0))),
         };
+
+        // The default estimator is given targets; splats do not refine and are given densities.
         let variant = |estimator: &str, target, settings: BakeSettings| {
             let labels = vec![
                 name.into(),
@@ -166,6 +174,8 @@ pub(super) fn scaling(bench: &Bench) -> Result<Sweep> {
     const fn ladder(file: &'static str, y: &'static str) -> Plot {
         Plot::new(file, ["value", y], &["what"])
     }
+
+    // One quantity varies at a time: rays, triangles, texels, threads.
     let ring = scene("ring")?;
     // Too little memory to keep traced light for later changes.
     let thrifty = |settings: BakeSettings| BakeSettings {
@@ -176,16 +186,22 @@ pub(super) fn scaling(bench: &Bench) -> Result<Sweep> {
     let step = |what: &str, value: f64, scene: &Arc<Scene>, settings| {
         Variant::new(vec![what.into(), value.into()], scene, settings)
     };
+
+    // Rays per steradian alone: scene and maps stay the same.
     let mut variants = Vec::new();
     for &density in bench.some(&DENSITIES, 3) {
         variants.push(step("rays", density, &ring, thrifty(splat(density))));
     }
+
+    // Each subdivision has four times the triangles of the same ball, under the same light.
     for &levels in bench.some(&LEVELS, 3) {
         let mesh = shapes::sphere(DVec3::new(0.0, 0.8, 0.0), 0.5, levels);
         let ball = over_a_floor(0.6, ("ball", mesh), DVec3::new(0.0, 3.0, 0.0));
         let triangles = 20.0 * 4_f64.powi(levels as i32);
         variants.push(step("triangles", triangles, &ball, bench.at(usual.clone(), 256)));
     }
+
+    // Kernels of the same rays cover more texels as these shrink.
     for &side in bench.some(&SIDES, 3) {
         variants.push(step(
             "texels",
@@ -194,6 +210,8 @@ pub(super) fn scaling(bench: &Bench) -> Result<Sweep> {
             bench.at(usual.clone(), side),
         ));
     }
+
+    // Far more rays, beside which starting the threads does not count.
     for threads in [1, 2] {
         let settings = BakeSettings {
             threads,

@@ -37,8 +37,9 @@ pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
 
 /// Bakes the caustic layer of a scene with about `rays` rays ([`RAYS`]), divided evenly among the lights. Of the
 /// settings, map resolution (which must be fixed), seed, item buffer, depth, branch threshold, threads and the switches
-/// of effects apply. Each map's `error` is the texel's standard error [W/m²], and its `estimated_relative_rmse` is the
-/// noise: the root mean square of these over the mean. Bit-identical for any number of threads.
+/// of the light pass, of roughness and of lights with a size apply; it has no dispersion. Each map's `error` is the
+/// texel's standard error [W/m²], and its `estimated_relative_rmse` is the noise: the root mean square of these over
+/// the mean. Bit-identical for any number of threads.
 ///
 /// # Errors
 /// Settings or rays outside their ranges; an automatic map resolution; lights without finite power; threads that cannot
@@ -80,6 +81,7 @@ fn run(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<Bake> {
+    // Nothing specular is culled from the aim: a reference must not inherit what culling misses.
     let scene = tracer.scene();
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);
@@ -91,6 +93,8 @@ fn run(
     } else {
         &[]
     };
+
+    // Rough surfaces are sampled as microfacets. All lights add to the same maps, in one unit of flux.
     let is_rough = settings.effects.get(Effect::Roughness) != EffectSwitch::Off
         && scene.materials.iter().any(Material::is_rough);
     let run = Run {
@@ -110,6 +114,8 @@ fn run(
         done: AtomicU64::new(0),
         total: lights.len() as u64 * OF_A_LIGHT,
     };
+
+    // A reference that was cut off would pass for the truth, so that cancellation is an error.
     let mut result = Bake {
         stop_reason: if lights.is_empty() {
             StopReason::NothingToDo
@@ -131,6 +137,8 @@ fn run(
             .ledgers
             .push(report.ledger.report(name, run.unit, LinearSrgb::WHITE));
     }
+
+    // Both half sets of rays become the map and its standard error.
     result.maps = run
         .targets
         .iter()
@@ -195,6 +203,7 @@ impl Run<'_> {
 
     /// Traces both half sets of a light.
     fn light(&self, light: &VisibleLight) -> PassReport {
+        // A lamp with a size is the mean of points on it, each of which sends all of its light.
         let source = self.tracer.scene().lights[light.light].of_unit_strength();
         let has_places = self.sizes && source.has_extent();
         let places = if has_places { PLACES } else { 1 };
@@ -216,6 +225,8 @@ impl Run<'_> {
                 .and_then(|emitter| {
                     light.from_place(self.tracer, (self.item_buffer, CullMode::Reachable), &emitter)
                 });
+
+            // Progress counts points that send nothing to a caster, too.
             match there {
                 Some(there) => self.place(&there, rays),
                 None => {
@@ -232,12 +243,15 @@ impl Run<'_> {
 
     /// Traces a random ray, with its share of the flux, in each cell of a lattice that may see something specular.
     fn place(&self, light: &VisibleLight, rays: RaySet) -> PassReport {
+        // Flux of this set of rays: the light of one point, divided between points and half sets.
         let share = 1.0 / (HALVES * rays.places) as f64;
         let strength = self.tracer.scene().lights[light.light].strength() * share;
         let launch = light.launch.clone().scaled(strength);
         // Rays per steradian, or per square metre for a sun.
         let density =
             (self.rays_per_half / rays.places as f64).max(1.0) / light.item_buffer.marked_measure(&launch);
+
+        // One ray at a random place in each cell: strata leave less noise than independent rays.
         let lattice = Lattice {
             tracer: self.tracer,
             band: None,
@@ -251,6 +265,8 @@ impl Run<'_> {
             limits: self.limits,
             unit: self.unit,
         };
+
+        // A hit goes whole into its texel, so that no kernel blurs the reference. What meets no texel is unresolved.
         let rows = lattice.size.1;
         let of_row = |row: usize| {
             if self.control.is_cancelled() {

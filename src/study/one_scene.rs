@@ -45,12 +45,15 @@ pub fn convergence(
     densities: &[f64],
     reference: Option<Reference>,
 ) -> Sweep {
+    // Each estimator is judged with the sigma that suits it: none, or one footprint for splats.
     let at = |estimator: Estimator, density_per_sr| BakeSettings {
         estimator,
         density_per_sr,
         sigma: estimator.default_sigma(),
         ..settings.clone()
     };
+
+    // Without a reference, a bake that is much denser than all variants stands for the truth.
     let densest = densities.last().copied().unwrap_or(1.0) * SELF_REFERENCE_FACTOR;
     let finest = at(estimators.last().copied().unwrap_or(settings.estimator), densest);
     let variants = estimators.iter().flat_map(|&estimator| {
@@ -97,9 +100,12 @@ pub fn convergence(
 /// # Errors
 /// Settings outside their ranges.
 pub fn effects(scene: &Arc<Scene>, settings: &BakeSettings) -> Result<Sweep> {
+    // The planned bake is the reference of all others, and the first row.
     let plan = Baker::new(Arc::clone(scene))?.plan(settings)?;
     let planned = vec!["none".into(), "as planned".into()];
     let mut variants = vec![Variant::new(planned, scene, settings.clone())];
+
+    // The difference to a bake without an effect is what the effect contributes.
     for line in plan.effects.iter().filter(|line| line.on) {
         let name = line.effect.name();
         let without = BakeSettings {
@@ -154,12 +160,15 @@ const THIN_RAD: f64 = 0.05;
 /// # Errors
 /// A scene without dispersive light.
 pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> Result<Sweep> {
+    // Thin beams show the colours of a prism apart; other lamps would overlap them.
     let mut scene = scene.clone();
     let is_thin = |light: &Light| matches!(light.kind, LightKind::Spot { outer_cone_rad, .. } if outer_cone_rad < THIN_RAD);
     if scene.lights.iter().any(is_thin) {
         scene.lights.retain(is_thin);
     }
     let scene = Arc::new(scene);
+
+    // The paper's ways: each ray at every wavelength, or wavelengths that share the rays.
     let with = |estimator: Estimator, wavelengths, spectral_sampling| BakeSettings {
         estimator,
         sigma: estimator.default_sigma(),
@@ -184,7 +193,7 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
     let all = with(Estimator::Splat, Wavelengths::Continuous, None);
     add("stochastic", "continuous".into(), all);
 
-    // Bundles and photons.
+    // Bundles and photons, all to the same error, so that cost and colours depend on the wavelengths alone.
     let to = |target, wavelengths| BakeSettings {
         max_error: Some(target),
         error_metric: ErrorMetric::Rmse,
@@ -202,6 +211,8 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
         "continuous".into(),
         to(TARGET, Wavelengths::Continuous),
     );
+
+    // Without dispersion in the light pass, all variants would be the same bake.
     let finest = to(REFERENCE_TARGET, Wavelengths::Continuous);
     if !Baker::new(Arc::clone(&scene))?
         .plan(&finest)?

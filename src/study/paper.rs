@@ -1,4 +1,5 @@
-//! The table, figures and plates of the paper (Collins 1994, *Adaptive Splatting for Specular to Diffuse Light Transport*).
+//! The table, figures and plates of the paper (Collins 1994, *Adaptive Splatting for Specular to Diffuse Light
+//! Transport*).
 
 use std::sync::Arc;
 
@@ -107,6 +108,8 @@ pub(super) fn table1(bench: &Bench) -> Result<Sweep> {
         (79_577.5, 34_680, 53.27, 144.72),
         (795_774.7, 346_813, 379.22, 135.96),
     ];
+
+    // The paper tabulates the time of the eye pass, too, so that each variant is also rendered.
     let (scene, against) = scene_and_truth("ring")?;
     let mut variants = Vec::new();
     let mut add = |labels: Vec<Cell>, settings: BakeSettings| {
@@ -114,6 +117,8 @@ pub(super) fn table1(bench: &Bench) -> Result<Sweep> {
         let settings = bench.at(settings, bench.side());
         variants.push(Variant::new(labels, &scene, settings).seen(file, &scene.cameras[0]));
     };
+
+    // Measured rows stand beside those of the paper. Bundles have no counterpart there.
     for &(density, rays, light_pass_s, eye_pass_s) in bench.some(&TABLE, 2) {
         let (name, settings) = AS_PAPER;
         let paper = [Cell::from(rays), light_pass_s.into(), eye_pass_s.into()];
@@ -176,6 +181,8 @@ pub(super) fn sigma(bench: &Bench) -> Result<Sweep> {
     /// σ is in squared lengths. In units of half the side of a square of the footprint's area, instead of the radius of
     /// its disc, the same kernel has a σ that is larger by this factor.
     const PER_HALF_SIDE: f64 = 4.0 / std::f64::consts::PI;
+
+    // Jitter and point samples add noise that a wider kernel hides, so that sigma is varied with and without them.
     let (scene, against) = scene_and_truth("ring")?;
     let even = BakeSettings {
         rays: RayPlacement::Lattice,
@@ -265,6 +272,8 @@ pub(super) fn kernels(bench: &Bench) -> Result<Sweep> {
         ("gaussian 2", Kernel::Gaussian, Sigma::Constant(2.0)),
         ("gaussian adaptive", Kernel::Gaussian, Sigma::Adaptive),
     ];
+
+    // Every shape is combined with every footprint, on jittered and on even rays: their errors are not independent.
     let (scene, against) = scene_and_truth("ring")?;
     let mut variants = Vec::new();
     for (placement, rays) in [
@@ -394,6 +403,7 @@ fn hits(scene: &Arc<Scene>, density_per_sr: f64) -> Vec<(DVec2, f64)> {
 }
 
 pub(super) fn item_buffer(bench: &Bench) -> Result<Sweep> {
+    // Both item buffers launch jittered rays at the same densities, so that only the cells differ.
     let mut groups = Vec::new();
     for &name in bench.some(&["ring", "ball"], 1) {
         let (scene, against) = scene_and_truth(name)?;
@@ -427,6 +437,7 @@ pub(super) fn item_buffer(bench: &Bench) -> Result<Sweep> {
 }
 
 pub(super) fn pool_plates(bench: &Bench) -> Result<Sweep> {
+    // The same waves as displacement, as bumps on one polygon, and as meshes of rising resolution.
     let (mesh, against) = scene_and_truth("pool")?;
     let waves = mesh.materials.iter().find_map(|material| material.waves.clone());
     let Some(waves) = waves else {
@@ -445,6 +456,8 @@ pub(super) fn pool_plates(bench: &Bench) -> Result<Sweep> {
         parts::add(&mut coarse, "water", water, parts::dielectric("water", 1.333));
         waters.push((format!("mesh of {quads} × {quads} quads"), Arc::new(coarse)));
     }
+
+    // All are compared with displaced water, whose light the plates show from above and from beneath.
     let mut variants: Vec<Variant> = Vec::new();
     for (name, scene) in &waters {
         let labels = vec![name.clone().into(), Cell::Count(scene.triangle_count() as u64)];

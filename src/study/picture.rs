@@ -114,6 +114,7 @@ impl Image {
 /// Maps side by side in rows of `columns`, cropped to the lit part of the first and at its exposure. `None` without
 /// maps.
 pub fn sheet(file: String, caption: String, images: &[Image], columns: usize) -> Option<Picture> {
+    // One crop and one exposure for all maps, so that they can be compared.
     let first = images.first()?;
     let [across, down] = first.lit_part();
     let share = |place: usize, side: usize| place as f64 / side as f64;
@@ -124,6 +125,8 @@ pub fn sheet(file: String, caption: String, images: &[Image], columns: usize) ->
         .map(|(row, column)| first.values[row * first.width + column].luminance())
         .sum();
     let white = WHITE_OVER_MEAN * sum / (across.len() * down.len()) as f64;
+
+    // Maps are enlarged by a whole factor, so that all texels are squares of the same size.
     let scale = MIN_SIDE.div_ceil(across.len().max(down.len()));
     let cell = [across.len() * scale, down.len() * scale];
     let columns = columns.clamp(1, images.len());
@@ -131,6 +134,8 @@ pub fn sheet(file: String, caption: String, images: &[Image], columns: usize) ->
         columns * (cell[0] + GAP) - GAP,
         images.len().div_ceil(columns) * (cell[1] + GAP) - GAP,
     ];
+
+    // A map of another size is sampled at the same places of its surface as the first.
     let mut rgba = Vec::with_capacity(4 * size[0] * size[1]);
     for (y, x) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (y, x))) {
         let (inner_x, inner_y) = (x % (cell[0] + GAP), y % (cell[1] + GAP));

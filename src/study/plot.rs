@@ -116,6 +116,7 @@ impl Plot {
         svg: &mut String,
         curves: &[Curve],
     ) -> std::result::Result<(), DrawingAreaErrorKind<std::io::Error>> {
+        // Logarithmic axes make power laws of error and cost straight lines.
         let root = SVGBackend::with_string(svg, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
         let (x, y) = (range(curves, |point| point.0), range(curves, |point| point.1));
@@ -137,6 +138,8 @@ impl Plot {
                 false => tick(*value),
             })
             .draw()?;
+
+        // Points mark what was measured; the lines between them only lead the eye.
         for (index, curve) in curves.iter().enumerate() {
             let colour = COLOURS[index % COLOURS.len()];
             // When colours repeat, lines become thinner.

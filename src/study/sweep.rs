@@ -66,7 +66,7 @@ pub enum Against {
     Nothing,
     /// A known map.
     Known(Reference),
-    /// All maps of another bake. If that has a target error but stops before it is known to 1 %, there is no reference.
+    /// All maps of another bake. If that has a target error and stops before it is met, there is no reference.
     Bake(Arc<Scene>, Box<BakeSettings>),
 }
 
@@ -303,6 +303,7 @@ impl Sweep {
     /// # Errors
     /// Errors of a bake; a reference that does not fit; cancellation.
     pub fn run(&self, bench: &Bench) -> Result<StudyResult> {
+        // Labels of variants come before what is measured on them.
         let mut table = Table {
             columns: self.labels.to_vec(),
             rows: Vec::new(),
@@ -310,6 +311,8 @@ impl Sweep {
         table
             .columns
             .extend(self.columns.iter().map(|column| column.name));
+
+        // A reference may be a long bake, so that the variants of a group share it.
         let (mut pictures, mut sheets) = (Vec::new(), Vec::new());
         for group in &self.groups {
             let reference = group.against.reference(bench)?;
@@ -318,10 +321,14 @@ impl Sweep {
                 table.rows.push(row);
             }
         }
+
+        // Sheets compare maps of several variants, so that they are drawn once all are baked.
         for (file, images, captions) in sheets {
             let captions = format!("In rows of {}: {captions}.", self.sheet_columns);
             pictures.extend(picture::sheet(file, captions, &images, self.sheet_columns));
         }
+
+        // A curve connects rows, so that plots need the whole table.
         let curves = |plot: &'static Plot| (plot, plot.curves(&table));
         let plots: Vec<_> = self.plots.iter().map(curves).collect();
         Ok(StudyResult {
@@ -344,6 +351,7 @@ impl Sweep {
         pictures: &mut Vec<Picture>,
         sheets: &mut Vec<Sheet>,
     ) -> Result<Vec<Cell>> {
+        // The median of several bakes is robust against other work of the machine.
         let mut result = bench.bake(&variant.scene, &variant.settings)?;
         let mut cpu_s = vec![light_pass_cpu_s(&result)];
         for _ in 1..self.repeats {
@@ -353,6 +361,8 @@ impl Sweep {
         if let Some(estimate) = variant.estimate {
             result = estimate(variant, result);
         }
+
+        // Views show the maps that are measured.
         let mut eye_pass_cpu_s = None;
         for (file, camera) in &variant.views {
             let request = (file.clone(), variant.caption());
@@ -360,6 +370,8 @@ impl Sweep {
             pictures.push(picture);
             *eye_pass_cpu_s.get_or_insert(0.0) += cpu_s;
         }
+
+        // A variant may transform its maps, so that it is compared after that.
         let pairs = pairs(reference, &result)?;
         let measured = Measured {
             variant,
@@ -371,6 +383,8 @@ impl Sweep {
             cpu_s: cpu_s[(cpu_s.len() - 1) / 2],
             eye_pass_cpu_s,
         };
+
+        // Pictures of differences stand alone, maps are collected in sheets.
         if let Some((file, found)) = variant.difference.clone().zip(measured.difference()) {
             pictures.extend(picture::difference(file, variant.caption(), &found));
         }

@@ -2,8 +2,8 @@
 //! object space, below a hierarchy over these instances. An object that is moved becomes an instance, so no triangle
 //! hierarchy is rebuilt.
 //!
-//! An instance's triangles are found by the mesh's hierarchy and met as placed in the scene, so that every hit is the one
-//! that a copy of the mesh would give, to the last bit.
+//! An instance's triangles are found by the mesh's hierarchy and met as placed in the scene, so that every hit is the
+//! one that a copy of the mesh would give, to the last bit.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -112,6 +112,7 @@ impl Hierarchy {
 
     /// Replaces the instances. A copied object that becomes an instance counts as moved.
     fn with_instances(&self, scene: &Scene, is_instance: &[bool]) -> Self {
+        // Hierarchies of known meshes are kept. A new one is built once, for all instances of its mesh.
         let known = self.meshes.iter();
         let known: HashMap<_, _> = known.map(|shared| (Arc::as_ptr(&shared.mesh), shared)).collect();
         let (mut meshes, mut places) = (Vec::new(), HashMap::new());
@@ -134,8 +135,13 @@ impl Hierarchy {
         };
         let objects = (0..is_instance.len()).filter(|&object| is_instance[object]);
         let instances: Vec<Instance> = objects.map(&mut instance).collect();
+
+        // Copies of moved objects stay in the triangle hierarchy and are skipped: that is cheaper than to build it
+        // anew.
         let copied = self.copied.objects.iter().copied();
         let moved = copied.filter(|&object| is_instance[object]).collect();
+
+        // The frame encloses all objects, so that devices use one set of single-precision coordinates.
         let bounds = scene.objects.iter().filter_map(Object::bounds);
         let corners: Vec<DVec3> = bounds.flat_map(|(low, high)| [low, high]).collect();
         let frame = Frame::around(corners.iter());
@@ -157,8 +163,8 @@ impl Hierarchy {
     }
 
     /// Closest hit for which `is_there` holds; among hits at the same distance, that of the lowest object and triangle.
-    /// Of two faces of an object that lie back to back, the one that faces the ray. Never the copied triangle in the slot
-    /// that the ray `left`.
+    /// Of two faces of an object that lie back to back, the one that faces the ray. Never the copied triangle in the
+    /// slot that the ray `left`.
     #[inline]
     pub(super) fn closest(
         &self,
@@ -166,6 +172,7 @@ impl Hierarchy {
         left: u32,
         is_there: impl Fn(usize, usize, [f64; 3]) -> bool,
     ) -> Option<(RayHit, Found<'_>)> {
+        // Hits within rounding of the nearest stay candidates, since faces back to back lie at the same distance.
         let sheared = ShearedRay::new(ray);
         let mut best: Option<(RayHit, Found)> = None;
         let mut limit_m = f64::INFINITY;
@@ -174,6 +181,9 @@ impl Hierarchy {
             let Some((distance_m, barycentric)) = hit.filter(|(distance_m, _)| *distance_m <= limit_m) else {
                 return Some(f64::INFINITY);
             };
+
+            // Ties go to the face that looks at the ray, or else to the lowest object and triangle, never to the order
+            // of traversal.
             let (object, triangle) = self.triangle(found);
             let is_first = |(hit, known): &(RayHit, Found)| {
                 let is_before =
@@ -183,6 +193,8 @@ impl Hierarchy {
                 let facing = known.and_then(|known| which_faces(ray.direction, corners, &known));
                 facing.unwrap_or_else(is_before)
             };
+
+            // The alpha mask costs a look-up in a texture, and is tested only for a hit that would win.
             let is_nearer = best.as_ref().is_none_or(is_first);
             let is_there = || is_there(object as usize, triangle as usize, barycentric);
             if !is_nearer || self.is_stale((object, found)) || !is_there() {

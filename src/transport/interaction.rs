@@ -113,8 +113,8 @@ struct ScatteredDirection {
 }
 
 impl SurfaceHit {
-    /// The triangle's normal and the one for scattering, on the side of a ray along the unit vector `incident`: where the
-    /// shading normal faces away from the ray, both are the triangle's.
+    /// The triangle's normal and the one for scattering, on the side of a ray along the unit vector `incident`: where
+    /// the shading normal faces away from the ray, both are the triangle's.
     pub fn normals_towards(&self, incident: DVec3) -> [DVec3; 2] {
         let frame = HitFrame::new(self, incident);
         [frame.geometric, frame.shading]
@@ -411,25 +411,31 @@ impl Tracer {
         if is_rough { roughness * roughness } else { 0.0 }
     }
 
-    /// Splits light. Fractions of branches outside `effects` are `switched_off`; without textures, the material's factor
-    /// alone tints. `micro` selects the microfacet of a rough surface by a point of the unit square; without it, or
-    /// without lobes among the effects, rough surfaces are smooth.
+    /// Splits light. Fractions of branches outside `effects` are `switched_off`; without textures, the material's
+    /// factor alone tints. `micro` selects the microfacet of a rough surface by a point of the unit square; without it,
+    /// or without lobes among the effects, rough surfaces are smooth.
     #[inline(always)]
     pub fn meet(&self, effects: EffectSet, micro: Option<DVec2>, meeting: &mut Meeting) {
         let &mut Meeting {
             hit, incident, media, ..
         } = meeting;
+
+        // The mixture of surface classes is looked up only where classes or roughness vary over the surface.
         let material = self.scene().material_of(hit.object);
         let place = (hit.triangle, hit.barycentric);
         let is_varied = material.surface == SurfaceKind::Varied;
         let varies = is_varied || (material.variation.is_some() && material.surface.is_specular());
         let mixture = varies.then(|| self.mixture(hit.object, place, effects.textures));
+
+        // Light scatters at one microfacet of the rough surface; squared roughness is the α of its GGX distribution.
         let roughness = mixture.map_or(material.roughness, |mixture| mixture.roughness);
         let is_rough = material.surface.is_specular() && roughness > SMOOTH_ROUGHNESS;
         meeting.frame.micro = micro.filter(|_| effects.lobes && is_rough).map(|point| Facet {
             alpha: roughness * roughness,
             point,
         });
+
+        // Fresnel's equations split the flux. What is neither reflected nor transmitted is deposited or absorbed.
         match material.surface {
             SurfaceKind::Diffuse => meeting.deposit = LinearSrgb::WHITE,
             SurfaceKind::Mirror => {
@@ -506,6 +512,8 @@ impl Tracer {
         let &mut Meeting {
             hit, incident, media, ..
         } = meeting;
+
+        // Both indices follow from the bodies that the path is inside of, not from the material alone.
         let is_front = meeting.frame.front;
         let body = self.scene().body_of(hit.object);
         let beyond = if is_front {
@@ -522,6 +530,8 @@ impl Tracer {
             // Where bodies overlap, the one entered last is the medium until it is left.
             (media.ior(self.scene()), beyond.ior(self.scene()))
         };
+
+        // Beyond the critical angle all light is reflected.
         let eta = ior_far / ior_near;
         let Some(scattered) = meeting.frame.refracted(incident, eta) else {
             meeting.through = BehindSurface::Unreachable;
@@ -532,6 +542,8 @@ impl Tracer {
             media: beyond,
             ior_ratio: ior_near / ior_far,
         };
+
+        // Fresnel reflectance splits the flux, and the tint absorbs part of what enters.
         let reflectance = fresnel::dielectric_reflectance(meeting.frame.cos_incident(incident), eta);
         if reflectance > 0.0 {
             meeting.add_reflection(effects, LinearSrgb::grey(reflectance));

@@ -10,9 +10,9 @@ use glam::DVec3;
 const CAPACITY: usize = 8;
 
 /// Bodies that the path is inside of, each by the object that stands for it, innermost last. Entering a body pushes it,
-/// leaving it removes its topmost entry. The medium is the one on top, or vacuum when empty. Where bodies overlap, the medium is thus the one entered
-/// last, and leaving the other one within it does not refract. A body beyond the capacity is not recorded: the path
-/// then leaves it into the medium on top.
+/// leaving it removes its topmost entry. The medium is the one on top, or vacuum when empty. Where bodies overlap, the
+/// medium is thus the one entered last, and leaving the other one within it does not refract. A body beyond the
+/// capacity is not recorded: the path then leaves it into the medium on top.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MediumStack {
     objects: [u32; CAPACITY],
@@ -99,6 +99,7 @@ const MAX_CROSSINGS: usize = 100_000;
 /// Media around a point, outermost first: bodies that an upward ray leaves more often than it enters. Upward, so that
 /// an open sheet of water with its normals up counts as the water below it.
 pub fn media_at(tracer: &Tracer, point: DVec3) -> MediumStack {
+    // Crossings are counted by body: an entry on the way cancels the exit that follows it.
     let scene = tracer.scene();
     let mut entered = vec![0u32; scene.objects.len()];
     let mut left_from_inside = Vec::new();

@@ -32,6 +32,8 @@ pub fn sharp_edges(mesh: InScene) -> Vec<[DVec3; 2]> {
     if mesh.triangle_count() > MAX_TRIANGLES {
         return Vec::new();
     }
+
+    // Vertices are welded by position, since normals and texture coordinates split them.
     let point_of = numbered(mesh.positions().map(bits));
     let mut points: Vec<DVec3> = Vec::new();
     for (position, point) in mesh.positions().zip(&point_of) {
@@ -55,6 +57,8 @@ pub fn sharp_edges(mesh: InScene) -> Vec<[DVec3; 2]> {
             edge.is_crease |= edge.normal.dot(normal) < SAME_SIDE;
         }
     }
+
+    // An edge of a single triangle is a border; one between triangles that face different ways is a crease.
     let is_sharp = |edge: &JoinedEdge| edge.count == 1 || edge.is_crease;
     let sharp = edges.iter().filter(|(_, edge)| is_sharp(edge));
     let ends: Vec<[DVec3; 2]> = sharp

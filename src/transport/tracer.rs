@@ -358,9 +358,14 @@ impl Tracer {
     fn surface_with(&self, hit: &RayHit, corners: &[DVec3; 3], slot: u32) -> SurfaceHit {
         let (object, triangle) = (hit.object as usize, hit.triangle as usize);
         let mesh = self.scene.objects[object].in_scene();
+
+        // The point lies on the triangle, not on the ray, and its rounding error is bounded: rays that leave are offset
+        // by it.
         let (point, point_error) = ray::point_with_error(corners, hit.barycentric);
         let [a, b, c] = *corners;
         let geometric_normal = (b - a).cross(c - a).normalize_or_zero();
+
+        // Vertex normals that cancel have no direction; the flat normal stands in.
         let [a, b, c] = mesh.corner_normals(triangle);
         let [wa, wb, wc] = hit.barycentric;
         let interpolated_normal = (a * wa + b * wb + c * wc)
@@ -381,7 +386,7 @@ impl Tracer {
         if !self.is_bumpy(object) {
             return flat;
         }
-        // Only a copy has an address: the usual hit is built in place.
+        // The gradient borrows a copy of the hit, so that the usual one needs no address and is built in place.
         let gradient = self.bump_gradient(&{ flat });
         SurfaceHit {
             shading_normal: bend::bent(interpolated_normal, gradient),

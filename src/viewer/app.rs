@@ -143,12 +143,15 @@ impl App {
     /// # Errors
     /// As [`Model::new`].
     pub fn new(options: &ViewerOptions, proxy: EventLoopProxy<UserEvent>) -> Result<Self> {
+        // Threads wake the event loop, which otherwise sleeps until there is input.
         let of_baker = proxy.clone();
         let wake = &Wake::new(move || {
             // Fails only once the event loop has ended.
             let _ = of_baker.send_event(UserEvent::Baker);
         });
         let model = Model::new(options, wake)?;
+
+        // Window and device follow with the first event, as windows can be opened only while the event loop runs.
         Ok(Self {
             exposure: AutoExposure::new(options.exposure_stops.is_none() && !model.exposure_is_kept),
             exposed: Instant::now(),
@@ -241,6 +244,7 @@ impl App {
 
     /// Recreates window and device, unless they were lost too often.
     fn recover(&mut self, event_loop: &ActiveEventLoop) {
+        // A lost device tells its reason, a lost surface does not.
         let reason = self
             .graphics
             .as_ref()
@@ -256,6 +260,8 @@ impl App {
             .log
             .write("device_lost", json!({"reason": reason.to_string()}));
         log::warn!("{reason}");
+
+        // The new window has the size of the old one; keys and mouse that were held there count as released.
         if let Some(graphics) = self.graphics.take() {
             let window = graphics.window();
             let size = window.inner_size().to_logical(window.scale_factor());
@@ -263,6 +269,8 @@ impl App {
         }
         self.stop_looking();
         self.model.navigator.stop();
+
+        // A driver that fails again and again would reopen the window without end.
         let now = Instant::now();
         self.losses
             .retain(|loss| now.duration_since(*loss) < LOSSES_WITHIN);
@@ -271,6 +279,8 @@ impl App {
             self.fail(event_loop, reason);
             return;
         }
+
+        // Nothing of the old device survives, so that everything is uploaded anew.
         self.open(event_loop);
         if self.graphics.is_some() {
             self.notice = Some(format!("The graphics device was lost and came back: {reason}"));
@@ -294,12 +304,15 @@ impl App {
 
     /// Handles input, draws and presents one frame.
     fn redraw(&mut self, event_loop: &ActiveEventLoop) {
+        // News of all threads comes first, so that the frame shows the newest camera, scene and maps.
         self.fly();
         self.poll_files();
         if self.model.poll() && self.is_software() {
             self.model.worker.look_away(LEVEL_OF_SOFTWARE);
         }
         self.report_chains();
+
+        // The panel runs before the picture is drawn: a dragged slider changes the picture of the same frame.
         let Some((mut painting, commands)) = self.run_interface() else {
             return;
         };
@@ -310,6 +323,8 @@ impl App {
             // Handles and legends were laid out before this change.
             self.request_redraw();
         }
+
+        // Commands are applied before drawing; those that need the window wait until the frame is shown.
         let of_window = self.model.act(commands, Instant::now());
         let before = std::mem::replace(&mut self.shown, self.model.maps_shown());
         if before.quantity != self.shown.quantity {
@@ -320,6 +335,8 @@ impl App {
         if of_window.contains(&Command::MeasureExposure) {
             self.exposure.ask();
         }
+
+        // A picture that cannot be drawn leaves a notice, and the panel stays usable.
         if let Err(error) = self.draw_picture() {
             self.tell_fault(&error);
         }
@@ -334,6 +351,7 @@ impl App {
         {
             self.tell_fault(&error);
         }
+
         for command in of_window {
             match command {
                 Command::Browse => self.ask_for_file(Choice::Open),
@@ -352,11 +370,14 @@ impl App {
         self.notice = Some(sentence);
     }
 
-    /// Runs panel and overlays in egui. Returns the commands in the order in which they are to be applied.
+    /// Runs panel and overlays in egui. Returns the commands of both and of keys; [`Model::act`] orders them.
     fn run_interface(&mut self) -> Option<(Painting, Vec<Command>)> {
+        // The panel tells of a lost device for a while. Lights that the mouse drags are edited like typed numbers.
         let lost = self.losses.last();
         self.model.picture.lost_device = lost.is_some_and(|loss| loss.elapsed() < LOSSES_WITHIN);
         let mut commands: Vec<Command> = self.model.placed().map(Command::Edit).into_iter().collect();
+
+        // The panel takes its width, the picture what is left, and marks are drawn over the picture.
         let graphics = self.graphics.as_mut()?;
         let (window, picture) = (Arc::clone(graphics.window()), graphics.main.id);
         let beside = graphics.beside.as_ref().map(|beside| beside.id);
@@ -384,6 +405,8 @@ impl App {
             commands.extend(pulled.map(Command::Edit));
         });
         commands.append(&mut self.pressed);
+
+        // The log tells where controls are, so that scripts can click them.
         if let Some(controls) = &painting.moved_controls {
             let control = |c: &super::interface::Control| json!({"role": c.role, "name": c.name, "rect_pixels": c.rect});
             let controls: Vec<Value> = controls.iter().map(control).collect();
@@ -399,10 +422,13 @@ impl App {
 
     /// Schedules the next frame.
     fn schedule(&mut self, event_loop: &ActiveEventLoop, shown: FrameOutcome, repaint_after: Duration) {
+        // A software rasterizer shares the cores with the bake, which pauses while the camera moves.
         let now = Instant::now();
         if self.is_software() && (self.model.is_moving() || self.looking_from.is_some()) {
             self.model.worker.hold(BAKE_WAITS);
         }
+
+        // A moving picture is followed by the next one at once; the window sleeps as long as nothing changes.
         let wait = match shown {
             FrameOutcome::Broken => {
                 self.recover(event_loop);
@@ -419,6 +445,8 @@ impl App {
             FrameOutcome::Yes if self.model.state.is_working() => repaint_after.min(BAKING_FRAME),
             FrameOutcome::Yes => repaint_after,
         };
+
+        // The GPU time of a picture arrives after it, and needs another frame to be shown.
         let is_report_due = self.reports_due > 0 && shown == FrameOutcome::Yes;
         let wait = if is_report_due {
             wait.min(REPORT_AFTER)
@@ -428,6 +456,8 @@ impl App {
         if shown == FrameOutcome::Yes {
             self.frames += 1;
         }
+
+        // The event loop wakes the window when the next frame or the next task of the model is due.
         if wait.is_zero() {
             self.wake_at = None;
             self.request_redraw();
@@ -437,10 +467,13 @@ impl App {
             .into_iter()
             .flatten()
             .min();
+
         // A frame that could not be presented is not idle.
         let is_working = self.model.state.is_working() || self.is_refining || is_report_due;
         let is_coming = self.is_exposing() || self.warm_up.is_coming();
         let is_working = is_working || shown == FrameOutcome::Later || self.model.is_moving() || is_coming;
+
+        // The log tells once per picture that the window has come to rest.
         if self.rested_at != self.pictures && !is_working {
             self.rested_at = self.pictures;
             let (pictures, frames) = (self.pictures, self.frames);
@@ -489,6 +522,7 @@ impl ApplicationHandler<UserEvent> for App {
     }
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, id: WindowId, event: WindowEvent) {
+        // A window that was replaced after the loss of its device may still send events.
         let Some(graphics) = &mut self.graphics else {
             return;
         };
@@ -496,13 +530,18 @@ impl ApplicationHandler<UserEvent> for App {
         if window.id() != id {
             return;
         }
+
+        // Input pauses the refinement of the picture: the response does not wait for a long frame.
         if is_by_hand(&event) {
             self.pace.touch(Instant::now());
         }
+
         // egui asks for another frame after each frame; `schedule` decides that here.
         if graphics.interface.on_event(&window, &event) && event != WindowEvent::RedrawRequested {
             window.request_redraw();
         }
+
+        // Handlers of keys and pointer check that no widget takes the event.
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => self.close(event_loop),
             WindowEvent::RedrawRequested if event_loop.exiting() => {}

@@ -1,5 +1,5 @@
-//! Maps to compare with: earlier ones that the user kept, or those of a folder. The right part of the picture shows them
-//! from the same camera and with the same colours.
+//! Maps to compare with: earlier ones that the user kept, or those of a folder. The right part of the picture shows
+//! them from the same camera and with the same colours.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -101,6 +101,7 @@ pub fn show(
     (beside, reference): (egui::TextureId, &SavedMaps),
 ) {
     let line = |share: f32| picture.left() + share * picture.width();
+
     // The divider follows the drag and stays within the picture.
     let grip = Rect::from_center_size(
         pos2(line(*divider), picture.center().y),
@@ -114,6 +115,7 @@ pub fn show(
     if response.dragged() && picture.width() > 0.0 {
         *divider = (*divider + response.drag_delta().x / picture.width()).clamp(LEAST, 1.0 - LEAST);
     }
+
     // The reference covers the part to the right of it.
     let x = line(*divider);
     let right = Rect::from_min_max(pos2(x, picture.top()), picture.max);
@@ -121,6 +123,7 @@ pub fn show(
     let painter = ui.painter().with_clip_rect(picture);
     painter.image(beside, right, part, Color32::WHITE);
     painter.vline(x, picture.y_range(), Stroke::new(2.0, Color32::from_gray(235)));
+
     // Labels on both sides say which maps are which.
     let say = |at: egui::Pos2, align: Align2, text: &str| {
         let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), Color32::WHITE);

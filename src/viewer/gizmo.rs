@@ -192,6 +192,7 @@ impl Gizmo {
         (handle, pose): (Handle, &Pose),
         at: Pos2,
     ) -> Option<Edit> {
+        // Handles beyond the picture lie under the panel; a drag that is in progress may leave the picture.
         let rect = Rect::from_center_size(at, vec2(2.0 * REACH, 2.0 * REACH));
         if !lens.picture.contains_rect(rect) && self.grip.is_none() {
             return None;
@@ -200,6 +201,8 @@ impl Gizmo {
         let response = ui.interact(rect, ui.scope_id().with(name), Sense::drag());
         response.widget_info(|| WidgetInfo::slider(true, 0.0, name));
         self.is_hot |= response.hovered() || response.dragged();
+
+        // A drag begins where the button was pressed, not where the pointer was once it counted as a drag.
         let pointer = response.interact_pointer_pos()?;
         if response.drag_started() {
             let pressed = ui.input(|input| input.pointer.press_origin());
@@ -211,6 +214,8 @@ impl Gizmo {
                 begun,
             });
         }
+
+        // Edits are relative to the pose at the start of the drag: rounding errors do not add up.
         let grip = self.grip.filter(|grip| grip.handle == handle)?;
         if response.drag_stopped() {
             self.grip = None;

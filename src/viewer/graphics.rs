@@ -229,6 +229,8 @@ impl Graphics {
             .create_window(attributes)
             .map_err(|error| window_error(&error.to_string()))?;
         let window = Arc::new(window);
+
+        // The surface comes before the adapter, which has to be able to present to it.
         let display = Box::new(event_loop.owned_display_handle());
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_with_display_handle_from_env(
             display,
@@ -237,6 +239,8 @@ impl Graphics {
             .create_surface(Arc::clone(&window))
             .map_err(|error| window_error(&error.to_string()))?;
         let gpu = Gpu::for_surface(instance, &surface)?;
+
+        // egui's pipelines are made for the format of the surface.
         let screen = Screen::new(Arc::clone(&window), surface, &gpu)?;
         let mut interface = Interface::new(event_loop, &window, proxy, &gpu.device, screen.config.format);
         let main = Canvas::new(&gpu, &mut interface.renderer, scene)?;
@@ -439,8 +443,8 @@ impl Screen {
         }
     }
 
-    /// Acquires the next frame; reconfigures or recreates the surface once if that may help. Without a frame, tells what
-    /// to do.
+    /// Acquires the next frame; reconfigures or recreates the surface once if that may help. Without a frame, tells
+    /// what to do.
     fn acquire(&mut self, gpu: &Gpu) -> std::result::Result<wgpu::SurfaceTexture, FrameOutcome> {
         for _ in 0..2 {
             if !self.has_area {

@@ -105,19 +105,22 @@ impl Interface {
         Some(found)
     }
 
-    /// Paints over the whole of a target, given with its size [pixels]. Must be called for every painting, even if there
-    /// is no target: egui sends textures only once.
+    /// Paints over the whole of a target, given with its size [pixels]. Must be called for every painting, even if
+    /// there is no target: egui sends textures only once.
     pub fn paint(
         &mut self,
         gpu: &Gpu,
         painting: &mut Painting,
         target: Option<(wgpu::TextureView, [u32; 2])>,
     ) {
+        // New textures are uploaded before the draw that reads them, old ones are freed after it.
         for (id, deltas) in painting.textures.set.drain() {
             for delta in &deltas {
                 self.renderer.update_texture(&gpu.device, &gpu.queue, id, delta);
             }
         }
+
+        // Buffers are filled by commands that are submitted before the pass.
         if let Some((target, size_in_pixels)) = target {
             let descriptor = egui_wgpu::ScreenDescriptor {
                 size_in_pixels,
@@ -135,6 +138,7 @@ impl Interface {
             renderer.render(&mut pass.forget_lifetime(), primitives, &descriptor);
             gpu.queue.submit(before.into_iter().chain([encoder.finish()]));
         }
+
         for id in painting.textures.free.drain() {
             self.renderer.free_texture(&id);
         }

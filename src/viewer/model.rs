@@ -133,9 +133,12 @@ impl Model {
     /// # Errors
     /// The event log cannot be written; the system cannot create a thread.
     pub fn new(options: &ViewerOptions, wake: &Wake) -> Result<Self> {
+        // Threads of the bake give way to the window, which would stutter otherwise.
         let scene = Arc::clone(&options.scene);
         let make_baker = |scene| Ok(Baker::new(scene)?.with_thread_start(background::give_way));
         let worker = Worker::spawn(make_baker, wake)?;
+
+        // Maps given at the start count as those of request 0: they stay until something changes.
         let wanted = BakeRequest::new(Arc::clone(&scene), options.settings.clone());
         let mut model = Self {
             navigator: Navigator::new(&scene, options.camera.as_deref()),
@@ -172,6 +175,8 @@ impl Model {
             edits: EditedScene::new(scene),
             playback: Playback::default(),
         };
+
+        // Saved state is restored before the first bake, which would use other settings otherwise.
         model.choices.display.exposure_stops = options.exposure_stops.unwrap_or(0.0);
         model.begin(options);
         if options.maps.is_none() {
@@ -307,11 +312,14 @@ impl Model {
         if self.exporter.poll() {
             self.log.write_export(&self.exporter.state);
         }
+
         // Reads the state first: the next call, for which the thread wakes the window, takes maps that arrive in
         // between.
         let state = self.worker.state();
         let mut has_maps = false;
         let level = self.worker.take_level();
+
+        // Maps of an earlier scene are dropped, as are coarse ones of a moment while time runs.
         let is_wanted = |level: &BakedLevel| {
             level.serial >= self.first_request && (level.is_final || !self.playback.is_playing)
         };
@@ -331,9 +339,12 @@ impl Model {
                 self.worth = None;
             }
         }
+
         if let Some(worth) = self.worker.take_worth() {
             has_maps |= self.take_worth(worth);
         }
+
+        // The log has one line per change of the state, not one per step of its progress.
         if std::mem::discriminant(&state) != std::mem::discriminant(&self.state) {
             match &state {
                 BakeState::Cancelled => self.log.write("cancelled", Value::Null),
@@ -347,6 +358,8 @@ impl Model {
                 | BakeState::Done => {}
             }
         }
+
+        // What depends on scene and maps follows them: probe, path preview, pending tasks and comparison.
         self.state = state;
         self.poll_probe(has_maps);
         self.poll_sketch();

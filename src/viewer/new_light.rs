@@ -85,12 +85,14 @@ impl NewLight {
         exposure_stops: f64,
         scene: &Scene,
     ) -> Light {
+        // The target gets the irradiance that is well exposed, whatever the exposure and the distance.
         let irradiance_w_m2 = SUITABLE_W_M2 * (-exposure_stops).exp2();
         let position = free_position(surfaces, target, radius_m);
         let way = target.point - position;
         let distance_m = way.length();
         let direction = way / distance_m;
         let intensity = RadiantIntensity(irradiance_w_m2 * distance_m * distance_m);
+
         // Whatever its kind, the light gives the target this irradiance.
         let kind = match self {
             Self::Lamp => LightKind::Point { position, intensity },
@@ -106,6 +108,7 @@ impl NewLight {
                 normal_irradiance: Irradiance(irradiance_w_m2),
             },
             Self::Panel => {
+                // Seen from the front, a panel of this width gives about E = L · SIDE².
                 let half_m = 0.5 * SIDE * distance_m;
                 let across = direction.any_orthonormal_vector();
                 LightKind::Panel {

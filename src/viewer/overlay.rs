@@ -63,6 +63,7 @@ impl Legend {
 
 /// The legend of the quantity shown, if it has one.
 fn legend(model: &Model) -> Option<Legend> {
+    // Legends use the colour maps of the picture itself, so that both always agree.
     let (quantity, choice) = (model.quantity(), &model.choices.display.scale);
     let scale = model.survey.scale(quantity, choice);
     let byte = |value: f64| (255.0 * value).round() as u8;
@@ -70,6 +71,7 @@ fn legend(model: &Model) -> Option<Legend> {
         let colour = move |place: f64| viridis(place).map(byte);
         Legend::new(title, 4, |place| short(factor * scale.at(place)), colour)
     };
+
     Some(match (quantity, model.worth.as_ref()) {
         (Quantity::Error, _) => {
             let (low, high) = ERROR_RANGE;
@@ -84,6 +86,7 @@ fn legend(model: &Model) -> Option<Legend> {
         (Quantity::Difference, Some(worth)) => {
             let name = worth.effect.name().replace('_', " ");
             let title = format!("What {name} adds (warm) or takes (cool), in % of the map's mean");
+            // Powers of ten to both sides of zero, from −1000 % to +1000 %.
             let mark = |place: f64| match (6.0 * place).round() as i32 - 3 {
                 0 => "0".into(),
                 power if power < 0 => format!("−{}", 10_i32.pow(-power as u32)),

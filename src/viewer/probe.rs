@@ -87,6 +87,7 @@ impl Probed {
     }
 
     pub fn to_json(&self) -> Value {
+        // Irradiance is given by its luminance, as in the panel.
         let texel = self.texel.as_ref().map(|texel| {
             let layers = texel.layers.iter();
             let layers: serde_json::Map<_, _> = layers
@@ -103,6 +104,7 @@ impl Probed {
                 "illuminance_lx": LUMENS_PER_WATT * texel.total_w_m2(),
             })
         });
+
         let path = |path: &LightPath| {
             let places = path.vertices.iter().map(|vertex| vertex.point.to_array());
             json!({
@@ -114,6 +116,8 @@ impl Probed {
                 "share": self.share(path),
             })
         };
+
+        // Paths, rays and completeness are null until the search for paths has ended.
         let paths = self
             .explanation
             .as_ref()
@@ -289,6 +293,7 @@ const POINT: Color32 = Color32::from_rgb(255, 80, 80);
 /// Draws the paths over the picture; stronger paths are wider.
 pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
     let painter = painter.with_clip_rect(lens.picture);
+
     // Each path from its light to the surface, with a dot on every glass or mirror and a ring around its start.
     let paths = probed
         .explanation
@@ -315,6 +320,7 @@ pub fn draw(painter: &Painter, lens: &Viewport<'_>, probed: &Probed) {
             painter.circle_stroke(lens.project(path.start), 5.0, Stroke::new(1.5, colour));
         }
     }
+
     // A cross hair on the probed point.
     if lens.is_before(probed.point) {
         let at = lens.project(probed.point);

@@ -34,9 +34,13 @@ pub fn time_left_s(
     else {
         return None;
     };
+
+    // The course of the caustics tells nothing about indirect light, and that of an earlier request nothing about this.
     let is_last = stage == Stage::Caustic && !is_wanted(&wanted.settings, LayerKind::Indirect);
     let elapsed_s = now.saturating_duration_since(since).as_secs_f64();
     let own = last.filter(|last| is_last && !last.is_final && last.request.is_same(wanted));
+
+    // The error so far gives the CPU time to the target; too uncertain a forecast counts as none.
     let by_course = own.and_then(|level| {
         let target = wanted.settings.max_error?;
         let course = &level.result.course;
@@ -51,10 +55,14 @@ pub fn time_left_s(
         let left_s = more_cpu_s * seconds_per_cpu_s - (elapsed_s - level.seconds);
         left_s.is_finite().then_some(left_s.max(0.0))
     });
+
+    // Without a target error, a stage advances evenly enough to extrapolate its time.
     let by_pace = || {
         let is_known = fraction >= MIN_FRACTION && wanted.settings.max_error.is_none();
         is_known.then(|| elapsed_s * (1.0 - fraction) / fraction)
     };
+
+    // The time limit bounds any forecast, and is the forecast where there is neither another one nor a target error.
     let at_most_s = wanted
         .settings
         .max_time_s

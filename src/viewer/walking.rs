@@ -116,6 +116,7 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
         along: wanted,
         away: DVec3::ZERO,
     };
+
     // A corner has two walls.
     for _ in 0..3 {
         let step = allowed.along + allowed.away;
@@ -123,6 +124,8 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
             return Allowed::NOTHING;
         };
         let right = DVec3::new(-forward.z, 0.0, forward.x);
+
+        // Rays in five directions at three heights find the walls that the step could touch.
         let reach_m = BODY_M + step.length();
         let fan = [
             forward,
@@ -133,6 +136,7 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
         ];
         // At the height of eyes, chest and knees; lower obstacles are climbed.
         let heights = [0.0, 0.5 * EYE_M, EYE_M - STEP_M - 0.05];
+
         let mut worst: Option<(f64, DVec3)> = None;
         for down_m in heights {
             for direction in fan {
@@ -148,6 +152,8 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
                 if normal.y.abs() > 0.7 {
                     continue;
                 }
+
+                // Only the nearest wall counts; the second one of a corner is found in the next round.
                 let away_m = distance_m * -direction.dot(wall) + step.dot(wall);
                 let missing_m = BODY_M - away_m;
                 if missing_m > 1e-9 && worst.is_none_or(|(most_m, _)| missing_m > most_m) {
@@ -155,6 +161,8 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
                 }
             }
         }
+
+        // What leads into the wall is taken from the step first; the rest is pushed away, a little each time.
         let Some((missing_m, wall)) = worst else {
             return allowed;
         };

@@ -437,6 +437,7 @@ fn bake_in_levels<B: LevelBaker>(
     job: &Job,
     serial: u64,
 ) -> BakeState {
+    // Levels are numbered within the request; those of a request that was replaced are not handed out.
     let mut levels = 0;
     let mut hand_out = |result, is_final| {
         levels += 1;
@@ -449,6 +450,8 @@ fn bake_in_levels<B: LevelBaker>(
             seconds: job.since.elapsed().as_secs_f64(),
         });
     };
+
+    // A cancelled bake may still complete a level, which nobody waits for.
     let outcome = bake(baker, make_baker, job, &mut |result| {
         if !job.control.is_cancelled() {
             hand_out(result, false);

@@ -233,22 +233,27 @@ def land(around, ray, choice, random):
     depth, going, landed = mi.UInt32(0), mi.Bool(True), mi.Bool(False)
     top, below = mi.UInt32(0), mi.UInt32(0)
     while going:
+        # A path ends on the floor. It counts there if it met something specular before.
         hit = around.loaded.ray_intersect(ray, going)
         on_floor = hit.shape == around.floor
         landed = hit.is_valid() & on_floor & (depth > 0)
         going = hit.is_valid() & ~on_floor & (depth < around.depth)
         ray.maxt = dr.select(landed, hit.t, ray.maxt)
 
+        # The interpolated normal counts on the side of the triangle that was met, unless it looks away from the ray.
         direction, body = ray.d, around.body(hit)
         is_front = dr.dot(direction, hit.n) < 0.0
         facet = dr.select(is_front, hit.n, -hit.n)
         normal = dr.select(dr.dot(hit.sh_frame.n, facet) < 0.0, -hit.sh_frame.n, hit.sh_frame.n)
         normal = dr.select(dr.dot(direction, normal) < 0.0, normal, facet)
+
+        # Rough surfaces reflect and refract about a visible micro-normal.
         micro, alpha = normal, mi.Float(0.0)
         if around.is_rough:
             alpha = dr.gather(mi.Float, around.alpha, body)
             micro = dr.select(alpha > 0.0, micro_normal(normal, direction, alpha, random), normal)
 
+        # Fresnel gives the probability of reflection, so that a path keeps all of its flux.
         near, far, inner, outer = around.cross(body, is_front, top, below)
         eta = dr.select(far > 0.0, far / near, 1.0)
         reflectance, _, _, _ = mi.fresnel(-dr.dot(direction, micro), eta)
@@ -263,10 +268,14 @@ def land(around, ray, choice, random):
             # What a micro-facet sends to the wrong side of its surface.
             back = dr.select((alpha > 0.0) & (dr.dot(back, normal) < 0.0), mirrored(back, normal), back)
             through = dr.select((alpha > 0.0) & (dr.dot(through, normal) > 0.0), mirrored(through, normal), through)
+
+        # Interpolated normals may send light to the wrong side of the triangle: then the triangle's own normal counts.
         back_by_facet = dr.select(alpha > 0.0, mirrored(back, facet), mirrored(direction, facet))
         back = dr.select(dr.dot(back, facet) > 0.0, back, back_by_facet)
         through_by_facet = dr.select(alpha > 0.0, mirrored(through, facet), refracted(direction, facet, eta))
         through = dr.select(dr.dot(through, facet) < 0.0, through, through_by_facet)
+
+        # Only a ray that goes through the surface changes its medium.
         top, below = dr.select(is_reflected, top, inner), dr.select(is_reflected, below, outer)
         ray = dr.select(going, around.onwards(hit, dr.select(is_reflected, back, through)), ray)
         depth += 1
@@ -274,6 +283,7 @@ def land(around, ray, choice, random):
 
 
 def main():
+    # Rays are aimed at the vertices of the casters: their bounds hold all that is specular.
     file, folder, budget_s, side, depth, samples, origins = sys.argv[1:]
     side = int(side)
     scene = scenes.read(file)
@@ -285,15 +295,20 @@ def main():
 
     def hits(ray_of, cells, start, count, seed):
         """What lands on each texel of `count` rays, one in each cell from the cell `start` on."""
+        # Each ray starts at a random place in its cell of the grid.
         random = mi.PCG32(count, initstate=seed)
         cell = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, start)
         width = dr.opaque(mi.UInt32, cells)
         down, across = cell // width, cell % width
         u = (down + random.next_float32()) / mi.Float(width)
         v = (across + random.next_float32()) / mi.Float(width)
+
+        # Choices between reflection and refraction are spread evenly among neighbours, another way for each seed.
         turn = down * EVEN_STEPS[0] + across * EVEN_STEPS[1] + dr.opaque(mi.UInt32, seed * HASH >> 8 & 0xFFFFFFFF)
         ray, share = ray_of(u, v, random)
         place, landed = land(around, ray, mi.Float(turn >> 8) * LAST_DIGIT, random)
+
+        # A ray brings its share of the watts to the texel of the floor that it lands in.
         column = mi.Int32((place.x - scene.x0) * (side / scene.side_m))
         row = mi.Int32((place.z - scene.z0) * (side / scene.side_m))
         inside = landed & (place.x >= scene.x0) & (place.z >= scene.z0) & (column < side) & (row < side)
@@ -303,6 +318,8 @@ def main():
 
     def trace(thousands, seed):
         total, all_watts = numpy.zeros(side * side), sum(watts for _, watts in beams)
+
+        # Lamps get rays by their watts, in a square number of cells, and passes that fit the memory.
         for number, (ray_of, watts) in enumerate(beams):
             cells = math.isqrt(max(int(1000 * thousands * watts / all_watts), 1))
             for start in range(0, cells * cells, LARGEST_PASS):

@@ -125,13 +125,17 @@ def settings():
 def main():
     file, folder, budget_s, side, way = sys.argv[1:]
     by_paths, side = way == "paths", int(side)
+
+    # An empty file has none of the lamps and settings that Blender starts with.
     scene = scenes.read(file)
     bpy.ops.wm.read_factory_settings(use_empty=True)
     cycles = settings()
     floor, image = add_floor(scene, side)
     add_casters(scene)
+
     # Paths have to find the lamp, so that it cannot be a point: as wide as a texel, it blurs as little as the map does.
     lamp = add_lamp(scene, scene.side_m / side if by_paths else 0.0)
+
     floor.cycles.is_caustics_receiver = True
     bpy.context.view_layer.objects.active = floor
     floor.select_set(True)
@@ -145,6 +149,7 @@ def main():
         image.pixels.foreach_get(pixels)
         return growth * math.pi * pixels.reshape(side, side, 4)[..., :3].mean(axis=-1, dtype=numpy.float64)
 
+    # Direct light is taken from a pass of its own, since the caustic is compared alone.
     direct = bake(DIRECT_SAMPLES, 1, {"DIRECT"})
     lamp.cycles.is_caustics_light = not by_paths
 
@@ -160,6 +165,7 @@ def main():
         trace(samples, 4095)
         return steps.cpu_s() - start_s
 
+    # A bake of n samples takes b + s·n seconds: two short ones tell b, the time before it samples.
     one_s, three_s = seconds(1), seconds(3)
     build_s = max(0.5 * (3.0 * one_s - three_s), 0.0)
     steps.take(folder, float(budget_s), 4, trace, pooled=True, build_s=build_s, rays_per_sample=side * side)

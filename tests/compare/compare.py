@@ -132,6 +132,8 @@ def measured(given, wanted, scenes):
     courses, references, scores, left_out = {}, {}, {}, {}
     for name, scene in scenes.items():
         folder, done = given.output / "steps" / name, []
+
+        # A program that fails is left out with its reason, and the others go on.
         for program in wanted:
             try:
                 if not given.page:
@@ -140,12 +142,18 @@ def measured(given, wanted, scenes):
             except (RuntimeError, OSError) as error:
                 left_out[f"{program.name} on `{name}`"] = str(error)
                 print(f"compare: {program.name} on {name} is LEFT OUT: {error}", file=sys.stderr, flush=True)
+
+        # Maps that differ by their seeds alone tell, block by block, whether two programs agree within their noise.
         alike = {each.key: numpy.load(file) for each in done if (file := folder / each.key / "alike.npy").exists()}
         for first, second in PAIRS:
             if first in alike and second in alike:
                 sides = (alike[first], alike[second]) if first != second else (alike[first][::2], alike[first][1::2])
                 scores[name, (first, second)] = figures.block_scores(*sides)
+
+        # Where no reference is known, the mean of such maps is one, with their noise.
         reference = scene.reference or next((figures.pooled(alike[key]) for key in ["aimed", "brute"] if key in alike), None)
+
+        # A course has at least the bias of the program whose rays start as its own do, up to the error at its end.
         for program in done:
             references[name] = reference
             if reference is None or not (folder / program.key / "steps.json").exists():

@@ -57,6 +57,8 @@ pub trait ShardSource: Send + Sync {
 /// A usage error that names the option and its replacement.
 pub fn check(settings: &BakeSettings) -> Result<()> {
     settings.validate()?;
+
+    // Each shard sees a part of the light only, and would decide otherwise than the others under these settings.
     if let Some(target) = settings.max_error {
         return Err(Error::usage(
             "--max-error",

@@ -18,11 +18,14 @@ pub fn write(
     world_from_node: &DAffine3,
     warnings: &mut Vec<Warning>,
 ) -> Option<usize> {
+    // A map on the coordinates of the mesh needs no new vertices.
     match chart.uv_set {
         UvSet::TexCoord0 => return Some(0),
         UvSet::TexCoord1 => return Some(1),
         UvSet::Generated => {}
     }
+
+    // Vertices are written in the space of the node; a node that is scaled to nothing has none to return to.
     let object = &scene.objects[chart.object()];
     let place = (object.node, object.primitive);
     let determinant = world_from_node.matrix3.determinant();
@@ -30,7 +33,11 @@ pub fn write(
     if determinant == 0.0 || !node_from_world.is_finite() {
         return None;
     }
+
+    // A vertex at a chart border has one place in each chart, so that it is split into as many.
     let parted = SplitMesh::new(object.mesh_in_scene(), chart, determinant < 0.0);
+
+    // Normals reach the world by the inverse transpose, and so return to the node by the transpose.
     let normal_from_world = world_from_node.matrix3.transpose();
     let position = |vertex: usize| {
         let world = object.mesh_in_scene().positions[vertex] + scene.origin_world;
@@ -43,6 +50,8 @@ pub fn write(
     let of_vertices = |value: &dyn Fn(usize) -> [f32; 3]| -> Vec<[f32; 3]> {
         parted.vertices.iter().map(|&(vertex, _)| value(vertex)).collect()
     };
+
+    // Coordinates that the material uses and all other attributes of the old primitive follow their vertices.
     let was = glb.primitive(place).clone();
     let mut attributes = json!({
         "POSITION": glb.push_vectors(&of_vertices(&position)),
@@ -71,6 +80,7 @@ pub fn write(
         &mut attributes,
         warnings,
     );
+
     let skin = format!("/nodes/{}/skin", object.node);
     if glb.json.pointer(&skin).is_some() {
         // Positions are written as the joints deformed them: a skin would do so again.
@@ -81,6 +91,8 @@ pub fn write(
             "give it light-map coordinates (TEXCOORD_1) of its own",
         ));
     }
+
+    // Triangles are indexed anew: the old mode, morph targets and compressed data belong to other vertices.
     let indices = glb.push_indices(parted.corners.iter().copied());
     let primitive = glb.primitive(place);
     primitive["attributes"] = attributes;
@@ -183,6 +195,7 @@ fn keep_others(
     attributes: &mut Value,
     warnings: &mut Vec<Warning>,
 ) {
+    // Positions, normals and coordinates are written anew; every other attribute follows its vertex.
     for (semantic, accessor) in was["attributes"].as_object().into_iter().flatten() {
         let is_known =
             ["POSITION", "NORMAL"].contains(&semantic.as_str()) || semantic.starts_with("TEXCOORD_");
@@ -199,6 +212,8 @@ fn keep_others(
             )),
         }
     }
+
+    // Morph targets move vertices away from the shape that was lit.
     if was.get("targets").is_some() {
         warnings.push(Warning::new(
             format!("surface `{name}`"),
@@ -210,10 +225,13 @@ fn keep_others(
 
 /// Copies an accessor in the order of the new vertices; `None` if it cannot be read.
 fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &SplitMesh) -> Option<usize> {
+    // Only an accessor of one element for each vertex can follow a split; a sparse one would need its base too.
     let stated = glb.json["accessors"].get(accessor)?.clone();
     if stated.get("sparse").is_some() || stated["count"].as_u64()? != vertices as u64 {
         return None;
     }
+
+    // Only plain data in the binary chunk can be copied: other buffers and compressed views are not at hand.
     let view = glb.json["bufferViews"]
         .get(stated["bufferView"].as_u64()? as usize)?
         .clone();
@@ -221,6 +239,8 @@ fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &SplitMesh)
     if view["buffer"].as_u64()? != 0 || view.get("extensions").is_some() {
         return None;
     }
+
+    // A damaged file may state any offset and stride, so that every sum and range is checked.
     let number = |value: &Value| value.as_u64().unwrap_or(0) as usize;
     let stride = number(&view["byteStride"]).max(element);
     let start = number(&view["byteOffset"]).checked_add(number(&stated["byteOffset"]))?;
@@ -231,6 +251,8 @@ fn gathered(glb: &mut Glb, accessor: usize, vertices: usize, parted: &SplitMesh)
         // Vertex elements are aligned to four bytes.
         bytes.resize(bytes.len().next_multiple_of(4), 0);
     }
+
+    // Type and bounds of the accessor stay, since a split repeats elements and makes none.
     let view = glb.push_view(&bytes);
     if element % 4 != 0 {
         glb.json["bufferViews"][view]["byteStride"] = json!(element.next_multiple_of(4));

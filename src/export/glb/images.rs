@@ -91,12 +91,15 @@ impl Default for Nearest {
 
 /// Assigns a triangle to the texels in and around it that have no nearer one.
 fn spread(chart: &Chart, corners: [DVec2; 3], triangle: usize, nearest: &mut [Nearest]) {
+    // A triangle without area in the chart covers no texel, and has no barycentric coordinates.
     let size = DVec2::new(chart.width as f64, chart.height as f64);
     let [a, b, c] = corners.map(|corner| corner * size);
     let doubled = (b - a).perp_dot(c - a);
     if doubled == 0.0 {
         return;
     }
+
+    // Texels in a margin around the triangle take its colour as well: filters reach across its borders.
     let low = (a.min(b).min(c) - MARGIN_TEXELS).max(DVec2::ZERO);
     let high = (a.max(b).max(c) + MARGIN_TEXELS).min(size);
     for row in low.y as usize..high.y.ceil() as usize {
@@ -113,6 +116,8 @@ fn spread(chart: &Chart, corners: [DVec2; 3], triangle: usize, nearest: &mut [Ne
                 .into_iter()
                 .zip(heights)
                 .map(|(share, height)| -share * height);
+
+            // The nearest triangle counts. Between those that contain the centre, the first does.
             let outside = depths.fold(0.0, f64::max);
             let known = &mut nearest[row * chart.width + column];
             if outside < known.outside && outside <= MARGIN_TEXELS {
@@ -133,6 +138,7 @@ pub fn encode(
     options: GlbOptions,
     exported: &mut ExportedMap,
 ) -> Result<Vec<u8>> {
+    // White is chosen to clip a small share of the map's light, for finer steps in the dark; an exposure fixes it.
     let white = match options.carrier {
         Carrier::Unlit => 1.0,
         Carrier::LightMap | Carrier::Emissive => {
@@ -140,6 +146,8 @@ pub fn encode(
             white(values, options.cut).unwrap_or(1.0)
         }
     };
+
+    // Light above white and colours outside of sRGB are lost, and counted for the report.
     let channels = || light.iter().flat_map(|light| light.to_array());
     let all: f64 = channels().map(|value| value.max(0.0)).sum();
     let above: f64 = channels().map(|value| (value - white).max(0.0)).sum();
@@ -147,14 +155,19 @@ pub fn encode(
         let has = |light: &&LinearSrgb| light.to_array().into_iter().any(fits);
         light.iter().filter(has).count()
     };
+
+    // Values are stored relative to white, by which the intensity of the material multiplies them again.
     let relative: Vec<[f64; 3]> = light
         .iter()
         .map(|light| light.to_array().map(|value| (value / white).clamp(0.0, 1.0)))
         .collect();
+
     exported.intensity = white;
     exported.cut_texels = count(&|value| value > white);
     exported.cut_share = if all > 0.0 { above / all } else { 0.0 };
     exported.negative_texels = count(&|value| value < 0.0);
+
+    // Eight bits need diffusion, since their steps show in dim light; steps of 1/65535 do not.
     let name = &exported.surface;
     match options.bits {
         Bits::Eight => png::<image::Rgb<u8>>(diffused(&relative, width), (width, height), name),

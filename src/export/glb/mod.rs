@@ -147,6 +147,7 @@ pub fn encode(
     maps: &[IlluminationMap],
     options: GlbOptions,
 ) -> Result<(Vec<u8>, GlbReport)> {
+    // Lamps that stay give their direct light by themselves, which the maps then must not hold.
     let layers = layers_of(scene, maps, options)?;
     let Opened {
         mut glb,
@@ -161,8 +162,12 @@ pub fn encode(
         maps: Vec::new(),
         warnings,
     };
+
+    // Nodes that share a mesh are lit differently: each gets a mesh of its own, and with it a material.
     let objects = maps.iter().map(|map| &scene.objects[map.chart.object()]);
     glb.push_own_meshes(objects.map(|object| object.node).collect());
+
+    // Every front gets its coordinates and its image; tiles are made dense, since an image has one resolution.
     for map in front_maps(maps, scene, &mut report.warnings) {
         let object = &scene.objects[map.chart.object()];
         let dense = map.dense();
@@ -180,6 +185,8 @@ pub fn encode(
         let exported = add_map(&mut glb, scene, &dense, &layers, tex_coord, options)?;
         report.maps.push(exported);
     }
+
+    // Lamps whose light is in the maps would shine twice. The file states what its maps hold.
     if options.lights == SceneLights::Remove {
         remove_lights(&mut glb);
     }
@@ -190,6 +197,7 @@ pub fn encode(
         "lights": options.lights,
     });
     glb.set("/asset/extras/nephroid", about);
+
     let bytes = glb.into_bytes()?;
     report.bytes = bytes.len();
     Ok((bytes, report))
@@ -254,9 +262,13 @@ fn add_map(
         cut_share: 0.0,
         negative_texels: 0,
     };
+
+    // The image holds the light relative to its white, which becomes the intensity of the material.
     let light = images::light_of(map, layers, scene, options);
     let png = images::encode(&light, (map.width(), map.height()), options, &mut exported)?;
     let image_index = glb.push_png(&format!("{} light", object.name), &png);
+
+    // Linear without mip levels and clamped: charts lie close, and smaller levels would mix them.
     let sampler = glb.push(
         "/samplers",
         json!({ "magFilter": 9729, "minFilter": 9729, "wrapS": 33071, "wrapT": 33071 }),
@@ -338,11 +350,13 @@ const UNLIT: &str = "KHR_materials_unlit";
 /// Gives a primitive a material of its own that carries the light of a texture. Colours and textures of its old
 /// material stay, unless they are part of the texture. `intensity`: value of the texture's white, in the export's unit.
 fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64, options: GlbOptions) {
+    // The old material is copied: primitives without a map keep it.
     let index = glb.primitive(place)["material"].as_u64();
     let mut material = index.map_or(json!({}), |index| glb.json["materials"][index as usize].clone());
     if let Some(name) = material["name"].as_str() {
         material["name"] = json!(format!("{name}, lit"));
     }
+
     let black = json!([0.0, 0.0, 0.0, 1.0]);
     match options.carrier {
         Carrier::LightMap => {
@@ -354,7 +368,7 @@ fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64
             material["emissiveFactor"] = json!([1.0, 1.0, 1.0]);
             material["extensions"][STRENGTH] = json!({ "emissiveStrength": intensity });
             if options.lights == SceneLights::Remove {
-                // Lights that a program adds would light it twice.
+                // Lamps that a program adds would light the surface twice.
                 material["pbrMetallicRoughness"] =
                     json!({ "baseColorFactor": black, "metallicFactor": 0.0, "roughnessFactor": 1.0 });
             }
@@ -369,6 +383,7 @@ fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64
             }
         }
     }
+
     let material = glb.push("/materials", material);
     glb.primitive(place)["material"] = json!(material);
 }

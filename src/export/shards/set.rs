@@ -64,6 +64,7 @@ impl ShardSet {
     /// A folder without a shard; a damaged shard; shards of different bakes or program versions, given twice, or
     /// missing.
     pub fn open(folders: &[PathBuf]) -> Result<Self> {
+        // Each shard is checked by itself first: its manifest, and the length of its sums.
         let shards: Vec<Shard> = folders
             .iter()
             .map(|folder| Shard::open(folder))
@@ -75,6 +76,8 @@ impl ShardSet {
                 "name the folders of all shards of a bake",
             ));
         }
+
+        // The sums of another version may mean something else: only the version that baked them may merge.
         let set = Self { shards };
         let first = set.first();
         if first.manifest.program_version != env!("CARGO_PKG_VERSION") {
@@ -88,6 +91,8 @@ impl ShardSet {
                 "merge with the version that baked",
             ));
         }
+
+        // Sums add up only within one bake. The first shard stands for all others.
         for shard in &set.shards {
             if let Some(difference) = shard.manifest.difference(&first.manifest) {
                 return Err(Error::failure(
@@ -107,6 +112,7 @@ impl ShardSet {
     }
 
     fn refuse_gaps(&self) -> Result<()> {
+        // Sorted by number, a shard that is named twice stands beside itself.
         let first = self.first();
         let mut by_number: Vec<&Shard> = self.shards.iter().collect();
         by_number.sort_by_key(|shard| shard.manifest.shard.number);
@@ -118,6 +124,8 @@ impl ShardSet {
                 "name each shard once",
             ));
         }
+
+        // Without one shard, every map would lack a part of its light.
         let count = first.manifest.shard.count;
         let mut present = by_number.iter().map(|shard| number(shard)).peekable();
         let is_missing = |wanted: &u32| present.next_if_eq(wanted).is_none();
@@ -126,6 +134,7 @@ impl ShardSet {
         if missing.is_empty() && by_number.len() == count as usize {
             return Ok(());
         }
+
         let named: Vec<String> = missing.iter().take(MAX_NAMED).map(u32::to_string).collect();
         let more = if missing.len() > MAX_NAMED {
             " and more"

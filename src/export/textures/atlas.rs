@@ -36,6 +36,7 @@ pub fn pack(
     options: AtlasOptions,
     name: impl Fn(usize) -> String,
 ) -> Result<Vec<Page>> {
+    // A map takes its texels, a gutter on either side, and whole blocks where texels are compressed by block.
     let cell = |side: usize| (side + 2 * options.gutter).next_multiple_of(options.grid);
     for (map, &(width, height)) in sizes.iter().enumerate() {
         if cell(width.max(height)) > options.most_side {
@@ -49,9 +50,11 @@ pub fn pack(
             ));
         }
     }
+
     let mut left: Vec<usize> = (0..sizes.len()).collect();
     let mut pages = Vec::new();
     while !left.is_empty() {
+        // A page of a shape takes what fits into it, which the packer returns even if something is left over.
         let fill = |(width, height): (usize, usize)| {
             let items = left.iter().map(|&map| {
                 let (width, height) = sizes[map];
@@ -72,6 +75,8 @@ pub fn pack(
                 places,
             }
         };
+
+        // The smallest shape that holds all the rest wastes the least memory. Where none does, the largest is filled.
         let holds_all = |page: &Page| page.places.len() == left.len();
         let page = shapes(options.most_side)
             .into_iter()

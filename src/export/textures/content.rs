@@ -104,6 +104,8 @@ impl Content {
             let layer = map.layer(kind)?;
             Some(part(vec![kind], kind.name(), layer.irradiance.clone()))
         };
+
+        // The layers add up to the map. Shares of lights may leave something out, and say so.
         match self {
             Self::Sum => Ok((vec![part(kinds, "", map.total())], None)),
             Self::Layer(kind) => Ok((layer(kind).into_iter().collect(), None)),

@@ -227,14 +227,20 @@ impl Loss {
             above += has(&|wanted, _| wanted > most);
             negative += has(&|wanted, got| wanted < 0.0 && got >= 0.0);
             vanished += has(&|wanted, got| wanted > 0.0 && got <= 0.0);
+
+            // White clips each channel by itself, so that clipped light is summed by channel.
             for value in wanted {
                 all += f64::from(value.max(0.0));
                 cut += (f64::from(*value) - f64::from(most)).max(0.0);
             }
+
+            // Luminance weighs the error as the eye does, whatever caused it: clipping, steps or blocks.
             let [wanted, got] = [wanted, got].map(luminance);
             mean += wanted;
             squares += (got - wanted) * (got - wanted);
         }
+
+        // Without light there is nothing that an error could be relative to.
         let texels = light.len() as f64;
         Self {
             above_texels: above,

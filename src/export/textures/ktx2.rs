@@ -53,6 +53,7 @@ impl Packing {
 /// # Errors
 /// Too little memory for zstd.
 pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadata<'_>) -> Result<Encoded> {
+    // Each mip level is halved from the unpacked one above, so that rounding does not add up.
     let (packed, stored) = packing.pack(texels);
     let mut images = vec![packed];
     let mut smaller = texels.clone();
@@ -60,6 +61,8 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadat
         smaller = smaller.halved();
         images.push(packing.pack(&smaller).0);
     }
+
+    // Levels are compressed by themselves, as readers load them one by one, and on all threads.
     let refused = |why: String| {
         let what = format!("the texture cannot be compressed ({why})");
         Error::failure(notes.location, what, "write smaller maps")
@@ -69,6 +72,8 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadat
         .map(|packed| zstd::bulk::compress(packed, ZSTD_LEVEL))
         .collect();
     let compressed = compressed.map_err(|error| refused(error.to_string()))?;
+
+    // The data format descriptor says how the bits of a texel become channels.
     let (descriptor, type_size) =
         Basic::from_format(packing.format()).map_err(|error| refused(error.to_string()))?;
     let descriptor = Block::Basic(descriptor);
@@ -79,6 +84,7 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadat
     descriptor.to_bytes(&mut described[4..]);
     let about = about(notes);
 
+    // Header, index of levels, descriptor, notes and levels follow each other: lengths give the offsets.
     let descriptor_at = Header::LENGTH + LevelIndex::LENGTH * images.len();
     let about_at = descriptor_at + described.len();
     let (width, height) = texels.size();
@@ -101,6 +107,7 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadat
             sgd_byte_length: 0,
         },
     };
+
     let mut bytes = header.as_bytes().to_vec();
     // The index begins with the largest level, the data with the smallest.
     let mut end = about_at + about.len() + compressed.iter().map(Vec::len).sum::<usize>();
@@ -113,6 +120,7 @@ pub fn encode(texels: &Texels, packing: Packing, mips: bool, notes: &FileMetadat
         };
         bytes.extend(level.as_bytes());
     }
+
     bytes.extend(described);
     bytes.extend(about);
     compressed.iter().rev().for_each(|level| bytes.extend(level));

@@ -99,10 +99,14 @@ pub fn write(
         return Err(Error::failure("maps", "there are none", "bake the scene again"));
     };
     options.content.check(first)?;
+
+    // Frames of a sequence share the index and, if there is one, the atlas.
     let maps: Vec<MapOf> = readers
         .iter()
         .flat_map(|reader| reader.entries().iter().map(move |entry| (reader, entry)))
         .collect();
+
+    // All textures share an exposure, which has to be known before the first of them is encoded.
     let mut writer = Writer {
         options,
         exposure_stops: 0.0,
@@ -116,6 +120,8 @@ pub fn write(
         Some(side) => writer.write_atlas(&maps, side)?,
         None => writer.write_each(&maps)?,
     };
+
+    // All files are staged with their index and move to their places together.
     let index = TextureIndex::new(first, options, writer.exposure_stops, textures);
     let json = files::to_json(&index, index::FILE_NAME)?;
     writer.put(index::FILE_NAME.into(), &json)?;
@@ -182,15 +188,17 @@ impl Writer<'_> {
 
     /// Writes as few files as hold all maps.
     fn write_atlas(&mut self, maps: &[MapOf], most_side: usize) -> Result<Vec<TextureEntry>> {
+        // The layout depends on sizes alone, so that maps are read page by page.
         let sizes: Vec<(usize, usize)> = maps
             .iter()
             .map(|(_, entry)| (entry.width, entry.height))
             .collect();
         let options = self.options.encoding.atlas_options(most_side);
         let name = |map: usize| format!("the map of {}", maps[map].1.surface);
+
         let mut textures = Vec::new();
         for (number, page) in atlas::pack(&sizes, options, name)?.into_iter().enumerate() {
-            // By the light that they hold.
+            // One for each layer or lamp. All of a page have the same layout.
             let mut sheets: BTreeMap<String, Sheet> = BTreeMap::new();
             for &(map, place) in &page.places {
                 let (reader, entry) = maps[map];
@@ -211,6 +219,8 @@ impl Writer<'_> {
                         .push(PlacedMap::new((reader, entry), uv_file.clone(), place));
                 }
             }
+
+            // Sheets are written page by page, so that memory holds those of one.
             for mut sheet in sheets.into_values() {
                 sheet.part.layers.sort_unstable();
                 sheet.part.layers.dedup();

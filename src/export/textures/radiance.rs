@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 /// # Errors
 /// None are known: it is encoded in memory.
 pub fn encode(texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
+    // The header states exposure and unit, which that of the encoder lacks.
     let (width, height) = texels.size();
     let mut bytes = format!(
         "#?RADIANCE\nSOFTWARE=nephroid {}\nFORMAT=32-bit_rle_rgbe\n",
@@ -25,6 +26,7 @@ pub fn encode(texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
     }
     let comment: String = notes.comment().chars().filter(|c| !c.is_control()).collect();
     bytes.extend(format!("# {comment}").bytes());
+
     // The encoder truncates, so it gets values that are rounded already.
     let rounded = |texel: &[f32; 3]| match RGBE.code(*texel) {
         (_, exponent) if exponent == RGBE.least => [0.0; 3],
@@ -35,6 +37,7 @@ pub fn encode(texels: &Texels, notes: &FileMetadata<'_>) -> Result<Encoded> {
     let mut file = Vec::new();
     let written = HdrEncoder::new(&mut file).encode(&pixels, width, height);
     written.map_err(|error| Error::failure(notes.location, error.to_string(), "report this"))?;
+
     // The header of the encoder, which ends with an empty line, is replaced by the fuller one above.
     let head = file.windows(2).position(|two| two == b"\n\n").unwrap_or_default();
     bytes.extend(&file[head..]);

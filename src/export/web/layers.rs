@@ -19,8 +19,8 @@ pub(super) struct ShownMap {
     peak_w_m2: f32,
 }
 
-/// Irradiance [W/m²], or radiance [W/(m² sr)] over a scale, in E5B9G9R9: words of four bytes, each the difference from the
-/// one in the row before.
+/// Irradiance [W/m²], or radiance [W/(m² sr)] over a scale, in E5B9G9R9: words of four bytes, each the difference from
+/// the one in the row before.
 pub(super) struct Texture {
     pub(super) size: (usize, usize),
     pub(super) scale: f32,
@@ -42,7 +42,7 @@ impl Texture {
         Self { size, scale, content }
     }
 
-    /// Of an environment.
+    /// Radiance of an environment, halved until it fits the page.
     pub(super) fn of_sky(environment: &Environment) -> Self {
         let mut texels = Texels::of(environment.size(), environment.pixels().to_vec());
         // Powers of two are lossless.

@@ -1,6 +1,6 @@
-//! A page to walk through baked maps in a browser: a folder that any server serves, or one file that opens from the disk.
-//! The page draws with the program's own shaders by WebGPU; without it, it shows a still picture. Nothing is fetched from
-//! elsewhere.
+//! A page to walk through baked maps in a browser: a folder that any server serves, or one file that opens from the
+//! disk. The page draws with the program's own shaders by WebGPU; without it, it shows a still picture. Nothing is
+//! fetched from elsewhere.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -78,7 +78,7 @@ pub struct Site {
     about: Value,
     /// Names and bytes of its files but for scripts and the page itself.
     files: Vec<(String, Vec<u8>)>,
-    /// What there is, so far.
+    /// The report, complete once the page is written.
     pub report: WebReport,
 }
 
@@ -92,6 +92,8 @@ impl Site {
         let Some(first) = moments.first() else {
             return Err(Error::failure("maps", "there are none", "bake the scene again"));
         };
+
+        // Every map becomes textures as it is read. Of a surface, its chart, its largest size and its peak are kept.
         let (mut shown, mut layers, mut light) = (BTreeMap::new(), BTreeSet::new(), Vec::new());
         for set in moments {
             let mut textures = BTreeMap::new();
@@ -111,6 +113,7 @@ impl Site {
             }
             light.push(textures);
         }
+
         let mut site = Self {
             about: json!({}),
             files: Vec::new(),
@@ -122,6 +125,8 @@ impl Site {
                 warnings: first.warnings(),
             },
         };
+
+        // Tiles are laid out once for all moments: a stand-in of each map has the largest size and peak of them all.
         let stand_ins: Vec<_> = shown.values().map(|map| map.stand_in(first.scene())).collect();
         let mut first_contents = BTreeMap::new();
         for (set, textures) in moments.iter().zip(light) {
@@ -150,6 +155,8 @@ impl Site {
                 first_contents = contents;
             }
         }
+
+        // What scripts read in the page itself: cameras with exposures, the extent, the scale of false colours.
         let names: Vec<String> = (0..moments.len()).map(moment_file).collect();
         let cameras = site.push_still(scene, eye)?;
         let (low, high) = scene.inner_bounds().unwrap_or_default();
@@ -168,6 +175,8 @@ impl Site {
             "moments": names,
             "fps": first.fps(),
         });
+
+        // Lamps do not shine in the page: without their layer, caustics lie in the dark.
         if !site.report.layers.contains(&LayerKind::Direct) && !scene.lights.is_empty() {
             site.report.warnings.push(Warning::new(
                 first.folder().display().to_string(),
@@ -206,8 +215,8 @@ impl Site {
         Ok(described)
     }
 
-    /// Writes the folder, all of it or nothing. A page of ours is replaced; another folder that is not empty is taken only
-    /// with `force`.
+    /// Writes the folder, all of it or nothing. A page of ours is replaced; another folder that is not empty is taken
+    /// only with `force`.
     ///
     /// # Errors
     /// Other people's files; a place that cannot be written.
@@ -232,7 +241,7 @@ impl Site {
         }
         self.report.files = self.files.len();
         folder.commit()?;
-        // Moments of an earlier page of more.
+        // An earlier page may have had more moments: their files are removed.
         let beyond = (self.report.moments..).map(|moment| path.join(moment_file(moment)));
         for outdated in beyond.take_while(|file| is_ours && file.exists()) {
             files::remove_file(&outdated)?;

@@ -9,15 +9,15 @@ use serde_json::{Value, json};
 
 use crate::eye_pass::renderer::Content;
 
-/// By name.
+/// Contents of buffers and textures, by name.
 pub(super) type Contents = BTreeMap<String, Content>;
 
 /// Contents start at multiples of this [bytes].
 const ALIGNMENT: usize = 4;
 
-/// The file of a moment, which gzip packed: length of the description [u32], description as JSON, contents but for those of
-/// the first moment. The description has their places by name: the first byte, counted from the description's end, the
-/// length and, where they are filtered, that of a record.
+/// The file of a moment, which gzip packed: length of the description [u32], description as JSON, contents but for
+/// those of the first moment. The description has their places by name: the first byte, counted from the description's
+/// end, the length and, where they are filtered, that of a record.
 pub(super) fn file(mut description: Value, contents: &Contents, first: &Contents) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (name, content) in contents
@@ -48,8 +48,8 @@ pub(super) fn gzip(parts: &[&[u8]]) -> Vec<u8> {
     packed.expect("memory takes all that is written to it")
 }
 
-/// Records of so many bytes, for gzip to find what they share: words are differences from the first moment, and these from
-/// the record before; each byte of a record lies with those of the others.
+/// Records of so many bytes, for gzip to find what they share: words are differences from the first moment, and these
+/// from the record before; each byte of a record lies with those of the others.
 fn filtered(bytes: &[u8], record: usize, first: &[u8]) -> Vec<u8> {
     let words: Vec<u32> = bytemuck::pod_collect_to_vec(bytes);
     let first: Vec<u32> = bytemuck::pod_collect_to_vec(first);

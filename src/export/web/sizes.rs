@@ -10,7 +10,7 @@ pub(super) const MAX_SIDE: usize = 2048;
 /// estimates: root mean squares, relative to the light there and a tenth of the mean of all layers [1].
 const ALIKE: f64 = 0.01;
 const SHARE_OF_ERROR: f64 = 0.5;
-/// Below, nothing is gained [texels].
+/// Shortest side of a layer that is halved [texels]: below, nothing is gained.
 const MIN_SIDE: usize = 32;
 
 /// Each layer of a map in the size that it needs.

@@ -115,6 +115,7 @@ fn trace<const CHAINS: bool>(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<(Picture, EyeRays)> {
+    // Samples lie on a regular grid. Each has wavelengths of its own: their mean covers the spectrum more densely.
     let (view, side) = (looks.view, looks.sides);
     let done = AtomicU64::new(0);
     let pixel = |column: u32, row: u32, rays: &mut EyeRays| {
@@ -127,6 +128,8 @@ fn trace<const CHAINS: bool>(
         let mean = sum / f64::from(side * side);
         mean.to_array().map(|channel| channel as f32)
     };
+
+    // A row is one task: long enough to outweigh its overhead, short enough to cancel the picture quickly.
     let rows: Vec<(Vec<[f32; 3]>, EyeRays)> = (0..view.height)
         .into_par_iter()
         .map(|row| {
@@ -142,9 +145,13 @@ fn trace<const CHAINS: bool>(
             (pixels, rays)
         })
         .collect();
+
+    // A cancelled picture has empty rows.
     if control.is_cancelled() {
         return Err(Error::cancelled("picture"));
     }
+
+    // Rows are put together in order, whichever thread finished them first.
     let rays = rows.iter().fold(EyeRays::default(), |sum, (_, rays)| sum + *rays);
     let picture = Picture {
         width: view.width,

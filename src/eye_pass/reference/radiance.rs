@@ -13,8 +13,8 @@ use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
 use crate::transport::{Branch, Event, MediumStack, SurfaceHit, Tracer};
 
-/// Highlights that reflect a smaller radiance per irradiance [1/sr] are left out: a thousandth of a white surface in the
-/// same light has 0.0003.
+/// Highlights that reflect a smaller radiance per irradiance [1/sr] are left out: a thousandth of a white surface in
+/// the same light has 0.0003.
 const DIMMEST_HIGHLIGHT: f64 = 3e-4;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -145,6 +145,7 @@ impl<'a> LitScene<'a> {
         spectrum: &SpectralScene,
         rays: &mut EyeRays,
     ) -> LinearSrgb {
+        // Paths that wait form a stack, so that long chains need no deep recursion.
         rays.camera_rays += 1;
         let mut seen = LinearSrgb::BLACK;
         let mut waiting = vec![EyePath {
@@ -155,16 +156,21 @@ impl<'a> LitScene<'a> {
             at: None,
         }];
         while let Some(mut path) = waiting.pop() {
+            // Lamps are no surfaces: each segment of a chain sees those that lie before its end.
             let next = nearest::<CHAINS>(self.tracer, path.cone.ray);
             seen += self.lamps_on(&path, next.map_or(f64::INFINITY, |(_, distance_m)| distance_m));
             let Some((hit, distance_m)) = next else {
                 seen += path.brings(self.beyond(path.cone.ray.direction));
                 continue;
             };
+
+            // Along the segment the footprint grows, and the medium absorbs (Beer and Lambert).
             path.cone.width_m += path.cone.spread_rad * distance_m;
             if CHAINS {
                 path.weight = path.weight * path.media.transmittance(self.tracer.scene(), distance_m);
             }
+
+            // At the first dispersive surface the path becomes one path per wavelength, each with indices of its own.
             if CHAINS && path.at.is_none() && spectrum.splits_at(self.tracer, &hit, &path.media) {
                 for at in &spectrum.wavelengths {
                     let at = Some(at);
@@ -185,6 +191,7 @@ impl<'a> LitScene<'a> {
         waiting: &mut Vec<EyePath<'b>>,
         rays: &mut EyeRays,
     ) -> LinearSrgb {
+        // The surface shows its emission and its diffuse light, less what its coat keeps from leaving.
         let incident = path.cone.ray.direction;
         let tracer = path.at.map_or(self.tracer, |at| &at.tracer);
         let interaction = tracer.interact(hit, incident, &path.media);
@@ -193,6 +200,8 @@ impl<'a> LitScene<'a> {
         if !CHAINS || (interaction.reflection.is_none() && interaction.transmission.is_none()) {
             return seen;
         }
+
+        // The one direction that is traced would miss most lamps within a rough lobe: they are added as highlights.
         let shape = ChainSurface {
             curvature: tracer.curvature(hit) * side.sign(),
             alpha: tracer.lobe_alpha(hit),
@@ -200,6 +209,8 @@ impl<'a> LitScene<'a> {
         if let Some(reflection) = interaction.reflection.filter(|_| shape.alpha > 0.0) {
             seen += path.brings(self.highlights(tracer, &path, hit, &reflection, shape.alpha));
         }
+
+        // Beyond the branching depth only the stronger branch goes on: the paths would double at each surface.
         let [back, through] = [interaction.reflection, interaction.transmission]
             .map(|branch| branch.and_then(|branch| self.followed(&path, &branch, &shape)));
         let is_through_stronger = match (&back, &through) {
@@ -240,6 +251,7 @@ impl<'a> LitScene<'a> {
         reflection: &Branch,
         alpha: f64,
     ) -> LinearSrgb {
+        // Bumps bend the normal of the lobe; the plane of the triangle decides which lamps are above the surface.
         let incident = path.cone.ray.direction;
         let [geometric, normal] = hit.normals_towards(incident);
         let lobe = Lobe {
@@ -248,6 +260,8 @@ impl<'a> LitScene<'a> {
             normal,
             alpha,
         };
+
+        // Highlights too dim to be seen get no shadow ray: the throughput of the chain's own reflection decides.
         let reflected = (path.weight * reflection.share).max_channel();
         let mut seen = LinearSrgb::BLACK;
         for lamp in &self.lamps {
@@ -260,6 +274,7 @@ impl<'a> LitScene<'a> {
                 {
                     return;
                 }
+
                 // The reflectance of the microfacets that shine.
                 let facet = SurfaceHit {
                     shading_normal: highlight.half,

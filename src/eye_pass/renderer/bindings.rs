@@ -90,6 +90,7 @@ pub(super) fn cover_pipeline(
     constants: &[(&str, f64)],
     target: wgpu::TextureFormat,
 ) -> wgpu::RenderPipeline {
+    // `cover` makes one triangle over the whole target from the vertex index, which needs no buffers and no depth.
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(entry_point),

@@ -85,10 +85,13 @@ impl ChainScene {
     }
 
     fn with_meshes(gpu: &Gpu, tracer: Tracer, firsts: Vec<First>) -> Result<Self> {
+        // Instances and the nodes over them come first: when objects move, these nodes are written again and no others.
         let (above, _) = tracer.packed_instances();
         let mut nodes = vec![Node::default(); 3 + above.nodes.len() + INSTANCE_NODES * above.triangles.len()];
         let mut triangles: Vec<Triangle> = Vec::new();
         let (mut starts, mut depth) = (Vec::new(), 0);
+
+        // Each mesh is stored once, however many instances it has, with its indices offset to its place in the buffers.
         let meshes = tracer.packed_meshes();
         for mesh in &meshes {
             let start = (nodes.len(), triangles.len());
@@ -97,10 +100,14 @@ impl ChainScene {
             nodes.extend(mesh.bvh.nodes.iter().map(|node| placed(node, start)));
             triangles.extend(records(mesh, &firsts));
         }
+
+        // Shaders see a buffer through one binding, whose size is limited.
         let largest = size_of_val(nodes.as_slice()).max(size_of_val(triangles.as_slice()));
         if largest as u64 > readable(gpu) {
             return Err(too_many_triangles(gpu, tracer.scene()));
         }
+
+        // The front is filled by `write_instances`, which is called after each move, too.
         let mut made = Self {
             firsts,
             root: meshes[0].bvh.nodes.first().map(|root| placed(root, starts[0])),
@@ -122,6 +129,7 @@ impl ChainScene {
     /// # Errors
     /// A hierarchy that is too deep.
     fn write_instances(&mut self, gpu: &Gpu) -> Result<()> {
+        // The shader drops branches that its stack cannot hold: surfaces of a deeper hierarchy would be missing.
         let (above, instances) = self.tracer.packed_instances();
         let depth = 2 + above.depth + self.depth;
         if depth >= STACK {
@@ -130,6 +138,8 @@ impl ChainScene {
             );
             return Err(refused(self.tracer.scene(), what));
         }
+
+        // Each leaf of the hierarchy over instances holds one of them, whose nodes follow that hierarchy.
         let first = 3 + above.nodes.len();
         let over_instances = |node: &PackedNode| match node.count {
             0 => placed(node, (3, 0)),
@@ -139,6 +149,9 @@ impl ChainScene {
                 ..placed(node, (0, 0))
             },
         };
+
+        // The root joins what is not instanced with the instances. Where one of them is missing, the other is the root.
+        // The box of the root is never tested, so that it may be empty.
         let both = Node {
             first: 1,
             ..Node::default()
@@ -147,9 +160,13 @@ impl ChainScene {
             (Some(root), Some(above)) => vec![both, root, above],
             (root, above) => vec![root.or(above).unwrap_or_default(); 3],
         };
+
+        // The indices above assume this order: three roots, the hierarchy over instances, the instances.
         nodes.extend(above.nodes.iter().map(over_instances));
         nodes.extend(instances.iter().flat_map(|instance| self.instance(instance)));
         self.nodes.write_at(gpu, 0, &nodes);
+
+        // Objects that were moved have their triangles in local coordinates, which change with each move.
         let moved = self.tracer.moved_meshes();
         let starts = &self.starts[self.starts.len() - moved.len()..];
         for (mesh, &(_, start)) in moved.iter().zip(starts) {
@@ -197,7 +214,8 @@ impl ChainScene {
         1.0 / self.tracer.frame().scale
     }
 
-    /// What nodes, triangles and lamps hold, by name. Triangles of the scene come without their corners, which their indices tell, and nodes of meshes without boxes, which their triangles tell.
+    /// What nodes, triangles and lamps hold, by name. Triangles of the scene come without their corners, which their
+    /// indices tell, and nodes of meshes without boxes, which their triangles tell.
     pub(super) fn contents_without_corners(&self) -> [(&'static str, Content); 3] {
         let mut triangles: Vec<Triangle> = bytemuck::pod_collect_to_vec(self.triangles.bytes());
         for triangle in triangles

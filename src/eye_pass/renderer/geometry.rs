@@ -297,6 +297,7 @@ impl Packing<'_> {
     /// Adds an object. Surfaces without maps share corners between neighbouring triangles and all instances of their
     /// mesh.
     fn add(&mut self, material: &Material, drawn: &Drawn) -> Vec<Segment> {
+        // Surfaces without maps have no seams: one set of corners serves all triangles and all instances of a mesh.
         let mesh = &*drawn.mesh;
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
@@ -312,6 +313,8 @@ impl Packing<'_> {
             self.shared.insert(key, segment.clone());
             return vec![segment];
         }
+
+        // Receivers have three corners per triangle, and continue on the next page where one is full.
         let mut segments = Vec::new();
         let mut triangle = 0;
         while triangle < mesh.triangles.len() {

@@ -66,6 +66,7 @@ impl Images {
 
     /// Switches to the images of an edited scene; maps stay if the number of objects is unchanged.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
+        // Maps are kept by receiver, and another number of objects gives every receiver another index.
         let mut uploaded = Uploaded::default();
         if self.maps.len() != 2 * scene.objects.len() {
             self.maps
@@ -74,6 +75,8 @@ impl Images {
                 .for_each(|map| map.image.release(&mut self.map_pool));
             self.maps = (0..2 * scene.objects.len()).map(|_| None).collect();
         }
+
+        // Most edits keep all textures, which are recognised by their pointers: they are not uploaded again.
         let is_same = self.sources.len() == scene.textures.len()
             && self
                 .sources
@@ -99,6 +102,8 @@ impl Images {
                 uploaded += bytes;
             }
         }
+
+        // Freed slots do not shrink a pool: one that is mostly free is replaced by a smaller one.
         if self.texture_pool.is_sparse() {
             self.texture_pool = self.texture_pool.emptied(gpu);
             for image in &mut self.textures {
@@ -106,6 +111,8 @@ impl Images {
                 uploaded += Uploaded::other(moved.tile_bytes as usize);
             }
         }
+
+        // References, bumps and lights take a few words each and are written anew with the table.
         let looks = |material: &Material| material.images().map(Option::<&TextureRef>::cloned);
         self.looks = scene.materials.iter().map(looks).collect();
         let bumps = |object: usize| {
@@ -122,6 +129,8 @@ impl Images {
     /// Shows these maps, by receiver, and no others.
     pub(super) fn set_maps(&mut self, gpu: &Gpu, shown: &[Option<&ShownMap>]) -> Uploaded {
         let mut uploaded = Uploaded::default();
+
+        // A map that keeps its chart uploads only tiles that differ; any other one gives its slots back first.
         for (map, shown) in self.maps.iter_mut().zip(shown) {
             match (&mut *map, shown) {
                 (Some(old), Some(shown)) if old.can_become(shown) => {
@@ -143,6 +152,8 @@ impl Images {
                 }
             }
         }
+
+        // Freed slots do not shrink a pool: one that is mostly free is replaced by a smaller one.
         if self.map_pool.is_sparse() {
             self.map_pool = self.map_pool.emptied(gpu);
             for map in self.maps.iter_mut().flatten() {
@@ -246,6 +257,7 @@ impl Images {
     }
 
     fn write_table(&mut self, gpu: &Gpu) -> Uploaded {
+        // All records share one buffer, as shaders may read few; each is known by the index of its first word.
         let mut words = Vec::new();
         let (mut map_records, mut texture_records) = (Vec::new(), Vec::new());
         for map in &self.maps {
@@ -255,6 +267,8 @@ impl Images {
                 record
             }));
         }
+
+        // Bit 4 of the wrap modes marks textures that are looked up without interpolation.
         for (texture, source) in self.textures.iter().zip(&self.sources) {
             let record = words.len();
             texture_records.push(record as u32);
@@ -262,6 +276,8 @@ impl Images {
             words[record + 3] |= u32::from(source.is_nearest) << 4;
         }
         self.map_records = map_records;
+
+        // References follow the images, whose indices they contain.
         let mut write_look = |look: &TextureRef| {
             let record = words.len() as u32;
             words.extend([texture_records[look.texture], look.uv_set as u32]);
@@ -275,6 +291,8 @@ impl Images {
             [0, 1, 2, 3].map(|which: usize| looks[which].as_ref().map_or(NO_IMAGE, &mut write_look))
         };
         self.look_records = self.looks.iter().map(records).collect();
+
+        // All bumps are shaded by the same lights, which are written once.
         let lights = match &self.relief_lights {
             Some(lights) => {
                 let record = words.len() as u32;
@@ -283,6 +301,8 @@ impl Images {
             }
             None => NO_IMAGE,
         };
+
+        // Bumps come last: they refer to a normal map, the last of a material's images, and to the lights.
         self.bump_records.clear();
         for bumps in &self.bumps {
             let record = words.len() as u32;
@@ -405,6 +425,7 @@ fn mip_chain(texture: &Texture, is_normals: bool) -> Vec<Level<Texel>> {
 
 /// Means of 2×2 texels, of colours in linear light; an odd last row or column is dropped.
 fn halved((fine_size, fine): &Image, is_normals: bool) -> Image {
+    // sRGB codes are not proportional to light: the mean of codes is darker than the mean of light.
     let [fine_width, fine_height] = *fine_size;
     let (width, height) = ((fine_width / 2).max(1), (fine_height / 2).max(1));
     let linear: Vec<f32> = (0..=u8::MAX)
@@ -414,6 +435,8 @@ fn halved((fine_size, fine): &Image, is_normals: bool) -> Image {
         let (x, y) = (x.min(fine_width - 1), y.min(fine_height - 1));
         fine[y * fine_width + x]
     };
+
+    // Alpha and the components of normals are linear in their codes, which are averaged as they are.
     let mean = |x: usize, y: usize| {
         let four = [
             texel(2 * x, 2 * y),

@@ -22,6 +22,7 @@ pub(super) struct Minification {
 
 impl Minification {
     pub(super) fn of(chart: &Chart) -> Self {
+        // A surface that fills its map has texels of equal area and no islands: the sizes of its levels tell all.
         let mut sizes = vec![[chart.width, chart.height]];
         if chart.is_full() {
             while let Some(&last) = sizes.last().filter(|size| is_halved(**size)) {
@@ -32,6 +33,8 @@ impl Minification {
                 areas: Vec::new(),
             };
         }
+
+        // Elsewhere means are weighted by surface area, so that texels without surface do not darken the levels.
         let mut areas = vec![
             chart
                 .texel_areas_m2
@@ -39,6 +42,8 @@ impl Minification {
                 .map(|area| *area as f32)
                 .collect::<Vec<_>>(),
         ];
+
+        // Islands are adjacent only in the map: levels end before a texel, or a lookup, would blend two of them.
         let mut owners = chart.islands().map(|islands| {
             let texels = 0..chart.width * chart.height;
             texels.map(|texel| Owner::of(islands, texel)).collect::<Vec<_>>()

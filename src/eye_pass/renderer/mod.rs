@@ -114,6 +114,7 @@ impl Renderer {
         colour_format: wgpu::TextureFormat,
         sample_count: u32,
     ) -> Result<Self> {
+        // Devices guarantee one and four samples alone.
         if ![1, 4].contains(&sample_count) {
             return Err(Error::usage(
                 "samples per pixel",
@@ -128,6 +129,8 @@ impl Renderer {
                 "update its driver, or use --backend cpu",
             ));
         }
+
+        // What only some views need, as chains, environment and targets, is created with the first of these views.
         let geometry = Geometry::new(gpu, scene);
         let renderer = Self {
             sample_count,
@@ -154,6 +157,8 @@ impl Renderer {
             timing: Timing::new(gpu),
             drawn: [0; 2],
         };
+
+        // Calls to the device do not fail; it reports errors to a callback, where they are collected.
         gpu.take_error().map_or(Ok(renderer), Err)
     }
 

@@ -191,6 +191,8 @@ impl Appearance {
             Some(glow) => scene.emitted_radiance(index) * glow.per_colour(),
             None => scene.emitted_radiance(index),
         };
+
+        // Records of images and the number of the glass are filled in later, once they are known.
         Self {
             surface: material.surface,
             double_sided: material.has_back(),

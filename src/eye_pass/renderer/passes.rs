@@ -39,11 +39,14 @@ impl Renderer {
         radiance_scale: f64,
         sample: Sample,
     ) -> Result<()> {
+        // The targets are overwritten from here on, so that after an error they show no view.
         let quality = self.quality;
         self.collect_times(gpu);
         self.drawn_view = None;
         let size = [view.width, view.height];
         let targets = Targets::of_size(self.targets.take(), gpu, "picture", size, self.sample_count)?;
+
+        // Chains have an image of their own with one sample per pixel, as each of them may take dozens of rays.
         let list = self.prepare(gpu, view);
         if list.specular_objects > 0 {
             let limit = gpu.limits().max_texture_dimension_2d;
@@ -53,10 +56,14 @@ impl Renderer {
             self.traced = Some(traced);
         }
         let frame = self.frame(view, radiance_scale, sample, quality);
+
+        // Chains and shadow rays go through the scene; pictures without them need no hierarchy.
         let needs_scene = list.all().any(|draw| draw.key.writes.goes_through_scene());
         let through_scene = needs_scene
             .then(|| self.bind_chains(gpu, view, quality, sample))
             .flatten();
+
+        // The traced image is complete before the surface pass composes it; its samples are spread over its own pixels.
         if let Some(chains) = &through_scene {
             let traced = Frame {
                 jitter: jitter(view, sample.traced_offset(quality)),
@@ -64,6 +71,8 @@ impl Renderer {
             };
             self.trace(encoder, &self.bind_frame(gpu, &traced), chains, &list);
         }
+
+        // The background is clamped, as half floats end at 65504.
         let frame = self.bind_frame(gpu, &frame);
         let background = view
             .background
@@ -71,6 +80,8 @@ impl Renderer {
         let marks = self.timing.as_ref().map(|timing| timing.marks(SURFACES));
         let mut pass = targets.begin_pass(encoder, background.to_array(), marks);
         pass.set_bind_group(0, &frame, &[]);
+
+        // Group 1 is either the traced image or the scene, so that surfaces are drawn in two runs.
         if let Some(sky) = self.seen_sky() {
             sky.draw(&mut pass);
         }
@@ -239,6 +250,7 @@ impl Renderer {
     }
 
     fn frame(&self, view: &View, radiance_scale: f64, sample: Sample, quality: EyeQuality) -> Frame {
+        // Without a traced image, its size is that of the frame.
         let camera = &view.camera;
         let size = [view.width, view.height].map(f64::from);
         let traced = self
@@ -253,6 +265,8 @@ impl Renderer {
         } else {
             FINEST
         };
+
+        // Mirrors without chains and values that are not finite look the same at any exposure, which is divided out.
         Frame {
             clip_from_camera: clip_from_camera(view),
             camera_position: single(camera.position),

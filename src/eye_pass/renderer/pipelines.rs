@@ -124,11 +124,14 @@ impl PipelineKey {
         faces: Faces,
         flags: PipelineFlags,
     ) -> Self {
+        // Mirrors have no diffuse part that direct light could add to.
         let is_lit = flags.traces_lights && surface != SurfaceKind::Mirror;
         let writes = match writes {
             RenderTarget::Own if is_lit => RenderTarget::OwnUnderLights,
             other => other,
         };
+
+        // What the shader does not read is cleared: another key would compile the same pipeline a second time.
         let shows_itself = matches!(writes, RenderTarget::Own | RenderTarget::OwnUnderLights);
         let looks_up = match writes {
             RenderTarget::Own | RenderTarget::OwnUnderLights => surface != SurfaceKind::Mirror,
@@ -188,8 +191,8 @@ impl PipelineKey {
         }
     }
 
-    /// Whether it writes depths, and which it passes. Chains are traced once per pixel: where the surface is the nearest,
-    /// which was drawn before.
+    /// Whether it writes depths, and which it passes. Chains are traced once per pixel: where the surface is the
+    /// nearest, which was drawn before.
     pub(super) fn depth(self) -> (bool, wgpu::CompareFunction) {
         if self.writes == RenderTarget::Traced {
             (false, wgpu::CompareFunction::Equal)
@@ -333,6 +336,7 @@ impl SurfacePipelines {
     }
 
     fn pipeline(&self, gpu: &Gpu, key: PipelineKey) -> wgpu::RenderPipeline {
+        // The depth prepass writes no colour, and has a fragment stage only where a mask cuts holes.
         let writes = key.writes;
         let module = &self.modules[key.program().name];
         let constants = key.constants();
@@ -351,6 +355,8 @@ impl SurfacePipelines {
             },
             targets,
         });
+
+        // All variants share the vertex stage: chains are traced where the depths of two passes are exactly equal.
         let (depth_write, depth_compare) = key.depth();
         gpu.device
             .create_render_pipeline(&wgpu::RenderPipelineDescriptor {

@@ -29,6 +29,7 @@ pub struct ProbedHit {
 /// # Errors
 /// A scene or a number of rays that exceeds the device's limits.
 pub fn probe(gpu: &Gpu, scene: &Scene, rays: &[Ray]) -> Result<Vec<Option<ProbedHit>>> {
+    // All rays are traced by one dispatch, whose workgroups the device limits.
     let groups = (rays.len() as u32).div_ceil(WORKGROUP);
     let limit = gpu.limits().max_compute_workgroups_per_dimension;
     if groups > limit {
@@ -38,11 +39,15 @@ pub fn probe(gpu: &Gpu, scene: &Scene, rays: &[Ray]) -> Result<Vec<Option<Probed
             format!("trace at most {}", limit * WORKGROUP),
         ));
     }
+
+    // The hierarchy is built even where nothing is traced: a scene beyond the device's limits is an error in any case.
     let geometry = Geometry::new(gpu, scene);
     let chains = ChainScene::new(gpu, &Arc::new(scene.clone()), &geometry, None)?;
     if rays.is_empty() || scene.triangle_count() == 0 {
         return Ok(vec![None; rays.len()]);
     }
+
+    // The device traces in local coordinates, in which the scene's radius is at most one.
     let local: Vec<ProbeRay> = rays
         .iter()
         .map(|ray| ProbeRay {
@@ -63,6 +68,7 @@ pub fn probe(gpu: &Gpu, scene: &Scene, rays: &[Ray]) -> Result<Vec<Option<Probed
 }
 
 fn run(gpu: &Gpu, chains: &ChainScene, rays: &[ProbeRay], groups: u32) -> Result<Vec<ProbeHit>> {
+    // The layout is derived from the shader, as no other pipeline shares it.
     let pipeline = gpu
         .device
         .create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
@@ -73,6 +79,8 @@ fn run(gpu: &Gpu, chains: &ChainScene, rays: &[ProbeRay], groups: u32) -> Result
             compilation_options: Default::default(),
             cache: None,
         });
+
+    // A hit takes half the bytes of a ray.
     let given = gpu.filled_buffer("rays", bytemuck::cast_slice(rays), wgpu::BufferUsages::STORAGE);
     let found = gpu.device.create_buffer(&wgpu::BufferDescriptor {
         label: Some("hits"),
@@ -80,6 +88,8 @@ fn run(gpu: &Gpu, chains: &ChainScene, rays: &[ProbeRay], groups: u32) -> Result
         usage: wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_SRC,
         mapped_at_creation: false,
     });
+
+    // Group 1 is that of chains, of which a search for hits reads only nodes and triangles.
     let bind = |group: u32, first: u32, resources: [wgpu::BindingResource<'_>; 2]| {
         let entries: Vec<_> = (first..)
             .zip(resources)
@@ -93,6 +103,8 @@ fn run(gpu: &Gpu, chains: &ChainScene, rays: &[ProbeRay], groups: u32) -> Result
     };
     let own = bind(0, 0, [given.as_entire_binding(), found.as_entire_binding()]);
     let scene = bind(1, 1, chains.bindings());
+
+    // One invocation traces one ray.
     let mut encoder = gpu.device.create_command_encoder(&Default::default());
     let mut pass = encoder.begin_compute_pass(&Default::default());
     pass.set_pipeline(&pipeline);

@@ -120,8 +120,11 @@ fn pipeline(
     sample_count: u32,
 ) -> wgpu::RenderPipeline {
     let module = SKY.module(&gpu.device);
+
     // Group 1 is used by chains, which this pipeline does not trace.
     let nothing = bind_group_layout(gpu, "nothing", &[]);
+
+    // The environment covers every pixel before any surface is drawn, and leaves the depth as cleared.
     gpu.device
         .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some("sky"),

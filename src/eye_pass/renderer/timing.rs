@@ -97,16 +97,20 @@ impl Timing {
         (has_specular, has_tone_mapping): (bool, bool),
         quality: EyeQuality,
     ) {
+        // A device that falls behind is not given more to read back.
         if self.pending == MAX_PENDING {
             return;
         }
         self.pending += 1;
         let drawn = [true, has_specular, has_tone_mapping];
+
         // Only queries that were written; the others are undefined.
         for (pass, _) in (0..).zip(drawn).filter(|(_, was_drawn)| *was_drawn) {
             let place = u64::from(pass) * STRIDE;
             encoder.resolve_query_set(&self.marks, 2 * pass..2 * pass + 2, &self.resolved, place);
         }
+
+        // Each frame is copied to a buffer of its own, which stays mapped until its times are collected.
         let usage = wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ;
         let buffer = buffer(&gpu.device, usage);
         encoder.copy_buffer_to_buffer(&self.resolved, 0, &buffer, 0, BYTES);

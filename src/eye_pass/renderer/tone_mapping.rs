@@ -61,6 +61,7 @@ impl ToneMappingPipelines {
         tone_map: ToneMap,
         timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
     ) {
+        // Each tone map is a specialisation of one shader, compiled when it is first shown.
         if !self.made.contains_key(&tone_map) {
             let constants = constants(tone_map, !self.target.is_srgb());
             let pipeline = cover_pipeline(
@@ -73,6 +74,8 @@ impl ToneMappingPipelines {
             );
             self.made.insert(tone_map, pipeline);
         }
+
+        // The radiance is that of the frame or the mean of several, so that its texture is bound anew each time.
         let resources = [
             wgpu::BindingResource::TextureView(radiance),
             self.white.as_entire_binding(),

@@ -261,12 +261,15 @@ shader_struct! {
 impl LightRecord {
     /// A light in a vacuum, at its place in the shader's coordinates.
     pub(super) fn of(emitter: &Emitter, placed: impl Fn(DVec3) -> [f32; 3]) -> Self {
+        // Medium and outline depend on the scene and are added by the caller.
         let single = |direction: DVec3| direction.as_vec3().to_array();
         let record = Self {
             strength: rgb(emitter.strength),
             ior: 1.0,
             ..Self::default()
         };
+
+        // Kinds are numbered as `LIGHT_*` of `light_record.wgsl`.
         match emitter.kind {
             EmitterKind::Point { position } => Self {
                 place: placed(position),

@@ -1,5 +1,5 @@
-//! A scene for browsers: what this renderer would hand to a device, for a host that draws as it does by WebGPU, whose words
-//! these are.
+//! A scene for browsers: what this renderer would hand to a device, for a host that draws as it does by WebGPU, whose
+//! words these are.
 
 use std::collections::BTreeMap;
 
@@ -35,7 +35,8 @@ const PICTURE_HEIGHT: f64 = 1080.0;
 /// Most that the maps of all layers together take on the device as half floats [bytes]: browsers on phones give a page
 /// little, and files are sent.
 const MAP_BUDGET_BYTES: u64 = 64 << 20;
-/// Pictures of a view that differ in their wavelengths.
+/// Pictures of a view that differ in their wavelengths: the first, which may remain the only one, and as many as a
+/// still averages.
 const PICTURES: u32 = 17;
 
 /// What pictures of a scene are made of, whatever the view.
@@ -43,8 +44,8 @@ const PICTURES: u32 = 17;
 pub struct WebScene {
     /// Shader modules, pipelines, draws and structs.
     pub description: Value,
-    /// What buffers and textures hold, by name, and where the tiles of each map lie, as `summed.wgsl` reads them. Triangles
-    /// lack what their indices tell, and nodes what their triangles tell.
+    /// What buffers and textures hold, by name, and where the tiles of each map lie, as `summed.wgsl` reads them.
+    /// Triangles lack what their indices tell, and nodes what their triangles tell.
     pub contents: BTreeMap<String, Content>,
     /// Why mirrors and glass are drawn without reflections and refractions, if they are.
     pub refusal: Option<Error>,
@@ -75,23 +76,27 @@ impl Content {
 }
 
 impl WebScene {
-    /// Gathers a scene with maps of some sizes. Of their light, only the largest value counts: the host fills the tiles,
-    /// and a texture of the environment.
+    /// Gathers a scene with maps of some sizes. Of their light, only the largest value counts: the host fills the
+    /// tiles, and a texture of the environment.
     ///
     /// # Errors
     /// A scene beyond what every browser's device holds; maps that do not belong to the scene.
     pub fn new(scene: &Scene, maps: &[IlluminationMap]) -> Result<Self> {
         let gpu = Gpu::idle()?;
         let mut renderer = Renderer::new(&gpu, scene, wgpu::TextureFormat::Rgba8Unorm, SAMPLES)?;
+
         // The host traces at any resolution.
         renderer.set_quality(EyeQuality {
             traced_scale: 0.5,
             ..EyeQuality::STILL
         });
+
         // Coarse first: tiles then fill the pool without gaps.
         renderer.set_map_budget(0);
         renderer.set_maps(&gpu, scene, maps)?;
         renderer.set_map_budget(MAP_BUDGET_BYTES);
+
+        // Detail is kept near the first camera of the scene or, without one, near a camera that frames it.
         let outside = || Camera::framing("outside", scene.inner_bounds().unwrap_or_default(), 1.0);
         let camera = scene.cameras.first().cloned().unwrap_or_else(outside);
         // What is far from the first camera loses its finest levels where maps are beyond the budget.
@@ -100,6 +105,8 @@ impl WebScene {
         renderer
             .objects
             .keep_budget(&gpu, camera.position, pixel_rad, &all);
+
+        // The host draws and traces from one buffer of vertices, whose size is limited in every browser.
         if renderer.geometry.pages.len() > 1 {
             let triangles = scene.triangle_count();
             return Err(Error::failure(
@@ -111,12 +118,15 @@ impl WebScene {
         if renderer.draw_state().has_specular(&renderer.objects) {
             renderer.make_chain_scene(&gpu);
         }
+
+        // The host fills the tiles of each map by the list of where they lie.
         let mut contents = renderer.web_contents(&gpu, camera)?;
         for receiver in maps.iter().map(|map| map.chart.receiver) {
             let tiles = renderer.objects.images.map(receiver).map(DeviceMap::tiles);
             let name = format!("tiles{}", receiver.index());
             contents.insert(name, Content::records(&tiles.unwrap_or_default()));
         }
+
         let made = Self {
             description: renderer.web_description(&all),
             contents,
@@ -129,6 +139,7 @@ impl WebScene {
 impl Renderer {
     /// `camera`: some view, which the host replaces.
     fn web_contents(&self, gpu: &Gpu, camera: Camera) -> Result<BTreeMap<String, Content>> {
+        // Each picture of a view traces chains at other wavelengths: the host gets one set for each.
         let is_dispersive = self.draw_state().flags.is_dispersive;
         let seen = |picture| match is_dispersive {
             true => SeenWavelengths::of(&wavelengths::of_picture(picture), &self.objects.glasses),
@@ -147,6 +158,8 @@ impl Renderer {
             ),
             ("white", Content::plain(&[DisplayWhite::new(&IDENTITY)])),
         ];
+
+        // Vertices are read back from the idle device, as the renderer keeps no copy of them.
         if let Some(page) = self.geometry.pages.first() {
             let [corner, uv] = [CORNER_LAYOUT, MAP_UV_LAYOUT].map(|layout| layout.array_stride as usize);
             for (name, buffer, record) in [
@@ -159,6 +172,8 @@ impl Renderer {
                 contents.push((name, Content { bytes, record_bytes }));
             }
         }
+
+        // Scenes without specular surfaces trace no chains.
         if let Some(scene) = &self.chain_scene {
             contents.extend(scene.contents_without_corners());
             let start = scene.start(&View::new(camera, [1, 1]), &ChainLimits::default());
@@ -190,10 +205,13 @@ impl Renderer {
     }
 
     fn web_description(&self, all: &[usize]) -> Value {
+        // Full-screen passes have no draws that would name their programs.
         let (mut programs, mut pipelines, mut draws) = (Map::new(), Map::new(), Map::new());
         for program in [ACCUMULATED, SUMMED, TONE_MAPPING, SKY] {
             programs.insert(program.name.into(), program.wgsl().into());
         }
+
+        // Each program and each pipeline is described once, however many draws use it.
         for (list, of) in self.web_draws(all) {
             let runs = self.runs(&of).into_iter().map(|(key, segment, objects)| {
                 let (program, name, indices) = (key.program(), format!("{key:?}"), &segment.indices);
@@ -205,14 +223,20 @@ impl Renderer {
             });
             draws.insert(list.into(), runs.collect());
         }
+
+        // A canvas takes encoded values, so that every tone map encodes as sRGB.
         let tone_maps = ToneMap::VARIANTS.iter().map(|&tone_map| {
             let values = constants(&tone_mapping::constants(tone_map, true));
             (<&str>::from(tone_map).to_owned(), values)
         });
+
+        // Corners of triangles and boxes of nodes are left out; the host restores them in local coordinates.
         let local = self.chain_scene.as_ref().map(|scene| {
             let (frame, first) = (scene.frame(), scene.first_mesh_node());
             json!({"centre_m": frame.centre.to_array(), "per_m": frame.scale, "first_mesh_node": first})
         });
+
+        // All that does not depend on the view, in words of WebGPU.
         let vertices = [CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT].map(|layout| vertices(&layout));
         let [map_pool, texture_pool] = self.objects.images.pool_sizes();
         let sky_strength = self.scene.sky().map(|(_, strength)| strength.to_array());
@@ -229,6 +253,8 @@ impl Renderer {
             "local": local,
             "background": sky_strength.unwrap_or_default(),
         });
+
+        // The host finds the fields that it reads and writes by their offsets.
         let structs = [Frame::layout(), ChainStart::layout(), ObjectRecord::layout()];
         for layout in structs
             .into_iter()

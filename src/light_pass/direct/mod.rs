@@ -3,7 +3,8 @@
 //! E = I cos θ/r² for points and spots and E⊥ cos θ for suns, with θ from the interpolated normal. Every surface casts
 //! shadows, clear glass included: what passes through it is caustic light (LS+D). A surface of partial coverage lets
 //! the rest of the light pass. The medium around a lamp absorbs on the way. Each side of a surface has its own map.
-//! Extended lights are averaged over samples, and where these are noisy over neighbouring texels that they light evenly.
+//! Extended lights are averaged over samples, and where these are noisy over neighbouring texels that they light
+//! evenly.
 
 pub mod border;
 pub(super) mod facet;
@@ -206,6 +207,8 @@ impl<'a> Baker<'a> {
         (sources, first_look): (&'a [Option<DirectSource>], FirstLook),
         chart: &'a Chart,
     ) -> Self {
+        // A counting sort of the triangles by the rows of texels that they overlap: each row reads one contiguous
+        // range.
         let size = DVec2::new(1.0, chart.height as f64);
         let reach = |uvs: &[DVec2; 3]| rows(uvs.map(|uv| uv * size), chart.height);
         let mut first = vec![0; chart.height + 1];
@@ -217,6 +220,8 @@ impl<'a> Baker<'a> {
         for row in 0..chart.height {
             first[row + 1] += first[row];
         }
+
+        // Triangles of a row keep the order of the mesh, and with it the order of the float sums in its texels.
         let mut next = first.clone();
         let mut triangles = vec![0; first[chart.height]];
         for (triangle, uvs) in chart.corner_uvs.iter().enumerate() {
@@ -289,11 +294,15 @@ impl<'a> Baker<'a> {
         row_done: &(impl Fn() + Sync),
         control: &Control,
     ) -> SubdividedTexels<Texel> {
+        // A texel is divided where its light is steep and unclear, but not once the time is up.
         let texels = &seen.texels;
         let is_late = control.is_cancelled();
         let steep =
             |texel: usize| !is_late && is_steep(self.chart, texels, texel) && self.is_unclear(texels, texel);
         let steep: Vec<bool> = (0..unclear.len()).map(steep).collect();
+
+        // Small texels replace the texel's own light, so that each gets a first look, whatever the deadline. Only those
+        // that stay unclear get more samples, as far as the time allows.
         let side = smaller.chart.width / self.chart.width;
         let mut divided = SubdividedTexels::new(self.chart, side, &steep, Texel::DARK);
         let is_there = |small: usize| divided.get(small).is_some();
@@ -308,6 +317,8 @@ impl<'a> Baker<'a> {
             divided.is_unclear(small)
         });
         seen.take_small(rows, &mut divided);
+
+        // The mean of its small texels is better than any finer samples of a texel, which needs none from here on.
         for (texel, unclear) in unclear.iter_mut().enumerate() {
             let Some(small) = divided.within(texel) else {
                 continue;
@@ -382,6 +393,7 @@ impl<'a> Baker<'a> {
     }
 
     fn row(&self, row: usize, look: SamplingDetail, wanted: &impl Fn(usize) -> bool) -> TexelRow {
+        // Triangles that share a texel add their samples to one sum.
         let width = self.chart.width;
         let mut sums = vec![TexelSum::EMPTY; width];
         let mut content = TexelRow::default();
@@ -398,6 +410,9 @@ impl<'a> Baker<'a> {
                 }
             });
         }
+
+        // A surface too thin for the grid of samples is sampled at the centroid of its largest overlap, lest the texel
+        // stay black.
         for (column, sum) in sums.iter_mut().enumerate() {
             if let (true, Some(part)) = (sum.lit == LightsOfTexel::EMPTY, sum.largest)
                 && let Some(facet) = self.facet(part.triangle)
@@ -427,6 +442,7 @@ impl<'a> Baker<'a> {
         look: SamplingDetail,
         sum: &mut TexelSum,
     ) -> u64 {
+        // The largest overlap is remembered for texels in which no sample lies on the surface.
         let area_m2 = part.area() * facet.m2_per_texel2;
         if sum.largest.is_none_or(|largest| largest.area_m2 < area_m2) {
             sum.largest = Some(LargestOverlap {
@@ -435,6 +451,9 @@ impl<'a> Baker<'a> {
                 middle: part.centroid(),
             });
         }
+
+        // The samples of a texel form one regular grid. Each triangle takes those within its overlap, and none is taken
+        // twice.
         let side = look.side;
         let step = 1.0 / side as f64;
         let mut shadow_rays = 0;
@@ -460,6 +479,7 @@ impl<'a> Baker<'a> {
         (hash, index): (u64, usize),
         look: (usize, SamplingDetail),
     ) -> Sample {
+        // The diffuse fraction and the coat at the point decide how much of the arriving light the map stores.
         let point = facet.at(place);
         let object = self.chart.object();
         let response = self
@@ -472,10 +492,14 @@ impl<'a> Baker<'a> {
             soft: 0.0,
             shadow_rays: 0,
         };
+
+        // Marks of the lights that arrive are combined, so that texels that see different lights can be told apart.
         for (light, source) in self.sources.iter().enumerate() {
             let Some(source) = source else { continue };
             match &source.emission {
                 Emission::Single(emitter) => {
+                    // A single point or direction is visible, blocked, or dimmed by partial coverage, which has a mark
+                    // of its own.
                     let arriving = IncidentLight::new(emitter, point.position).and_then(|beam| {
                         UnshadowedLight::from_beam(
                             &beam,
@@ -496,6 +520,8 @@ impl<'a> Baker<'a> {
                     }
                 }
                 Emission::Extended(soft) => {
+                    // A run of samples decides visibility. Where it is partial, the texel counts as crossed by a
+                    // penumbra.
                     let run = soft.run(hash, index, look);
                     let gathered = soft.gather(
                         self.tracer,

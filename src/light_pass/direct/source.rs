@@ -120,17 +120,21 @@ impl DirectSource {
 impl LightSamples {
     /// A light with a shape is sampled uniformly by area.
     fn new(light: &Light, scene: &Scene, index: usize, has_shape: bool) -> Option<Self> {
+        // Owen-scrambled Sobol points, which all texels share.
         let sequence = |count: usize, pair| {
             (0..count as u32).map(move |place| even_point(place, pair, SEED + index as u64))
         };
         let squares = || sequence(READY, 0);
         Some(match (light.kind, light.size) {
+            // Seen from afar, a sphere of intensity I is a disc of area πr²: its radiance is I/(πr²).
             (LightKind::Point { position, .. }, LightSize::Radius { radius_m }) => Self::Ball {
                 centre: position,
                 radius_m,
                 radiance: light.strength() / (PI * radius_m * radius_m),
                 squares: squares().collect(),
             },
+            // Half of the samples follow the sky's radiance; the second sequence is for those that follow the
+            // receiver's cosine.
             (LightKind::Environment { .. }, _) => {
                 let sky = scene.environment.as_ref()?;
                 let to_light: Option<Vec<DVec3>> = sequence(READY_OF_SKY, 0)
@@ -144,6 +148,8 @@ impl LightSamples {
                 }
             }
             _ => {
+                // Where the unoccluded E is analytic, samples only compare occluded with unoccluded light, evenly over
+                // the area.
                 let places = match has_shape {
                     true => EmitterSampler::spread_evenly(light, scene),
                     false => EmitterSampler::new(light, scene),
@@ -160,6 +166,7 @@ impl LightSamples {
 
 /// The polygons of a light if they are few.
 fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
+    // Panels and meshes of few triangles have a closed form of E; all other lights are left to samples.
     let polygons = match light.kind {
         LightKind::Panel {
             centre,
@@ -189,6 +196,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
                 .map(|place| centre + across * place.x + down * place.y);
             vec![Polygon::new(corners.collect(), normal, false)]
         }
+        // Every triangle adds its closed form at each sample point, which only few triangles are worth.
         LightKind::Surface { object, .. } => {
             let mesh = scene.objects.get(object)?.in_scene();
             if mesh.triangle_count() > MAX_POLYGONS {
@@ -235,6 +243,7 @@ impl ExtendedLight {
         media: &MediumStack,
         run: Range<usize>,
     ) -> Gathered {
+        // Each sample stands for the whole light and costs one shadow ray, which ends short of the light's own surface.
         let count = run.len() as f64;
         let mut sum = Sum::default();
         for index in run.clone() {
@@ -249,6 +258,8 @@ impl ExtendedLight {
             sum.blocked_rays += u64::from(passing < 1.0);
             sum.irradiance += arriving.irradiance * passing;
         }
+
+        // The share of light that is not occluded scales the analytic E, so that fully lit places are free of noise.
         let irradiance = match &self.shape {
             // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018. The
             // ratio includes the image on a light, as it includes shadows.
@@ -274,6 +285,7 @@ impl ExtendedLight {
         material: &Material,
     ) -> Option<IncidentLight> {
         match &self.places {
+            // A sample without a closed form stands for a patch of the light, since a point would be singular close by.
             LightSamples::Emitters { all, area_m2 } => {
                 let patch_m2 = if self.shape.is_some() {
                     0.0
@@ -288,6 +300,8 @@ impl ExtendedLight {
                 to_light,
                 squares,
             } => {
+                // Half of the run follows the sky's radiance and half the receiver's cosine: either alone is noisy
+                // where the other varies.
                 let surface = Cosines::of(point, material);
                 let half = run.len() / 2;
                 let place = run.start / 2 + (index - run.start) % half;

@@ -1,7 +1,7 @@
 //! The light paths that reach a texel, with the flux of each: found by tracing the scene, without the baked maps.
 //!
-//! The part of a light's domain that lights the texel is found by dividing the domain into squares; its flux is the flux
-//! of the texel. Connected squares on the same path form one [`LightPath`]. It is shown by the ray of these that
+//! The part of a light's domain that lights the texel is found by dividing the domain into squares; its flux is the
+//! flux of the texel. Connected squares on the same path form one [`LightPath`]. It is shown by the ray of these that
 //! hits the requested point, found by Newton's method on the ray's start.
 
 mod clip;
@@ -104,6 +104,7 @@ pub fn explain(
     scale_w_m2: f64,
     control: &Control,
 ) -> Explanation {
+    // The launch domain of each light is searched for the squares whose caustic light reaches the texel.
     let aim = LightVisibility::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, true);
     let negligible_w = NEGLIGIBLE * scale_w_m2 * target.area_m2;
     let mut found = Explanation {
@@ -120,6 +121,8 @@ pub fn explain(
             &mut found,
         );
     }
+
+    // Direct light comes from the estimator of the direct layer, so that both agree.
     explain_direct(tracer, target, control, &mut found);
     let brightness = |path: &LightPath| path.irradiance.luminance();
     found
@@ -137,13 +140,16 @@ fn explain_light(
     control: &Control,
     found: &mut Explanation,
 ) {
-    // Each sample point of the light on its own.
+    // A light with extent is searched from each of its sample points, which share its strength equally.
     let light = &tracer.scene().lights[visible_light.light];
     let source = light.of_unit_strength();
     let extended = light.has_extent().then_some(&source);
     let launch = PhotonLaunch::of(tracer, visible_light, extended, PLACES_SEED);
     let places = if light.has_extent() { PLACES } else { 1 };
     let strength = light.strength() * (1.0 / f64::from(places));
+
+    // Squares connected on one path are one entry. Points of an extended light see nearly the same paths, which are
+    // merged by signature.
     let mut by_way: BTreeMap<PathSignature, LightPath> = BTreeMap::new();
     for place in 0..places {
         let searcher = TexelSearch {
@@ -213,6 +219,7 @@ fn path_of(walker: &LightPathWalker<'_>, light: usize, pieces: &[LitSquare]) -> 
 
 /// The ray of a piece that hits the requested point; the nearest one if none does, as beyond the edge of a caustic.
 fn meeting(walker: &LightPathWalker<'_>, piece: &LitSquare) -> Option<WalkedPath> {
+    // Newton's method starts from the point of the piece that is known to light the texel.
     let goal = walker.target.place;
     let texel_m = walker.target.area_m2.sqrt();
     let way = |square: DVec2| walker.way(piece.point.root as usize, square, piece.way);
@@ -220,6 +227,8 @@ fn meeting(walker: &LightPathWalker<'_>, piece: &LitSquare) -> Option<WalkedPath
     let mut square = piece.point.off_border();
     let mut best = way(square)?;
     let mut step = 1e-4 * side;
+
+    // Finite differences give the derivative of where the ray lands. A neighbour that leaves the path ends the search.
     for _ in 0..MAX_STEPS {
         let miss = goal - best.place;
         if miss.length() * texel_m < MEETS_M {
@@ -243,6 +252,8 @@ fn meeting(walker: &LightPathWalker<'_>, piece: &LitSquare) -> Option<WalkedPath
             (found.place.distance(goal) < best.place.distance(goal)).then_some((to, found))
         });
         let Some((to, found)) = better else { break };
+
+        // Differences shrink with the steps, for precision near the goal, but not so far that rounding dominates them.
         step = (0.1 * to.distance(square)).clamp(1e-7 * side, 1e-4 * side);
         (square, best) = (to, found);
     }
@@ -251,6 +262,7 @@ fn meeting(walker: &LightPathWalker<'_>, piece: &LitSquare) -> Option<WalkedPath
 
 /// Adds the direct light of each light, as the direct layer computes it.
 fn explain_direct(tracer: &Tracer, target: &Target, control: &Control, found: &mut Explanation) {
+    // The direct layer of each light alone, on a chart of this texel alone.
     let chart = target.chart_of_texel();
     let (low, high) = tracer.scene().bounds().unwrap_or_default();
     for (index, light) in tracer.scene().lights.iter().enumerate() {
@@ -265,6 +277,8 @@ fn explain_direct(tracer: &Tracer, target: &Target, control: &Control, found: &m
         if irradiance.max_channel() <= 0.0 {
             continue;
         }
+
+        // Parallel light has no start: its path is drawn from a point in front of the scene.
         let start = light.kind.position().or_else(|| {
             let LightKind::Sun { direction, .. } = light.kind else {
                 return None;

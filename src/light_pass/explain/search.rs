@@ -180,7 +180,7 @@ impl TexelSearch<'_> {
         way: PathSignature,
         at: [Option<&Landing>; 5],
     ) -> Verdict {
-        // Where it lands, and how far that may be from where it lands between its points.
+        // Bounds of where the path lands: those of its known arrivals, widened by what it may stray between them.
         let there: Vec<&Landing> = at.into_iter().flatten().collect();
         let is_whole = there.len() == at.len();
         let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);
@@ -201,13 +201,16 @@ impl TexelSearch<'_> {
                 (BEYOND * map_texels * (-f64::from(square.level - first)).exp2()).max(extent)
             }
         };
+
+        // A path that stays clear of the texel needs no finer squares.
         let margin = DVec2::splat(2.0 * bend + 0.25 * extent);
         let is_near = (low - margin).cmplt(DVec2::ONE).all() && (high + margin).cmpgt(DVec2::ZERO).all();
         if !(is_near || extent.is_nan()) {
             return Verdict::Away;
         }
 
-        // What of it is as fine as it has to be.
+        // A straight and fine piece is integrated over triangles, a negligible one estimated from its points; any other
+        // is divided.
         let brightest = there
             .iter()
             .map(|landing| landing.flux_w.luminance())
@@ -221,6 +224,8 @@ impl TexelSearch<'_> {
             _ if is_negligible => part(at),
             _ => return Verdict::Divide,
         };
+
+        // The piece is drawn by a ray that lands near the texel, if any is known.
         let piece = at[point].map(|landing| LitSquare {
             way,
             square,

@@ -39,6 +39,7 @@ pub struct Target {
 impl Target {
     /// The texel under a point that is seen along a direction; `None` if the chart has none there.
     pub fn new(tracer: &Tracer, chart: &Arc<Chart>, hit: &SurfaceHit, direction: DVec3) -> Option<Self> {
+        // The finest texel under the point. Rounding may put points on the border just outside of the map.
         let receiver = Receiver::new(hit.object, Side::met(direction, hit.geometric_normal));
         let corners = tracer.scene().objects[hit.object]
             .mesh_in_scene()
@@ -48,6 +49,8 @@ impl Target {
         let at = uv * size;
         let within = |at: f64, count: usize| (at.max(0.0) as usize).min(count - 1);
         let (column, row) = (within(at.x, chart.width), within(at.y, chart.height));
+
+        // In a coarser tile, texels begin at multiples of their own size.
         let level = chart
             .layout
             .as_ref()
@@ -56,6 +59,8 @@ impl Target {
         let texels = f64::from(1_u32 << level);
         let texel = chart.texel_at(column, row);
         let area_m2 = chart.texel_area_m2(texel);
+
+        // The Jacobian turns displacements in the triangle's plane into texels. A collapsed triangle has none.
         let rows = chart.texel_from_world(hit.triangle, corners)?;
         (receiver == chart.receiver && area_m2 > 0.0).then(|| Self {
             receiver,

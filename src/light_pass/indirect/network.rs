@@ -42,6 +42,7 @@ pub struct Network {
 impl Network {
     /// Elements of all receivers, one chart each at the size of its grid; no rays yet.
     pub fn new(scene: &Scene, charts: &[Arc<Chart>]) -> Self {
+        // Grids are built on all threads, and numbered once the element counts of all grids before them are known.
         let unnumbered: Vec<Grid> = charts
             .par_iter()
             .map(|chart| Grid::new(scene, chart, 0))
@@ -55,6 +56,8 @@ impl Network {
             grids.push(Grid { first, ..grid });
             first += count;
         }
+
+        // A closed body hides the points within it. A room does not: its inside is drawn and holds other objects.
         let is_closed = |object: usize| {
             let mesh = scene.objects[object].copy_in_scene();
             enclosure::is_closed(&mesh.positions, &mesh.triangles)
@@ -153,6 +156,7 @@ impl Network {
         progress: &dyn Progress,
         control: &Control,
     ) -> bool {
+        // The rays of a pass continue the sequence of all passes before it, so that together they are evenly spread.
         for pass in 0..passes.iter().copied().max().unwrap_or(0) {
             let elements = self.missing(passes, pass);
             if elements.is_empty() {
@@ -169,6 +173,8 @@ impl Network {
                 seed,
                 rays: (rays, Self::rays_after(pass + 1)),
             };
+
+            // Only whole passes are kept: a cancelled one must not leave some elements with fewer rays than they claim.
             let Some(batch) = work.run(&elements, progress, control) else {
                 return false;
             };

@@ -50,17 +50,24 @@ impl Follower<'_> {
             let Some(hit) = self.tracer.closest_hit(&ray) else {
                 return found;
             };
+
+            // An opaque back as the first surface tells that the ray starts inside a body.
             let material = scene.material_of(hit.object);
             let side = Side::met(ray.direction, hit.geometric_normal);
             let is_back = side == Side::Back;
             if depth == 0 && is_back && material.is_opaque() {
                 found.first_back = Some(hit.object);
             }
+
+            // The segment absorbs by the Beer–Lambert law. A rough surface scatters at a microfacet of a random point
+            // of its own.
             weight = weight * media.transmittance(scene, hit.distance_m);
             let micro = material.is_rough().then(|| choice(2 * depth + 1));
             let interaction =
                 self.tracer
                     .interact_with(EffectSet::EVERYTHING, &hit, ray.direction, &media, micro);
+
+            // A diffuse surface sends π·L = ρ·E, less what its coat keeps. The coat may also mirror the ray onwards.
             if material.surface.is_receiver() {
                 if is_back && !material.has_back() {
                     // A back that is not drawn sends no light.
@@ -72,6 +79,9 @@ impl Follower<'_> {
                     weight * interaction.leaving * self.tracer.base_colour(&hit),
                 );
             }
+
+            // Of two branches, one is sampled in proportion to its share. Radiance, unlike flux, scales with the
+            // squared ratio of indices.
             let Some((branch, share)) = chosen(&interaction, material.surface, choice(2 * depth).x) else {
                 return found;
             };

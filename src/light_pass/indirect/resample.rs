@@ -66,6 +66,9 @@ impl<'a> Resampling<'a> {
         let mut flux = vec![LinearSrgb::BLACK; elements.len()];
         let mut area_m2 = vec![0.0; elements.len()];
         let (width, height) = (self.chart.width, self.chart.height);
+
+        // The overlap of two rectangles is the product of those along both axes, found once per row and column of a
+        // block.
         for block in self.blocks() {
             let lines = |first: usize, count: usize, from: usize, to: usize| -> Vec<Vec<(usize, f64)>> {
                 let low = |index: usize| first + index * block.side;
@@ -83,6 +86,8 @@ impl<'a> Resampling<'a> {
             let places = rows
                 .iter()
                 .flat_map(|rows| columns.iter().map(move |columns| (rows, columns)));
+
+            // A texel gives its flux only to elements of its own piece, so that no light crosses a crease.
             for (texel, (rows, columns)) in block.texels.zip(places) {
                 let texel_m2 = self.chart.texel_area_m2(texel);
                 if texel_m2 <= 0.0 {
@@ -101,6 +106,8 @@ impl<'a> Resampling<'a> {
                 }
             }
         }
+
+        // Flux over area is the mean E. An element that owns no texel of the map takes E at its centroid.
         let at_middle = |element: usize| {
             let size = DVec2::new(self.grid.chart.width as f64, self.grid.chart.height as f64);
             let place = elements[element].middle / size * DVec2::new(width as f64, height as f64);
@@ -153,6 +160,7 @@ impl<'a> Resampling<'a> {
         values: &[[f64; 3]],
         is_hidden: &impl Fn(usize) -> bool,
     ) -> [f64; 3] {
+        // Only elements of the texel's own piece take part: light is not interpolated across creases.
         let (width, height) = (self.grid.chart.width as i64, self.grid.chart.height as i64);
         let element = |column: i64, row: i64| {
             let inside = (0..width).contains(&column) && (0..height).contains(&row);
@@ -161,9 +169,11 @@ impl<'a> Resampling<'a> {
                 .flatten()
         };
         let own = element(place.x.floor() as i64, place.y.floor() as i64);
+
+        // Bilinear weights, divided by the sum of those in use: at the border of a piece some of the four are missing.
         let low = (place - 0.5).floor();
         let part = place - 0.5 - low;
-        // Of visible and of hidden elements.
+        // Weighted values and weights: of visible elements, then of hidden ones.
         let mut sums = [([0.0; 3], 0.0); 2];
         for (right, across) in [(0, 1.0 - part.x), (1, part.x)] {
             for (down, along) in [(0, 1.0 - part.y), (1, part.y)] {
@@ -178,6 +188,9 @@ impl<'a> Resampling<'a> {
                 *weights += weight;
             }
         }
+
+        // Hidden elements are dark, as they lie within solids or see nothing. They count only where no visible one is
+        // near.
         if let Some((sum, weights)) = sums.into_iter().find(|(_, weights)| *weights > 0.0) {
             return sum.map(|channel| channel / weights);
         }
@@ -218,6 +231,8 @@ fn shares(texels: Range<usize>, from: usize, to: usize) -> Vec<(usize, f64)> {
 }
 
 fn pieces_of_texels(grid: &Grid, chart: &Chart) -> Vec<u32> {
+    // The piece that overlaps a texel most owns it, as far as that shows without memory per piece: only the leader's
+    // area is summed, and others compete triangle by triangle.
     let (width, height) = (chart.width, chart.height);
     let size = DVec2::new(width as f64, height as f64);
     let mut best = vec![(0.0_f32, 0_u32); width * height];

@@ -32,6 +32,7 @@ impl Network {
     /// Solves E = K (S + E) for the sources S [W/m²] of all elements, using the first `passes` of each element, at
     /// least [`MIN_PASSES`](super::MIN_PASSES).
     pub fn solve(&self, sources: &[LinearSrgb], passes: &[u8]) -> Solution {
+        // Jacobi iteration from darkness: after n rounds, E holds the light of up to n bounces.
         let count = self.element_count();
         let mut irradiance = vec![LinearSrgb::BLACK; count];
         let (mut bounces, mut converged, mut last_change) = (0, false, f64::INFINITY);
@@ -52,6 +53,9 @@ impl Network {
                 break;
             }
         }
+
+        // Noise is measured under the converged light, and pooled with the elements around: a single difference says
+        // little.
         let sent: Vec<LinearSrgb> = sources.iter().zip(&irradiance).map(|(s, e)| *s + *e).collect();
         let lone: Vec<f64> = (0..count)
             .into_par_iter()

@@ -109,6 +109,8 @@ struct RayEnd {
 impl GatherPass<'_> {
     /// Traces the rays of some elements; `None` if cancelled.
     pub fn run(&self, elements: &[u32], progress: &dyn Progress, control: &Control) -> Option<Batch> {
+        // Chunks are traced on all threads and joined in their order: the result does not depend on the number of
+        // threads.
         let has_bodies = self.has_bodies();
         let chunks = elements.len().div_ceil(CHUNK);
         let done = AtomicU64::new(0);
@@ -127,6 +129,8 @@ impl GatherPass<'_> {
                 Some(part)
             })
             .collect();
+
+        // Rows refer to links of their own chunk. They move by the links of all chunks before it.
         let mut all = Batch::default();
         for part in parts? {
             let before = all.links.len() as u64;
@@ -151,6 +155,8 @@ impl GatherPass<'_> {
     }
 
     fn element(&self, number: usize, has_bodies: bool, part: &mut Batch) {
+        // Rays start in the medium around the element: its index decides what a coat reflects, and it absorbs on the
+        // way.
         let grid = &self.grids[self.grids.partition_point(|grid| grid.first <= number) - 1];
         let element = number - grid.first;
         let mesh = self.tracer().scene().objects[grid.chart.object()].mesh_in_scene();
@@ -159,6 +165,9 @@ impl GatherPass<'_> {
         } else {
             MediumStack::default()
         };
+
+        // Elements smaller than usual get fewer rays. A halved range of indices is aligned as before, and so evenly
+        // spread.
         let seed = self.seed_of(grid, element);
         let halvings = (grid.usual_m2 / grid.elements.all()[element].area_m2)
             .log2()
@@ -171,6 +180,9 @@ impl GatherPass<'_> {
                 ends.push(end);
             }
         }
+
+        // The first pass decides whether points within a solid count. Later passes keep to it, so that all rows of an
+        // element sample the same part of it.
         let stance = match self.stances[number] {
             ElementPoints::Unknown => stance(&ends),
             known => known,
@@ -206,14 +218,19 @@ impl GatherPass<'_> {
         (seed, media): (u64, MediumStack),
         part: &mut Batch,
     ) -> Option<RayEnd> {
+        // With points uniform by area and directions weighted by the cosine, each ray estimates E as π·L.
         let point = grid.point(mesh, element, even_point(index, 0, seed))?;
         let direction = cosine_direction(&point, even_point(index, 1, seed));
+
+        // The coat of the receiving surface reflects part of what arrives at this angle.
         let own = grid.chart.object();
         let response = self
             .tracer()
             .diffuse_response(own, point.triangle, point.barycentric);
         let ior_around = media.ior(self.tracer().scene());
         let share = response.of(direction.dot(point.shading_normal), ior_around);
+
+        // Each diffuse surface on the path becomes a link, weighted by the E that it causes here per E of its own.
         let first = part.links.len();
         let (links, counts) = (&mut part.links, &mut part.counts);
         let found = self.follower.follow(
@@ -237,6 +254,8 @@ impl GatherPass<'_> {
         counts.rays += 1;
         counts.segments += found.segments;
         counts.truncated += found.truncated;
+
+        // A ray that first meets the back of a closed opaque body started within that body.
         let within = found
             .first_back
             .filter(|&object| object != own && self.closed[object]);

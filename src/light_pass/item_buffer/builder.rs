@@ -72,6 +72,7 @@ impl Builder<'_> {
 
     /// By face: the cells in which something may be hidden, and what is hidden. Empty if nothing can be.
     pub(super) fn hidden(&self, faces: &[CellBits]) -> Vec<(CellBits, Hidden)> {
+        // Only opaque triangles in front of a caster can hide it.
         let hiders = self.hiders();
         if hiders.is_empty() {
             return Vec::new();
@@ -81,6 +82,9 @@ impl Builder<'_> {
             let mut cells = HiddenCells::new(self.launch, face);
             let mut tests = 0;
             let search = Search::new(self.launch, face, &self.boxes, &[], &wanted);
+
+            // Opaque faces make the cells that they touch doubtful. Faces of casters come last: they cover cells too,
+            // but make none doubtful, as light goes on from them.
             let is_any_marked = marked.count() > 0;
             let is_near = |bounds: Bounds| is_any_marked && search.may_touch(bounds, marked);
             let are_near: Vec<bool> = self
@@ -93,6 +97,8 @@ impl Builder<'_> {
                 let marked = (!self.wanted[object]).then_some(marked);
                 tests += cells.add_opaque(object, &mesh.corners(triangle), marked);
             }
+
+            // Casters are compared with these faces only in doubtful cells: elsewhere nothing can hide them.
             let doubtful = cells.doubtful().clone();
             search.visit(self.roots(), &doubtful, |object, corners| {
                 tests += cells.add_caster(object, corners);

@@ -76,8 +76,8 @@ impl Dispersion {
     /// The same formula, if its constants are plausible for a transparent material.
     ///
     /// # Errors
-    /// A constant that is not finite; an Abbe number that is not above 0; an infinite index at a visible wavelength; n_d
-    /// not from 1 to 10.
+    /// A constant that is not finite; an Abbe number that is not above 0; an infinite index at a visible wavelength;
+    /// n_d not from 1 to 10.
     pub fn checked(self) -> Result<Self> {
         let (formula, constants) = self.constants();
         let wrong = |value: f64| refused(format!("{value} cannot be a constant of {formula}"), FINITE);

@@ -64,6 +64,7 @@ impl Spectrum {
 
     /// [`Self::new`] for rows of a file, by the line of each for errors.
     pub(super) fn of_lines(rows: Vec<(Nanometres, f64)>, line: impl Fn(usize) -> usize) -> Result<Self> {
+        // A table is linear between rows, which takes two of them.
         if rows.len() < 2 {
             let what = format!(
                 "a spectrum of {} rows says nothing between wavelengths",
@@ -71,6 +72,8 @@ impl Spectrum {
             );
             return Err(refused(what, "give two rows or more"));
         }
+
+        // Integrals and look-ups rely on rising wavelengths and on finite values that are not negative.
         let mut before = f64::NEG_INFINITY;
         for (row, &(Nanometres(nm), value)) in rows.iter().enumerate() {
             let wrong = |what: String, remedy| Err(refused(format!("line {}: {what}", line(row)), remedy));
@@ -88,6 +91,8 @@ impl Spectrum {
             }
             before = nm;
         }
+
+        // Look-ups search the wavelengths alone, so that values are stored apart from them.
         let (wavelengths_nm, values) = rows
             .into_iter()
             .map(|(Nanometres(nm), value)| (nm, value))

@@ -128,6 +128,8 @@ impl Basin<'_> {
             self.bottom_m,
         );
         parts::add_with(scene, "basin bottom", floor, bottom);
+
+        // Inner faces meet at the corners; outer faces and rims reach around them by the thickness of the walls.
         for (side, outward, half_inner, half_along) in [
             ("left", DVec3::NEG_X, half_x, half_z),
             ("right", DVec3::X, half_x, half_z),
@@ -149,6 +151,8 @@ impl Basin<'_> {
                 parts::add_with(scene, &format!("basin {side} {part}"), mesh, walls);
             }
         }
+
+        // The water ends within the walls, where no light passes beside it.
         let half = self.half_m.map(|half| half + 0.5 * wall_m);
         let depth_m = self.water_m - self.bottom_m;
         let place = centre + DVec3::Y * self.water_m;

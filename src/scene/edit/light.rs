@@ -44,6 +44,8 @@ impl LightEdit {
     pub(super) fn apply(&self, light: &mut Light) -> Result<()> {
         let owner = format!("light `{}`", light.name);
         let lacks = |what: &str, remedy: &str| Error::usage(&owner, format!("has no {what}"), remedy);
+
+        // Every value is checked before it is set, so that a refused edit changes nothing.
         match self {
             Self::Strength(strength) => {
                 if !(*strength > 0.0 && strength.is_finite()) {
@@ -190,6 +192,7 @@ pub fn why_light_stays(kind: &LightKind) -> Option<&'static str> {
 
 /// Checks an added light, since an edit that was read from a file may have been written by hand.
 fn check(light: &Light) -> Result<()> {
+    // Only lamps can be added: glowing objects and the environment bring their own lights.
     let numbers = |values: &[f64]| values.iter().all(|value| value.is_finite());
     let is_sound = match light.kind {
         LightKind::Point { position, .. } => numbers(&position.to_array()),
@@ -211,6 +214,8 @@ fn check(light: &Light) -> Result<()> {
         } => numbers(&centre.to_array()) && across.cross(down).length() > 0.0,
         LightKind::Surface { .. } | LightKind::Environment { .. } => false,
     };
+
+    // A scene holds no light without power.
     let strength = light.strength().luminance();
     if is_sound && strength > 0.0 && strength.is_finite() {
         return Ok(());

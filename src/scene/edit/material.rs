@@ -52,6 +52,8 @@ impl MaterialEdit {
         let owner = format!("material `{}`", material.name);
         // A class that the file sets by other means (unlit) is left alone.
         let follows = material.surface == material.classified();
+
+        // Every value is checked before it is set, so that a refused edit changes nothing.
         match self {
             Self::Ior(ior) => {
                 check_index(*ior, &owner)?;

@@ -56,6 +56,7 @@ impl Reader<'_> {
         owner: &str,
         load: &mut LoadContext,
     ) -> Result<Vec<[f64; N]>> {
+        // Shape and format are checked before any bytes are read, as the file may state anything.
         let accessor = self.get(index, owner)?;
         let is_quantised = self.root.extensions_used.iter().any(|name| name == QUANTISATION);
         let component = match (accessor.type_, accessor.component_type) {
@@ -76,6 +77,8 @@ impl Reader<'_> {
                 ),
             ));
         };
+
+        // Each number takes eight bytes from here on, up to eight times what the buffer holds.
         let bytes = self.packed(accessor, N * component.size(), owner, load)?;
         load.take((accessor.count.0).saturating_mul(8 * N as u64), owner)?;
         let numbers = bytes.chunks_exact(component.size());
@@ -158,6 +161,8 @@ impl Reader<'_> {
         let Checked::Valid(component) = sparse.indices.component_type else {
             return Err(broken(owner, "has sparse indices of an unknown format"));
         };
+
+        // Sparse data are two packed lists: which elements are replaced, and by what.
         let (count, width) = (sparse.count.0, component.0.size());
         let indices = self.elements(
             sparse.indices.buffer_view,
@@ -173,6 +178,8 @@ impl Reader<'_> {
             element,
             owner,
         )?;
+
+        // Indices are untrusted: each must name an element of the accessor.
         for (index, value) in indices
             .chunks_exact(width)
             .map(unsigned)
@@ -199,6 +206,7 @@ impl Reader<'_> {
         element: usize,
         owner: &str,
     ) -> Result<Vec<u8>> {
+        // Elements may be interleaved with other attributes, but not overlap.
         let index = view.value();
         let view = self.buffers.view(view, owner)?;
         let stride = view.stride.unwrap_or(element);
@@ -211,6 +219,8 @@ impl Reader<'_> {
         if count == 0 {
             return Ok(Vec::new());
         }
+
+        // The last element needs no room beyond its own bytes; sums of stated numbers may overflow.
         let end = (count - 1)
             .checked_mul(stride as u64)
             .and_then(|last| last.checked_add(offset)?.checked_add(element as u64));

@@ -63,6 +63,7 @@ impl Animations {
         reader: Reader,
         load: &mut LoadContext,
     ) -> Option<Clip> {
+        // A scene has one time line, on which all animations run at once.
         let mut tracks: HashMap<usize, Vec<Track>> = HashMap::new();
         for (index, animation) in self.animations.iter().enumerate() {
             let Some(animation) = animation.get() else {
@@ -74,11 +75,14 @@ impl Animations {
             };
             let name = extras::name(animation.name.as_deref(), "animation", index);
             let owner = format!("animation `{name}`");
+
+            // Faults cost a channel, not the clip.
             for channel in &animation.channels {
                 let read = node_of(channel, document)
                     .and_then(|node| Ok((node, track(animation, channel, reader, &owner, load)?)));
                 match read {
                     Ok((node, track)) => {
+                        // Of two channels for one part of a node, the first in the file wins.
                         let of_node = tracks.entry(node).or_default();
                         if of_node.iter().all(|other| other.animated != track.animated) {
                             of_node.push(track);
@@ -120,6 +124,7 @@ fn track(
     owner: &str,
     load: &mut LoadContext,
 ) -> Result<Track, String> {
+    // Only transforms of nodes are played.
     let animated = match channel.target.path.as_str() {
         "translation" => Animated::Translation,
         "rotation" => Animated::Rotation,
@@ -135,6 +140,8 @@ fn track(
         Some("CUBICSPLINE") => Interpolation::CubicSpline,
         Some(_) => return Err("has an interpolation that glTF does not know".into()),
     };
+
+    // All parts are kept as four numbers, of which translations and scales leave the last one 0.
     let (input, output) = (Index::new(sampler.input), Index::new(sampler.output));
     let what = |error: Error| error.what;
     let times = reader.vectors::<1>(input, Formats::Float, owner, load);
@@ -151,6 +158,8 @@ fn track(
                     .collect()
             }),
     };
+
+    // What is kept was checked: times ascend, and rotations are of unit length.
     let (times, values): (_, Vec<DVec4>) = (times.map_err(what)?, values.map_err(what)?);
     let mut track = Track {
         animated,
@@ -195,6 +204,7 @@ fn check(track: &mut Track) -> Result<(), &'static str> {
 }
 
 fn clip(mut tracks: HashMap<usize, Vec<Track>>, document: &Document, placed: &[PlacedNode]) -> Option<Clip> {
+    // Nodes are posed relative to their parents, which the clip therefore keeps, moving or not.
     let parents: HashMap<usize, usize> = document
         .root
         .nodes
@@ -210,6 +220,8 @@ fn clip(mut tracks: HashMap<usize, Vec<Track>>, document: &Document, placed: &[P
         .enumerate()
         .map(|(place, of)| (of.node, place))
         .collect();
+
+    // Whatever an object, a light or a camera may hang on is kept, which is any placed node.
     let nodes: Vec<ClipNode> = placed
         .iter()
         .enumerate()
@@ -228,6 +240,8 @@ fn clip(mut tracks: HashMap<usize, Vec<Track>>, document: &Document, placed: &[P
             }
         })
         .collect();
+
+    // Without a keyframe there is no clip; it starts over after the last one.
     let all = nodes.iter().flat_map(|node| &node.tracks);
     let ends = all.filter_map(|track| track.times_s.last().copied());
     let duration_s = ends.reduce(f64::max)?;

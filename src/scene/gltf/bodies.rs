@@ -22,27 +22,32 @@ const SAMPLES: u32 = 16;
 /// Smallest cosine between the normals of triangles of one plane, whose vertices are rounded to single precision.
 const FLAT: f64 = 1.0 - 1e-9;
 
-/// Smallest vertical component of the mean normal of a level sheet.
+/// Smallest vertical component of the mean normal of a level sheet: a tilt of 45°.
 const LEVEL: f64 = 0.7;
 
 /// Highest index of water and other liquids that stand in the open; window glass has a higher one.
 const MOST_LIQUID_IOR: f64 = 1.4;
 
-/// Turns meshes that are wound inwards, leaves out faces that a body has twice, and gives each object of a body that several
-/// bound its [`Object::body`]. Returns whether each object bounds a body. `materials`: those of the file.
+/// Turns meshes that are wound inwards, leaves out faces that a body has twice, and gives each object of a body that
+/// several bound its [`Object::body`]. Returns whether each object bounds a body. `materials`: those of the file.
 pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadContext) -> Vec<bool> {
     let material = |object: &Object| &materials[object.material];
+
+    // Instances share their mesh, so that each is tested for closedness once.
     let mut closed = HashMap::new();
     let mut closes = |object: &Object| {
         let mesh = object.mesh();
         *closed.entry(Arc::as_ptr(mesh)).or_insert_with(|| is_closed(mesh))
     };
+
+    // Objects that bound a body by themselves come first; only what they leave open is pieced together with others.
     let (mut turned, mut singled) = (Remade::default(), Remade::default());
     let mut bounds_body = vec![false; objects.len()];
     let mut open = Vec::new();
     for index in 0..objects.len() {
         let object = &objects[index];
         if !material(object).transmits() {
+            // Opaque surfaces only need a front. Normals that all oppose the winding say that it is the other side.
             if !material(object).double_sided && is_against_normals(object.mesh()) {
                 turned.invert(&mut objects[index]);
                 let what = "was wound against its normals; its front is now where these point";
@@ -54,6 +59,8 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
             }
             continue;
         }
+
+        // Where a mesh has both sides of every face, the two enclose a volume of 0; one of them alone may bound a body.
         let mut volume_m3 = body_volume_m3(object.in_scene(), closes(object));
         if volume_m3.is_none() && singled.remake(&mut objects[index], single) {
             load.warn(
@@ -70,12 +77,16 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
             }
             continue;
         };
+
+        // Faces that look inwards enclose a negative volume; light would refract at them as if it left the body.
         bounds_body[index] = true;
         if volume_m3 < 0.0 {
             turned.invert(&mut objects[index]);
             warn_of_turn(&objects[index], load);
         }
     }
+
+    // Opaque surfaces may close a body of glass at its border; those far from all open pieces cannot.
     if open.is_empty() {
         return bounds_body;
     }
@@ -93,6 +104,9 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
         !material(object).transmits() && is_near(object) && !closes(object)
     };
     let opaque: Vec<usize> = (0..objects.len()).filter(opaque).collect();
+
+    // One piece stands for its whole body, so that light that enters by one piece may leave by another. A piece whose
+    // material states an interior is preferred: the body absorbs as that says.
     let pieces = Pieces::new(objects, &open, &opaque);
     for body in pieces.bodies(objects, materials) {
         let states_volume = |index: &&usize| material(&objects[**index]).volume.is_some();
@@ -109,6 +123,8 @@ pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadConte
             }
         }
     }
+
+    // What stays open and states a volume is the surface of a liquid or a pane.
     let mut held = Held::default();
     for index in open {
         let object = &objects[index];
@@ -195,8 +211,11 @@ fn inverted(mesh: &Mesh) -> Mesh {
 /// The mesh with the first of all facets that have the same outline, if it then bounds a body: some programs write both
 /// sides of a face, and cut each into triangles in its own way.
 fn single(mesh: &Mesh) -> Option<Mesh> {
+    // Positions tell vertices apart, since normals and texture coordinates split those of one corner.
     let ids = numbered(mesh.positions.iter().copied().map(bits));
     let corners = |triangle: usize| mesh.triangles[triangle].map(|vertex| ids[vertex as usize]);
+
+    // Triangles of the same three corners are one, whichever way they are wound.
     let mut known = HashSet::new();
     let mut kept: Vec<usize> = (0..mesh.triangles.len()).collect();
     kept.retain(|&triangle| {
@@ -204,6 +223,8 @@ fn single(mesh: &Mesh) -> Option<Mesh> {
         corners.sort_unstable();
         known.insert(corners)
     });
+
+    // Two sides of a facet may be cut into different triangles; their outlines have the same edges.
     let mut outlines = HashSet::new();
     let mut first = Vec::new();
     for facet in facets(mesh, &kept, corners) {
@@ -216,6 +237,8 @@ fn single(mesh: &Mesh) -> Option<Mesh> {
             first.extend(facet);
         }
     }
+
+    // A two-sided sheet has such faces as well; it keeps them, since the rest bounds no body.
     if first.len() == mesh.triangles.len() {
         return None;
     }
@@ -406,10 +429,13 @@ struct Held {
 impl Held {
     /// Whether an open mesh is level and has one side of a liquid, or other surfaces are below it all around.
     fn is_water(&mut self, index: usize, objects: &[Object], materials: &[Material]) -> bool {
+        // Liquids lie level, which the area-weighted mean of the normals tells.
         let (mesh, material) = (objects[index].in_scene(), &materials[objects[index].material]);
         let count = mesh.triangle_count();
         let area = |triangle: usize| mesh.face_normal(triangle) * mesh.triangle_area_m2(triangle);
         let up: DVec3 = (0..count).map(area).sum();
+
+        // Index and sides decide most sheets: two-sided ones of a high index are panes, one-sided liquids are water.
         let is_liquid = material.ior <= MOST_LIQUID_IOR;
         if (material.double_sided && !is_liquid) || up.y < LEVEL * mesh.area_m2() {
             return false;
@@ -417,6 +443,8 @@ impl Held {
         if is_liquid && !material.double_sided {
             return true;
         }
+
+        // All else is water if it has something below it in all directions, as in a vessel.
         let all = self.all.get_or_insert_with(|| {
             let meshes = objects.iter().map(|object| object.in_scene());
             let corners = meshes
@@ -432,6 +460,8 @@ impl Held {
             });
             is_stopped
         };
+
+        // Rays fill the lower hemisphere, uniform in solid angle, down from a degree below the horizontal.
         let samples = (0..SAMPLES).flat_map(|place| (0..SAMPLES).map(move |way| (place, way)));
         samples.into_iter().all(|(place, way)| {
             let triangle = place as usize * count / SAMPLES as usize;

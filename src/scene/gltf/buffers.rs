@@ -47,6 +47,8 @@ impl<'a> Buffers<'a> {
             .zip(&compressed)
             .filter_map(|(view, compressed)| compressed.as_ref().map(|_| view.buffer.value()))
             .collect();
+
+        // A spare buffer without data, or one that the file marks as a fallback, need not be read.
         for (index, buffer) in all.iter().enumerate() {
             let owner = format!("buffer {index}");
             let is_binary = index == 0 && binary.is_some();
@@ -54,6 +56,8 @@ impl<'a> Buffers<'a> {
                 data.push(None);
                 continue;
             }
+
+            // A first buffer without a URI is the binary chunk, which is borrowed and was counted with the file.
             let bytes: Option<Cow<[u8]>> = match (&buffer.uri, binary) {
                 (Some(uri), _) => Some(uri::read(uri, folder, load.left(), &owner)?.into()),
                 (None, Some(binary)) if index == 0 => Some(binary.into()),
@@ -69,6 +73,8 @@ impl<'a> Buffers<'a> {
             }
             data.push(Some(trimmed(bytes, buffer.byte_length.0, &owner, load)?));
         }
+
+        // A damaged view is no error here: it matters only to those who need it.
         let mut buffers = Self {
             views,
             data,
@@ -120,6 +126,8 @@ impl<'a> Buffers<'a> {
             )));
         };
         let stride = view.byte_stride.map(|stride| stride.0);
+
+        // Compressed views are whole by themselves; their buffer may be a placeholder.
         if let Some(unpacked) = &self.unpacked[index] {
             return match unpacked {
                 Ok(data) => Ok(View { data, stride }),
@@ -128,6 +136,8 @@ impl<'a> Buffers<'a> {
                 ))),
             };
         }
+
+        // Offset and length come from the file and must lie within the bytes that were read.
         let buffer = view.buffer.value();
         if self.data.get(buffer).is_none_or(Option::is_none) {
             return Err(broken(format!(

@@ -32,11 +32,15 @@ impl MaterialReader<'_, '_> {
             self.warn_damaged("its clearcoat cannot be read and was left out");
             return Ok(());
         };
+
+        // A coat of factor 0, and one over an unlit surface, reflects nothing.
         let mut factor = self.share(stated.clearcoat_factor, "clearcoat factor");
         let mut roughness = self.share(stated.clearcoat_roughness_factor, "clearcoat roughness");
         if factor == 0.0 || extensions.unlit.is_some() {
             return Ok(());
         }
+
+        // The factor is in the red channel, roughness in the green one, both linear.
         let of = |code: u8| LinearSrgb::grey(f64::from(code) / 255.0);
         let textures = [&stated.clearcoat_texture, &stated.clearcoat_roughness_texture];
         factor *= self.mean_of(textures[0].as_ref(), |[red, ..]| of(red))?.r;
@@ -53,6 +57,8 @@ impl MaterialReader<'_, '_> {
                 "expect it to look and bake as if it were not there",
             );
         }
+
+        // A surface has one lobe of reflection, as wide for the coat as for what it covers.
         if let Err(why) = apply_coat(material, factor, roughness) {
             self.warn(why, "expect it to look and bake as if it were not there");
         } else if (material.roughness - roughness).abs() > UNLIKE {

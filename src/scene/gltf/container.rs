@@ -24,6 +24,7 @@ const BINARY_CHUNK: [u8; 4] = *b"BIN\0";
 /// # Errors
 /// A binary file that is truncated, has another version, or does not begin with a JSON chunk.
 pub fn split<'a>(bytes: &'a [u8], load: &mut LoadContext) -> Result<Container<'a>> {
+    // A file in text is its own JSON part.
     if !bytes.starts_with(b"glTF") {
         return Ok(Container {
             json: bytes,
@@ -32,6 +33,8 @@ pub fn split<'a>(bytes: &'a [u8], load: &mut LoadContext) -> Result<Container<'a
             others: &[],
         });
     }
+
+    // The header has the magic number, the version, and the length of the whole file, as little-endian words.
     let word = |at: usize| {
         let four = bytes.get(at..at + 4)?;
         Some(u32::from_le_bytes(four.try_into().ok()?))
@@ -46,6 +49,8 @@ pub fn split<'a>(bytes: &'a [u8], load: &mut LoadContext) -> Result<Container<'a
             "export it as glTF 2.0",
         ));
     }
+
+    // A file shorter than stated was cut off; bytes after the stated end are no part of it.
     let length = length as usize;
     if length < HEADER_BYTES || length > bytes.len() {
         return Err(broken(format!(

@@ -1,5 +1,5 @@
-//! The JSON of a file as typed data, without the parts that are not read. Violations of the specification are reported as
-//! warnings; those that affect what is read stop the loading where the faulty part is needed.
+//! The JSON of a file as typed data, without the parts that are not read. Violations of the specification are reported
+//! as warnings; those that affect what is read stop the loading where the faulty part is needed.
 
 use std::fmt::Display;
 
@@ -132,10 +132,13 @@ fn strings(file: &Map<String, Value>, key: &str) -> Result<Vec<String>> {
 /// Removes animations, skins and morph targets, so that faults in them cannot stop a scene; converts outdated
 /// materials; and adds fields that the typed reader requires although glTF does not.
 fn prepare(file: &mut Map<String, Value>, load: &mut LoadContext) {
+    // The typed reader knows metallic-roughness alone.
     for (index, material) in objects(file.get_mut("materials")).enumerate() {
         let owner = owner(material, index);
         glossiness::convert(material, &owner, load);
     }
+
+    // These parts have been read by themselves; the typed reader would refuse the whole file for one fault in them.
     file.remove("animations");
     let mut is_bent = file.remove("skins").is_some();
     for node in objects(file.get_mut("nodes")) {
@@ -155,6 +158,9 @@ fn prepare(file: &mut Map<String, Value>, load: &mut LoadContext) {
             "pose the scene where it was made",
         );
     }
+
+    // Every scene must have a list of nodes for the typed reader. Extensions of lights it keeps as raw text, which a
+    // parsed value cannot give.
     name_variants(file, load);
     for scene in objects(file.get_mut("scenes")) {
         scene.entry("nodes").or_insert_with(|| Value::Array(Vec::new()));

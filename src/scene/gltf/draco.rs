@@ -39,6 +39,7 @@ pub fn unpack(
     owner: &str,
     load: &mut LoadContext,
 ) -> Result<Option<Unpacked>> {
+    // A position accessor with a view of its own states the same data uncompressed, which costs less to read.
     let extensions = primitive.extensions.as_ref();
     let Some(stated) = extensions.and_then(|extensions| extensions.others.get(NAME)) else {
         return Ok(None);
@@ -48,6 +49,8 @@ pub fn unpack(
     if accessor.is_some_and(|accessor| accessor.buffer_view.is_some()) {
         return Ok(None);
     }
+
+    // One view holds all attributes and triangles of the primitive.
     let damaged = |why: &str| {
         let what = format!("its Draco data cannot be unpacked ({why})");
         damaged(owner, what)
@@ -61,6 +64,8 @@ pub fn unpack(
         .with_max_points(most / 12)
         .with_max_faces(most / 12)
         .with_max_decoded_bytes(most);
+
+    // Crafted data may make the decoder panic, which must not end the program.
     let mut mesh = Mesh::new();
     let unpacked = guard::without_panic(|| {
         let mut buffer = DecoderBuffer::new(data).with_limits(limits);
@@ -71,6 +76,8 @@ pub fn unpack(
         Some(Err(error)) => return Err(damaged(&error.to_string().replace('\n', " "))),
         None => return Err(damaged("it breaks off")),
     }
+
+    // Counts three numbers of four bytes for each triangle and each attribute of a vertex.
     let bytes = 12 * mesh.num_faces() as u64 + 12 * mesh.num_points() as u64 * stated.attributes.len() as u64;
     load.take(bytes, owner)?;
     Ok(Some(Unpacked {

@@ -83,6 +83,7 @@ pub fn loss(extension: &str, stated: &Value) -> Option<&'static str> {
 /// # Errors
 /// A required extension without which the scene cannot be read.
 pub fn check(required: &[String], used: &[String], load: &mut LoadContext) -> Result<()> {
+    // A file is refused if it requires what is not read, unless its scene is the same without that.
     for extension in required {
         if !READ.contains(&extension.as_str()) && !LEFT_OUT.contains(&extension.as_str()) {
             return Err(Error::failure(
@@ -101,6 +102,8 @@ pub fn check(required: &[String], used: &[String], load: &mut LoadContext) -> Re
             );
         }
     }
+
+    // Extensions of materials are left to these, which know whether they miss anything.
     for (index, extension) in used.iter().enumerate() {
         if used[..index].contains(extension) {
             load.warn_damaged(

@@ -35,6 +35,7 @@ impl Default for SpecularGlossiness {
 
 /// Converts a material that is stated in this way only to metallic-roughness.
 pub fn convert(material: &mut Map<String, Value>, owner: &str, load: &mut LoadContext) {
+    // A material that states metallic-roughness as well is read by that.
     let own = material.get("pbrMetallicRoughness").and_then(Value::as_object);
     if own.is_some_and(|own| !own.is_empty()) {
         return;
@@ -57,6 +58,9 @@ pub fn convert(material: &mut Map<String, Value>, owner: &str, load: &mut LoadCo
     } else {
         0.0
     };
+
+    // Dielectrics have the diffuse colour, metals the specular one; the square of metallic blends both, as in the
+    // reference converter of the extension.
     let base = |channel: usize| {
         let left = (1.0 - F0) * (1.0 - metallic).max(1e-3);
         let of_diffuse = diffuse[channel] * (1.0 - strongest(specular)) / left;
@@ -64,6 +68,8 @@ pub fn convert(material: &mut Map<String, Value>, owner: &str, load: &mut LoadCo
         let share = metallic * metallic;
         (of_diffuse * (1.0 - share) + of_specular * share).clamp(0.0, 1.0)
     };
+
+    // A diffuse texture is the base colour of a dielectric already, and its factor stays with it.
     let colour = match stated.diffuse_texture.is_null() && has_only_factors {
         true => [base(0), base(1), base(2)],
         false => diffuse,

@@ -62,6 +62,8 @@ pub fn read(root: &Root, buffers: &Buffers, load: &mut LoadContext) -> Result<Ve
         let broken = |what: String| damaged(&owner, what);
         let attributes = Attributes::deserialize(stated)
             .map_err(|error| broken(format!("its instances cannot be read ({error})")))?;
+
+        // Each part of the transforms may be missing, and then is that of the identity.
         let mut read = |index: Option<u32>| {
             let index = index.map(Index::new);
             index
@@ -73,6 +75,8 @@ pub fn read(root: &Root, buffers: &Buffers, load: &mut LoadContext) -> Result<Ve
         let rotations = rotations
             .map(|index| reader.vectors::<4>(index, Formats::FloatOrSigned, &owner, load))
             .transpose()?;
+
+        // All parts that are there have one entry for each instance.
         let counts = [
             translations.as_ref().map(Vec::len),
             rotations.as_ref().map(Vec::len),
@@ -84,6 +88,8 @@ pub fn read(root: &Root, buffers: &Buffers, load: &mut LoadContext) -> Result<Ve
                 "its instances have different numbers of translations, rotations and scales".into(),
             ));
         }
+
+        // A few bytes of transform become a whole node with a name.
         load.take(count as u64 * NODE_BYTES, &owner)?;
         let transform = |instance: usize| NodeTransform {
             matrix: None,

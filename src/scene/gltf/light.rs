@@ -47,6 +47,7 @@ pub fn all(
     folder: &Path,
     load: &mut LoadContext,
 ) -> Result<Vec<(Light, Origin)>> {
+    // Lights of both extensions differ in how they are stated; what follows treats them alike.
     let of_file = &document.extras;
     let mut lights = Vec::new();
     for (list, of_lights) in [(NAME, &of_file.lights), (area_light::NAME, &of_file.area_lights)] {
@@ -56,6 +57,8 @@ pub fn all(
                 NAME => punctual(document, placed, &owner, load),
                 _ => area_light::read(document, placed),
             };
+
+            // A fault costs its light, not the scene.
             let (index, colour, kind) = match read {
                 None => continue,
                 Some(Ok(read)) => read,
@@ -65,6 +68,8 @@ pub fn all(
                     continue;
                 }
             };
+
+            // Nodes may share a light; what their own extras say comes first.
             let stated = |key: &str| {
                 let of_node = extras::stated(&of_file.nodes, placed.node, key);
                 of_node.or_else(|| extras::stated(of_lights, index, key))
@@ -131,6 +136,7 @@ fn kind(
     owner: &str,
     load: &mut LoadContext,
 ) -> std::result::Result<LightKind, String> {
+    // Light falls off with the square of the distance and ends nowhere, whatever range a game would cut it off at.
     let strength = strength(colour, widen(source.intensity))?;
     if source.range.is_some() {
         load.warn(
@@ -139,6 +145,8 @@ fn kind(
             "lower its intensity instead",
         );
     }
+
+    // Light leaves along the −z of the node, which may be scaled to nothing: only point lights shine all the same.
     let position = placed.world_from_node.translation;
     let direction = placed
         .world_from_node
@@ -170,6 +178,7 @@ fn kind(
 
 /// Half-angles of a spot [rad] with 0 ≤ inner < outer ≤ π/2.
 fn cone(spot: Option<&Spot>, owner: &str, load: &mut LoadContext) -> (f64, f64) {
+    // A cone is required of a spot; 45° is what glTF gives one without an outer angle.
     let Some(spot) = spot else {
         load.warn(
             owner,
@@ -211,6 +220,7 @@ fn size<'a>(
     owner: &str,
     load: &mut LoadContext,
 ) -> LightSize {
+    // A sun has an angle, as its distance is infinite; every other lamp has a radius.
     const RADIUS: (&str, &str, &str) = ("radius_m", "lamp", "use metres from 0 up");
     const ANGLE: (&str, &str, &str) = ("angular_diameter_deg", "sun", "use degrees from 0 to 180");
     let is_sun = matches!(kind, LightKind::Sun { .. });
@@ -229,6 +239,8 @@ fn size<'a>(
     let Some(stated) = stated(key) else {
         return LightSize::None;
     };
+
+    // A size of 0 states a light without extent and needs no warning.
     match stated.as_f64() {
         Some(0.0) => LightSize::None,
         Some(degrees) if is_sun && degrees > 0.0 && degrees <= 180.0 => LightSize::Angle {

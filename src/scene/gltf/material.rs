@@ -125,6 +125,7 @@ impl<'a> MaterialReader<'a, '_> {
     }
 
     fn read(&mut self, name: String) -> Result<Material> {
+        // Factors come first; textures, alpha and substances multiply or replace them.
         let none = extension::Material::default();
         let extensions = self.source.extensions.as_ref().unwrap_or(&none);
         let pbr = &self.source.pbr_metallic_roughness;
@@ -163,11 +164,15 @@ impl<'a> MaterialReader<'a, '_> {
                 .and_then(|waves| waves::read(waves, &self.owner, self.load)),
             double_sided: self.source.double_sided,
         };
+
+        // Blending asks for the transmission that its texture leaves, a spectrum for the emission that its own leaves.
         self.vary(&mut material, transmission)?;
         self.blend(&mut material);
         self.glow(&mut material)?;
         self.emission_spectrum(&mut material)?;
         self.substance(&mut material, extensions)?;
+
+        // Unlit materials have no reflections: they are diffuse, or matte with holes where their alpha blends.
         material.surface = if extensions.unlit.is_none() {
             self.classify(&material)
         } else if material.coverage.is_some() {
@@ -177,10 +182,14 @@ impl<'a> MaterialReader<'a, '_> {
         } else {
             SurfaceKind::Diffuse
         };
+
+        // Only what transmits light has an interior.
         if !material.transmits() {
             material.volume = None;
         }
         material.is_solid_by_shape &= material.volume.is_some();
+
+        // What covers a surface depends on its class.
         let is_coat = matches!(material.surface, SurfaceKind::Coated | SurfaceKind::Varied);
         if let (true, Some(specular)) = (is_coat, &extensions.specular) {
             material.coat = self.specular_weight(specular)?;
@@ -270,6 +279,7 @@ impl<'a> MaterialReader<'a, '_> {
     }
 
     fn volume(&mut self, extensions: &extension::Material) -> Option<Volume> {
+        // A broken thickness voids the volume, so that the mesh alone decides whether the glass is solid.
         let stated = extensions.volume.as_ref()?;
         let thickness = stated.thickness_factor.0;
         if thickness < 0.0 || !thickness.is_finite() {
@@ -279,6 +289,8 @@ impl<'a> MaterialReader<'a, '_> {
             );
             return None;
         }
+
+        // Absorption is −ln(colour) / distance: a distance of 0 or a black colour would make it infinite.
         let mut distance = widen(stated.attenuation_distance.0);
         if distance.is_nan() || distance <= 0.0 {
             self.warn(

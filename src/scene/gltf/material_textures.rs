@@ -19,7 +19,7 @@ use crate::error::Result;
 use crate::optics::LinearSrgb;
 use crate::scene::{AlphaMask, Material, NormalMap, SurfaceKind, TextureRef, Variation};
 
-/// Alphas that are neither transparent nor opaque [codes].
+/// Alphas that are neither transparent nor opaque, from 10 to 90 % [codes].
 const BETWEEN: RangeInclusive<u8> = 26..=229;
 
 /// Largest share of texels with alphas [`BETWEEN`] in an image that is read as a cut-out.
@@ -90,6 +90,8 @@ impl MaterialReader<'_, '_> {
         if transmission.is_none() && metallic_roughness.is_none() {
             return Ok(());
         }
+
+        // An image is kept where its texels matter: they change the class, or the width of the lobe.
         let mean = factors.mean();
         let class = factors.class(material);
         if let (Some(surface), Some((uv_set, uv_transform))) = (class, factors.place())
@@ -103,12 +105,16 @@ impl MaterialReader<'_, '_> {
                 uv_transform,
             };
             material.variation = Some(Variation { image, surface });
+
+            // Within one class, transmission and metallic act by their means.
             if surface != SurfaceKind::Varied {
                 (material.transmission, material.metallic) =
                     (material.transmission * mean.r, material.metallic * mean.b);
             }
             return Ok(());
         }
+
+        // Elsewhere the means stand for all texels.
         (material.transmission, material.roughness, material.metallic) = (
             material.transmission * mean.r,
             material.roughness * mean.g,

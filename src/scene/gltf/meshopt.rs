@@ -103,6 +103,7 @@ fn unzigzag(value: u32) -> u32 {
 }
 
 fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
+    // Version 1 came with the KHR_ extension.
     let (version, mut data) = match data.split_first()? {
         (0xa0, data) => (0, data),
         (0xa1, data) => (1, data),
@@ -111,6 +112,9 @@ fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     if !stride.is_multiple_of(4) || !(4..=BLOCK).contains(&stride) {
         return None;
     }
+
+    // The tail, padded in front to a least size, holds the `baseline`, from which the first deltas count, and in
+    // version 1 the mode of each channel of four bytes.
     let (modes, least) = if version == 0 { (0, 32) } else { (stride / 4, 24) };
     let body = data.len().checked_sub((stride + modes).max(least))?;
     let tail = &data[body..];
@@ -118,11 +122,14 @@ fn attributes(data: &[u8], count: usize, stride: usize) -> Option<Vec<u8>> {
     let (baseline, modes_of_channels) = tail[tail.len() - stride - modes..].split_at(stride);
     let mut last = baseline.as_chunks::<4>().0.to_vec();
 
+    // A block has as many whole groups as fit into 8 KiB, at most 256 elements.
     let mut unpacked = vec![0; count * stride];
     let most = ((8192 / stride) & !(GROUP - 1)).min(BLOCK);
     for block in unpacked.chunks_mut(most * stride) {
         let elements = block.len() / stride;
         let controls = take(&mut data, modes)?;
+
+        // Each byte position has a stream of its own; the four of a channel together give its next value.
         for (channel, last) in last.iter_mut().enumerate() {
             let mut deltas = [[0; BLOCK]; 4];
             for (index, deltas) in deltas.iter_mut().enumerate() {
@@ -156,6 +163,8 @@ fn read_deltas(data: &mut &[u8], control: Option<u8>, deltas: &mut [u8], element
             return Some(());
         }
     };
+
+    // Two bits for each group choose the width of its deltas.
     let headers = take(data, deltas.len().div_ceil(4 * GROUP))?;
     for (group, deltas) in deltas.chunks_exact_mut(GROUP).enumerate() {
         let header = headers[group / 4] >> (2 * (group % 4)) & 3;
@@ -164,6 +173,8 @@ fn read_deltas(data: &mut &[u8], control: Option<u8>, deltas: &mut [u8], element
             8 => deltas.copy_from_slice(take(data, GROUP)?),
             bits => {
                 let packed = take(data, GROUP * bits / 8)?;
+
+                // The largest number that fits stands for a delta that does not, and follows as a whole byte.
                 let sentinel = (1 << bits) - 1;
                 for (index, delta) in deltas.iter_mut().enumerate() {
                     let at = index * bits;
@@ -232,6 +243,7 @@ fn varint(data: &mut &[u8]) -> Option<u32> {
 }
 
 fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
+    // A code for each triangle, then the data that codes call for, then the 16 most frequent pairs of vertex codes.
     let (codes, data) = data.strip_prefix(&[0xe1])?.split_at_checked(count / 3)?;
     let (mut data, table) = data.split_last_chunk::<16>()?;
     let (mut edges, mut vertices) = (Fifo([[0; 2]; 16], 0), Fifo([0; 16], 0));
@@ -243,6 +255,8 @@ fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
             next.wrapping_sub(1)
         };
         let (high, low) = (code >> 4, code & 15);
+
+        // The triangle continues a recent edge, so that only its third vertex is coded.
         if high < 15 {
             let [a, b] = edges.get(high);
             let c = match low {
@@ -266,12 +280,16 @@ fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
             unpacked.extend([a, b, c]);
             continue;
         }
+
+        // The triangle stands by itself; a pair from the table or the data codes its second and third vertex.
         let is_listed = low < 14;
         let pair = if is_listed {
             table[usize::from(low)]
         } else {
             byte(&mut data)?
         };
+
+        // A pair of 0 outside the table restarts the numbering of new vertices.
         if !is_listed && pair == 0 {
             next = 0;
         }
@@ -283,6 +301,8 @@ fn triangles(data: &[u8], count: usize) -> Option<Vec<u32>> {
             15 => explicit(&mut data, &mut last),
             _ => Some(vertices.get(code - 1)),
         };
+
+        // Vertices that were found in the queue are not queued again.
         let codes = [if low == 15 { 15 } else { 0 }, pair >> 4, pair & 15];
         let [a, b, c] = [corner(codes[0])?, corner(codes[1])?, corner(codes[2])?];
         for (code, vertex) in codes.into_iter().zip([a, b, c]) {

@@ -119,6 +119,7 @@ fn crashed() -> Error {
 }
 
 fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene> {
+    // The file itself, its buffers and all that is made of them count against one budget.
     let mut load = LoadContext::new(options.memory_limit_bytes);
     load.take(bytes.len() as u64, "the file")?;
     let container = container::split(bytes, &mut load)?;
@@ -132,14 +133,18 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         folder,
         &mut load,
     )?;
+
+    // Instances become nodes of their own, so that all else knows only nodes.
     let instanced = instancing::read(&document.root, &buffers, &mut load)?;
     instancing::expand_instances(&mut document, &instanced);
 
+    // Materials precede meshes: only diffuse surfaces keep their colours per vertex.
     let mut images = images::Images::new(&document.root, &buffers, folder);
     let materials = material::read_all(&document, folder, &mut images, &mut load)?;
     let mut materials = surface::Materials::new(materials);
     let placed = nodes::place(&document, &mut load)?;
 
+    // Skins place meshes by the world transforms of other nodes.
     let stands = placed
         .iter()
         .map(|placed| (placed.node, placed.world_from_node))
@@ -165,10 +170,14 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
     materials.warn_of_thin_walls(options.solid_glass, &mut load);
     scene.materials = materials.into_all();
     scene.textures = images.into_textures().into_iter().map(Arc::new).collect();
+
+    // Lights of nodes come before those of glowing objects: the clip carries the first ones, in this order.
     let lights = light::all(&document, &placed, folder, &mut load)?;
     let light_nodes = lights.iter().map(|(_, origin)| origin.node).collect();
     scene.lights = lights.into_iter().map(|(light, _)| light).collect();
     add_lights(&mut scene);
+
+    // Objects name their node; for lights and cameras the clip lists the nodes that carry them.
     let (cameras, camera_nodes) = nodes::read_all(&document.root, &placed, &mut load);
     scene.cameras = cameras;
     let animations = &document.animations;
@@ -180,6 +189,8 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
             ..clip
         })
     });
+
+    // Waves lift vertices in the final coordinates of the scene, after a far one was moved to its centre.
     substance::warn_of_ranges(&scene, &mut load);
     rebase(&mut scene);
     waves::displace(&mut scene, &document.extras.nodes, &mut load);

@@ -47,6 +47,8 @@ pub fn place(document: &Document, load: &mut LoadContext) -> Result<Vec<PlacedNo
     for node in top_nodes(root, load).into_iter().rev() {
         waiting.push((node, DAffine3::IDENTITY, false));
     }
+
+    // Parents are placed before their children, an order on which the clip relies.
     while let Some((index, world_from_parent, is_below_hidden)) = waiting.pop() {
         let Some(node) = root.nodes.get(index) else {
             return Err(damaged(
@@ -55,6 +57,8 @@ pub fn place(document: &Document, load: &mut LoadContext) -> Result<Vec<PlacedNo
             ));
         };
         let name = extras::name(node.name.as_deref(), "node", index);
+
+        // A node with two parents would be placed twice, and one below itself for ever.
         if std::mem::replace(&mut reached[index], true) {
             load.warn(
                 format!("node `{name}`"),
@@ -67,6 +71,8 @@ pub fn place(document: &Document, load: &mut LoadContext) -> Result<Vec<PlacedNo
         if !world_from_node.is_finite() {
             return Err(not_finite(&name));
         }
+
+        // What is hidden is walked all the same, and hides all that is below it.
         let is_hidden = is_below_hidden || is_hidden(node);
         let children = node.children.as_deref().unwrap_or_default();
         waiting.extend(
@@ -83,6 +89,8 @@ pub fn place(document: &Document, load: &mut LoadContext) -> Result<Vec<PlacedNo
             });
         }
     }
+
+    // Without scenes, roots are nodes without a parent, which a ring of nodes does not have.
     let unreached = reached.iter().filter(|reached| !**reached).count();
     if root.scenes.is_empty() && unreached > 0 {
         load.warn(
@@ -147,6 +155,7 @@ fn find_children(root: &Root) -> Vec<bool> {
 }
 
 fn local(transform: &NodeTransform, name: &str, load: &mut LoadContext) -> Result<DAffine3> {
+    // A matrix excludes translation, rotation and scale.
     if let Some(matrix) = transform.matrix {
         let matrix = DMat4::from_cols_array(&matrix);
         if !matrix.is_finite() {
@@ -164,6 +173,8 @@ fn local(transform: &NodeTransform, name: &str, load: &mut LoadContext) -> Resul
             translation: matrix.w_axis.truncate(),
         });
     }
+
+    // A quaternion that is not of unit length would scale the node as well.
     let (scale, rotation, translation) = stated(transform);
     if !scale.is_finite() || !translation.is_finite() || !rotation.is_finite() {
         return Err(not_finite(name));
@@ -228,6 +239,8 @@ pub fn read_all(root: &Root, placed: &[PlacedNode], load: &mut LoadContext) -> (
         let is_orthographic = read
             .as_ref()
             .is_ok_and(|source| matches!(source.type_, Checked::Valid(Type::Orthographic)));
+
+        // The list of nodes stays parallel to that of cameras, so that an unreadable one enters neither.
         match read.and_then(|source| read_one(source, placed)) {
             Ok(camera) => {
                 if is_orthographic {
@@ -253,6 +266,7 @@ pub fn read_all(root: &Root, placed: &[PlacedNode], load: &mut LoadContext) -> (
 const PARALLEL_FOV_RAD: f64 = PI / 180.0;
 
 fn read_one(source: &Source, placed: &PlacedNode) -> std::result::Result<Camera, String> {
+    // Far behind its place, a narrow perspective frames the same height there as the orthographic camera.
     let (vertical_fov_rad, near_m, behind_m) =
         match (&source.type_, &source.perspective, &source.orthographic) {
             (Checked::Valid(Type::Perspective), Some(lens), _) => (widen(lens.yfov), widen(lens.znear), 0.0),
@@ -263,12 +277,15 @@ fn read_one(source: &Source, placed: &PlacedNode) -> std::result::Result<Camera,
             }
             _ => return Err("has no lens".into()),
         };
+
+    // A lens that opens by nothing or by half a turn has no image.
     if !(vertical_fov_rad > 0.0 && vertical_fov_rad < PI) {
         return Err(format!("has an angle of view of {vertical_fov_rad} rad"));
     }
     if !(near_m > 0.0 && near_m.is_finite()) {
         return Err(format!("has a near plane at {near_m} m"));
     }
+
     let axis = |axis: DVec3| placed.world_from_node.transform_vector3(axis).try_normalize();
     let forward = axis(DVec3::NEG_Z);
     // Scale and shear do not affect a camera: its axes are made orthogonal again.

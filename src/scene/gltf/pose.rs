@@ -117,6 +117,7 @@ impl Poses {
         owner: &str,
         load: &mut LoadContext,
     ) -> Result<()> {
+        // Weights of the node replace those of its mesh.
         let Some(morphed) = self.meshes.get(place.mesh).and_then(Maybe::get) else {
             return Ok(());
         };
@@ -125,6 +126,8 @@ impl Poses {
             .filter(|weights| !weights.is_empty())
             .unwrap_or(&morphed.weights);
         let targets = morphed.primitives.get(place.primitive).map(|part| &part.targets);
+
+        // Targets of weight 0 are never read, so that faults in them do no harm.
         for (weight, target) in weights.iter().zip(targets.into_iter().flatten()) {
             if *weight == 0.0 || !weight.is_finite() {
                 continue;

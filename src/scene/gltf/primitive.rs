@@ -111,9 +111,9 @@ impl Variant {
 }
 
 impl Primitives {
-    /// Triangles of a primitive, in coordinates that `world_from_node` maps to the world, and the factors of their vertex
-    /// colours. Colours that vary are kept in the mesh if it `has_colours`, and averaged otherwise. `None`, with a warning,
-    /// if no triangle has an area there.
+    /// Triangles of a primitive, in coordinates that `world_from_node` maps to the world, and the factors of their
+    /// vertex colours. Colours that vary are kept in the mesh if it `has_colours`, and averaged otherwise. `None`, with
+    /// a warning, if no triangle has an area there.
     ///
     /// # Errors
     /// Positions that are not finite or too far away, indices of missing vertices, broken accessors.
@@ -125,6 +125,7 @@ impl Primitives {
         owner: &str,
         load: &mut LoadContext,
     ) -> Result<Option<(Arc<Mesh>, VertexFactors)>> {
+        // Nodes share the source data of a mesh, but for those that bend it by a skin or weights of their own.
         let deformed_by = source.poses.is_own(place.node).then_some(place.node);
         let known = match self.known.entry((place.mesh, place.primitive, deformed_by)) {
             Entry::Occupied(known) => known.into_mut(),
@@ -136,6 +137,8 @@ impl Primitives {
                 })
             }
         };
+
+        // The transform decides how far rounding moves vertices, and which triangles have an area.
         let Some(local) = &known.source else {
             return Ok(None);
         };
@@ -153,6 +156,8 @@ impl Primitives {
             );
             return Ok(None);
         }
+
+        // Nodes under which the same triangles are left share one mesh in memory.
         let variant = Variant {
             is_split_mirrored: !has_normals && world_from_node.matrix3.determinant() < 0.0,
             stands_at_origin: *world_from_node == DAffine3::IDENTITY,
@@ -161,6 +166,8 @@ impl Primitives {
         if let Some((_, made)) = known.made.iter().find(|(made, _)| *made == variant) {
             return Ok(Some((Arc::clone(made), local.factors)));
         }
+
+        // The memory of the first mesh was reserved on reading; each further one is a copy.
         if !known.made.is_empty() {
             take_copy(source, owner, load)?;
         }
@@ -284,6 +291,8 @@ impl Vertices<'_> {
             return Ok(None);
         };
         load.take(mesh.positions.len() as u64 * COLOUR_BYTES, self.owner)?;
+
+        // Colours without alpha are opaque.
         let has_alpha = self.reader.root.accessors.get(index.value()).is_some_and(
             |accessor| matches!(accessor.type_, Checked::Valid(shape) if shape.multiplicity() == 4),
         );
@@ -298,6 +307,8 @@ impl Vertices<'_> {
         let Some(colours) = colours else {
             return Ok(None);
         };
+
+        // Weights by area give the mean albedo of the surface, however finely its parts are tessellated.
         let (mut sum, mut area) = (DVec4::ZERO, 0.0);
         for (triangle, corners) in mesh.triangles.iter().enumerate() {
             let weight = mesh.triangle_area_m2(triangle);
@@ -315,6 +326,8 @@ impl Vertices<'_> {
         let mean = mean.clamp(DVec4::ZERO, DVec4::ONE);
         // Rounded, so that a uniform colour is independent of the averaging and white stays white.
         let mean = (mean / COLOUR_STEP).round() * COLOUR_STEP;
+
+        // Colours that vary stay with the vertices, as albedos in [0, 1]; of the alpha, only the mean is used.
         let differs = |colour: &DVec4| colour.truncate().distance(mean.truncate()) > SAME_COLOUR;
         let varies = colours.iter().any(differs);
         let linear = |colour: &DVec4| {
@@ -359,6 +372,8 @@ fn read_local(
         load.warn_damaged(owner, "is of an unknown kind and was skipped");
         return Ok(None);
     };
+
+    // Without positions there is nothing to trace.
     let reader = source.reader;
     let vertices = Vertices {
         reader,
@@ -372,9 +387,13 @@ fn read_local(
     };
     let positions: Vec<DVec3> = convert(positions);
     let count = positions.len();
+
+    // The budget is asked as soon as the numbers of vertices and corners are known.
     load.take(count as u64 * VERTEX_BYTES, owner)?;
     let order = vertices.order(count, load)?;
     load.take(order.len() as u64 * TRIANGLE_BYTES, owner)?;
+
+    // Draco data hold triangles, whatever mode the primitive states.
     let mode = if vertices.unpacked.is_some() {
         Mode::Triangles
     } else {
@@ -383,6 +402,8 @@ fn read_local(
     let Some(triangles) = assemble(&order, mode, owner, load) else {
         return Ok(None);
     };
+
+    // Attributes of another number than the positions cost themselves, not the mesh.
     let normals: Option<Vec<DVec3>> =
         vertices.one_each((Semantic::Normals, "normals"), Formats::Float, count, load)?;
     let mut uv_sets = [None, None];
@@ -392,6 +413,8 @@ fn read_local(
         *uvs = read.map(|read| finite_uvs(read, owner, load));
     }
     let [uv0, uv1] = uv_sets;
+
+    // A normal of 0 stands for one to be computed from the triangles.
     let has_normals = normals.is_some();
     let mut mesh = Mesh {
         normals: normals.unwrap_or_else(|| vec![DVec3::ZERO; count]),
@@ -401,6 +424,8 @@ fn read_local(
         colours: None,
         triangles,
     };
+
+    // Vertex colours that cannot be read leave the base colour as it is.
     let colours = vertices.colours(&mesh, load).unwrap_or_else(|error| {
         load.warn(
             error.location,
@@ -421,6 +446,9 @@ fn read_local(
             "use the alpha of a base colour texture",
         );
     }
+
+    // Only diffuse light is tinted per vertex, elsewhere by the mean. Colours that stay in the mesh leave a white
+    // factor to the material, which would apply them twice otherwise.
     if let Some(of_vertices) = colours.and_then(|colours| colours.of_vertices) {
         if has_colours {
             (factors.colour, mesh.colours) = (LinearSrgb::WHITE, Some(of_vertices));
@@ -432,6 +460,8 @@ fn read_local(
             );
         }
     }
+
+    // A morph target or skin that does not fit leaves the mesh undeformed.
     if source.poses.is_deformed(place) {
         match vertices.deformed(source, place, &mesh, load) {
             Ok(deformed) => mesh = deformed,
@@ -442,6 +472,8 @@ fn read_local(
             ),
         }
     }
+
+    // Writers round floats; quantised positions are integers and exact.
     let positions = vertices.index(Semantic::Positions);
     Ok(Some(Local {
         mesh,

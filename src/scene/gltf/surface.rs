@@ -30,6 +30,7 @@ pub fn add_objects(
     materials: &mut Materials,
     load: &mut LoadContext,
 ) -> Result<()> {
+    // Source data of a mesh are dropped after its last use: scenes of many meshes would hold all of them twice.
     let root = source.reader.root;
     let mut primitives = Primitives::default();
     let mut factors = Vec::new();
@@ -40,6 +41,8 @@ pub fn add_objects(
             *uses += 1;
         }
     }
+
+    // Every primitive of every placed node becomes an object.
     for placed in placed {
         let Some(mesh_index) = root.nodes[placed.node].mesh else {
             continue;
@@ -78,6 +81,8 @@ pub fn add_objects(
             primitives.forget(mesh_index.value());
         }
     }
+
+    // Whether glass is solid is known only with all objects, since several may bound one body.
     let bounds_body = bodies::find(&mut scene.objects, &materials.all, load);
     for (object, (bounds_body, mut factors)) in
         scene.objects.iter_mut().zip(bounds_body.into_iter().zip(factors))
@@ -85,15 +90,22 @@ pub fn add_objects(
         let source = root.materials.get(object.material);
         let blends = source.is_some_and(|source| source.alpha_mode == Checked::Valid(AlphaMode::Blend));
         let material = materials.thin_or_solid(object.material, bounds_body, solid_glass);
+
+        // A pane has no interior to trace through, so that the absorption of its stated thickness tints it. The cube
+        // root of the determinant is the geometric mean of the scales along the axes.
         let volume = source.and_then(|source| source.extensions.as_ref()?.volume.as_ref());
         if let Some(volume) = volume.filter(|_| !materials.all[material].is_solid()) {
             let scale = object.world_from_object().matrix3.determinant().abs().cbrt();
             let thickness_m = extras::widen(volume.thickness_factor.0) * scale;
             factors.colour = factors.colour * materials.through_pane(material, thickness_m);
         }
+
+        // Vertex colours and panes make variants of materials, shared by all objects with the same factors.
         object.material = materials.tinted(material, factors, blends);
         materials.check_coordinates(object.material, object.mesh(), &object.name, load);
     }
+
+    // Meshes of few uses or triangles are copied for each object, which the budget must hold.
     take_copies(&scene.objects, load)?;
     let degenerate = primitives.degenerate;
     if degenerate > 0 {
@@ -270,8 +282,8 @@ impl Materials {
         }
     }
 
-    /// Variant of a material with its base colour multiplied by the factors of vertices and, if it is cut out or `blends`,
-    /// its alpha.
+    /// Variant of a material with its base colour multiplied by the factors of vertices and, if it is cut out or
+    /// `blends`, its alpha.
     fn tinted(&mut self, material: usize, mut factors: VertexFactors, blends: bool) -> usize {
         let own = &self.all[material];
         let has_alpha = own.alpha_mask.is_some() || (blends && !own.transmits());

@@ -61,6 +61,7 @@ pub fn file(uri: &str, folder: &Path) -> Option<PathBuf> {
 /// Resolves a relative path below `folder`. Files from elsewhere are refused, since a scene must not make the program
 /// open arbitrary ones.
 fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
+    // The message quotes untrusted text, which must neither fill the screen nor steer the terminal.
     let refused = |what: &str| {
         Error::failure(
             owner,
@@ -74,6 +75,8 @@ fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
             "put the file into the scene's folder and refer to it by a relative path",
         )
     };
+
+    // Whatever has a scheme (RFC 3986, section 3.1) lies elsewhere; a drive letter of Windows looks like one.
     let has_scheme = uri.split_once(':').is_some_and(|(scheme, _)| {
         scheme.starts_with(|c: char| c.is_ascii_alphabetic())
             && scheme
@@ -83,6 +86,8 @@ fn path_within(folder: &Path, uri: &str, owner: &str) -> Result<PathBuf> {
     if has_scheme {
         return Err(refused("its URI does not name a local file"));
     }
+
+    // Encoded dots and slashes are decoded before the path is judged, or they would leave the folder unseen.
     let decoded = percent_decode(uri).and_then(|bytes| String::from_utf8(bytes).ok());
     let Some(relative) = decoded.filter(|path| !path.is_empty() && !path.contains('\0')) else {
         return Err(refused("its URI is not valid"));

@@ -23,6 +23,7 @@ use crate::viewer::timing::FrameStats;
 impl App {
     /// Uploads what has changed and draws the picture if its view, maps or quality changed.
     pub(super) fn draw_picture(&mut self) -> Result<()> {
+        // Shaders for mirrors and glass take seconds to compile; a thread does it, and until then the picture has none.
         let Some(mut view) = self.view() else {
             return Ok(());
         };
@@ -32,6 +33,7 @@ impl App {
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
+
         // On a software rasterizer, shadow rays take longer than the next bake.
         let traces_lights = self.model.traces_lights() && !graphics.gpu.is_software();
         let wanted_maps = MapsOnDevice {
@@ -42,6 +44,8 @@ impl App {
         if before.is_some_and(|before| before.traces_lights) != traces_lights {
             graphics.main.set_traces_lights(traces_lights);
         }
+
+        // The scene precedes its maps: surfaces may have become receivers, and their maps are set again.
         let start = Instant::now();
         let mut uploaded = graphics.main.set_scene(&graphics.gpu, self.model.scene())?;
         let mut is_new = uploaded != Uploaded::default();
@@ -54,6 +58,8 @@ impl App {
         } else {
             graphics.main.set_style(self.model.map_style());
         }
+
+        // The log tells what it cost to show an edit.
         if is_new {
             let seconds = start.elapsed().as_secs_f64();
             self.model.log.write(
@@ -66,6 +72,8 @@ impl App {
                 }),
             );
         }
+
+        // The right part of a comparison shows the same quantity; its maps are uploaded only where something changed.
         let style = self.model.map_style();
         let reference = self.model.reference.as_ref();
         let beside = reference.map(|reference| (Arc::clone(&reference.maps), style));
@@ -80,6 +88,8 @@ impl App {
             let shown = shown.as_ref().map(|(scene, maps)| (*scene, &maps[..], style));
             graphics.set_beside(shown)?;
         }
+
+        // While shaders are compiled, grey mirrors stand in: black ones would look broken.
         let is_compiling = wanted != EffectSwitch::Off && chains == EffectSwitch::Off;
         graphics
             .main
@@ -91,6 +101,7 @@ impl App {
             white_balance,
         };
         graphics.main.set_options(&graphics.gpu, options)?;
+
         // Must come before `expose` and drawing, which would collect the times without reporting them.
         if let Some(ms) = graphics.take_times() {
             if let Some(quality) = graphics.main.renderer.counts().timed_quality {
@@ -98,14 +109,20 @@ impl App {
             }
             self.tell_time(ms);
         }
+
+        // A measured exposure changes the view, and with it whether the picture shows it already.
         self.expose(&mut view, has_new_maps)?;
         let Some(graphics) = &mut self.graphics else {
             return Ok(());
         };
+
+        // Once there is light, compilation begins, in the quality that a moving camera needs.
         if !self.model.maps().is_empty() {
             let quality = self.pace.walking();
             self.warm_up.begin(self.model.scene(), &view, quality);
         }
+
+        // A view that is shown already is refined; any other one is drawn at the quality that keeps the frame rate.
         if graphics.shows(&view) {
             return self.refine_picture(&view);
         }

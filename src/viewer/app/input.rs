@@ -82,6 +82,7 @@ impl App {
 
     /// Handles a letter key.
     fn on_letter(&mut self, letter: &str) {
+        // Commands go by letter on any keyboard layout, unlike keys of motion, which go by place.
         match letter {
             "c" => drop(self.model.navigator.next_camera().map(str::to_owned)),
             "f" => self.model.frame(f64::from(self.picture_rect.aspect_ratio())),

@@ -72,6 +72,7 @@ impl Model {
 
     /// Returns a message for the panel, if any.
     fn filmed(&mut self, command: &FilmCommand) -> Result<Option<String>> {
+        // Keys are in world coordinates, cameras of the window in those of the scene.
         let origin_world = self.scene().origin_world;
         match command {
             FilmCommand::Record(key) => {
@@ -103,6 +104,7 @@ impl Model {
             }
             FilmCommand::Load(path) => {
                 let plan = PathPlan::read(path)?;
+                // A path that cannot be played does not replace the present one.
                 plan.path(&path.display().to_string())?;
                 self.choices.film.take(plan);
                 self.tell_keys();

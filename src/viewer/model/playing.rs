@@ -11,7 +11,7 @@ use crate::viewer::command::PlayCommand;
 use crate::viewer::playback::Playback;
 use crate::viewer::worker::{BakeRequest, BakedLevel};
 
-/// Nobody looks at maps on the way to those of a moment.
+/// For so long a bake hands out no levels: while time runs, only the last maps of each moment are shown.
 const NO_LEVELS: Duration = Duration::from_secs(3600);
 
 impl Model {

@@ -105,6 +105,8 @@ impl Model {
             let object = scene.objects.get(map.chart.object());
             object.is_none_or(|object| scene.materials[object.material].surface.is_receiver())
         };
+
+        // Error and difference are those of all layers; the dominant wavelength is that of the light shown.
         let in_colours = match quantity {
             Quantity::Wavelength => Some(false_colours::wavelength_maps(
                 &self.with_quantity(maps, Quantity::Light),
@@ -116,6 +118,8 @@ impl Model {
         if let Some(maps) = in_colours {
             return Cow::Owned(maps.into_iter().filter(|map| receives(&map)).collect());
         }
+
+        // Maps are borrowed as long as all of them can be shown as they are: copies take as much memory again.
         let LayerShown::Only(kind) = self.choices.display.layer else {
             return if maps.iter().all(|map| receives(&map)) {
                 Cow::Borrowed(maps)

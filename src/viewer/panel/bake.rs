@@ -40,6 +40,7 @@ fn show(ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Co
 }
 
 fn state_line(ui: &mut Ui, choices: &Choices, model: &Model) {
+    // While time runs, the maps follow the scene with a delay that is no reason to bake again.
     let wanted = BakeRequest::new(Arc::clone(model.scene()), choices.settings.clone());
     let is_other = |last: &BakedLevel| !last.request.is_same(&wanted);
     let is_stale = !model.playback().is_playing && model.last.as_deref().is_some_and(is_other);
@@ -83,6 +84,7 @@ fn state_line(ui: &mut Ui, choices: &Choices, model: &Model) {
         BakeState::Cancelled => {
             drop(ui.colored_label(ATTENTION, "Cancelled; the maps are those of an earlier bake."))
         }
+        // A bake that is done belongs to the settings of its request, which may have changed since.
         BakeState::Done | BakeState::Idle if is_stale => {
             ui.colored_label(ATTENTION, "Settings changed since the last bake.");
         }
@@ -111,6 +113,8 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
         "Relative RMSE over all maps as estimated without a reference, and the time from the request to these maps. \
          Maps of rising quality are shown until the bake is done.",
     );
+
+    // Only this bake's own work is counted: levels that were reused cost nothing.
     let hover = format!(
         "Rays that this bake traced up to here; those kept from earlier bakes are not counted. Build {:.2} s, \
          plan {:.2} s, trace {:.2} s, deposit {:.2} s; {:.2} s of CPU over all threads.",
@@ -120,6 +124,8 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
         result.timings_s.deposit,
         result.cpu_s.total,
     );
+
+    // Memory is that of a bake, which sums flux in integers beside the finished maps.
     let texels = |map: &IlluminationMap| map.chart.texel_count() as u64;
     let bytes = result.maps.iter().map(texels).sum::<u64>() * BYTES_PER_TEXEL;
     ui.label(format!(
@@ -178,6 +184,7 @@ pub fn two_digits(value: f64) -> String {
 }
 
 fn ledger(ui: &mut Ui, total: &EnergyLedger) {
+    // All flux is accounted for: what was emitted equals the sum of the other lines.
     let lines = [
         (
             "Emitted",
@@ -201,6 +208,7 @@ fn ledger(ui: &mut Ui, total: &EnergyLedger) {
             "Flux that the bake gave up: depth limit, branch threshold, unresolved.",
         ),
     ];
+
     Grid::new("ledger")
         .num_columns(3)
         .spacing([14.0, 1.0])
@@ -212,6 +220,8 @@ fn ledger(ui: &mut Ui, total: &EnergyLedger) {
                     .on_hover_text("Of what was emitted.");
                 ui.end_row();
             }
+
+            // Sums are integers, so that a larger imbalance is no rounding but lost flux.
             let imbalance = total.relative_imbalance();
             let text = RichText::new(format!("{imbalance:.1e}"));
             let hover = "|emitted − sum of the others| / emitted; below 1e-6 the account is closed.";

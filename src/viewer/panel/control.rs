@@ -224,6 +224,7 @@ pub fn pick(
     entries: &[Entry<'_>],
 ) -> (Response, Option<usize>) {
     let mut picked = None;
+
     // Draws one entry of the open list.
     let mut entry = |ui: &mut Ui, index: usize, (name, hover, why_not): &Entry<'_>| {
         ui.add_enabled_ui(why_not.is_none(), |ui| {
@@ -239,6 +240,7 @@ pub fn pick(
             }
         });
     };
+
     let list = ComboBox::from_id_salt(id)
         .width(width)
         .height(LIST_HEIGHT)
@@ -249,6 +251,7 @@ pub fn pick(
                 entry(ui, index, offered);
             }
         });
+
     // Arrow keys step through the entries of a closed list, past those that cannot be picked.
     if list.inner.is_none() {
         let open: Vec<usize> = (0..entries.len())

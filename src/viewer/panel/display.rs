@@ -25,6 +25,7 @@ const DAYLIGHT_KELVIN: f64 = 6504.0;
 pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Vec<Command>) {
     let baked = &model.layers()[..];
     rows(ui, "display", |ui| {
+        // The exposure has no default to go back to: it is measured.
         row(ui, "Exposure [stops]", None, |ui| {
             ui.horizontal(|ui| {
                 // Leaves room for the button.
@@ -35,11 +36,14 @@ pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Ve
             })
             .inner
         });
+
         let default = Display::default();
         let white = (&mut display.white_balance, &default.white_balance);
         setting(ui, "White balance", None, white, white_balance);
         let tone_map = (&mut display.tone_map, &default.tone_map);
         setting(ui, "Tone map", None, tone_map, listed);
+
+        // Without maps there is no light to choose from.
         let nothing = baked.is_empty().then_some("There are no maps yet.");
         let shown = (&mut display.layer, &default.layer);
         setting(ui, "Light shown", nothing, shown, |ui, shown| {
@@ -47,12 +51,16 @@ pub fn show(ui: &mut Ui, display: &mut Display, model: &Model, commands: &mut Ve
         });
         let shown = (&mut display.quantity, &default.quantity);
         setting(ui, "View", nothing, shown, |ui, shown| quantity(ui, shown, model));
+
+        // The scales of all other quantities are fixed or follow the values.
         if display.quantity == Quantity::Irradiance {
             let chosen = (&mut display.scale, &default.scale);
             setting(ui, "Scale", None, chosen, scale);
             row(ui, "From, to", None, |ui| range(ui, &mut display.scale, model));
         }
     });
+
+    // Values that are not finite are faults of a bake and never pass unnoticed.
     if model.survey.faults > 0 {
         let faults = counted(model.survey.faults, "texel");
         ui.colored_label(
@@ -71,6 +79,7 @@ fn exposure(ui: &mut Ui, stops: &mut f64) -> Response {
 }
 
 fn white_balance(ui: &mut Ui, white: &mut WhiteBalance) -> Response {
+    // The entry of temperatures has the present one, since the list finds its value by equality.
     let kelvin = match *white {
         WhiteBalance::Kelvin(kelvin) => kelvin,
         _ => DAYLIGHT_KELVIN,
@@ -88,6 +97,8 @@ fn white_balance(ui: &mut Ui, white: &mut WhiteBalance) -> Response {
             "Daylight, or below 4000 K a black body.",
         ),
     ];
+
+    // The slider appears with the choice that it belongs to.
     ui.vertical(|ui| {
         let response = choice(ui, "white balance", white, "custom", &choices);
         if let WhiteBalance::Kelvin(kelvin) = white {

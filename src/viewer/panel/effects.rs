@@ -57,11 +57,14 @@ fn known(effect: Effect, model: &Model) -> Option<Cow<'_, EffectLine>> {
 
 /// Shows one effect; returns whether its contribution was requested.
 fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, model: &Model) -> bool {
+    // What an effect adds is found by a bake without it; chains and motion are not part of a bake.
     let known = known(effect, model);
     let is_on = known.as_ref().map(|line| line.on);
     let name = effect.name().replace('_', " ");
     let has_worth = is_on == Some(true) && !matches!(effect, Effect::Chains | Effect::Motion);
     let mut is_asked = false;
+
+    // Name and state are at the left, the switch at the right end of the row.
     ui.horizontal(|ui| {
         title(ui, &name, is_on).on_hover_text(effect.description());
         if has_worth {
@@ -73,6 +76,8 @@ fn entry(ui: &mut Ui, effect: Effect, switch: &mut EffectSwitch, model: &Model) 
             *switch = EffectSwitch::Auto;
         }
     });
+
+    // Below are the reason for its state, the rays it took, and what it adds.
     detail(ui, &name, |ui| {
         let reason = match &known {
             Some(line) => line.reason.as_str(),

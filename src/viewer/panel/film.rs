@@ -29,6 +29,7 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
         ask(ui, "Tour", few_cameras, commands, FilmCommand::Tour);
         ui.label(RichText::new(length(film)).weak());
     });
+
     // The keys, and how they are filmed.
     keys(ui, film, commands);
     let default = Film::default();
@@ -39,6 +40,7 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
         });
         setting(ui, "Frame size", None, (&mut film.size, &default.size), size);
     });
+
     ui.horizontal(|ui| {
         // The path as a file, to and from disk.
         ask(ui, "Save path", too_few, commands, FilmCommand::Save);
@@ -57,6 +59,7 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
             FilmCommand::Load(file.trim().into()),
         );
     });
+
     // Frames on disk, and how that goes.
     let no_light = model.layers().is_empty().then_some("There are no maps yet.");
     let busy = model
@@ -82,6 +85,7 @@ pub fn show(ui: &mut Ui, film: &mut Film, file: &mut String, model: &Model, comm
         let idle = (!model.exporter.state.is_running()).then_some("Nothing is filmed now.");
         ask(ui, "Stop", idle, commands, FilmCommand::Stop);
     });
+
     if let Some(message) = &model.film_message {
         ui.label(RichText::new(message).small());
     }

@@ -41,6 +41,8 @@ pub fn show(ui: &mut Ui, index: usize, model: &Model, commands: &mut Vec<Command
     let (kind, kind_of_file) = (&light.kind, &of_file.kind);
     let mut push =
         |edit: Option<LightEdit>| commands.extend(edit.map(|edit| Command::Edit(Edit::Light(index, edit))));
+
+    // Each kind of light has rows for what can be changed; panels and surfaces keep their extent and colour.
     push(power(ui, kind, kind_of_file));
     let sizes = (&light.size, &of_file.size);
     let size = match kind {
@@ -55,6 +57,8 @@ pub fn show(ui: &mut Ui, index: usize, model: &Model, commands: &mut Vec<Command
     ) {
         push(colour(ui, light, of_file));
     }
+
+    // A sun has no position, and a point no direction.
     if let (Some(position), Some(default)) = (kind.position(), kind_of_file.position()) {
         let moved = edited(ui, "Position [m]", None, (&position, &default), |ui, moved| {
             coordinates(ui, "Position [m]", moved, model.scene())

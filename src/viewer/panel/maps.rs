@@ -58,7 +58,10 @@ pub fn show(
         ui.label(format!("{} in {memory}", counted(model.maps().len(), "map")));
         export::all(ui, "Export all", maps_folder, model, commands);
     });
+
+    // A few thumbnails are made per frame, the rest in the next ones: a long list does not stall the window.
     let mut still_to_make = MAX_AT_ONCE;
+
     // Limits the height, to keep the sections below within reach.
     let list = ScrollArea::vertical()
         .id_salt("maps")
@@ -112,6 +115,7 @@ fn entry(
 ) {
     let name = name(map, model);
     ui.horizontal(|ui| {
+        // An empty button keeps the place of a thumbnail that is still to be made, so that rows do not jump.
         let texture = thumbnail(ui, browser, (index, map), still_to_make);
         let size = vec2(THUMBNAIL, THUMBNAIL);
         let button = match texture {
@@ -123,6 +127,8 @@ fn entry(
         if look.clicked() {
             browser.large = Some(large::Large::new(index));
         }
+
+        // Beside it: name, figures, and the export of this map alone.
         ui.vertical(|ui| {
             ui.set_width(ui.available_width());
             ui.horizontal(|ui| {
@@ -195,6 +201,7 @@ const FOLDER: &str = "Folder to compare with";
 
 /// Shows the section *Compare*.
 pub fn compare(ui: &mut Ui, folder: &mut String, model: &Model, commands: &mut Vec<Command>) {
+    // The maps shown can be kept before a change, to be compared with those after it.
     ui.horizontal(|ui| {
         let none = model.layers().is_empty().then_some("There are no maps yet.");
         let keep = Command::Compare(CompareCommand::Keep);
@@ -207,6 +214,8 @@ pub fn compare(ui: &mut Ui, folder: &mut String, model: &Model, commands: &mut V
         let end = Command::Compare(CompareCommand::End);
         ask(ui, "End comparison", none, commands, end);
     });
+
+    // Enter in the field does what the button does.
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(folder)
             .hint_text("folder of maps")

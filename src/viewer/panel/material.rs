@@ -160,12 +160,15 @@ fn slope(ui: &mut Ui, list: &mut [Wave], in_file: &[Wave]) {
 }
 
 fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
+    // An azimuth of 0 points along −z, as for lights.
     let mut azimuth_deg = wave.direction.x.atan2(-wave.direction.z).to_degrees();
     let before = azimuth_deg;
     let response = ui
         .horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.spacing_mut().interact_size.x = 58.0;
+
+            // A point of a drag changes a length by one per cent: waves range from ripples to swell.
             let fine = |value: f64| 0.01 * value.max(MIN_HEIGHT_M);
             let (height_speed, length_speed) = (fine(wave.amplitude_m), fine(wave.wavelength_m));
             number(ui, &mut wave.amplitude_m, 5, |shown| {
@@ -189,6 +192,8 @@ fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
             )
         })
         .inner;
+
+    // Without an edit the direction stays as it is: its angle is rounded.
     if azimuth_deg != before {
         let azimuth = azimuth_deg.to_radians();
         wave.direction = DVec3::new(azimuth.sin(), 0.0, -azimuth.cos());

@@ -129,6 +129,7 @@ impl Panel {
     }
 
     fn sections(&mut self, ui: &mut Ui, choices: &mut Choices, model: &Model, commands: &mut Vec<Command>) {
+        // Sections follow the light: what is lit, how it is baked, the maps, how they are shown, and what is written.
         self.scene(ui, choices, model, commands);
         if model.can_play() {
             section(ui, "Motion", true, |ui| motion::show(ui, model, commands));
@@ -255,6 +256,7 @@ fn titled(ui: &mut Ui, name: &str, title: RichText, open: bool, add: impl FnOnce
 
 /// Lists the keys for a navigation mode and its speed [m/s].
 fn keys(ui: &mut Ui, travel: NavigationMode, speed_m_per_s: f64) {
+    // Mouse and wheel act on the pivot in orbit, and on direction and speed otherwise.
     let (way, wheel) = match travel {
         NavigationMode::Fly | NavigationMode::Walk => (
             "hold to look around",
@@ -263,6 +265,7 @@ fn keys(ui: &mut Ui, travel: NavigationMode, speed_m_per_s: f64) {
         NavigationMode::Orbit => ("hold to orbit", "move nearer, farther".to_owned()),
     };
     let now = format!("fly, walk, orbit; now {}", travel.name());
+
     let lines = [
         ("V", now.as_str()),
         ("W A S D", "forward, left, back, right"),

@@ -24,9 +24,11 @@ pub fn show(ui: &mut Ui, model: &Model, commands: &mut Vec<Command>) {
             ui.label(format!("{rate_hz:.1} maps/s at {error:.0} %, {side} texels"));
         }
     });
+
+    // Values are compared with those shown, and only a change becomes a command.
     rows(ui, "motion", |ui| {
         let span_s = Playback::span_s(model.edits().scene());
-        // Shown to hundredths, which is no choice.
+        // The slider rounds to hundredths, which must not count as the choice of another moment.
         let shown_s = (100.0 * playback.time_s).round() / 100.0;
         let mut time_s = shown_s;
         row(ui, "Moment", None, |ui| {
@@ -36,6 +38,7 @@ pub fn show(ui: &mut Ui, model: &Model, commands: &mut Vec<Command>) {
         if time_s != shown_s {
             commands.push(Command::Play(PlayCommand::GoTo(time_s)));
         }
+
         let mut speed = playback.speed;
         row(ui, "Speed of time", None, |ui| {
             ui.add(DragValue::new(&mut speed).range(0.0..=MAX_SPEED).speed(0.01))

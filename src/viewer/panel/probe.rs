@@ -27,7 +27,10 @@ pub fn show(
         let dark = model.maps().is_empty().then_some("No light is baked yet.");
         ask(ui, "Brightest spot", dark, commands, Command::Brightest);
     });
+
     sketch(ui, sketched, model);
+
+    // A result stays when the mode is switched off, until it is cleared.
     let Some(probed) = model.probed() else {
         if *is_on {
             ui.weak("Click on a surface.");
@@ -36,6 +39,8 @@ pub fn show(
     };
     let [x, y, z] = probed.point.to_array();
     ui.label(format!("{} at {x:.4}, {y:.4}, {z:.4} m", probed.surface));
+
+    // Values of the map are there at once, light paths as soon as a thread has found them.
     match &probed.texel {
         Some(texel) => figures(ui, texel),
         None => drop(ui.label("No light is baked onto it.")),
@@ -76,6 +81,8 @@ fn figures(ui: &mut Ui, texel: &ProbedTexel) {
                 ui.label(text);
                 ui.end_row();
             };
+
+            // Layers add up to the total, of which alone the error is estimated.
             let total = texel.total_w_m2();
             let error = texel
                 .error_w_m2
@@ -88,6 +95,8 @@ fn figures(ui: &mut Ui, texel: &ProbedTexel) {
                 "illuminance",
                 format!("{} lx", significant(LUMENS_PER_WATT * total)),
             );
+
+            // The texel's size is the side of a square of its area on the surface.
             let [column, row] = texel.corner;
             let [width, height] = texel.map;
             let side_mm = 1e3 * texel.area_m2.sqrt();

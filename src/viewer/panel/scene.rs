@@ -93,6 +93,7 @@ impl Selection {
 /// Shows the section; pushes edits to `commands`.
 pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mut Vec<Command>) {
     let scene = model.scene();
+
     // What the scene holds, in one line.
     let inventory = format!(
         "{}, {}, {}",
@@ -102,6 +103,7 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mu
     );
     ui.label(RichText::new(inventory).weak())
         .on_hover_text(format!("{}, drawn by {}.", scene.source, model.picture.adapter));
+
     rows(ui, "scene", |ui| {
         // Lights: to add, to remove, to edit, to pull in the picture.
         if scene.lights.is_empty() {
@@ -128,6 +130,7 @@ pub fn show(ui: &mut Ui, selection: &mut Selection, model: &Model, commands: &mu
             light::show(ui, selection.light, model, commands);
             light_tools(ui, selection, model);
         }
+
         // Objects: their material, place and handles.
         if !scene.objects.is_empty() {
             let names = scene.objects.iter().map(|object| object.name.as_str());

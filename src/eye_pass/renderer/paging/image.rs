@@ -133,12 +133,15 @@ impl<T: Pod> PagedImage<T> {
         index: usize,
         before: Option<&Level<T>>,
     ) -> Uploaded {
+        // Tiles are compared bit by bit; those that did not change stay where they are.
         let level = &self.levels[index];
         let mut uploaded = Uploaded::default();
         for (tile, texels) in level.tiles.iter().enumerate() {
             if before.is_some_and(|before| bits(before.tiles[tile].as_deref()) == bits(texels.as_deref())) {
                 continue;
             }
+
+            // Black tiles and those that are no finer than the next level take no slot: their page tells the shader.
             let page = &mut self.pages[index][tile];
             let Some(texels) = texels else {
                 release(pool, page);
@@ -150,6 +153,7 @@ impl<T: Pod> PagedImage<T> {
                 release(pool, page);
                 continue;
             }
+
             if *page >= COARSER {
                 // If the device has no room left, the tile stays dark; the budget keeps well below that.
                 if pool.reserve(gpu, 1).is_none() {
@@ -161,6 +165,7 @@ impl<T: Pod> PagedImage<T> {
                 }
                 *page = pool.take();
             }
+
             pool.write(gpu, *page, texels, level.stored_across(tile));
             uploaded.tile_bytes += size_of_val(texels.as_slice()) as u64;
         }
@@ -259,8 +264,8 @@ pub(super) fn is_zero<T: Pod>(texel: &T) -> bool {
     bytemuck::bytes_of(texel) == bytemuck::bytes_of(&T::zeroed())
 }
 
-/// The stored texels of a tile, row by row: its own, and one more in each direction for bilinear lookups between its last
-/// ones.
+/// The stored texels of a tile, row by row: its own, and one more in each direction for bilinear lookups between its
+/// last ones.
 fn stored_texels<T: Copy>(
     [width, height]: [usize; 2],
     wrap: [Wrap; 2],

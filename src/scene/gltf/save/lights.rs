@@ -38,6 +38,7 @@ impl Edited<'_> {
         placing: &mut NodePlacement<'_>,
         glb: &mut Glb,
     ) -> Result<()> {
+        // The light is stated as it was and as it is; only what differs between the two is changed in the file.
         let (was, is) = (self.was, self.is);
         let stated = |light| lights::stated(light).map_or(Value::Null, |(_, stated)| stated);
         let (mut before, after) = (stated(was), stated(is));
@@ -47,10 +48,14 @@ impl Edited<'_> {
             // With a spectrum, the colour as loaded is not that in the file.
             before["color"] = Value::Null;
         }
+
+        // The entry becomes that of this node alone, since other nodes may share it.
         let [had, has] = [was, is].map(lights::extras);
         if before != after || had != has || new_spectrum {
             let entry = own_entry(origin, glb);
             glb.patch(&entry, &before, &after);
+
+            // Extras of the node precede those of the light: values go there, and what is removed goes from both.
             for key in lights::EXTRAS {
                 let is_same = had.get(key) == has.get(key) && !(new_spectrum && key == spectrum::KEY);
                 let of_node = format!("/nodes/{}/extras/{key}", origin.node);

@@ -36,11 +36,13 @@ pub fn save(
     edited: &Scene,
     options: &LoadOptions,
 ) -> Result<()> {
+    // Lights are read again only to learn where the file states each.
     let mut file = File::read(original, options.memory_limit_bytes)?;
     let mut load = LoadContext::default();
     let lights = light::all(&file.document, &file.placed, &file.folder, &mut load)?;
     let origins: Vec<Origin> = lights.into_iter().map(|(_, origin)| origin).collect();
 
+    // Edits are patches of the document, so that content unknown to the program stays as it is.
     let before = file.glb.json.clone();
     let mut patch = Patch {
         loaded,
@@ -54,6 +56,8 @@ pub fn save(
     patch.materials()?;
     patch.objects()?;
     patch.placing.write(&file.document, patch.glb);
+
+    // An unchanged file is copied byte for byte. Nothing is written that does not read back as the edited scene.
     let bytes = match file.is_binary && file.glb.json == before {
         true => file.bytes,
         false => file.glb.into_bytes()?,
@@ -90,6 +94,7 @@ impl Patch<'_> {
     }
 
     fn lights(&mut self, origins: &[Origin]) -> Result<()> {
+        // The file states its lights at nodes; the light of a glowing object is the strength of its material.
         let materials = self.document.root.materials.len();
         let shift = self.edited.origin_world;
         for (index, is) in self.edited.lights.iter().enumerate() {
@@ -98,6 +103,8 @@ impl Patch<'_> {
                 Some(place) => (Some(&self.loaded.lights[place]), origins.get(place)),
                 None => (None, None),
             };
+
+            // Lights that were added, and the default sun where it must stay, get nodes of their own.
             let is_foreign = origin.is_none() && write::lights::stated(is).is_some();
             match (was, origin) {
                 _ if is_foreign && is_to_be_written(index, self.loaded, self.edited) => {
@@ -114,6 +121,8 @@ impl Patch<'_> {
                 }
             }
         }
+
+        // A removed light leaves its node; its entry may serve others and stays.
         for place in &self.edited.light_list.removed {
             if let Some(origin) = origins.get(*place) {
                 let node = format!("/nodes/{}/extensions/{}", origin.node, origin.list);
@@ -124,6 +133,7 @@ impl Patch<'_> {
     }
 
     fn materials(&mut self) -> Result<()> {
+        // Both states are written as glTF, so that only what differs between them is changed in the file.
         let shift = self.edited.origin_world;
         let pairs = self.loaded.materials.iter().zip(&self.edited.materials);
         for (index, (was, is)) in pairs.take(self.document.root.materials.len()).enumerate() {
@@ -131,6 +141,8 @@ impl Patch<'_> {
             let mut before = write::materials::written(was, shift, &mut Vec::new());
             let after = write::materials::written(is, shift, &mut unstated);
             let material = format!("/materials/{index}");
+
+            // A glass that no file can state must not be saved as another one.
             if was.glass != is.glass {
                 if let Some(Warning {
                     location,
@@ -182,6 +194,7 @@ fn is_to_be_written(light: usize, loaded: &Scene, edited: &Scene) -> bool {
 
 /// Reads the new file as any other, and refuses it if the result is not the edited scene.
 fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -> Result<()> {
+    // What counts is the scene that the new file gives, not what was meant to be written.
     let read = super::read_scene(bytes, original, options)?;
     let differs = |what: String| {
         Error::failure(
@@ -190,6 +203,8 @@ fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -
             "undo its last edit and save again",
         )
     };
+
+    // Both scenes may have moved to different origins, and a file rounds positions.
     let extent_m = edited.bounds().map_or(1.0, |(low, high)| (high - low).length());
     let shift = read.origin_world - edited.origin_world;
     let is_at = |a: DVec3, b: DVec3| (a + shift).distance(b) <= SAME * extent_m;
@@ -199,6 +214,8 @@ fn check(bytes: &[u8], original: &Path, edited: &Scene, options: &LoadOptions) -
             return Err(differs(format!("object `{}`", is.name)));
         }
     }
+
+    // Of a material, what an edit can change is compared, and the class that follows from it.
     for (read, is) in read.materials.iter().zip(&edited.materials) {
         let colours = read
             .base_colour

@@ -11,6 +11,7 @@ use crate::units::LUMENS_PER_WATT;
 
 /// glTF of a material. `shift` leads from scene to world coordinates [m].
 pub fn written(material: &Material, shift: DVec3, warnings: &mut Vec<Warning>) -> Value {
+    // The alpha of the base colour is the factor of the cut-out.
     let [red, green, blue] = material.base_colour.to_array();
     let alpha = material.alpha_mask.as_ref().map_or(1.0, |mask| mask.factor);
     let mut metallic_roughness = json!({
@@ -34,6 +35,8 @@ pub fn written(material: &Material, shift: DVec3, warnings: &mut Vec<Warning>) -
         written["normalTexture"] = reference(&map.image);
         written["normalTexture"]["scale"] = json!(map.scale);
     }
+
+    // The rest needs extensions, or `extras` where glTF has none.
     write_glow(material, &mut written);
     write_dielectric(material, &mut written);
     write_substance(material, &mut written, warnings);

@@ -82,6 +82,8 @@ fn add_object(object: &Object, still: Option<&Arc<Mesh>>, shift: DVec3, glb: &mu
         colours: _,
         triangles,
     } = &**still.unwrap_or(object.mesh_in_scene());
+
+    // Positions lead back to world coordinates; normals are the same in both.
     let vectors = |list: &[DVec3], shift: DVec3| -> Vec<[f32; 3]> {
         let shifted = list.iter().map(|vector| (*vector + shift).as_vec3().to_array());
         shifted.collect()
@@ -96,6 +98,8 @@ fn add_object(object: &Object, still: Option<&Arc<Mesh>>, shift: DVec3, glb: &mu
             attributes[name] = json!(glb.push_vectors(&uvs));
         }
     }
+
+    // Nothing is shared: the numbers of node, mesh and object agree.
     let indices = glb.push_indices(triangles.iter().flatten().copied());
     let primitive = json!({ "attributes": attributes, "indices": indices, "material": object.material });
     let mesh = glb.push("/meshes", json!({ "primitives": [primitive] }));

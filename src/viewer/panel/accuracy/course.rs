@@ -233,6 +233,8 @@ fn draw(ui: &Ui, curve: &Curve, frame: &Frame) {
     let write = |at: Pos2, align: Align2, text: String| {
         painter.text(at, align, text, FontId::proportional(SMALL), TEXT);
     };
+
+    // The grid: powers of ten of time, and the errors of the presets.
     for seconds in decades(&frame.seconds) {
         let foot = frame.place(seconds, *frame.errors.start());
         painter.line_segment([foot, pos2(foot.x, frame.rect.top())], Stroke::new(0.5, MARK));
@@ -248,6 +250,8 @@ fn draw(ui: &Ui, curve: &Curve, frame: &Frame) {
         let label = format!("{} {} %", preset.name(), 100.0 * expected.target);
         write(right - vec2(2.0, 0.0), Align2::RIGHT_BOTTOM, label);
     }
+
+    // The doubt is a factor on time, which makes a band of equal width to both sides on a logarithmic axis.
     for pair in curve.future.windows(2) {
         let edge = |point: &Forecast, times: f64| frame.place(point.wall_s * times, point.target);
         let corners = [
@@ -261,12 +265,16 @@ fn draw(ui: &Ui, curve: &Curve, frame: &Frame) {
     let expected = curve.future.iter();
     let expected: Vec<Pos2> = expected.map(|to| frame.place(to.wall_s, to.target)).collect();
     painter.extend(Shape::dashed_line(&expected, Stroke::new(1.5, FUTURE), 4.0, 3.0));
+
+    // What is known is drawn over what is expected.
     let past = curve.past.iter();
     let past: Vec<Pos2> = past.map(|level| frame.place(level.wall_s, level.error)).collect();
     for point in &past {
         painter.circle_filled(*point, 3.0, PAST);
     }
     painter.line(past, Stroke::new(1.5, PAST));
+
+    // Presets and the target lie on the expected curve, at the time that they take.
     for (_, preset) in &curve.presets {
         painter.circle_filled(frame.place(preset.wall_s, preset.target), 2.5, TEXT);
     }

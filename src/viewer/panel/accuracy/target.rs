@@ -115,6 +115,7 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>)
     let before = Target::of(settings);
     let mut target = before;
     let default = Target::default_of(settings.estimator);
+
     // A different error is not a different kind of target; its own row resets it.
     let mut kind = match (target, default) {
         (Target::Error(_), Target::Error(_)) => default,
@@ -131,6 +132,8 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>)
     if kind != shown {
         target = kind;
     }
+
+    // Only the kind of target that is chosen has a row for its value here.
     match &mut target {
         Target::Density => {}
         Target::Error(error) => {
@@ -146,6 +149,8 @@ pub fn show(ui: &mut Ui, settings: &mut BakeSettings, unavailable: Option<&str>)
             });
         }
     }
+
+    // Untouched settings keep an error and a time that were given together.
     if target != before {
         target.set(settings);
     }

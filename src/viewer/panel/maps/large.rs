@@ -130,6 +130,7 @@ impl Large {
         canvas: &Response,
         (mut middle, mut zoom): ([f64; 2], f64),
     ) -> ([f64; 2], f64) {
+        // Once it was clicked, the map has the keyboard: arrows move it, plus and minus zoom.
         let before = (middle, zoom);
         let mut drag = canvas.drag_delta();
         if canvas.clicked() || canvas.drag_started() {
@@ -149,6 +150,8 @@ impl Large {
             let steps = presses(Key::Plus) + presses(Key::Equals) - presses(Key::Minus);
             times *= STEP.powf(f64::from(steps));
         }
+
+        // The texel under the pointer stays there, whether the map is dragged or zoomed.
         middle[0] -= f64::from(drag.x) / zoom;
         middle[1] -= f64::from(drag.y) / zoom;
         let pointer = canvas.hover_pos();
@@ -157,11 +160,14 @@ impl Large {
             times *= (WHEEL * f64::from(scroll)).exp() * f64::from(pinch);
         }
         let zoomed = (zoom * times).clamp(ZOOM.0, ZOOM.1);
+
         // Zooms about the pointer.
         let off = pointer.map_or(vec2(0.0, 0.0), |pointer| pointer - canvas.rect.center());
         middle[0] += f64::from(off.x) * (1.0 / zoom - 1.0 / zoomed);
         middle[1] += f64::from(off.y) * (1.0 / zoom - 1.0 / zoomed);
         zoom = zoomed;
+
+        // A map that was never moved keeps fitting the window, whatever its size becomes.
         if (middle, zoom) != before {
             self.place = Some((middle, zoom));
         }
