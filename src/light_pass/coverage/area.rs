@@ -102,12 +102,15 @@ impl Area {
     /// The row between two cuts, restricted to the texels that it reaches.
     #[inline(always)]
     fn wide_span<'a>(&self, from: &SideCut, to: &SideCut, shares: &'a mut RowShares) -> Option<Span<'a>> {
+        // A row of the triangle may lie beside the map while others reach it.
         let pieces = self.sides.between(from, to);
         let (left, right) = pieces.extent();
         let width = self.columns as f64;
         if right <= 0.0 || left >= width {
             return None;
         }
+
+        // Where the triangle crosses the borders of the map, only the shares between them fall on texels.
         let columns = cells(left, right, self.columns);
         let share_up_to = |x: f64| most(from.above, least(to.above, from.above + pieces.share_up_to(x)));
         let start = if left >= 0.0 { from.above } else { share_up_to(0.0) };
@@ -116,6 +119,8 @@ impl Area {
         } else {
             share_up_to(width)
         };
+
+        // Most rows cross the long side and one short one, and need no third piece. Four borders are done at once.
         let borders = (columns.start + 1) as f64;
         let (fours, _) = shares.ends[..columns.len().next_multiple_of(4)].as_chunks_mut();
         match pieces.only_short() {
@@ -127,6 +132,8 @@ impl Area {
             }
             None => fill(fours, borders, |x| least(end, from.above + pieces.share_up_to(x))),
         }
+
+        // The last border has the exact share, so that no flux is lost between rows.
         let ends = &mut shares.ends[..columns.len()];
         *ends.last_mut()? = end;
         Some(Span {

@@ -62,6 +62,7 @@ fn add_in_bands(
     coverage: &impl Coverage,
     report: &mut CoverageReport,
 ) {
+    // Chunks find out in parallel which rows their triangles reach, and at what cost.
     let chunks: Vec<&[FluxTriangle]> = triangles.chunks(TRIANGLES_PER_CHUNK).collect();
     let prepare = |chunk: &&[FluxTriangle]| {
         let mut report = CoverageReport::default();
@@ -70,10 +71,14 @@ fn add_in_bands(
     };
     let (mut bins, reports): (Vec<Bins>, Vec<CoverageReport>) = chunks.par_iter().map(prepare).unzip();
     reports.iter().for_each(|part| report.merge(part));
+
+    // Bands are of about equal work, several for each thread.
     let mut work = vec![0; size.1];
     bins.iter().for_each(|part| part.add_work(&mut work));
     let bands = split_rows(&work, BANDS_PER_THREAD * rayon::current_num_threads());
     bins.par_iter_mut().for_each(|part| part.sort(&bands));
+
+    // Each task owns the texels of its band, so that none has to wait.
     let parts: Vec<[i128; 3]> = split_texels(texels, size.0, &bands)
         .into_par_iter()
         .zip(bands)

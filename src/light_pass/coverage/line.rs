@@ -57,6 +57,7 @@ impl Line {
 
     /// The shares of one of the line's rows; `None` where it misses the map.
     pub fn span<'a>(&self, row: usize, shares: &'a mut RowShares) -> Option<Span<'a>> {
+        // The part of the line within the row, from its left to its right end.
         let width = self.width;
         let (from, to) = self.part_in_row(row);
         let x_at = |t: f64| self.from.x + t * self.way.x;
@@ -64,11 +65,14 @@ impl Line {
         if right < 0.0 || left > width as f64 {
             return None;
         }
+
+        // The flux along the line is a tent with its peak at the middle corner: shares are its integral.
         let (before, after) = (tent(from, self.middle), tent(to, self.middle));
         let columns = cells(left, right, width);
         let up_to = |column: usize| {
             let t = ((column as f64 - self.from.x) / self.way.x).clamp(from, to);
             let along = tent(if t.is_nan() { to } else { t }, self.middle);
+            // A line that runs to the left passes its borders in reverse order.
             let share = if self.way.x < 0.0 {
                 before + (after - along)
             } else {
@@ -76,6 +80,8 @@ impl Line {
             };
             share.clamp(before, after)
         };
+
+        // Borders beyond the ends have the exact shares of these, so that no flux is lost between rows.
         let first = columns.start;
         let start = if left >= first as f64 {
             before

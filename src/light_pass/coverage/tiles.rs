@@ -1,7 +1,8 @@
 //! Deposits into tiled maps: each tile is a small map in its own texels.
 //!
-//! Bands of rows of tiles are what threads divide among themselves. On one tile a triangle's shares are exact to the last
-//! count; where it lies on several they are rounded down, and its largest share takes the few counts that are left.
+//! Bands of rows of tiles are what threads divide among themselves. On one tile a triangle's shares are exact to the
+//! last count; where it lies on several they are rounded down, and its largest share takes the few counts that are
+//! left.
 
 use std::ops::Range;
 
@@ -40,8 +41,11 @@ struct PartialDeposit {
 
 /// Adds triangles to the texels of a tiled map.
 pub fn deposit(triangles: &[FluxTriangle], layout: &TileLayout, texels: &mut [FluxCount]) -> CoverageReport {
+    // All flux counts as outside until texels take it.
     let mut report = CoverageReport::default();
     book_outside(triangles, &mut report);
+
+    // Triangles are sorted by the bands that they may reach, tile by tile.
     let mut visits: Vec<Visit> = triangles
         .par_iter()
         .with_min_len(1024)
@@ -50,12 +54,16 @@ pub fn deposit(triangles: &[FluxTriangle], layout: &TileLayout, texels: &mut [Fl
         .collect();
     visits.par_sort_unstable();
     let bands: Vec<&[Visit]> = visits.chunk_by(|a, b| a.band == b.band).collect();
+
+    // Each task owns the texels of its band, so that none has to wait.
     let slices = split_texels(texels, layout, &bands);
     let done: Vec<([i128; 3], Vec<PartialDeposit>)> = bands
         .into_par_iter()
         .zip(slices)
         .map(|(visits, (tile, rows, texels))| add(visits, triangles, &tile, rows, texels))
         .collect();
+
+    // Shares on several tiles were rounded down: the largest takes the rest, unless some lies beside the map.
     let mut parts = Vec::new();
     for (added, more) in done {
         for (sum, channel) in report.deposited.iter_mut().zip(added) {
@@ -70,6 +78,8 @@ pub fn deposit(triangles: &[FluxTriangle], layout: &TileLayout, texels: &mut [Fl
             place_rest(triangle, parts, texels, &mut report);
         }
     }
+
+    // What no texel took stays outside.
     for (outside, deposited) in report.outside.iter_mut().zip(report.deposited) {
         *outside -= deposited;
     }
@@ -138,6 +148,7 @@ fn add(
     rows: Range<usize>,
     texels: &mut [FluxCount],
 ) -> ([i128; 3], Vec<PartialDeposit>) {
+    // A tile is a small map, with its own origin and size of texels.
     let mut added = [0; 3];
     let mut parts = Vec::new();
     let mut shares = RowShares::new(tile.size.0);
@@ -154,6 +165,8 @@ fn add(
         if ours.is_empty() {
             continue;
         }
+
+        // Triangles within the tile are divided exactly; of others, the largest share is noted for the rest.
         let mut target = Rows {
             width: tile.size.0,
             first: rows.start,

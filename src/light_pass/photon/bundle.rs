@@ -39,7 +39,8 @@ pub(super) const NEAREST_WEIGHTS: [f64; 9] = [
     1.0 / 16.0,
 ];
 
-/// Extent of the light from one part of a lamp, or of a spectrum, on the map [texels], unless that takes too many parts.
+/// Extent of the light from one part of a lamp, or of a spectrum, on the map [texels], unless that takes too many
+/// parts.
 pub(super) const PART_TEXELS: f64 = 0.1;
 
 /// Maximum number of parts of a lamp along each axis: of light of one hue, and of dispersed light.
@@ -319,11 +320,12 @@ impl Bundle {
     }
 
     /// Triangles of the map with the light of the square, whose area is `area` unit squares. `add` gets corners
-    /// [texels] and flux [W].
+    /// [texels], flux per unit square [W per channel], and the part of the area that the triangle stands for.
     pub(super) fn triangles(&self, area: f64, mut add: impl FnMut([DVec2; 3], LinearSrgb, f64)) {
         match &self.shape {
             Shape::Nothing => {}
             Shape::Cut(pieces) => {
+                // Place and flux are linear in a piece: one triangle is exact.
                 for piece in pieces {
                     let flux_w = mean(piece.nodes.map(|node| node.flux_w()));
                     let corners = piece.nodes.map(|node| node.place.as_dvec2());
@@ -331,10 +333,14 @@ impl Bundle {
                 }
             }
             Shape::Whole(nodes) => {
+                // Chords lie on one side of their curve, and the errors of many squares would add up: nodes are moved
+                // so that the triangles keep the mean.
                 let divisions = self.divisions;
                 let centre = nodes[4].place;
                 let nodes = unbiased(nodes, divisions);
                 let moved = (nodes[4].place - centre).as_dvec2();
+
+                // Each point of the grid is interpolated once: two rows are kept at a time.
                 let step = 1.0 / divisions as f64;
                 let point = |column: usize, row: usize| DVec2::new(column as f64, row as f64) * step;
                 let row_of = |row: usize| -> Vec<Predicted> {
@@ -343,6 +349,9 @@ impl Bundle {
                         .map(|column| biquadratic(&nodes, point(column, row)))
                         .collect()
                 };
+
+                // Each triangle holds even light: it is moved so that this has the centre of the linear light, but
+                // across no fold.
                 let triangle_area = 0.5 * area * step * step;
                 let mut above = row_of(0);
                 for row in 1..=divisions {
@@ -472,8 +481,8 @@ fn centred_on_light(corners: [Predicted; 3]) -> [DVec2; 3] {
     places.map(|place| place + moved)
 }
 
-/// A triangle that was moved by `moved`, roughly [texels]. Beside a fold, which light does not cross, it is flattened instead, about its
-/// middle, so that it reaches no farther than before.
+/// A triangle that was moved by `moved`, roughly [texels]. Beside a fold, which light does not cross, it is flattened
+/// instead, about its middle, so that it reaches no farther than before.
 fn off_fold(corners: [DVec2; 3], moved: DVec2) -> [DVec2; 3] {
     // The triangle is thin across its longest side.
     let [a, b, c] = corners;

@@ -40,6 +40,7 @@ impl ResidualPass<'_> {
         times: usize,
         ledger: &mut LedgerSum,
     ) {
+        // A limited number of squares at once bounds the memory for their triangles.
         let at_once = SQUARES_AT_ONCE[usize::from(self.rules.spectrum.is_some())];
         let pass = DepositPass {
             sample,
@@ -58,10 +59,15 @@ impl ResidualPass<'_> {
                     triangles
                 })
                 .collect();
+
+            // All triangles of a map are deposited together, which divides its rows among the threads.
             let mut by_map = TrianglesByMap::new();
             for (map, mut triangles) in made.into_iter().flatten() {
                 by_map.entry(map).or_default().append(&mut triangles);
             }
+
+            // Photons alone emit: `Sampling` balances what bundles deposit, and gets it back from photons that remove
+            // it.
             for ((set, receiver), triangles) in by_map {
                 maps[set].touch(receiver, self.chart_for);
                 if let Some(map) = maps[set].get_mut(receiver) {
@@ -78,10 +84,13 @@ impl ResidualPass<'_> {
 
     /// Adds the triangles of a square.
     fn triangles(&self, square: &Square, pass: DepositPass, triangles: &mut TrianglesByMap) {
+        // Halves with bundles of their own draw from other seeds, so that their difference shows the noise of lamp and
+        // spectrum.
         let DepositPass { sample, sets, .. } = pass;
         let lamp = self.launch.lamp_outline();
         let seed = mix64(half_seed(self.rules.seed, sample as usize));
         for bundle in &square.bundles {
+            // Light from one point and of one hue has a single image.
             if self.rules.spectrum.is_none() && lamp.is_none() {
                 let triangles = triangles.entry((0, bundle.receiver())).or_default();
                 bundle.triangles(square.place.area(), |corners, flux_w, area| {
@@ -91,12 +100,15 @@ impl ResidualPass<'_> {
                 continue;
             }
             // The triangles of a path draw from one sequence, so that lamp and spectrum are sampled evenly even where
-            // a single texel holds the light of many squares. Those of a bundle share their wavelengths: at each of these
-            // they meet without a gap.
+            // a single texel holds the light of many squares. Those of a bundle share their wavelengths: at each of
+            // these they meet without a gap.
             let mut index = bundle.first_triangle;
             let hues = self.hues(bundle, BundleDraw { index, seed }, sets);
             let part_texels = pass.lamp_part_texels;
             let lamp = lamp.map(|lamp| LampImage::new(lamp, &bundle.shift, part_texels, hues.len() > 1));
+
+            // Each triangle is spread over the image of the lamp, and moved for each wavelength; the copies share its
+            // flux.
             bundle.triangles(square.place.area(), |corners, flux_w, area| {
                 let draw = BundleDraw { index, seed };
                 index = index.wrapping_add(1);
@@ -221,7 +233,8 @@ impl<'a> LampImage<'a> {
             return moved.map(|&moved| corners.map(|corner| corner + moved)).collect();
         }
 
-        // A triangle smaller than the lamp's image: this image, around its middle, as much wider as the triangle makes it.
+        // A triangle smaller than the lamp's image: this image, around its middle, as much wider as the triangle makes
+        // it.
         let middle = (a + b + c) / 3.0;
         let wider = self
             .shift

@@ -52,6 +52,7 @@ pub(super) struct Level {
 impl Level {
     /// `(width, height)` of the map in finest texels.
     fn new(level: u8, (width, height): (usize, usize), chart: &Chart) -> Self {
+        // A tile has the same extent at all levels, and half as many cells along each side from one to the next.
         let length = 1_usize << level;
         let size = (width.div_ceil(length), height.div_ceil(length));
         let side = SIDE.div_ceil(length);
@@ -64,11 +65,16 @@ impl Level {
                 .as_ref()
                 .filter(|_| level <= COARSEST)
                 .map(|layout| layout.tile(tile));
+
+            // Texels coarser than the level have no cells here: values at their place come from coarser levels.
             if own.as_ref().is_some_and(|tile| tile.level > level) {
                 begins.push(NONE);
                 continue;
             }
             begins.push(places.len() as u32);
+
+            // Cells as large as the tile's texels are these, in the order in which they are stored; larger ones are
+            // sums.
             let mut next = own
                 .filter(|tile| tile.level == level)
                 .map(|tile| tile.texels.start as u32);
@@ -81,6 +87,8 @@ impl Level {
                 }
             }
         }
+
+        // Areas are summed from level to level once all levels exist.
         Self {
             size,
             tiles_across: tiles.0,
@@ -303,8 +311,8 @@ impl Cells {
             .collect()
     }
 
-    /// [`Self::pooled`] without a cell's own contribution, given [`Self::relative_areas`]; exact where the surface covers
-    /// the coarser cells evenly.
+    /// [`Self::pooled`] without a cell's own contribution, given [`Self::relative_areas`]; exact where the surface
+    /// covers the coarser cells evenly.
     pub fn around<const N: usize>(
         &self,
         level: usize,
@@ -345,6 +353,8 @@ impl Cells {
             };
             [(own, 0.75), (other, 0.25)]
         };
+
+        // Bilinear weights, times shares of surface; cells that are missing leave their weight to the others.
         let places = self.levels[level].places.par_iter();
         let value = |&(column, row): &(u32, u32)| {
             let (mut sum, mut weights) = ([0.0; N], 0.0);

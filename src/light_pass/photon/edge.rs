@@ -1,8 +1,8 @@
 //! Cuts the squares that only a part of has a path, along the edge of that part.
 //!
-//! A square is a fan of eight triangles around its centre. Where some corners of a triangle have the path, its sides are
-//! bisected between those that do and those that do not, and the triangle is cut there. What a straight cut between two
-//! brackets leaves of a curved edge is left to photons.
+//! A square is a fan of eight triangles around its centre. Where some corners of a triangle have the path, its sides
+//! are bisected between those that do and those that do not, and the triangle is cut there. What a straight cut between
+//! two brackets leaves of a curved edge is left to photons.
 
 use std::sync::Arc;
 
@@ -35,6 +35,8 @@ pub(super) fn finish(finder: &PathFinder, squares: &mut Squares, control: &Contr
         plan,
         ..
     } = squares;
+
+    // Neighbouring squares bisect the same sides: within a chunk, each point is traced once.
     let chunks = squares.par_chunks_mut(SQUARES_AT_ONCE);
     let traced: Vec<(u64, u64)> = chunks
         .map(|squares| {
@@ -43,6 +45,8 @@ pub(super) fn finish(finder: &PathFinder, squares: &mut Squares, control: &Contr
                 shared: points,
                 own: Points::default(),
             };
+
+            // Counts the rays to other points of the lamp and wavelengths, and those of the bisections.
             let mut more = (0, 0);
             for square in squares {
                 if control.is_cancelled() {
@@ -125,6 +129,7 @@ impl Cutter<'_, '_> {
 
     /// The parts of a square that have a path.
     fn pieces(&mut self, square: &Square, signature: PathSignature, is_cut: bool) -> Vec<Piece> {
+        // The square is a fan of triangles around its centre, in each of which place and flux are linear.
         let node = |node: usize| square.points[node].end(signature).map(Node::of);
         let within = |node: usize| square.place.within(square.place.node(node).square()).as_vec2();
         let mut pieces = Vec::new();
@@ -132,6 +137,8 @@ impl Cutter<'_, '_> {
             let corners = [CENTRE, first, AROUND[(number + 1) % AROUND.len()]];
             let nodes = corners.map(node);
             let places = corners.map(within);
+
+            // A triangle whose corners disagree has the edge of the path across it. Uncut, it is left to photons.
             match nodes {
                 [Some(a), Some(b), Some(c)] => pieces.push(Piece {
                     corners: places,
@@ -150,6 +157,8 @@ impl Cutter<'_, '_> {
                     let (next, last) = ((odd + 1) % 3, (odd + 2) % 3);
                     let mut cut =
                         |from: usize, to: usize| self.cut(square, signature, [corners[from], corners[to]]);
+
+                    // The part that has the path is a triangle at one corner, or a quadrilateral along two of them.
                     if count == 1 {
                         let (second, third) = (cut(odd, next), cut(odd, last));
                         pieces.push(Piece {

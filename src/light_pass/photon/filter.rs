@@ -193,7 +193,8 @@ impl Details {
         }
     }
 
-    /// All texels: the coarsest cells as they are, plus the filtered details of each finer level, and what is `bundled`.
+    /// All texels: the coarsest cells as they are, plus the filtered details of each finer level, and what is
+    /// `bundled`.
     fn filtered(&self, bundled: &[[f32; 3]]) -> Vec<FilteredCell> {
         let coarsest = self.raw.len() - 1;
         let mut kept: Values<6> = vec![Vec::new(); self.raw.len()];
@@ -224,9 +225,12 @@ impl Details {
 
     /// The filtered cells of a level, given those of all coarser levels.
     fn refined(&self, level: usize, kept: &Values<6>) -> Vec<FilteredCell> {
+        // Details are what this level adds to the interpolation of the coarser one, in each half.
         let mut details: Vec<Raw> = self.cells.between(level, &self.raw);
         let cells = details.par_iter_mut().zip(&self.raw[level]);
         cells.for_each(|(detail, raw)| *detail = [0, 1, 2, 3, 4, 5].map(|i| raw[i] - detail[i]));
+
+        // Filtered details are added to the filtered light of the coarser levels.
         let mut refined = self.cells.between(level, kept);
         let noise = |detail: &Raw| {
             let [a, b] = luminances(detail);
@@ -234,18 +238,28 @@ impl Details {
         };
         // Noise is proportional to light where photons carry equal flux.
         let light = |smooth: &FilteredCell| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
+
+        // Slivers at the edge of an island are noisier in inverse proportion to their area, and say less about others.
         let above = self.cells.areas_above(level, PHOTONS_POOLED);
         let areas = self.cells.relative_areas(level, &above);
+
+        // Noise and tint are judged by all light that is seen: bundles have no noise, but belong to it.
         let whole: Vec<FilteredCell> = refined
             .par_iter()
             .zip(&self.bundled[level])
             .map(|(filtered, bundled)| with_bundles(filtered, bundled))
             .collect();
+
+        // Photons of luminance p make halves of light L differ by a variance of 2pL: the ratio of noise to light tells
+        // p. It is averaged over a wide region, since a cell with few photons cannot tell.
         let cells = details.par_iter().zip(&whole).zip(&areas);
         let both = cells
             .clone()
             .map(|((detail, smooth), area)| [noise(detail) * area, light(smooth)]);
         let by_light = self.cells.pooled(level, both.collect(), &above);
+
+        // Signal and noise of luminance, and of tint. A few photons that fall into one cell in both halves by chance
+        // would pass for signal.
         let power = cells
             .zip(&by_light)
             .map(|(((detail, smooth), area), [noise_of_all, light])| {
@@ -272,8 +286,14 @@ impl Details {
             });
         let power: Vec<[f32; 4]> = power.collect();
         drop(by_light);
+
+        // The mean over the surroundings leaves the cell itself out: it would keep whatever agrees in both halves by
+        // chance.
         let pooled = self.cells.around(level, &power, (&areas, &above));
         drop(power);
+
+        // Wiener's share of each detail is added to the base. What is dropped of a detail that both halves have is
+        // bias.
         let cells = refined
             .par_iter_mut()
             .zip(&whole)
@@ -330,6 +350,7 @@ impl Details {
     /// The squared error of each texel [W²/m⁴], bias and remaining noise: averaged over the texels around, weighted by
     /// the square of their area, and distributed among them by their irradiance.
     fn squares(&self, of_texels: &[FilteredCell], bundled: &[[f32; 3]], map: &ReceiverMap) -> Vec<f64> {
+        // Errors are averaged relative to a power of irradiance; slivers count by the square of their area.
         let expected = |[.., a, b, _]: &FilteredCell| (0.5 * (a + b)).max(DARKEST).powf(ERROR_BY_LIGHT);
         let shares = self.cells.shares();
         let area_of = |texel: usize| shares[texel] * map.chart.texel_area_m2(texel) as f32;
@@ -343,18 +364,24 @@ impl Details {
             let bundled = luminance(&bundled[texel]) as f32;
             (a - bundled - first) * (b - bundled - second) - missed
         };
+
+        // Squared bias plus the variance of the mean of both halves, beside the error that the light there lets expect.
         let mut ratios = self.cells.densities(|texel| {
             let kept = &of_texels[texel];
             let [.., a, b, missed] = *kept;
             let square = missed + 0.25 * (a - b) * (a - b);
             [square, expected(kept), untold(texel)].map(|value| value * area_of(texel))
         });
+
+        // Single cells hardly know their error: it is averaged over coarse ones, and interpolated back.
         let pool = self.cells.pool();
         add_untold(&mut ratios[pool], self.cells.areas_m2(pool));
         for level in (0..pool).rev() {
             ratios[level] = self.cells.between(level, &ratios);
         }
         let ratios = self.cells.texels(&ratios);
+
+        // The mean error is distributed among the texels by their irradiance, in absolute units.
         let squares = of_texels
             .par_iter()
             .zip(&ratios)
@@ -406,14 +433,15 @@ fn add_untold(cells: &mut [[f32; 3]], areas_m2: &[f32]) {
 }
 
 /// Replaces a map's counts; each channel keeps its sum. The difference is distributed in proportion to the flux of
-/// `takers` in the channel, or to its luminance where channels may be negative: luminance stays above 0. Returns what no
-/// texel could take.
+/// `takers` in the channel, or to its luminance where channels may be negative: luminance stays above 0. Returns what
+/// no texel could take.
 fn put(
     map: &mut ReceiverMap,
     flux: impl Fn(usize) -> [f64; 3] + Sync,
     takers: impl Fn(usize) -> [f64; 3] + Sync,
     is_signed: bool,
 ) -> Sums {
+    // The filter moves flux from texel to texel, but may neither create nor destroy any: sums of counts are exact.
     let texels = map.texels_mut();
     let sums = |texels: &[FluxCount]| {
         let counts = texels.par_iter().map(|count| count.map(i128::from));
@@ -423,6 +451,8 @@ fn put(
         true => [LinearSrgb::from(takers(texel)).luminance(); 3],
         false => takers(texel),
     };
+
+    // Floating-point sums are taken in the order of the texels, so that the number of threads changes nothing.
     let before = sums(texels);
     let (mut after, mut size) = ([0.0; 3], [0.0; 3]);
     for texel in 0..texels.len() {
@@ -432,10 +462,14 @@ fn put(
             size[channel] += share[channel];
         }
     }
+
+    // Each taker gets the same fraction of its flux more or less.
     let missing = [0, 1, 2].map(|channel| match size[channel] > 0.0 {
         true => (before[channel] as f64 - after[channel]) / size[channel],
         false => 0.0,
     });
+
+    // Light that becomes negative is cut off, which adds to the rounding error of the sums.
     texels.par_iter_mut().enumerate().for_each(|(texel, count)| {
         let (flux, share) = (flux(texel), share(texel));
         let wanted = [0, 1, 2].map(|channel| flux[channel] + share[channel] * missing[channel]);

@@ -5,13 +5,13 @@ use super::bundle::Node;
 /// Maximum number of divisions of a square's sides for its deposit.
 const MAX_DIVISIONS: usize = 64;
 
-/// Largest distance between a curve and its chord in a deposit [texels]. Between a flattened triangle beside a fold and the
-/// next one is a gap of two thirds of it.
+/// Largest distance between a curve and its chord in a deposit [texels]. Between a flattened triangle beside a fold and
+/// the next one is a gap of two thirds of it.
 const MAX_CHORD_TEXELS: f64 = 0.06;
 
-/// Relative errors of a deposit: of curves, per distance of a chord over its part of the image's width, and of light that
-/// varies, per variation in a part. With these, deposits of the built-in scenes with a reference have half to nine tenths
-/// of the planned error, at 32 x 32 and 256 x 256.
+/// Relative errors of a deposit: of curves, per distance of a chord over its part of the image's width, and of light
+/// that varies, per variation in a part. With these, deposits of the built-in scenes with a reference have half to nine
+/// tenths of the planned error, at 32 x 32 and 256 x 256.
 const ERROR_PER_CHORD: f64 = 0.65;
 const ERROR_PER_VARIATION: f64 = 0.15;
 
@@ -30,7 +30,7 @@ pub(super) struct Image {
     width: f64,
     /// Largest deviation of a node from the middle between its neighbours [texels].
     pub(super) bend: f64,
-    /// Largest difference of irradiance between quarters, relative to their mean.
+    /// Difference of irradiance from end to end, relative to its mean: twice the largest between quarters.
     variation: f64,
     /// Width of the lamp's image [texels].
     blur: f64,
@@ -38,12 +38,16 @@ pub(super) struct Image {
 
 impl Image {
     pub(super) fn of(nodes: &[Node; 9]) -> Self {
+        // Extents are measured along the axes of the map, as texels are.
         let place = |node: usize| nodes[node].place.as_dvec2();
         let (mut low, mut high) = (place(0), place(0));
         for node in 1..9 {
             low = low.min(place(node));
             high = high.max(place(node));
         }
+
+        // The chord over a whole side errs most at its middle node; chords over n parts of a parabola err n² times
+        // less.
         let mut bend = 0.0_f64;
         for [a, b, c] in [[0, 1, 2], [3, 4, 5], [6, 7, 8], [0, 3, 6], [1, 4, 7], [2, 5, 8]] {
             bend = bend.max((0.5 * (place(a) + place(c)) - place(b)).abs().max_element());
@@ -65,6 +69,8 @@ impl Image {
             brightest = brightest.max(light);
             area += quarter;
         }
+
+        // Area over length makes a thin image thin in any direction.
         let length = (high - low).max_element();
         Self {
             length,

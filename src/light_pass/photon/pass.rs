@@ -79,6 +79,8 @@ impl PhotonPass<'_> {
             .filter(|(number, _)| share.is_none_or(|share| share.has(*number as u64)))
             .map(|(_, block)| block)
             .collect();
+
+        // Hits of one chunk are deposited while the next one is traced; an empty last chunk flushes the rest.
         let receivers = Receivers::new(self.rules.tracer.scene().objects.len(), self.chart_for);
         let mut report = PassReport::default();
         let mut waiting: Vec<Block> = Vec::new();
@@ -95,10 +97,14 @@ impl PhotonPass<'_> {
             };
             let (traced, ()) = rayon::join(follow, || deposit_blocks(&waiting, halves, self.chart_for));
             report.trace_s.add(watch.elapsed());
+
+            // A chunk that was cancelled may lack blocks, and is dropped.
             if listener.control.is_cancelled() {
                 report.cancelled = true;
                 return report;
             }
+
+            // Counts are merged once, when a chunk is traced; its hits wait for the next round.
             for block in &traced {
                 report.ledger.merge(&block.ledger);
                 report.rays += block.rays;
@@ -114,6 +120,7 @@ impl PhotonPass<'_> {
     }
 
     fn block(&self, half: usize, indices: impl Iterator<Item = u32>, receivers: &Receivers) -> Block {
+        // Halves are independent samples, with a seed for each.
         let rules = PhotonRules {
             seed: half_seed(self.rules.seed, half),
             ..self.rules
@@ -122,11 +129,16 @@ impl PhotonPass<'_> {
             half,
             ..Block::default()
         };
+
+        // Photons start in the order of the launch domain's curve, so that neighbours meet the same triangles.
         let mut order: Vec<(u64, u32)> = indices
             .map(|index| (PhotonLaunch::place(index, rules.seed), index))
             .collect();
         order.sort_unstable();
         block.rays = order.len() as u64;
+
+        // Flux counts as deposited only if a texel takes it. Without a map, or on a texel without surface, it is
+        // unresolved.
         let mut walk = PhotonWalk::new(rules);
         let mut placed = LedgerSum::default();
         for (place, index) in order {

@@ -202,6 +202,7 @@ impl PathFinder<'_> {
         paths: &mut PointPaths,
         waiting: &mut Vec<QueuedLight>,
     ) {
+        // Direct light belongs to another layer. Rough surfaces scatter into more directions than bundles can follow.
         let effects = self.rules.effects;
         let material = tracer.scene().material_of(hit.object);
         let is_straight = light.chain.len() == 0;
@@ -212,6 +213,8 @@ impl PathFinder<'_> {
             paths.lose(light.flux_w, light.chain);
             return;
         }
+
+        // The medium absorbs along the way (Beer-Lambert); the surface splits what is left.
         let mut flux_w = light.flux_w;
         if effects.absorption && light.media.absorbs(tracer.scene()) {
             flux_w = flux_w * light.media.transmittance(tracer.scene(), hit.distance_m);

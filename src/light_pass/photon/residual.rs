@@ -1,14 +1,14 @@
 //! Photons that put right what bundles get wrong.
 //!
-//! A photon follows all bundles of its square until the scene or a random choice separates them. Where it leaves one, it
-//! removes the bundle's flux where that predicts its arrival, divided by the probability of having followed it so far;
-//! where it arrives, it adds its own flux. In the mean, photons thus contribute the difference between the light and its
-//! bundles, whatever is wrong with these: edges, surfaces that they missed, curvature (control variates: Hammersley and
-//! Handscomb, "Monte Carlo Methods", 1964, section 5.5).
+//! A photon follows all bundles of its square until the scene or a random choice separates them. Where it leaves one,
+//! it removes the bundle's flux where that predicts its arrival, divided by the probability of having followed it so
+//! far; where it arrives, it adds its own flux. In the mean, photons thus contribute the difference between the light
+//! and its bundles, whatever is wrong with these: edges, surfaces that they missed, curvature (control variates:
+//! Hammersley and Handscomb, "Monte Carlo Methods", 1964, section 5.5).
 //!
 //! A photon that arrives near its prediction changes both places by bilinear weights, so that the noise of the
-//! difference is proportional to its length. Bundles are deposited once, and halves hold photons alone; but of dispersed
-//! bundles each half samples the wavelengths anew, so that their noise is seen.
+//! difference is proportional to its length. Bundles are deposited once, and halves hold photons alone; but of
+//! dispersed bundles each half samples the wavelengths anew, so that their noise is seen.
 
 use glam::DVec2;
 use rayon::prelude::*;
@@ -121,6 +121,8 @@ impl ResidualPass<'_> {
         let surveyor = Surveyor::new(finder, listener.control, self.sought);
         let before = squares.points.len();
         surveyor.refine(squares, goal);
+
+        // Bundles that carry too little of the light are not worth their cost: all of it is left to photons.
         let least = if self.is_rough {
             MIN_BUNDLED
         } else {
@@ -133,24 +135,28 @@ impl ResidualPass<'_> {
             report.pass.cancelled = listener.control.is_cancelled();
             return report;
         }
+
+        // The final squares are cut, and their deposit is made as fine as the goal requires.
         edge::finish(&finder, squares, listener.control, &mut report.pass);
         report.pass.rays += (squares.points.len() - before) as u64;
         report.pass.squares += squares.squares.len() as u64;
         report.deposit_square = plan_deposits(squares, goal, &receivers);
         report.pass.trace_s.add(watch.elapsed());
 
+        // Dispersed bundles sample the spectrum. Each half samples it anew, as noise that both share would not be seen.
         let watch = Stopwatch::start();
         if self.rules.spectrum.is_some() {
             for (half, sets) in maps.halves.iter_mut().enumerate() {
                 self.deposit_bundles(squares, sets, half as u32, 1, &mut report.pass.ledger);
             }
         } else {
-            // Photons of both halves remove it.
+            // Deposited once, but booked for each half: the photons of both remove it.
             let sets = std::slice::from_mut(maps.bundles);
             self.deposit_bundles(squares, sets, 0, HALVES, &mut report.pass.ledger);
         }
         report.pass.deposit_s.add(watch.elapsed());
 
+        // Photons add what is missing, remove what is wrong, and tell each square how much that was.
         let watch = Stopwatch::start();
         let photons = ResidualPhotons {
             pass: self,
@@ -225,7 +231,7 @@ impl ResidualPhotons<'_> {
         report: &mut PassReport,
         listener: &ProgressScope,
     ) -> Vec<Found> {
-        // Photons of each square in each half, and blocks of squares.
+        // Decides on the photons of each square in each half, and groups squares into blocks of about equal work.
         let squares = &self.squares.squares;
         let mut orders = Vec::with_capacity(squares.len());
         let mut blocks = Vec::new();
@@ -233,6 +239,8 @@ impl ResidualPhotons<'_> {
         for (number, square) in squares.iter().enumerate() {
             let wanted = 0.5 * self.squares.plan.photons(square);
             let photons = wanted.ceil().clamp(1.0, f64::from(u32::MAX >> 8)) as u32;
+
+            // Indices run on from square to square, so that neighbours together sample lamp and spectrum evenly.
             orders.push(DrawOrder {
                 half: 0,
                 is_anew: false,
@@ -248,6 +256,7 @@ impl ResidualPhotons<'_> {
             }
         }
 
+        // Hits of one chunk are deposited while the next one is traced; an empty last chunk flushes the rest.
         let mut found = vec![Found::default(); squares.len()];
         let mut waiting: Vec<Block> = Vec::new();
         for chunk in blocks.chunks(BLOCKS_AT_ONCE).chain([&[][..]]) {
@@ -262,6 +271,8 @@ impl ResidualPhotons<'_> {
             if listener.control.is_cancelled() {
                 return found;
             }
+
+            // Squares learn what their photons found; hits wait for the next round.
             waiting.clear();
             for ((of_halves, of_squares), block) in traced.into_iter().zip(chunk) {
                 found[block.clone()].copy_from_slice(&of_squares);
@@ -290,6 +301,7 @@ impl ResidualPhotons<'_> {
             .collect();
         let mut all_found = Vec::with_capacity(squares.len());
         for (square, order) in squares.iter().zip(orders) {
+            // Both halves draw the planned photons, which tell whether these suffice.
             let order_of = |half| DrawOrder { half, ..*order };
             let draws: Vec<Draw> = (0..HALVES)
                 .map(|half| self.draw(square, order_of(half)))
@@ -304,6 +316,8 @@ impl ResidualPhotons<'_> {
                 let variance = square.variance_with(founds[1 - half], plan);
                 let wanted = 0.5 * plan.photons_for_variance(variance, square);
                 let so_far = f64::from(order.photons);
+
+                // Photons that are dropped later were traced all the same, and count as rays.
                 let block = &mut blocks[half];
                 block.rays += u64::from(order.photons);
                 block.segments += draw.segments;
@@ -312,6 +326,9 @@ impl ResidualPhotons<'_> {
                     block.take(draw.deposits, &draw.ledger);
                     continue;
                 }
+
+                // Far too few. A photon's flux depends on their number, so that their hits are dropped and the half is
+                // drawn anew.
                 let photons = wanted.min(ANEW.1 * so_far).ceil() as u32;
                 let anew = self.draw(
                     square,
@@ -363,6 +380,7 @@ impl ResidualPhotons<'_> {
         walk: &mut PhotonWalk,
         draw: &mut Draw,
     ) {
+        // The photon starts at points of its square and of the lamp, and stands for an equal part of the square.
         let pass = self.pass;
         let outline = pass.launch.lamp_outline();
         let lamp = match outline {
@@ -378,6 +396,8 @@ impl ResidualPhotons<'_> {
                 flux_w: start.flux_w * unit_squares,
                 ..start
             });
+
+        // It follows the bundles that exist where it starts: cut ones predict nothing beside their pieces.
         let mut mask = 0;
         for (number, bundle) in square.bundles.iter().enumerate() {
             mask |= u64::from(bundle.has(within)) << number;
@@ -390,6 +410,9 @@ impl ResidualPhotons<'_> {
             scale: unit_squares,
             lamp: outline.map_or(DVec2::ZERO, |outline| outline.at(lamp)),
         };
+
+        // Predictions are collected first. One that is close to an arrival is moved there, which has less noise than a
+        // removal here and a deposit there.
         let mut removals = std::mem::take(&mut draw.removals);
         let mut maps = Changes {
             photons: self,
@@ -417,6 +440,8 @@ impl ResidualPhotons<'_> {
                 barycentric,
             } => maps.arrive(&hit, (triangle, barycentric), &mut removals),
         });
+
+        // What no arrival took over did not arrive, and is removed where its bundle put it.
         for removal in removals.drain(..) {
             maps.remove(&removal);
         }

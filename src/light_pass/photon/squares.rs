@@ -60,17 +60,17 @@ const LEFT_BY_MANY_CUTS: (usize, f64) = (8, 0.5);
 /// visible, since few photons meet the light in dark places.
 const MIN_AUDITS: f64 = 16384.0;
 
-/// Where photons of the last level found a larger squared error than planned, there is light that points have missed: the
-/// next one audits as many times as often, at most.
+/// Where photons of the last level found a larger squared error than planned, there is light that points have missed:
+/// the next one audits as many times as often, at most.
 const MOST_AUDITED: f64 = 4.0;
 
 /// Audits know no smaller part to arrive of the light that is looked at closely than this: of a receiver seen edge-on,
 /// they would never end.
 const LEAST_AUDITED: f64 = 0.01;
 
-/// Squares beside an edge are audited four times as often, and at least for this goal: the corner of a receiver may reach
-/// in between all their points, a thousandth of its light, or a caster may hide a sliver of itself. A few photons would
-/// miss it, both halves would agree, and no error would tell.
+/// Squares beside an edge are audited four times as often, and at least for this goal: the corner of a receiver may
+/// reach in between all their points, a thousandth of its light, or a caster may hide a sliver of itself. A few photons
+/// would miss it, both halves would agree, and no error would tell.
 const GOAL_BESIDE_EDGES: f64 = 0.02;
 
 /// Paths that photons compare themselves with, and that lead them.
@@ -312,6 +312,8 @@ impl<'a> Surveyor<'a> {
 
     /// Divides squares for a goal, the relative root mean square error of all maps together.
     pub(super) fn refine(&self, squares: &mut Squares, goal: f64) {
+        // Later levels refine the squares of earlier ones; the first starts from an even division, finer around small
+        // casters.
         if squares.squares.is_empty() {
             let places = self.with_small_casters(self.lit.first());
             self.trace_points(
@@ -327,6 +329,8 @@ impl<'a> Surveyor<'a> {
                 .collect();
         }
         for round in 0..=MAX_ROUNDS {
+            // Each round plans anew, since finer squares leave less to photons. Without bundled light they would save
+            // nothing.
             mark_beside_edges(&mut squares.squares);
             squares.plan = self.plan(squares, goal);
             let plan = squares.plan;
@@ -350,6 +354,8 @@ impl<'a> Surveyor<'a> {
             if !divided.contains(&true) {
                 break;
             }
+
+            // A division adds the points of a grid of five by five that are not among the nine.
             let new_points = squares
                 .squares
                 .iter()
@@ -363,6 +369,7 @@ impl<'a> Surveyor<'a> {
                 });
             self.trace_points(new_points, &mut squares.points);
 
+            // Quarters take their parent's place, so that neighbours stay together; those without light are dropped.
             let points = &squares.points;
             let before = std::mem::take(&mut squares.squares);
             let after = before
@@ -383,6 +390,8 @@ impl<'a> Surveyor<'a> {
                 });
             squares.squares = after.collect();
         }
+
+        // Audits take at least a small part of this light to arrive: of a receiver seen edge-on, hardly any does.
         let close = squares
             .squares
             .iter()
@@ -444,7 +453,7 @@ impl<'a> Surveyor<'a> {
     /// How many photons each square needs, as its bundles and the photons so far tell.
     fn plan(&self, squares: &Squares, goal: f64) -> Plan {
         let mut plan = Plan {
-            // Decides on cuts in the first round.
+            // Cuts, and roots of variance with them, depend on the plan before; at first all cuts are worth it.
             per_root: match squares.plan.per_root {
                 0.0 => f64::INFINITY,
                 known => known,
@@ -452,6 +461,8 @@ impl<'a> Surveyor<'a> {
             surprise: squares.surprise,
             ..Plan::default()
         };
+
+        // Light that bundles carry to their receivers, with its mean weight, and light that they lose.
         let mut receivers = BTreeSet::new();
         let (mut weighted_w, mut bundled_w, mut lost_w) = (0.0, 0.0, 0.0);
         for square in &squares.squares {
@@ -463,6 +474,8 @@ impl<'a> Surveyor<'a> {
                 weighted_w += bundle.flux_w * self.finder.receivers.weight(bundle.receiver());
             }
         }
+
+        // Without bundled light, what photons found in the last level tells whether there is any.
         plan.goal = goal;
         let by_photons_w = if bundled_w > 0.0 {
             0.0
@@ -479,6 +492,8 @@ impl<'a> Surveyor<'a> {
         if bundled_w <= 0.0 || plan.arriving_w <= 0.0 {
             return plan;
         }
+
+        // Errors are relative to the mean irradiance of all receivers together: the arriving flux over their area.
         plan.lost_weight = weighted_w / bundled_w;
         let mut area_m2 = 0.0;
         for receiver in receivers {
@@ -488,6 +503,9 @@ impl<'a> Surveyor<'a> {
             }
         }
         plan.relative = area_m2 / (plan.arriving_w * plan.arriving_w);
+
+        // The goal is reached with the fewest segments if photons are in proportion to the root of variance over that
+        // of the segments that one takes (Neyman's allocation).
         let sum = |of: &dyn Fn(&Square) -> f64| squares.squares.iter().map(of).sum::<f64>();
         let roots = sum(&|square| square.root(&plan) * square.segments.sqrt());
         plan.per_root = roots * plan.relative / (goal * goal);
@@ -507,6 +525,7 @@ impl<'a> Surveyor<'a> {
 
     /// The square of a place, whose points are known.
     fn square(&self, place: SquarePlace, points: &Points, parent: Option<&Square>) -> Square {
+        // Emission and length of paths vary smoothly: Simpson's rule gives their means.
         let points: [Arc<PointPaths>; 9] = std::array::from_fn(|node| Arc::clone(&points[&place.node(node)]));
         let mean = |value: &dyn Fn(&PointPaths) -> f64| -> f64 {
             points
@@ -539,6 +558,8 @@ impl<'a> Surveyor<'a> {
                 routes.push(end.route);
             }
         }
+
+        // Where many paths end in one square, cuts miss some of the edges.
         let is_partial = |route: &Route| {
             square
                 .points
@@ -549,6 +570,8 @@ impl<'a> Surveyor<'a> {
         for route in routes {
             self.add_bundle(&mut square, route, parent, edges);
         }
+
+        // Photons follow a limited number of bundles; the faintest ones are left to them.
         square.bundles.sort_by(|a, b| b.flux_w.total_cmp(&a.flux_w));
         for bundle in square.bundles.drain(MAX_BUNDLES.min(square.bundles.len())..) {
             square.residual.lost_w += bundle.flux_w;
@@ -578,6 +601,7 @@ impl<'a> Surveyor<'a> {
 
     /// Adds the bundle of a path, and what it leaves to photons. `edges`: paths that not all points have.
     fn add_bundle(&self, square: &mut Square, route: Route, parent: Option<&Square>, edges: usize) {
+        // Light that only some points have ends abruptly: each of these stands for the area nearest to it.
         let ends: [Option<&PathEnd>; 9] =
             std::array::from_fn(|node| square.points[node].end(route.signature));
         let is_whole = ends.iter().all(Option::is_some);
@@ -587,10 +611,14 @@ impl<'a> Surveyor<'a> {
             flux_w += end.map_or(0.0, |end| end.flux_w.max_channel()) * weight * square.place.area();
         }
         square.arriving_w += flux_w;
+
+        // What is left to photons is a variance relative to squared flux; its root is added up over paths.
         let mut bundle = Bundle::new(route, flux_w);
         let root = flux_w * self.finder.receivers.weight(route.receiver);
         let left: f64;
         if is_whole {
+            // Whole bundles err by their curvature. That of a quarter is told by how well its parent predicted its new
+            // points.
             let nodes: [Node; 9] = std::array::from_fn(|node| Node::of(ends[node].expect("all are there")));
             let image = Image::of(&nodes);
             bundle.displaced_texels = parent
@@ -601,6 +629,7 @@ impl<'a> Surveyor<'a> {
             left = displaced_square(bundle.displaced_texels, bundle.is_smooth);
             square.residual.displaced += root * left.sqrt();
         } else {
+            // A straight cut leaves a sliver of a curved edge, a part of the square in proportion to its side.
             let side = (-f64::from(square.place.level)).exp2();
             let of_cut = if edges > LEFT_BY_MANY_CUTS.0 {
                 LEFT_BY_MANY_CUTS.1
@@ -612,6 +641,8 @@ impl<'a> Surveyor<'a> {
             square.residual.uncut += root * (2.0 * LEFT_UNCUT).sqrt();
             left = 2.0 * of_cut;
         }
+
+        // Photons are led along ways on which light is left, and a little along those that seem exact.
         square.guides.push(Guide {
             chain: route.chain,
             weight: flux_w * (left + 0.002).sqrt(),
@@ -638,8 +669,8 @@ fn displaced_square(texels: f64, is_smooth: bool) -> f64 {
     }
 }
 
-/// Marks squares beside one that has an edge, of which they may be a quarter as long: those that share one of its points
-/// or of the points half-way between.
+/// Marks squares beside one that has an edge, of which they may be a quarter as long: those that share one of its
+/// points or of the points half-way between.
 fn mark_beside_edges(squares: &mut [Square]) {
     let mut on_edges: HashSet<DomainPoint, PointHash> = HashSet::default();
     for square in squares.iter().filter(|square| square.residual.cut > 0.0) {

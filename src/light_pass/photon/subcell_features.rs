@@ -71,6 +71,7 @@ impl SubcellFeatures {
     /// Objects that are small relative to squares of the given size in the unit square, and narrow openings. Both only
     /// where they can deflect light or occlude it, according to `visible`.
     pub fn find(tracer: &Tracer, launch: &Launch, visible: &ItemBuffer, square: DVec2) -> Self {
+        // Squares are measured in the middle of the domain, at the distance of the body.
         let scene = tracer.scene();
         let middle = DVec2::splat(0.5);
         let origin = launch.ray(0, middle).origin;
@@ -80,6 +81,8 @@ impl SubcellFeatures {
                 .sqrt();
             body.radius_m > 0.0 && 2.0 * body.radius_m < SMALL_SQUARES * width_m
         };
+
+        // Objects, as their bounding spheres, are booked in all cells of the item buffer that may see them.
         let mut bodies = Bins::default();
         for (index, object) in scene.objects.iter().enumerate() {
             let Some((low, high)) = object.bounds() else {
@@ -96,6 +99,8 @@ impl SubcellFeatures {
                 book(launch, (low, high), body, &mut bodies);
             }
         }
+
+        // Narrow openings let light through between points that all meet what surrounds them.
         let (openings, across) = narrow_openings(tracer, launch, visible, square);
         for opening in &openings {
             let body = Body::of(opening, across);

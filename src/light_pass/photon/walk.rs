@@ -174,6 +174,8 @@ impl<'a> PhotonWalk<'a> {
         followed: Followed<'_>,
         mut arrive: impl FnMut(Hit),
     ) {
+        // The wavelength is drawn in advance: dispersed bundles that the photon leaves on its way are removed at it
+        // too.
         let whole_hue = self.rules.whole_hue();
         let own_hue = self.rules.spectrum.and_then(|spectrum| {
             let place = even_point(index, WAVELENGTH_DIMENSION, self.rules.seed).x;
@@ -194,18 +196,26 @@ impl<'a> PhotonWalk<'a> {
             probability: 1.0,
             is_straight: true,
         };
+
+        // Where no light starts, bundles may predict some nonetheless, and all of it is removed.
         let brightest_w = photon.flux_w.max_channel();
         let Some(start) = start.filter(|_| brightest_w > 0.0 && photon.flux_w.is_finite()) else {
             return photon.leave_all(&mut arrive);
         };
+
+        // Separate maps for each band need single wavelengths from the start.
         if self.rules.spectrum.is_some_and(PhotonSpectrum::starts_parted) {
             self.part(&mut photon);
         }
+
+        // Guides lead into faint branches on purpose; early roulette would undo that.
         let roulette_below = if followed.guides.is_empty() {
             ROULETTE_BELOW
         } else {
             GUIDED_ROULETTE_BELOW
         };
+
+        // The path ends where nothing goes on, at the depth limit, or by roulette.
         let mut leg = Leg {
             ray: start.ray,
             media: start.media,
@@ -234,6 +244,7 @@ impl<'a> PhotonWalk<'a> {
         Leg { ray, media, left }: &Leg,
         arrive: &mut impl FnMut(Hit),
     ) -> Option<Leg> {
+        // Light that leaves the scene arrives nowhere: all that bundles predict for it is removed.
         self.segments += 1;
         let Some(hit) = photon.hue.tracer.next_hit(ray, *left) else {
             photon.leave_all(arrive);
@@ -245,6 +256,9 @@ impl<'a> PhotonWalk<'a> {
             self.book(account, &photon.hue.channels, photon.flux_w);
             return None;
         };
+
+        // Light that meets a diffuse surface first is direct light, which is another layer's. If it came through holes,
+        // it was booked as emitted there, which is taken back.
         let scene = photon.hue.tracer.scene();
         let material = scene.material_of(hit.object);
         if photon.is_straight && !material.surface.is_specular() {
@@ -255,6 +269,8 @@ impl<'a> PhotonWalk<'a> {
             }
             return None;
         }
+
+        // The medium absorbs along the leg (Beer-Lambert); a dispersive surface leaves a single wavelength.
         let effects = self.rules.effects;
         let (sent_w, sent_hue) = (photon.flux_w, photon.hue);
         if effects.absorption && media.absorbs(scene) {
@@ -263,15 +279,22 @@ impl<'a> PhotonWalk<'a> {
         if material.is_dispersive() {
             self.part(photon);
         }
+
+        // A rough surface shows one microfacet, from dimensions of its own at each depth.
         let micro = (effects.lobes && material.is_rough())
             .then(|| even_point(photon.index, LAMP_DIMENSION + 1 + depth, self.rules.seed));
         let tracer = photon.hue.tracer;
         let mut meeting = Meeting::new(&hit, ray.direction, media);
         tracer.meet(effects, micro, &mut meeting);
+
+        // Bundles that end here or go elsewhere are left before the photon arrives: near predictions can be moved
+        // there.
         let deposit_w = photon.flux_w * meeting.deposit;
         if photon.followed.mask != 0 {
             photon.leave_at(depth as usize, hit.object, &meeting, arrive);
         }
+
+        // The diffuse part of a surface takes its share, and the rest goes on.
         if photon.is_straight {
             // Before any specular event, deposits are direct light.
             self.book(Account::NotEmitted, &sent_hue.channels, deposit_w);
@@ -288,6 +311,8 @@ impl<'a> PhotonWalk<'a> {
                 band: photon.hue.band,
             });
         }
+
+        // What the medium took is booked in the hue that was sent, what the surface takes in the hue that is left.
         self.book(Account::Absorbed, &sent_hue.channels, sent_w - photon.flux_w);
         self.book(
             Account::Absorbed,
@@ -299,6 +324,8 @@ impl<'a> PhotonWalk<'a> {
             &photon.hue.channels,
             photon.flux_w * meeting.switched_off,
         );
+
+        // One of the branches goes on, drawn at random.
         let (ray, media) = self.choose(photon, (depth as usize, hit.object), &meeting)?;
         let left = hit.slot;
         Some(Leg { ray, media, left })
@@ -316,8 +343,8 @@ impl<'a> PhotonWalk<'a> {
         }
     }
 
-    /// Draws reflection or transmission at an object, in proportion to flux and towards guides; `None` if neither carries
-    /// any.
+    /// Draws reflection or transmission at an object, in proportion to flux and towards guides; `None` if neither
+    /// carries any.
     #[inline(always)]
     fn choose(
         &mut self,
@@ -325,6 +352,7 @@ impl<'a> PhotonWalk<'a> {
         (depth, object): (usize, usize),
         meeting: &Meeting,
     ) -> Option<(Ray, MediumStack)> {
+        // Branches are weighed by their flux, summed over the channels.
         let carried = |share: Option<LinearSrgb>| {
             let flux_w = share.map_or(LinearSrgb::BLACK, |share| photon.flux_w * share);
             (flux_w, flux_w.to_array().iter().sum::<f64>())
@@ -335,6 +363,8 @@ impl<'a> PhotonWalk<'a> {
         if both <= 0.0 {
             return None;
         }
+
+        // Guides make ways more probable on which bundles leave light; dividing by the probability keeps the mean.
         let share = photon.guided_share(depth, object, reflected / both);
         let is_reflected = share >= 1.0 || (share > 0.0 && photon.choice.falls_below(share));
         let probability = if is_reflected { share } else { 1.0 - share };
@@ -347,17 +377,24 @@ impl<'a> PhotonWalk<'a> {
         let Branch {
             ray, media, event, ..
         } = branch;
+
+        // Bundles of the other branch are dropped, not removed: photons that take it remove them, divided by its
+        // probability.
         if photon.followed.mask != 0 {
             photon.follow_only(depth, is_reflected, probability);
         }
         if photon.guided != 0 {
             photon.follow_guides(depth, object, is_reflected);
         }
+
+        // Numbers that are not finite would spoil every sum: the path ends, and its light is booked.
         if !(flux_w.is_finite() && ray.direction.is_finite() && ray.origin.is_finite()) {
             let lost_w = (reflected_w + transmitted_w).map(|w| if w.is_finite() { w } else { 0.0 });
             self.book(Account::NonFinite, &photon.hue.channels, lost_w);
             return None;
         }
+
+        // A random choice conserves flux in the mean alone.
         self.book(
             Account::Sampling,
             &photon.hue.channels,
@@ -402,6 +439,7 @@ impl Photon<'_> {
     fn leave_where(&mut self, is_left: impl Fn(&Chain) -> bool, arrive: &mut impl FnMut(Hit)) {
         let followed = self.followed;
         for (number, bundle) in followed.bundles.iter().enumerate() {
+            // Each bundle is left once.
             let bit = 1 << number;
             if self.followed.mask & bit == 0 || !is_left(&bundle.route.chain) {
                 continue;
@@ -412,6 +450,9 @@ impl Photon<'_> {
                 .own_hue
                 .filter(|_| bundle.route.is_dispersed)
                 .unwrap_or(self.whole_hue);
+
+            // The prediction is for the photon's own point of the lamp and wavelength, so that only what is wrong with
+            // it differs.
             let origin = Origin {
                 lamp: followed.lamp,
                 ends: hue.ends,
@@ -419,6 +460,8 @@ impl Photon<'_> {
             let Some(predicted) = bundle.at(followed.within, &origin) else {
                 continue;
             };
+
+            // Photons that chose otherwise do not remove it: those that are still here do so in their stead.
             let flux_w = predicted.flux_w * (-followed.scale / self.probability);
             arrive(Hit {
                 receiver: bundle.receiver(),

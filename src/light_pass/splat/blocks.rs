@@ -1,5 +1,5 @@
-//! Adds splats to a map in parallel: each task adds neighbouring splats to a block of its own, and the block to the map.
-//! Sums are integers, so that neither order nor number of threads matters.
+//! Adds splats to a map in parallel: each task adds neighbouring splats to a block of its own, and the block to the
+//! map. Sums are integers, so that neither order nor number of threads matters.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -82,6 +82,7 @@ pub(super) fn add(
     coverage: &impl Coverage,
     sampling: KernelSampling,
 ) -> LedgerSum {
+    // A task takes neighbouring splats of similar width, which keeps its block small.
     let (width, _) = coverage.size();
     let mut order: Vec<u64> = splats
         .par_iter()
@@ -93,11 +94,15 @@ pub(super) fn add(
         .chunk_by(|a, b| a >> 32 == b >> 32)
         .flat_map(|tile| tile.chunks(MAX_SPLATS))
         .collect();
+
+    // Blocks lock the map in stripes of rows, so that tasks seldom wait for each other.
     let stripes: Vec<Mutex<&mut [FluxCount]>> = flux
         .texels_mut()
         .chunks_mut(ROWS_PER_STRIPE * width)
         .map(Mutex::new)
         .collect();
+
+    // Each task fills a block of its own, and locks the map only to add it.
     tasks
         .into_par_iter()
         .map_init(

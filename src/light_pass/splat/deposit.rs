@@ -70,6 +70,7 @@ impl Depositor<'_> {
     /// Deposits rows of one face. Maps must have been touched for every receiver of the arrivals. Half sets, if there
     /// are two, take rays in a checkerboard pattern. Reports kernels, and deposited and unresolved flux.
     pub fn deposit(&self, rows: &[RowContext], halves: &mut HalfBuffers) -> PassReport {
+        // Each row makes its splats by itself; they are then grouped by the map and level that they go to.
         let parts: Vec<RowSplats> = rows
             .par_iter()
             .map(|row| self.splats_of(row, halves.first))
@@ -96,6 +97,8 @@ impl Depositor<'_> {
                 }
             }
         }
+
+        // One map after the other, each filled by all threads.
         for ((is_second, receiver, level), splats) in groups {
             let map = halves
                 .maps(is_second)
@@ -147,6 +150,7 @@ impl Depositor<'_> {
         unbent_area_m2: &dyn Fn() -> f64,
         made: &mut RowSplats,
     ) -> Option<PlacedSplat> {
+        // The area that the ray lights, on the map; footprints of fixed size are as large as the receiver's mean.
         let map = surface.map;
         let mean = self
             .statistics
@@ -167,6 +171,8 @@ impl Depositor<'_> {
         if !ellipse.is_finite() {
             return None;
         }
+
+        // Later runs need the mean footprint of each receiver.
         let area_m2 = || ellipse.area_texels() / surface.texels_per_m2;
         if self.gathers {
             let texels = (map.chart.width * map.chart.height) as f64;
@@ -174,6 +180,8 @@ impl Depositor<'_> {
             made.statistics
                 .add(arrival.receiver, arrival.flux_w.luminance(), area_m2(), share);
         }
+
+        // Sigma is a Gaussian's width relative to its footprint; other kernels have the footprint's size.
         let sigma = match (self.settings.kernel, self.settings.sigma) {
             (Kernel::Gaussian, Sigma::Constant(sigma)) => sigma,
             // The range of the paper's figure 5.
@@ -182,6 +190,8 @@ impl Depositor<'_> {
             }
             (Kernel::Cone | Kernel::Disc | Kernel::Box, _) => 1.0,
         };
+
+        // The kernel in texels of the finest level, with its flux as counts.
         let splat = Splat {
             centre: surface.centre(arrival),
             ellipse,
@@ -197,6 +207,8 @@ impl Depositor<'_> {
         } else {
             0
         };
+
+        // A wide kernel reaches fewer texels on a coarser level.
         let splat = if level > 0 { splat.at_level(level) } else { splat };
         let reach = SplatBounds::of(&splat, (map.chart.width >> level, map.chart.height >> level));
         Some(PlacedSplat {

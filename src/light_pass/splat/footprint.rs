@@ -99,6 +99,7 @@ pub fn footprint(
     unbent_area_m2: &dyn Fn() -> f64,
     fixed_area_m2: &dyn Fn() -> f64,
 ) -> Ellipse {
+    // A disc on the surface is an ellipse on the map.
     let round = |area_m2: f64| {
         let [across, down] = texel_from_world;
         Ellipse {
@@ -108,6 +109,8 @@ pub fn footprint(
         }
         .scaled(area_m2 / std::f64::consts::PI)
     };
+
+    // Neighbours give an ellipse or, for discs, its area alone. A ray without any falls back on undeflected light.
     match kind {
         Footprint::Fixed => round(fixed_area_m2()),
         Footprint::Distance => round(unbent_area_m2()),

@@ -75,6 +75,7 @@ impl Cornered {
         covariance: Ellipse,
         weights: &mut Vec<f64>,
     ) -> Option<Block> {
+        // In units of its deviations, the kernel is the density of two correlated standard normal variables.
         let Ellipse { xx, xy, yy } = covariance;
         let (x_deviation, y_deviation) = (xx.sqrt(), yy.sqrt());
         let (x_step, y_step) = (1.0 / x_deviation, 1.0 / y_deviation);
@@ -82,10 +83,14 @@ impl Cornered {
         if correlation.is_nan() || correlation.abs() >= 1.0 {
             return None;
         }
+
+        // Windows have a fixed size: longer kernels are integrated by lines.
         let Self { across, down, joint } = self;
         if !(across.set(centre.x, x_deviation, x_step) && down.set(centre.y, y_deviation, y_step)) {
             return None;
         }
+
+        // The integral over a texel is a difference of the distribution function at its four corners.
         weights.clear();
         let (columns, rows) = (across.count, down.count);
         let borders = Borders {
@@ -106,6 +111,8 @@ impl Cornered {
                 here[..columns].copy_from_slice(&across.below[..columns]);
             }
             here[columns - 1] = below;
+
+            // Differences along the row of what this row adds; rounding may make them negative.
             let mut before = 0.0;
             for (here, above) in here[..columns].iter().zip(&mut above) {
                 let left = here - *above;

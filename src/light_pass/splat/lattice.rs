@@ -160,11 +160,14 @@ impl Lattice<'_> {
 
     /// Traces one row of one face.
     pub fn trace_row(&self, face: usize, row: usize) -> TracedRow {
+        // With strides, a row of the whole lattice stands for several.
         let mut traced = TracedRow::default();
         let fine_row = self.fine_row(row);
         if fine_row >= self.size.1 {
             return traced;
         }
+
+        // Places and seeds are those of the whole lattice, so that a run with strides traces a part of its rays.
         let mut points = Points::new(self.tracer.scene());
         let whole = Self {
             strides: (1, 1),
@@ -174,11 +177,15 @@ impl Lattice<'_> {
             Some(band) => PathTracer::new(&band.tracer, self.limits, self.unit).with_channels(band.channels),
             None => PathTracer::new(self.tracer, self.limits, self.unit),
         };
+
+        // Only cells that touch a marked cell of the item buffer can meet a specular surface.
         for (start, end) in self.item_buffer.lattice_spans(face, fine_row, self.size) {
             for fine_column in start..end {
                 let Some(column) = self.coarse_column(fine_column) else {
                     continue;
                 };
+
+                // The flux of a cell travels along one ray.
                 let (low, high) = whole.cell(fine_column, fine_row);
                 let square = low + (high - low) * self.place(face, fine_column, fine_row);
                 let ray = self.launch.ray(face, square);
@@ -186,6 +193,8 @@ impl Lattice<'_> {
                 if flux_w.max_channel() <= 0.0 {
                     continue;
                 }
+
+                // Microfacets are drawn by cell, independent of the order of tracing.
                 traced.rays += 1;
                 let cell_seed = self.cell_seed(face, fine_column, fine_row);
                 paths.limits.microfacets = self.limits.microfacets.map(|seed| mix64(seed ^ cell_seed));

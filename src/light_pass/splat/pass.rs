@@ -42,6 +42,7 @@ pub fn run(
     chart_for: &ChartFor,
     listener: &ProgressScope,
 ) -> (PassReport, Option<ArrivalCache>) {
+    // Rows are traced in bands, so that memory does not grow with the number of rays.
     let mut report = PassReport::default();
     let mut recorder = Recorder::new(source);
     let lattice = &depositor.lattice;
@@ -51,6 +52,7 @@ pub fn run(
         let mut held: BTreeMap<usize, TracedRow> = BTreeMap::new();
         let mut next = 0;
         while next < rows {
+            // Shards share out whole bands, which are numbered over all faces.
             let band = next..band_end(lattice, face, next);
             (next, number) = (band.end, number + 1);
             if share.is_some_and(|share| !share.has(number - 1)) {
@@ -100,6 +102,8 @@ pub fn run(
                 .advance(Stage::Caustic, listener.done + done, listener.total);
         }
     }
+
+    // No path was traced: the cache knows what became of the light on the way.
     if let PassInput::Cached(light) = source {
         report.ledger.merge(light.ledger());
     }

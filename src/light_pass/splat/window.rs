@@ -124,6 +124,7 @@ impl Splat {
         (width, height): (usize, usize),
         window: &mut Window,
     ) {
+        // Lines run along the footprint's shorter extent; if they are columns, the kernel is transposed.
         window.clear(ellipse.xx > ellipse.yy);
         let (frame, centre, size, wide) = if window.columns {
             (
@@ -135,6 +136,8 @@ impl Splat {
         } else {
             (LineFrame::new(ellipse), self.centre, (width, height), wide)
         };
+
+        // A texel that holds all of the kernel needs no integral.
         self.lay_out(&frame, centre, size, window);
         if window.weights.len() == 1 {
             window.weights[0] = 1.0;
@@ -361,6 +364,7 @@ impl Window {
     /// Each texel gets its share rounded to counts, and the heaviest one the remainder, so that the sum is exact. What
     /// reaches beyond the map's border is folded back: the ray landed on the surface, and so does its light.
     pub fn add(&self, flux: FluxCount, size: (usize, usize), block: &mut Block) {
+        // Shares are rounded to counts. The fast rounding is for numbers below 2⁵¹ alone.
         let mut rest = flux;
         let (mut heaviest, mut most) = ((0, 0), -1.0);
         let per_weight = 1.0 / self.sum;
@@ -381,6 +385,8 @@ impl Window {
                 scale.map(|channel| part(channel * weight))
             }
         };
+
+        // The heaviest texel is the one where the remainder of the rounding shows least.
         for line in &self.lines {
             let weights = &self.weights[line.span.0..line.span.1];
             let (offset, weight) = largest(weights);
@@ -394,6 +400,8 @@ impl Window {
                     rest[channel] -= share[channel];
                 }
             };
+
+            // A row within the map needs no folding.
             if let Some((column, row)) = self.inside(line, size) {
                 let texels = block.row_mut(column, row, weights.len());
                 texels
@@ -406,6 +414,8 @@ impl Window {
                 }
             }
         }
+
+        // With the remainder, the sum of all texels is the splat's flux to the count.
         let texel = texel_mut(block, heaviest, size);
         for channel in 0..3 {
             texel[channel] += rest[channel];
