@@ -206,22 +206,25 @@ fn chain_radiance(first: Gaze) -> vec3f {
         var point: SurfacePoint;
         var arrives = false;
         loop {
-            // Lamps are no surfaces: they are seen on the way, but not by the eye directly.
+            // Wavelengths part before anything is added: the waiting ones trace this ray again.
             let seen = nearest(walk.gaze);
+            let meets = seen.hit.triangle != NO_TRIANGLE;
+            if meets {
+                point = surface_point(seen.hit);
+                part(&walk, point.object);
+            }
+
+            // Lamps are no surfaces: they are seen on the way, but not by the eye directly.
             if walk.gaze.depth > 0u {
                 let lamps = walk.gaze.weight * lamps_on(walk.gaze, seen.distance);
                 walk.radiance += shown(lamps, walk.gaze.wavelength);
             }
-            if seen.hit.triangle == NO_TRIANGLE {
+            if !meets {
                 let beyond = walk.gaze.weight * background(walk.gaze.direction);
                 walk.radiance += shown(beyond, walk.gaze.wavelength);
                 break;
             }
-
-            // Wavelengths part before anything of the surface is added, as the waiting ones will meet it again.
-            point = surface_point(seen.hit);
             let object = objects[point.object];
-            part(&walk, point.object);
             walk.gaze.weight *= medium_transmittance(walk.gaze.media, seen.distance * start.unit_m);
             walk.gaze.width += walk.gaze.spread * seen.distance;
 

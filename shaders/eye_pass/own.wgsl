@@ -7,14 +7,8 @@ fn own(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0
         let lit = own_irradiance(fragment, is_front);
         is_fault = lit.a > 0.0;
         let normals = own_normals(fragment);
-        var lit_rgb = lit.rgb;
-        if HAS_BUMPS {
-            let side = select(-1.0, 1.0, is_front);
-            let place_m = frame.camera_position + fragment.from_camera;
-            let bumps = objects[fragment.object].bumps;
-            lit_rgb = in_relief(lit_rgb, bumps, place_m, array(side * normals[0], side * normals[1]));
-        }
-        let diffuse = own_base_colour(fragment) * lit_rgb / PI;
+        let shaded = own_relief(lit.rgb, fragment, is_front, normals);
+        let diffuse = own_base_colour(fragment) * shaded / PI;
         radiance += (1.0 - own_coat(fragment, normals[1])) * diffuse;
     } else {
         // Brighter towards the top, so that the shape of curved mirrors is visible.

@@ -20,7 +20,7 @@ fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -
     let response = diffuse_response_of(object, mixture);
     let point = LitPoint(place, margin, towards_eye * normalize(across), shading_normal, response);
     let baked = own_irradiance(fragment, is_front);
-    let irradiance = baked.rgb + direct_irradiance(point, object);
+    let irradiance = own_relief(baked.rgb, fragment, is_front, normals) + direct_irradiance(point, object);
     let diffuse = own_base_colour(fragment) * irradiance / PI;
     let radiance = own_emission(fragment) + (1.0 - own_coat(fragment, normals[1])) * diffuse;
     cut_out(fragment);

@@ -45,6 +45,17 @@ fn own_normals(fragment: Fragment) -> array<vec3f, 2> {
     return array(normal, bent(normal, bump_at(record, place_m, piece, normal).gradient));
 }
 
+// Irradiance of a map, shaded by bumps; `normals` as of own_normals.
+fn own_relief(baked: vec3f, fragment: Fragment, is_front: bool, normals: array<vec3f, 2>) -> vec3f {
+    if !HAS_BUMPS {
+        return baked;
+    }
+    let side = select(-1.0, 1.0, is_front);
+    let place_m = frame.camera_position + fragment.from_camera;
+    let bumps = objects[fragment.object].bumps;
+    return in_relief(baked, bumps, place_m, array(side * normals[0], side * normals[1]));
+}
+
 // Share of light that the coat reflects towards the eye, seen from vacuum; 0 without one.
 fn own_coat(fragment: Fragment, normal: vec3f) -> f32 {
     if SURFACE == SURFACE_COATED {

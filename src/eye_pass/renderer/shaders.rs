@@ -60,7 +60,7 @@ pub(super) const SKY: Program = program! { "sky":
 pub(super) const UNDER_LIGHTS: Program = program! { "under_lights":
     "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
     "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-    "eye_pass/mixture" "eye_pass/light_record" "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
+    "eye_pass/mixture" "eye_pass/light_record" "eye_pass/relief" "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
 };
 
 /// The traced image, composed into the frame.

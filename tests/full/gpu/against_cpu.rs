@@ -373,6 +373,25 @@ fn relief_is_seen_on_diffuse_surfaces() {
     }
 }
 
+/// The sky is not traced, and what the lamp adds is too little to be seen.
+#[test]
+fn relief_stays_while_lights_are_traced() {
+    let mut case = reliefs().swap_remove(0);
+    case.scene.objects.pop();
+    case.scene.lights = vec![
+        light(LightKind::Environment { scale: 0.5 }),
+        light(LightKind::Point {
+            position: dvec3(0.3, 0.4, 0.6),
+            intensity: RadiantIntensity(1e-9),
+        }),
+    ];
+    let mut rig = or_skip!(Rig::at(AS_CPU, &case.scene, &case.maps));
+    let baked = rig.picture(&case.view);
+    rig.renderer.set_traces_lights(true);
+    let share = off(&case, &baked, &rig.picture(&case.view));
+    assert!(share < case.few, "{share}");
+}
+
 #[test]
 fn chains_keep_to_their_laws() {
     for law in chain_laws::all() {

@@ -5,12 +5,13 @@ use nephroid::eye_pass::ToneMap;
 use nephroid::eye_pass::reference::ReferenceSettings;
 use nephroid::eye_pass::renderer::EyeQuality;
 use nephroid::eye_pass::tone_mapping::display_rgba8;
+use nephroid::scene::PanelShape;
 
 use crate::gpu::rig::{AS_CPU, Rig, or_skip};
 use support::flip::mean_flip;
 use support::floors::{diffuse, floor_map, floor_scene};
 use support::prelude::*;
-use support::scenes::{limited, seen, view};
+use support::scenes::{limited, panel, seen, view};
 
 /// Largest mean FLIP between the device's picture at rest and the CPU's of the same chains. Nearly all of it is that
 /// they look through other places of the pixels: without dispersion they differ as much.
@@ -106,12 +107,33 @@ fn switched_off_glass_has_one_index() {
     assert!(one_index.is_none() || parted != one_index);
 }
 
-#[test]
-fn white_stays_white_in_every_picture() {
+/// A slab before a white background.
+fn slab() -> Scene {
     let mut scene = Scene::default();
     let slab = shapes::cuboid(dvec3(-2.0, 0.1, -2.0), dvec3(3.0, 0.4, 3.0));
     parts::add(&mut scene, "slab", slab, parts::glass("N-SF11"));
-    let mut rig = or_skip!(Rig::at(AS_CPU, &scene, &[]));
+    scene
+}
+
+/// A white panel before a slab, both seen in a mirror.
+fn lamp_before_a_slab() -> Scene {
+    let mut scene = floor_scene(parts::mirror());
+    let slab = shapes::cuboid(dvec3(-3.0, -1.0, -3.0), dvec3(3.0, 4.0, -2.6));
+    parts::add(&mut scene, "slab", slab, parts::glass("N-SF11"));
+    let half_axes = [dvec3(0.1, 0.0, 0.0), dvec3(0.0, 0.086, 0.05)];
+    let centre = dvec3(0.4, 1.0, -1.55);
+    scene.lights = vec![panel(centre, half_axes, PanelShape::Disc, 0.3)];
+    scene
+}
+
+#[test]
+fn white_stays_white_in_every_picture() {
+    white_stays_white(&slab());
+    white_stays_white(&lamp_before_a_slab());
+}
+
+fn white_stays_white(scene: &Scene) {
+    let mut rig = or_skip!(Rig::at(AS_CPU, scene, &[]));
     rig.renderer.set_dispersion(EffectSwitch::Off);
     let by_one_index = at_rest(&mut rig, 1);
     rig.renderer.set_dispersion(EffectSwitch::Auto);
