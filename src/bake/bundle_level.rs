@@ -8,7 +8,7 @@ use glam::DVec2;
 use super::band_maps::BandMaps;
 use super::caustic::{BakeContext, CausticLayer, LightProgress};
 use super::light_level::{KeptSquares, LevelKey, LightLevel, LightState, PhotonAim, PhotonSums};
-use super::photon_level::{Layers, PART_OF_TIME, PlannedNoise};
+use super::photon_level::{Layers, PART_OF_TIME, PlannedNoise, squared_noise};
 use crate::error::Result;
 use crate::illumination::Receiver;
 use crate::illumination::accumulator::FluxUnit;
@@ -29,9 +29,6 @@ use crate::transport::EffectSet;
 
 /// Relative RMSE up to which automatic maps are as fine as in a preview.
 const USUAL_MAP_ERROR: f64 = 0.03;
-
-/// Density that these maps are made for [rays/sr].
-const PREVIEW_DENSITY_PER_SR: f64 = 25_000.0;
 
 /// Texels for the light of a cell of such a lattice: on the built-in scenes, 0.5 to 2 mm each, as fine as their
 /// caustics are seen to be.
@@ -59,9 +56,6 @@ const FAR: f64 = 2.5;
 
 /// An error so much larger than its goal comes from light that the plan did not know, and knows now.
 const SURPRISE: f64 = 2.0;
-
-/// Noise below this fraction of the goal is low enough, whatever else the error contains.
-const MIN_NOISE: f64 = 0.7;
 
 /// A light whose error is still unknown at this goal is given up.
 const LEAST_WITHOUT_ERROR: f64 = 0.05;
@@ -144,7 +138,7 @@ impl CausticLayer<'_> {
         match self.settings.max_error {
             Some(target) => {
                 let coarser = (target / USUAL_MAP_ERROR).max(1.0);
-                PREVIEW_DENSITY_PER_SR / (coarser * coarser)
+                Estimator::Auto.preview_density_per_sr() / (coarser * coarser)
             }
             None => self.settings.density_per_sr,
         }
@@ -172,8 +166,8 @@ impl CausticLayer<'_> {
 
         // Finer squares do not recover truncated light.
         let truncated = accuracy::truncated_share(&energy);
-        let noise2 = error * error - truncated * truncated;
-        let wanted2 = (target * target - truncated * truncated).max((MIN_NOISE * target).powi(2));
+        let [noise2, wanted2] = squared_noise(error, truncated, target);
+
         // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the
         // target is near.
         let scaled = AIM * before * (wanted2 / noise2).sqrt();

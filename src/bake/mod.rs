@@ -88,12 +88,12 @@ pub struct Baker {
 type VisibilityKey = (ItemBufferKind, CullMode, bool);
 
 fn visibility_key(settings: &BakeSettings) -> VisibilityKey {
-    let aiming = match settings.effects.get(Effect::LightPass) {
+    let mode = match settings.effects.get(Effect::LightPass) {
         EffectSwitch::On => CullMode::Everything,
         EffectSwitch::Auto | EffectSwitch::Off => CullMode::Reachable,
     };
     let sizes = settings.effects.get(Effect::AreaLights) != EffectSwitch::Off;
-    (settings.item_buffer, aiming, sizes)
+    (settings.item_buffer, mode, sizes)
 }
 
 /// What `inspect` reports before any bake.
@@ -228,7 +228,7 @@ impl Baker {
     pub fn estimate(&mut self, settings: &BakeSettings) -> Result<BakeEstimate> {
         settings.validate()?;
         let visibility = self.visibility(settings);
-        let plan = plan::decide(&self.scene, settings, &visibility.sights);
+        let plan = plan::decide(&self.scene, settings, &visibility.reaches);
         let mut estimate = BakeEstimate {
             plan,
             rays: 0,
@@ -317,7 +317,7 @@ impl Baker {
         let visibility = clock.time(|clock| &mut clock.plan, || self.visibility(settings));
         let is_new = known.is_none_or(|known| !Arc::ptr_eq(&known, &visibility));
         PreparedBake {
-            plan: plan::decide(&self.scene, settings, &visibility.sights),
+            plan: plan::decide(&self.scene, settings, &visibility.reaches),
             item_buffer_tests: if is_new { visibility.tests() } else { 0 },
             tracer,
             visibility,
@@ -584,13 +584,13 @@ impl PreparedBake<'_> {
 /// Records times, and the cost of the item buffers, light by light.
 fn account(result: &mut Bake, finish: &MapAssembler, visibility: &LightVisibility, clock: &Clock) {
     (result.timings_s, result.cpu_s) = clock.timings();
-    let lights = finish.scene.lights.iter().zip(&visibility.looks);
-    let item_buffers = lights.map(|(light, look)| ItemBufferReport {
+    let lights = finish.scene.lights.iter().zip(&visibility.item_buffers);
+    let item_buffers = lights.map(|(light, stats)| ItemBufferReport {
         light: light.name.clone(),
-        cells: look.cells,
-        hidden_cells: look.hidden_cells,
-        tests: look.tests,
-        cpu_ms: 1e3 * look.seconds.cpu,
+        cells: stats.cells,
+        hidden_cells: stats.hidden_cells,
+        tests: stats.tests,
+        cpu_ms: 1e3 * stats.seconds.cpu,
     });
     result.item_buffers = item_buffers.collect();
 }

@@ -81,6 +81,13 @@ fn in_time(photons: u32, before: u32, state: &LightState, context: &BakeContext)
     (affordable.max(least) as u32).min(photons)
 }
 
+/// Squared noise that an error contains, and how much of it a goal allows. Finer levels do not recover truncated light.
+pub(super) fn squared_noise(error: f64, truncated: f64, goal: f64) -> [f64; 2] {
+    let truncated2 = truncated * truncated;
+    let wanted2 = (goal * goal - truncated2).max((MIN_NOISE * goal).powi(2));
+    [error * error - truncated2, wanted2]
+}
+
 /// Minimum number of photons in each half of the level after `level`, which are few where the maps are large.
 fn least_photons(level: &LightLevel, before: u32) -> f64 {
     let texels = level.maps.iter().map(|(_, map)| map.chart.texel_count());
@@ -162,9 +169,7 @@ impl CausticLayer<'_> {
         let goal = target_rmse.unwrap_or(target);
         let times = match known {
             Some((error, truncated)) => {
-                // More photons do not recover truncated light.
-                let noise2 = error * error - truncated * truncated;
-                let wanted2 = (goal * goal - truncated * truncated).max((MIN_NOISE * goal).powi(2));
+                let [noise2, wanted2] = squared_noise(error, truncated, goal);
                 if noise2 <= wanted2 {
                     return None;
                 }

@@ -14,7 +14,7 @@ impl CausticLayer<'_> {
     /// The first rough or spatially varying object that the light reaches; `None` if roughness is off.
     pub(super) fn rough_object(&self, light: &VisibleLight) -> Option<usize> {
         let scene = self.tracer.scene();
-        let reached = self.visibility.sights[light.light].reached.iter();
+        let reached = self.visibility.reaches[light.light].reached.iter();
         let mut objects = reached.map(|&(object, _)| object);
         let rough = objects.find(|&object| scene.material_of(object).is_rough());
         rough.filter(|_| self.plan.is_on(Effect::Roughness))

@@ -106,7 +106,7 @@ impl Spectra {
         // Only lights that reach dispersive glass pay for wavelengths.
         for visible_light in &visibility.lights {
             let light = &scene.lights[visible_light.light];
-            let reached = &visibility.sights[visible_light.light].reached;
+            let reached = &visibility.reaches[visible_light.light].reached;
             let parts = |&(object, _): &(usize, Option<usize>)| scene.material_of(object).is_dispersive();
             let is_parted = plan.is_on(Effect::Dispersion) && reached.iter().any(parts);
             if light.strength().max_channel() > 0.0 && (is_parted || settings.keep_spectrum) {

@@ -27,7 +27,7 @@ pub const NO_SLOT: u32 = u32::MAX;
 
 /// Rays that start farther from the centre than this many scene radii are advanced before the box tests, which would
 /// lose precision at that distance.
-const FAR_RADII: f64 = 4.0;
+pub const FAR_RADII: f64 = 4.0;
 
 /// A bounding volume hierarchy over triangles or boxes.
 ///

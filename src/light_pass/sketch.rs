@@ -57,9 +57,9 @@ pub struct PathPreview {
 /// Traces thin wavefronts of all lights. Extended lights emit from their centres, glass refracts all light as at 587.56
 /// nm, and rough surfaces are smooth. Ends early if cancelled.
 pub fn sketch(tracer: &Tracer, limits: SketchLimits, control: &Control) -> PathPreview {
-    let aim = LightVisibility::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, false);
+    let visibility = LightVisibility::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, false);
     let mut all = PathPreview::default();
-    for visible_light in &aim.lights {
+    for visible_light in &visibility.lights {
         if control.is_cancelled() {
             break;
         }

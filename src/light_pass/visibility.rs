@@ -77,15 +77,15 @@ impl VisibleLight {
     pub fn from_place(
         &self,
         tracer: &Tracer,
-        (item_buffer, aiming): (ItemBufferKind, CullMode),
+        (item_buffer, mode): (ItemBufferKind, CullMode),
         emitter: &Emitter,
     ) -> Option<Self> {
-        let aimer = EmissionCuller {
+        let culler = EmissionCuller {
             tracer,
             item_buffer,
-            aiming,
+            mode,
         };
-        let view = aimer.look(emitter, &self.casters)?;
+        let view = culler.view(emitter, &self.casters)?;
         (!view.item_buffer.casters.is_empty()).then(|| Self {
             launch: view.launch,
             item_buffer: Arc::new(view.item_buffer),
@@ -122,51 +122,51 @@ pub struct LightVisibility {
     /// Lights with at least one marked cell.
     pub lights: Vec<VisibleLight>,
     /// What each light of the scene sees.
-    pub sights: Vec<LightReach>,
+    pub reaches: Vec<LightReach>,
     /// Cost for each light of the scene.
-    pub looks: Vec<ItemBufferStats>,
+    pub item_buffers: Vec<ItemBufferStats>,
 }
 
 impl LightVisibility {
     /// Builds the item buffers of all lights, if the scene has both casters and receivers.
     ///
     /// `sizes`: whether lights have their extent, or shine from their middles.
-    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, aiming: CullMode, sizes: bool) -> Self {
+    pub fn take(tracer: &Tracer, item_buffer: ItemBufferKind, mode: CullMode, sizes: bool) -> Self {
         let scene = tracer.scene();
         let has = |wanted: fn(&Material) -> bool| {
             (0..scene.objects.len()).any(|object| wanted(scene.material_of(object)))
         };
-        let mut aim = Self::default();
+        let mut visibility = Self::default();
         if !has(Material::is_specular) || !has(|material| material.surface.is_receiver()) {
-            aim.sights = vec![LightReach::default(); scene.lights.len()];
-            aim.looks = vec![ItemBufferStats::default(); scene.lights.len()];
-            return aim;
+            visibility.reaches = vec![LightReach::default(); scene.lights.len()];
+            visibility.item_buffers = vec![ItemBufferStats::default(); scene.lights.len()];
+            return visibility;
         }
-        let looker = ItemBufferBuilder {
-            aimer: EmissionCuller {
+        let finder = ItemBufferBuilder {
+            culler: EmissionCuller {
                 tracer,
                 item_buffer,
-                aiming,
+                mode,
             },
             sizes,
             reach: SceneReach::of(scene),
         };
         for light in 0..scene.lights.len() {
             let watch = Stopwatch::start();
-            let (sight, visible_light, mut look) = looker.look(light);
-            look.seconds = watch.elapsed();
-            aim.sights.push(sight);
-            aim.looks.push(look);
-            aim.lights.extend(visible_light);
+            let (reach, visible_light, mut stats) = finder.find(light);
+            stats.seconds = watch.elapsed();
+            visibility.reaches.push(reach);
+            visibility.item_buffers.push(stats);
+            visibility.lights.extend(visible_light);
         }
-        aim
+        visibility
     }
 }
 
 impl LightVisibility {
     /// Nodes, triangles and cells tested for all lights.
     pub fn tests(&self) -> u64 {
-        self.looks.iter().map(|look| look.tests).sum()
+        self.item_buffers.iter().map(|stats| stats.tests).sum()
     }
 }
 
@@ -183,7 +183,7 @@ const PLACES_SEED: u64 = 0;
 struct EmissionCuller<'a> {
     tracer: &'a Tracer,
     item_buffer: ItemBufferKind,
-    aiming: CullMode,
+    mode: CullMode,
 }
 
 /// What a point of a light sees.
@@ -197,9 +197,9 @@ struct View {
 
 impl EmissionCuller<'_> {
     /// `casters`: specular objects that matter. `None` where there is nothing to aim at.
-    fn look(&self, emitter: &Emitter, casters: &[usize]) -> Option<View> {
+    fn view(&self, emitter: &Emitter, casters: &[usize]) -> Option<View> {
         let visible = self.at_reachable(emitter, casters);
-        match self.aiming {
+        match self.mode {
             CullMode::Reachable => visible,
             CullMode::Everything => self.at_everything(emitter, visible),
         }
@@ -291,28 +291,28 @@ impl AllSeen {
 }
 
 struct ItemBufferBuilder<'a> {
-    aimer: EmissionCuller<'a>,
+    culler: EmissionCuller<'a>,
     /// Whether lights have extent.
     sizes: bool,
     reach: SceneReach<'a>,
 }
 
 impl ItemBufferBuilder<'_> {
-    fn look(&self, light: usize) -> (LightReach, Option<VisibleLight>, ItemBufferStats) {
+    fn find(&self, light: usize) -> (LightReach, Option<VisibleLight>, ItemBufferStats) {
         // A light with extent looks from several of its points; further ones are tried only while no caster is seen.
-        let scene = self.aimer.tracer.scene();
+        let scene = self.culler.tracer.scene();
         let casters: Arc<[usize]> = self.reach.casters(light).into();
         let places: Vec<(u32, Emitter)> = self.places(light).collect();
         let (usual, more) = places.split_at(places.partition_point(|(place, _)| *place < PLACES));
-        let look_from = |(_, emitter): &(u32, Emitter)| self.aimer.look(emitter, &casters);
-        let views: Vec<Option<View>> = usual.par_iter().map(look_from).collect();
+        let view_from = |(_, emitter): &(u32, Emitter)| self.culler.view(emitter, &casters);
+        let views: Vec<Option<View>> = usual.par_iter().map(view_from).collect();
         let mut all = AllSeen::default();
         views.into_iter().flatten().for_each(|view| all.add(view));
         for place in more {
             if !all.seen.is_empty() {
                 break;
             }
-            if let Some(view) = look_from(place) {
+            if let Some(view) = view_from(place) {
                 all.add(view);
             }
         }
@@ -325,7 +325,7 @@ impl ItemBufferBuilder<'_> {
             hidden_cells,
             tests,
         } = all;
-        let mut look = ItemBufferStats {
+        let mut stats = ItemBufferStats {
             tests,
             ..ItemBufferStats::default()
         };
@@ -335,19 +335,19 @@ impl ItemBufferBuilder<'_> {
         }
 
         // Without a caster in sight there is nothing to launch, but what was tested is reported all the same.
-        let mut sight = self.sight(light, &casters, seen);
+        let mut reach = self.reach(light, &casters, seen);
         let Some(view) = first else {
-            return (sight, None, look);
+            return (reach, None, stats);
         };
-        sight.hidden_cells = hidden_cells;
-        look.cells = view.item_buffer.marked_cells();
-        look.hidden_cells = hidden_cells;
-        if sight.seen.is_empty() {
-            return (sight, None, look);
+        reach.hidden_cells = hidden_cells;
+        stats.cells = view.item_buffer.marked_cells();
+        stats.hidden_cells = hidden_cells;
+        if reach.seen.is_empty() {
+            return (reach, None, stats);
         }
 
         // The ray density of suns follows the distance from the visible casters to their farthest receiver.
-        let near = if visibly.is_empty() { &sight.seen } else { &visibly };
+        let near = if visibly.is_empty() { &reach.seen } else { &visibly };
         let visible_light = VisibleLight {
             light,
             reach_m: reach_m(scene, near),
@@ -357,11 +357,11 @@ impl ItemBufferBuilder<'_> {
             casters,
             spheres: Arc::default(),
         };
-        (sight, Some(visible_light), look)
+        (reach, Some(visible_light), stats)
     }
 
-    fn sight(&self, light: usize, casters: &[usize], seen: Vec<usize>) -> LightReach {
-        match self.aimer.aiming {
+    fn reach(&self, light: usize, casters: &[usize], seen: Vec<usize>) -> LightReach {
+        match self.culler.mode {
             CullMode::Reachable => LightReach {
                 unsealed: self.reach.unsealed(light).len(),
                 casters: casters.len(),
@@ -370,7 +370,7 @@ impl ItemBufferBuilder<'_> {
                 ..LightReach::default()
             },
             CullMode::Everything => {
-                let specular = specular_objects(self.aimer.tracer.scene());
+                let specular = specular_objects(self.culler.tracer.scene());
                 LightReach {
                     unsealed: specular.len(),
                     casters: specular.len(),
@@ -385,7 +385,7 @@ impl ItemBufferBuilder<'_> {
     /// Emitters to look from: several sample points of a light with extent, otherwise its only one. All points of a
     /// surface light with an image get its mean radiance: any of them may represent its power, and may be black.
     fn places(&self, light: usize) -> impl Iterator<Item = (u32, Emitter)> {
-        let scene = self.aimer.tracer.scene();
+        let scene = self.culler.tracer.scene();
         let source = scene.lights[light].of_unit_strength();
         let many = self.sizes && source.has_extent();
         let is_surface = matches!(source.kind, LightKind::Surface { .. });

@@ -21,12 +21,12 @@ pub struct LightReach {
 }
 
 /// Decides every effect. `sights` is in the order of `Scene::lights`.
-pub fn decide(scene: &Scene, settings: &BakeSettings, sights: &[LightReach]) -> EffectPlan {
+pub fn decide(scene: &Scene, settings: &BakeSettings, reaches: &[LightReach]) -> EffectPlan {
     // The light pass is decided first: without it, no effect on its paths is simulated.
     let decision = Decision {
         scene,
         settings,
-        sights,
+        reaches,
         caustic: wants_caustics(settings),
     };
     let pass = decision.light_pass();
@@ -132,7 +132,7 @@ const FORCED_ON: &str = "switched on by the user, though nothing calls for it";
 struct Decision<'a> {
     scene: &'a Scene,
     settings: &'a BakeSettings,
-    sights: &'a [LightReach],
+    reaches: &'a [LightReach],
     /// Whether the caustic layer is baked.
     caustic: bool,
 }
@@ -183,11 +183,11 @@ impl Decision<'_> {
     /// Objects that light may reach: object, light, and the object that sends light there, if any.
     fn lit_objects(&self) -> impl Iterator<Item = (usize, usize, Option<usize>)> {
         let shining = |light: usize| self.scene.lights[light].strength().max_channel() > 0.0;
-        let sights = self.sights.iter().enumerate();
-        sights
+        let reaches = self.reaches.iter().enumerate();
+        reaches
             .filter(move |(light, _)| shining(*light))
-            .flat_map(|(light, sight)| {
-                let reached = sight.reached.iter();
+            .flat_map(|(light, reach)| {
+                let reached = reach.reached.iter();
                 reached.map(move |&(object, way)| (object, light, way))
             })
     }
@@ -323,21 +323,21 @@ impl Decision<'_> {
         let lights = self.scene.lights.iter().enumerate();
         lights
             .map(|(light, source)| {
-                let sight = self.sights.get(light);
+                let reach = self.reaches.get(light);
                 let shines = source.strength().max_channel() > 0.0;
-                let seen = sight.map_or(&[][..], |sight| &sight.seen);
+                let seen = reach.map_or(&[][..], |reach| &reach.seen);
                 LightLine {
                     light: source.name.clone(),
                     on: self.caustic && shines && !seen.is_empty(),
-                    reason: self.light_reason(shines, sight),
+                    reason: self.light_reason(shines, reach),
                 }
             })
             .collect()
     }
 
-    fn light_reason(&self, shines: bool, sight: Option<&LightReach>) -> String {
+    fn light_reason(&self, shines: bool, reach: Option<&LightReach>) -> String {
         // The first obstacle on the way from the lamp to a receiver is the reason: those behind it do not matter.
-        let Some(sight) = sight.filter(|_| self.caustic) else {
+        let Some(reach) = reach.filter(|_| self.caustic) else {
             return "the caustic layer is not asked for".into();
         };
         if !shines {
@@ -346,14 +346,14 @@ impl Decision<'_> {
         if !self.has(Material::is_specular) {
             return "nothing in the scene is specular".into();
         }
-        if sight.unsealed == 0 {
+        if reach.unsealed == 0 {
             return "opaque bodies seal it from everything specular".into();
         }
-        if sight.casters == 0 {
+        if reach.casters == 0 {
             return "nothing specular that it could light can send light to a diffuse surface".into();
         }
-        if sight.seen.is_empty() {
-            let why = if sight.hidden_cells > 0 {
+        if reach.seen.is_empty() {
+            let why = if reach.hidden_cells > 0 {
                 "opaque surfaces hide everything specular from it"
             } else {
                 "it sees nothing specular"
@@ -362,7 +362,7 @@ impl Decision<'_> {
         }
 
         // A plan is read at a glance, so that a few names stand for many.
-        let names: Vec<String> = sight
+        let names: Vec<String> = reach
             .seen
             .iter()
             .map(|&object| format!("`{}`", self.scene.objects[object].name))

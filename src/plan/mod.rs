@@ -11,6 +11,7 @@ pub use reach::SceneReach;
 
 use serde::{Deserialize, Serialize};
 
+use crate::effect::EffectSwitches;
 pub use crate::effect::{Effect, EffectSwitch};
 
 /// Whether an effect is on, and why.
@@ -74,13 +75,22 @@ impl EffectSet {
     };
 
     pub fn of(plan: &EffectPlan) -> Self {
+        Self::where_on(|effect| plan.is_on(effect))
+    }
+
+    /// Every effect that is not switched off, needed or not.
+    pub fn unless_off(switches: &EffectSwitches) -> Self {
+        Self::where_on(|effect| switches.get(effect) != EffectSwitch::Off)
+    }
+
+    fn where_on(is_on: impl Fn(Effect) -> bool) -> Self {
         Self {
-            transmission: plan.is_on(Effect::Refraction),
-            reflection: plan.is_on(Effect::Reflection),
-            absorption: plan.is_on(Effect::Absorption),
-            textures: plan.is_on(Effect::Textures),
-            lobes: plan.is_on(Effect::Roughness),
-            bumps: plan.is_on(Effect::Bumps),
+            transmission: is_on(Effect::Refraction),
+            reflection: is_on(Effect::Reflection),
+            absorption: is_on(Effect::Absorption),
+            textures: is_on(Effect::Textures),
+            lobes: is_on(Effect::Roughness),
+            bumps: is_on(Effect::Bumps),
         }
     }
 }

@@ -26,7 +26,7 @@ use crate::light_pass::path::{Arrival, PathLimits};
 use crate::light_pass::splat::lattice::Lattice;
 use crate::light_pass::visibility::{CullMode, LightVisibility, VisibleLight};
 use crate::optics::LinearSrgb;
-use crate::plan::{self, Effect, EffectSwitch};
+use crate::plan::{self, Effect, EffectSet, EffectSwitch};
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::{Material, Scene};
 use crate::settings::{BakeSettings, ItemBufferKind, LayerKind, MapResolution, RayPlacement};
@@ -37,8 +37,7 @@ pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
 
 /// Bakes the caustic layer of a scene with about `rays` rays ([`RAYS`]), divided evenly among the lights. Of the
 /// settings, map resolution (which must be fixed), seed, item buffer, depth, branch threshold, threads and the switches
-/// of the light pass, of roughness and of lights with a size apply; it has no dispersion. Each map's `error` is the
-/// texel's standard error [W/m²], and its `estimated_relative_rmse` is the noise: the root mean square of these over
+/// of effects apply; it has no dispersion. Each map's `error` is the texel's standard error [W/m²], and its `estimated_relative_rmse` is the noise: the root mean square of these over
 /// the mean. Bit-identical for any number of threads.
 ///
 /// # Errors
@@ -86,10 +85,10 @@ fn run(
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);
     let sizes = settings.effects.get(Effect::AreaLights) != EffectSwitch::Off;
-    let aim = LightVisibility::take(tracer, settings.item_buffer, CullMode::Everything, sizes);
-    let plan = plan::decide(scene, settings, &aim.sights);
+    let visibility = LightVisibility::take(tracer, settings.item_buffer, CullMode::Everything, sizes);
+    let plan = plan::decide(scene, settings, &visibility.reaches);
     let lights: &[VisibleLight] = if plan.is_on(Effect::LightPass) {
-        &aim.lights
+        &visibility.lights
     } else {
         &[]
     };
@@ -101,6 +100,7 @@ fn run(
         tracer,
         limits: PathLimits {
             microfacets: is_rough.then_some(0),
+            effects: EffectSet::unless_off(&settings.effects),
             ..PathLimits::smooth(settings.photon_depth(), settings.path_threshold())
         },
         item_buffer: settings.item_buffer,

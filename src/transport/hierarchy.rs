@@ -12,15 +12,11 @@ use glam::{DAffine3, DVec3};
 
 use super::smoothing::smoothing_groups;
 use super::tracer::RayHit;
-use crate::geometry::bvh::{self, Frame, NO_SLOT};
+use crate::geometry::bvh::{self, FAR_RADII, Frame, NO_SLOT};
 use crate::geometry::triangle::ShearedRay;
 use crate::geometry::{Ray, TriangleBvh};
 use crate::scene::mesh::Placement;
 use crate::scene::{Mesh, Object, Scene, instances};
-
-/// Rays that start farther from an instance than this many of its radii are advanced before they are transformed into
-/// object space, which keeps their precision.
-const FAR_RADII: f64 = 4.0;
 
 /// Rounding of a hit's distance, relative to it and the scene's size.
 const SAME: f64 = 1.0 / (1_u64 << 44) as f64;

@@ -61,9 +61,9 @@ pub fn bake_direct(
 ) -> Vec<DirectLayer> {
     let sources = sources(tracer, lights);
     let first = FirstLook::of(&sources, control);
-    let looks = if first == FirstLook::Coarse { 2 } else { 3 };
+    let passes = if first == FirstLook::Coarse { 2 } else { 3 };
     let rows = |(chart, smaller): &(&Chart, Option<&Chart>)| {
-        looks * chart.height as u64 + smaller.map_or(0, |smaller| 2 * smaller.height as u64)
+        passes * chart.height as u64 + smaller.map_or(0, |smaller| 2 * smaller.height as u64)
     };
     let total: u64 = charts.iter().map(rows).sum();
     let done = AtomicU64::new(0);
@@ -370,7 +370,7 @@ impl<'a> Baker<'a> {
         &self,
         row_done: &(impl Fn() + Sync),
         control: &Control,
-        look: SamplingDetail,
+        detail: SamplingDetail,
         wanted: impl Fn(usize) -> bool + Sync,
     ) -> Vec<TexelRow> {
         let whole = control.without_deadline();
@@ -385,14 +385,14 @@ impl<'a> Baker<'a> {
                         ..TexelRow::default()
                     };
                 }
-                let content = self.row(row, look, &wanted);
+                let content = self.row(row, detail, &wanted);
                 row_done();
                 content
             })
             .collect()
     }
 
-    fn row(&self, row: usize, look: SamplingDetail, wanted: &impl Fn(usize) -> bool) -> TexelRow {
+    fn row(&self, row: usize, detail: SamplingDetail, wanted: &impl Fn(usize) -> bool) -> TexelRow {
         // Triangles that share a texel add their samples to one sum.
         let width = self.chart.width;
         let mut sums = vec![TexelSum::EMPTY; width];
@@ -406,7 +406,7 @@ impl<'a> Baker<'a> {
                     let texel = DVec2::new(column as f64, row as f64);
                     let hash = self.hash(row * width + column);
                     let sum = &mut sums[column];
-                    content.shadow_rays += self.add_part(&facet, part, (texel, hash), look, sum);
+                    content.shadow_rays += self.add_part(&facet, part, (texel, hash), detail, sum);
                 }
             });
         }
@@ -421,7 +421,7 @@ impl<'a> Baker<'a> {
                     &facet,
                     part.middle,
                     (self.hash(row * width + column), 0),
-                    (1, look),
+                    (1, detail),
                 );
                 content.shadow_rays += sample.shadow_rays;
                 sum.add(sample, part.area_m2);
@@ -439,7 +439,7 @@ impl<'a> Baker<'a> {
         facet: &Facet,
         part: &Polygon,
         (texel, hash): (DVec2, u64),
-        look: SamplingDetail,
+        detail: SamplingDetail,
         sum: &mut TexelSum,
     ) -> u64 {
         // The largest overlap is remembered for texels in which no sample lies on the surface.
@@ -454,7 +454,7 @@ impl<'a> Baker<'a> {
 
         // The samples of a texel form one regular grid. Each triangle takes those within its overlap, and none is taken
         // twice.
-        let side = look.side;
+        let side = detail.side;
         let step = 1.0 / side as f64;
         let mut shadow_rays = 0;
         for index in 0..side * side {
@@ -462,7 +462,7 @@ impl<'a> Baker<'a> {
                 + DVec2::new((index % side) as f64 + 0.5, (index / side) as f64 + 0.5) * step
                 + OFF_THE_DIAGONALS;
             if part.contains(place) {
-                let sample = self.sample(facet, place, (hash, index), (side * side, look));
+                let sample = self.sample(facet, place, (hash, index), (side * side, detail));
                 shadow_rays += sample.shadow_rays;
                 sum.add(sample, facet.m2_per_texel2 * step * step);
             }
@@ -477,7 +477,7 @@ impl<'a> Baker<'a> {
         facet: &Facet,
         place: DVec2,
         (hash, index): (u64, usize),
-        look: (usize, SamplingDetail),
+        detail: (usize, SamplingDetail),
     ) -> Sample {
         // The diffuse fraction and the coat at the point decide how much of the arriving light the map stores.
         let point = facet.at(place);
@@ -522,7 +522,7 @@ impl<'a> Baker<'a> {
                 Emission::Extended(soft) => {
                     // A run of samples decides visibility. Where it is partial, the texel counts as crossed by a
                     // penumbra.
-                    let run = soft.run(hash, index, look);
+                    let run = soft.run(hash, index, detail);
                     let gathered = soft.gather(
                         self.tracer,
                         &point,

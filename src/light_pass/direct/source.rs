@@ -17,7 +17,7 @@ use super::texel::SamplingDetail;
 use crate::geometry::sampling::{even_point, mix64};
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, EmitterSampler};
-use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
+use crate::scene::{Environment, Light, LightKind, LightSize, Material, Scene};
 use crate::transport::{DiffuseResponse, MediumStack, Tracer, media_at};
 
 /// Number of samples that are prepared for a light: a power of 2.
@@ -29,7 +29,7 @@ const NARROW_RAD: f64 = 0.03;
 /// Luminous surfaces of more triangles are integrated by samples alone.
 const MAX_POLYGONS: usize = 16;
 /// Corners of the polygon that approximates a disc.
-const DISC_CORNERS: usize = 64;
+const DISC_CORNERS: u32 = 64;
 /// Part of its length by which a shadow ray ends short of a light, so as not to hit the light's own surface.
 const SHADOW_RAY_MARGIN: f64 = 1e-9;
 const SEED: u64 = 0x6c69_6768_7473;
@@ -176,21 +176,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
             ..
         } => {
             let normal = across.cross(down).try_normalize()?;
-            let outline: Vec<DVec2> = match shape {
-                PanelShape::Rectangle => vec![
-                    DVec2::NEG_ONE,
-                    DVec2::new(1.0, -1.0),
-                    DVec2::ONE,
-                    DVec2::new(-1.0, 1.0),
-                ],
-                PanelShape::Disc => {
-                    // A regular polygon of the disc's area.
-                    let step = TAU / DISC_CORNERS as f64;
-                    let radius = (step / step.sin()).sqrt();
-                    let corner = |corner: usize| DVec2::from_angle(corner as f64 * step) * radius;
-                    (0..DISC_CORNERS).map(corner).collect()
-                }
-            };
+            let outline = shape.corners(DISC_CORNERS, 0.0);
             let corners = outline
                 .iter()
                 .map(|place| centre + across * place.x + down * place.y);
@@ -222,10 +208,10 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
 
 impl ExtendedLight {
     /// The light's samples for sample point `place` of a texel, which has `places` sample points.
-    pub fn run(&self, texel: u64, place: usize, (places, look): (usize, SamplingDetail)) -> Range<usize> {
+    pub fn run(&self, texel: u64, place: usize, (places, detail): (usize, SamplingDetail)) -> Range<usize> {
         let (ready, of_texel) = match self.places {
-            LightSamples::Sky { .. } => (2 * READY_OF_SKY, look.samples_of_sky),
-            _ => (READY, look.samples_of_lamp),
+            LightSamples::Sky { .. } => (2 * READY_OF_SKY, detail.samples_of_sky),
+            _ => (READY, detail.samples_of_lamp),
         };
         let each = (of_texel / places.max(1)).max(2);
         let runs = ready / (each * places.next_power_of_two());

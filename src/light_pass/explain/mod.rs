@@ -105,13 +105,13 @@ pub fn explain(
     control: &Control,
 ) -> Explanation {
     // The launch domain of each light is searched for the squares whose caustic light reaches the texel.
-    let aim = LightVisibility::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, true);
+    let visibility = LightVisibility::take(tracer, ItemBufferKind::Equal, CullMode::Reachable, true);
     let negligible_w = NEGLIGIBLE * scale_w_m2 * target.area_m2;
     let mut found = Explanation {
         is_complete: true,
         ..Explanation::default()
     };
-    for visible_light in &aim.lights {
+    for visible_light in &visibility.lights {
         explain_light(
             tracer,
             visible_light,
@@ -274,6 +274,7 @@ fn explain_direct(tracer: &Tracer, target: &Target, control: &Control, found: &m
             control,
         );
         let irradiance = LinearSrgb::from(baked[0].irradiance[0].map(f64::from));
+        found.rays += baked[0].shadow_rays;
         if irradiance.max_channel() <= 0.0 {
             continue;
         }
@@ -285,7 +286,6 @@ fn explain_direct(tracer: &Tracer, target: &Target, control: &Control, found: &m
             };
             Some(target.point - direction * (high - low).length())
         });
-        found.rays += baked[0].shadow_rays;
         found.paths.push(LightPath {
             light: index,
             // The sky has no position.

@@ -105,7 +105,7 @@ impl TexelSearch<'_> {
             if self.control.is_cancelled() || found.rays > self.walker.limits.most_rays {
                 return found;
             }
-            found.rays += self.look(&squares, &mut known);
+            found.rays += self.examine(&squares, &mut known);
             let judged: Vec<(Vec<LitSquare>, Vec<OpenSquare>)> = squares
                 .par_iter()
                 .map(|square| self.judge(square, level, &known))
@@ -121,7 +121,7 @@ impl TexelSearch<'_> {
     }
 
     /// Traces the rays of all new points; returns their number.
-    fn look(&self, squares: &[OpenSquare], known: &mut Known) -> u64 {
+    fn examine(&self, squares: &[OpenSquare], known: &mut Known) -> u64 {
         let wanted = squares.iter().flat_map(|open| points(open.square));
         let new: HashSet<DomainPoint, PointHash> =
             wanted.filter(|point| !known.contains_key(point)).collect();

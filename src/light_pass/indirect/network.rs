@@ -29,7 +29,7 @@ pub struct Network {
     grids: Vec<Grid>,
     /// The grid of each receiver.
     by_receiver: Vec<Option<u32>>,
-    stances: Vec<ElementPoints>,
+    points: Vec<ElementPoints>,
     closed: Vec<bool>,
     /// Whether the inside of each object is drawn and holds another object.
     rooms: Vec<bool>,
@@ -83,7 +83,7 @@ impl Network {
             grids,
             rooms: (0..scene.objects.len()).into_par_iter().map(is_room).collect(),
             by_receiver,
-            stances: vec![ElementPoints::Unknown; first],
+            points: vec![ElementPoints::Unknown; first],
             closed: (0..scene.objects.len()).into_par_iter().map(is_closed).collect(),
             batches: Vec::new(),
             rows: Vec::new(),
@@ -96,13 +96,13 @@ impl Network {
     }
 
     pub fn element_count(&self) -> usize {
-        self.stances.len()
+        self.points.len()
     }
 
     /// Whether an element lies inside a solid or sees nothing: others should not interpolate from it.
     pub fn is_hidden(&self, element: usize) -> bool {
         let sees_nothing = |pass: u8| self.row(element, pass).is_none_or(|(_, kept)| kept == 0);
-        self.stances[element] == ElementPoints::Inside || (0..MIN_PASSES).all(sees_nothing)
+        self.points[element] == ElementPoints::Inside || (0..MIN_PASSES).all(sees_nothing)
     }
 
     /// Links of an element in a pass, and the number of its rays that count; `None` if it was not traced.
@@ -167,7 +167,7 @@ impl Network {
                 follower: Follower { tracer, max_depth },
                 grids: &self.grids,
                 by_receiver: &self.by_receiver,
-                stances: &self.stances,
+                points: &self.points,
                 closed: &self.closed,
                 rooms: &self.rooms,
                 seed,
@@ -186,11 +186,11 @@ impl Network {
     fn keep(&mut self, pass: u8, elements: &[u32], batch: Batch) {
         let number = self.batches.len() as u32;
         while self.rows.len() <= usize::from(pass) {
-            self.rows.push(vec![None; self.stances.len()]);
+            self.rows.push(vec![None; self.points.len()]);
         }
-        for (&element, (row, stance)) in elements.iter().zip(batch.rows) {
+        for (&element, (row, points)) in elements.iter().zip(batch.rows) {
             self.rows[usize::from(pass)][element as usize] = Some((number, row));
-            self.stances[element as usize] = stance;
+            self.points[element as usize] = points;
         }
         self.batches.push(batch.links);
         self.counts += batch.counts;

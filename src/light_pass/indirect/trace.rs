@@ -89,7 +89,7 @@ pub struct GatherPass<'a> {
     pub grids: &'a [Grid],
     /// The grid of each receiver.
     pub by_receiver: &'a [Option<u32>],
-    pub stances: &'a [ElementPoints],
+    pub points: &'a [ElementPoints],
     /// Whether each object's mesh is closed.
     pub closed: &'a [bool],
     /// Whether the inside of each object is drawn and holds another object.
@@ -134,9 +134,9 @@ impl GatherPass<'_> {
         let mut all = Batch::default();
         for part in parts? {
             let before = all.links.len() as u64;
-            let moved = |(row, stance): (LinkRange, ElementPoints)| {
+            let moved = |(row, points): (LinkRange, ElementPoints)| {
                 let first = row.first + before;
-                (LinkRange { first, ..row }, stance)
+                (LinkRange { first, ..row }, points)
             };
             all.rows.extend(part.rows.into_iter().map(moved));
             all.links.extend(part.links);
@@ -183,22 +183,22 @@ impl GatherPass<'_> {
 
         // The first pass decides whether points within a solid count. Later passes keep to it, so that all rows of an
         // element sample the same part of it.
-        let stance = match self.stances[number] {
-            ElementPoints::Unknown => stance(&ends),
+        let points = match self.points[number] {
+            ElementPoints::Unknown => points_of(&ends),
             known => known,
         };
-        let kept = self.keep(stance, &ends, first_link, part);
+        let kept = self.keep(points, &ends, first_link, part);
         let row = LinkRange {
             first: first_link as u64,
             links: (part.links.len() - first_link) as u32,
             kept,
         };
-        part.rows.push((row, stance));
+        part.rows.push((row, points));
     }
 
     /// Drops the links of rays that started on the wrong side; returns the number of rays that are left.
-    fn keep(&self, stance: ElementPoints, ends: &[RayEnd], first_link: usize, part: &mut Batch) -> u32 {
-        let wanted = |end: &RayEnd| end.within.is_some() == (stance == ElementPoints::Inside);
+    fn keep(&self, points: ElementPoints, ends: &[RayEnd], first_link: usize, part: &mut Batch) -> u32 {
+        let wanted = |end: &RayEnd| end.within.is_some() == (points == ElementPoints::Inside);
         if !ends.iter().all(wanted) {
             let links: Vec<Link> = ends
                 .iter()
@@ -283,7 +283,7 @@ impl GatherPass<'_> {
 }
 
 /// Outside, unless all points lie inside a solid, or most do and it is a room.
-fn stance(ends: &[RayEnd]) -> ElementPoints {
+fn points_of(ends: &[RayEnd]) -> ElementPoints {
     let within = ends.iter().filter(|end| end.within.is_some()).count();
     let is_room = ends.iter().any(|end| end.within == Some(true));
     if within > 0 && (within == ends.len() || is_room && 2 * within > ends.len()) {

@@ -11,7 +11,7 @@ use crate::geometry::bvh::NO_SLOT;
 use crate::illumination::{Receiver, Side};
 use crate::light_pass::path::PathSignature;
 use crate::optics::LinearSrgb;
-use crate::transport::{Branch, MediumStack, Meeting, SurfaceHit, Tracer};
+use crate::transport::{Branch, Event, MediumStack, Meeting, SurfaceHit, Tracer};
 
 /// Longer paths are left to photons.
 pub(super) const MAX_STEPS: usize = 12;
@@ -127,6 +127,8 @@ struct QueuedLight {
     flux_w: LinearSrgb,
     signature: PathSignature,
     chain: Chain,
+    /// Whether it has only passed holes, and is still direct light.
+    is_straight: bool,
     is_dispersed: bool,
 }
 
@@ -179,6 +181,7 @@ impl PathFinder<'_> {
             flux_w: start.flux_w,
             signature: PathSignature::default(),
             chain: Chain::default(),
+            is_straight: true,
             is_dispersed: self.rules.spectrum.is_some_and(PhotonSpectrum::starts_parted),
         });
         while let Some(light) = waiting.pop() {
@@ -205,8 +208,7 @@ impl PathFinder<'_> {
         // Direct light belongs to another layer. Rough surfaces scatter into more directions than bundles can follow.
         let effects = self.rules.effects;
         let material = tracer.scene().material_of(hit.object);
-        let is_straight = light.chain.len() == 0;
-        if is_straight && !material.surface.is_specular() {
+        if light.is_straight && !material.surface.is_specular() {
             return;
         }
         if effects.lobes && material.is_rough() {
@@ -225,7 +227,7 @@ impl PathFinder<'_> {
 
         // What a diffuse surface takes, if it has a map.
         let taken_w = flux_w * meeting.deposit;
-        if !is_straight && taken_w.max_channel() > 0.0 {
+        if !light.is_straight && taken_w.max_channel() > 0.0 {
             let is_followed = taken_w.max_channel() >= least_w && taken_w.is_finite();
             match self.end(&light, hit).filter(|_| is_followed) {
                 Some(end) => paths.ends.push(PathEnd {
@@ -264,6 +266,7 @@ impl PathFinder<'_> {
                 flux_w,
                 signature: signature.event(branch.event),
                 chain,
+                is_straight: light.is_straight && branch.event == Event::Passage,
                 is_dispersed,
             });
         };

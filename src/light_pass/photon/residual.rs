@@ -91,7 +91,7 @@ pub struct ResidualReport {
     pub deposit_square: f64,
     /// Squared relative error that the flux of single photons tells.
     pub photon_square: f64,
-    /// Whether rough surfaces scatter nearly all of the light.
+    /// Whether bundles carry too little of the light to be worth their cost.
     pub is_left_to_photons: bool,
     /// The goal that was aimed at: larger than the one asked for if that would take too many photons at once.
     pub goal: f64,

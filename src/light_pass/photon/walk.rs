@@ -203,9 +203,9 @@ impl<'a> PhotonWalk<'a> {
             return photon.leave_all(&mut arrive);
         };
 
-        // Separate maps for each band need single wavelengths from the start.
+        // Separate maps for each band need single wavelengths from the start: all that is booked is of this hue.
         if self.rules.spectrum.is_some_and(PhotonSpectrum::starts_parted) {
-            self.part(&mut photon);
+            photon.hue = photon.own_hue.unwrap_or(photon.hue);
         }
 
         // Guides lead into faint branches on purpose; early roulette would undo that.
@@ -297,9 +297,11 @@ impl<'a> PhotonWalk<'a> {
         // The diffuse part of a surface takes its share, and the rest goes on.
         if photon.is_straight {
             // Before any specular event, deposits are direct light.
-            self.book(Account::NotEmitted, &sent_hue.channels, deposit_w);
-            let sent_w = if depth == 0 { sent_w } else { LinearSrgb::BLACK };
-            self.book(Account::Emitted, &sent_hue.channels, sent_w - deposit_w);
+            if depth == 0 {
+                self.book(Account::Emitted, &sent_hue.channels, sent_w);
+            }
+            self.book(Account::Emitted, &photon.hue.channels, deposit_w * -1.0);
+            self.book(Account::NotEmitted, &photon.hue.channels, deposit_w);
         } else if deposit_w.max_channel() > 0.0 {
             arrive(Hit {
                 receiver: Receiver::new(hit.object, Side::met(ray.direction, hit.geometric_normal)),

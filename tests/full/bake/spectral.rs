@@ -193,6 +193,7 @@ fn kept_bands_add_up_to_their_colour() {
     for estimator in [Estimator::Photon, Estimator::Splat] {
         let kept = set(sampled(7, estimator, 64), |s| s.keep_spectrum = true);
         let result = bake(scene.clone(), &kept);
+        assert_eq!(energy_fault(&result), None, "{estimator:?}");
         let texels = caustic(&result, &scene, "floor");
         let floor = result.maps[0].chart.receiver;
         let layers = result.band_layers.iter();
