@@ -85,5 +85,3 @@ quantity!(
 
 product!(RadiantIntensity * SolidAngle = Flux);
 product!(Irradiance * Area = Flux);
-
-impl Irradiance {}

@@ -15,7 +15,12 @@ use super::picture::holds_radiance;
 use super::values::{self, Named};
 
 /// Layers of an EXR map that can be compared.
-const LAYERS: &[Named<&str>] = &[("caustic", "caustic"), ("direct", "direct"), ("sum", "sum")];
+const LAYERS: &[Named<&str>] = &[
+    ("caustic", "caustic"),
+    ("direct", "direct"),
+    ("indirect", "indirect"),
+    ("sum", "sum"),
+];
 
 #[derive(Debug, Args)]
 pub struct CompareArguments {
@@ -23,7 +28,7 @@ pub struct CompareArguments {
     map: PathBuf,
     /// What it should be: .exr or .pfm
     reference: PathBuf,
-    /// caustic, direct or sum [default: caustic where there is one]
+    /// caustic, direct, indirect or sum [default: caustic where there is one]
     #[arg(long, value_parser = values::named(LAYERS))]
     layer: Option<&'static str>,
     /// Picture: red where the map is brighter, blue where darker

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use clap::Args;
 #[cfg(feature = "gpu")]
 use nephroid::effect::EffectSwitches;
-use nephroid::error::{Error, Result};
+use nephroid::error::{Error, Result, Warning};
 use nephroid::export::glb::{self, Bits, Carrier, GlbOptions, GlbReport, SceneLights};
 use nephroid::export::map_set::MapSet;
 use nephroid::export::textures::{
@@ -211,7 +211,10 @@ impl ExportArguments {
             format => format!("--format {format}"),
         };
         let takes_exposure = !is("glb web") || self.carrier == Some(Carrier::Unlit);
-        let multiplied = "light that materials multiply: it is for --as unlit only";
+        let multiplied = match is("web") {
+            true => &*kind,
+            false => "light that materials multiply: it is for --as unlit only",
+        };
         let mixed = "--atlas, as smaller sizes mix the maps in it";
 
         // Option, whether it is given, whether it applies, and what it does not apply to.
@@ -282,15 +285,31 @@ impl ExportArguments {
     }
 
     fn write_glb(&self, console: &Console) -> Result<()> {
-        let scene = self.load()?;
+        let loaded = self.load()?;
         let output = self.output.clone().unwrap_or_else(|| {
-            let name = files::slug(&scene.name, "scene");
+            let name = files::slug(&loaded.name, "scene");
             self.maps.join(format!("{name}.glb"))
         });
-        check_target(&output, &scene)?;
-        let set = MapSet::open(&self.maps, &scene)?;
+        check_target(&output, &loaded)?;
+
+        // A .glb shows one moment.
+        let frames = self.frames(&loaded)?;
+        let (scene, set) = match frames.first() {
+            None => (&loaded, MapSet::open(&self.maps, &loaded)?),
+            Some(first) => (first, MapSet::open_frame(&self.maps, first, 0)?),
+        };
+        if frames.len() > 1 {
+            console.warn(&[Warning::new(
+                self.maps.display().to_string(),
+                format!(
+                    "holds {} moments, and a .glb shows the first one only",
+                    frames.len()
+                ),
+                "export textures (--format) or a page (--format web) for all of them",
+            )]);
+        }
         let maps = set.read_all()?;
-        let report = glb::write(&scene, &maps, self.glb_options(&scene, &maps), &output)?;
+        let report = glb::write(scene, &maps, self.glb_options(scene, &maps), &output)?;
         console.warn(&set.warnings());
         console.warn(&report.warnings);
         let file = &output.display().to_string();
@@ -325,7 +344,7 @@ impl ExportArguments {
         let eye = |view: &View| {
             let effects = EffectSwitches::default();
             let (picture, made_by) = picture::drawn(&shown, &maps, view, &effects, backend.get(), console)?;
-            backend.set((made_by == "cpu").then_some(Backend::Cpu));
+            backend.set((made_by == picture::CPU).then_some(Backend::Cpu));
             Ok(picture)
         };
 

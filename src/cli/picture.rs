@@ -32,7 +32,7 @@ pub enum Backend {
 const BACKENDS: &[values::Named<Backend>] = &[("gpu", Backend::Gpu), ("cpu", Backend::Cpu)];
 
 /// How it is made and shown.
-#[derive(Debug, Default, Args)]
+#[derive(Clone, Debug, Default, Args)]
 pub struct EyeOptions {
     /// none, neutral, agx, aces or soft [default: soft]
     #[arg(long, value_parser = values::one_of::<ToneMap>(), hide_short_help = true)]
@@ -69,11 +69,14 @@ pub fn maps(
 /// Samples across and down per pixel.
 const SAMPLES_PER_SIDE: u32 = 2;
 
+/// What makes pictures without a graphics card.
+pub const CPU: &str = "cpu";
+
 /// A picture that was written, and how it was made.
 pub struct MadePicture {
     /// With the exposure that was used.
     pub view: View,
-    /// The graphics card's name, or `cpu`.
+    /// The graphics card's name, or [`CPU`].
     pub made_by: String,
 }
 
@@ -162,7 +165,7 @@ fn by_cpu(
         ..ReferenceSettings::switched(effects.get(Effect::Dispersion))
     };
     let picture = reference::render(&tracer, maps, view, &settings, &console.bar(), console.control())?;
-    Ok((picture, "cpu".into()))
+    Ok((picture, CPU.into()))
 }
 
 /// `takes_software`: an adapter that is software, slower than `by_cpu`, also counts.

@@ -19,12 +19,10 @@ use serde_json::json;
 
 use super::bake_options::BakeOptions;
 use super::console::Console;
-use super::loaded::LoadedScene;
+use super::loaded::{LoadedScene, within_reach};
 use super::moments::MomentOptions;
 use super::options::{MapsOption, PictureOptions, RunOptions, SceneOptions};
-#[cfg(feature = "gpu")]
-use super::picture::Backend;
-use super::picture::{self, EyeOptions};
+use super::picture::{self, Backend, EyeOptions};
 #[cfg(feature = "gpu")]
 use super::render_path::Film;
 use super::values::{self, Exposure};
@@ -124,26 +122,37 @@ impl RenderArguments {
         console: &Console,
     ) -> Result<()> {
         let folder = FrameFolder::open(output)?;
-        let mut options = self.picture.clone();
+        let (mut options, mut eye) = (self.picture.clone(), self.eye.clone());
+        let affordable = within_reach(settings, console);
 
         // One baker keeps what stays the same between frames; maps of a folder take its place.
         loaded.session(console, |session, bar, control| {
             for frame in 0..times.frames {
                 let scene = Arc::new(loaded.scene.at(times.time_s(frame)));
                 let maps = match &self.maps.maps {
-                    Some(maps) => MapSet::open_frame(maps, &scene, frame)?.read_all()?,
+                    Some(maps) => {
+                        let set = MapSet::open_frame(maps, &scene, frame)?;
+                        console.warn(&set.warnings());
+                        set.read_all()?
+                    }
                     None => {
                         session.set_scene(scene.clone())?;
-                        let result = session.bake(settings, bar, control)?;
+                        let result = session.bake(&affordable, bar, control)?;
                         console.check(&loaded.scene.source)?;
+                        console.warn(&result.warnings);
                         result.maps
                     }
                 };
 
                 // The exposure of the first picture holds for all: an automatic one for each would flicker.
-                let (look, path) = ((&options, &self.eye), folder.file(frame));
+                let (look, path) = ((&options, &eye), folder.file(frame));
                 let made = picture::make(&scene, &maps, &settings.effects, look, &path, console)?;
                 options.exposure = Some(Exposure::Stops(made.view.exposure_stops));
+
+                // Where there is no graphics card, it is neither looked for nor missed again.
+                if made.made_by == picture::CPU {
+                    eye.backend = Some(Backend::Cpu);
+                }
             }
             Ok(())
         })?;

@@ -268,7 +268,9 @@ impl<'a> EmitterSampler<'a> {
             (LightKind::Surface { .. }, _, square) => {
                 // Where an image varies the radiance, a sample has that of its texel; the middle has the mean.
                 let surface = self.surface.as_ref()?;
-                let (kind, brightness) = surface.facet(square.unwrap_or(DVec2::splat(0.5)))?;
+                // Of surfaces that shine from both sides, the front.
+                let middle = DVec2::new(0.5, if surface.both_sides { 0.25 } else { 0.5 });
+                let (kind, brightness) = surface.facet(square.unwrap_or(middle))?;
                 let brightness = brightness.filter(|_| square.is_some());
                 Some(Emitter {
                     strength: brightness.map_or(strength, |of| strength * of) * surface.area_m2(),

@@ -134,7 +134,7 @@ pub(super) fn accuracy(bench: &Bench) -> Result<Sweep> {
     Ok(Sweep {
         note: "`auto` refines towards each target; splats trace lattices of given densities. Bakes end after 20 s. Predictions \
                are of when the error was first at most five times the target. A scene without a map that is known is measured against a bake \
-               to 0.2 % of 60 s, where that gets to 1 %."
+               to 0.2 %, where 60 s are enough for that."
             .into(),
         labels: &["scene", "estimator", "target", "density_per_sr"],
         columns: ACCURACY,

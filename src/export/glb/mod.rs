@@ -379,7 +379,7 @@ fn give(glb: &mut Glb, place: (usize, usize), mut texture: Value, intensity: f64
             material["extensions"] = json!({ UNLIT: {} });
             // Vertex colours are part of the texture already.
             if let Some(attributes) = glb.primitive(place)["attributes"].as_object_mut() {
-                attributes.remove("COLOR_0");
+                attributes.shift_remove("COLOR_0");
             }
         }
     }

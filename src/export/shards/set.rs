@@ -125,13 +125,21 @@ impl ShardSet {
             ));
         }
 
-        // Without one shard, every map would lack a part of its light.
         let count = first.manifest.shard.count;
+        if let Some(beyond) = by_number.last().filter(|shard| number(shard) > count) {
+            return Err(Error::failure(
+                beyond.name(),
+                format!("it says that it is shard {} of {count}", number(beyond)),
+                "bake it again",
+            ));
+        }
+
+        // Without one shard, every map would lack a part of its light.
         let mut present = by_number.iter().map(|shard| number(shard)).peekable();
         let is_missing = |wanted: &u32| present.next_if_eq(wanted).is_none();
         // One more than is named tells that there are more.
         let missing: Vec<u32> = (1..=count).filter(is_missing).take(MAX_NAMED + 1).collect();
-        if missing.is_empty() && by_number.len() == count as usize {
+        if missing.is_empty() {
             return Ok(());
         }
 

@@ -211,9 +211,18 @@ fn check(light: &Light) -> Result<()> {
         LightKind::Sun { direction, .. } => direction.is_normalized(),
         LightKind::Panel {
             centre, across, down, ..
-        } => numbers(&centre.to_array()) && across.cross(down).length() > 0.0,
+        } => {
+            let area = across.cross(down).length();
+            numbers(&centre.to_array()) && area > 0.0 && area.is_finite()
+        }
         LightKind::Surface { .. } | LightKind::Environment { .. } => false,
     };
+    let owner = format!("light `{}`", light.name);
+    let is_panel = matches!(light.kind, LightKind::Panel { .. });
+    if !(is_panel && light.size == LightSize::None) {
+        check_size(&light.kind, light.size, &owner)?;
+    }
+    check_colour(light.colour, light.spectrum.is_some(), &owner)?;
 
     // A scene holds no light without power.
     let strength = light.strength().luminance();
@@ -221,7 +230,7 @@ fn check(light: &Light) -> Result<()> {
         return Ok(());
     }
     Err(Error::usage(
-        format!("light `{}`", light.name),
+        owner,
         "is none that can be added: it needs a place, a direction and a power",
         "add a lamp, a spot, a sun or a panel",
     ))

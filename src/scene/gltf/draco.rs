@@ -107,11 +107,13 @@ impl Unpacked {
             DataType::Uint16 if normalised => f64::from(u16::MAX),
             _ => 1.0,
         };
+        // Signed integers reach one step below −1.
+        let bounded = |number: f64| if normalised { number.max(-1.0) } else { number };
         let numbers = attribute.read_f32s(self.mesh.num_points(), N);
         let vectors = numbers.as_chunks::<N>().0.iter();
         Some(
             vectors
-                .map(|vector| vector.map(|number| f64::from(number) / scale))
+                .map(|vector| vector.map(|number| bounded(f64::from(number) / scale)))
                 .collect(),
         )
     }

@@ -287,6 +287,7 @@ fn kind(list: &str, data: &[u8]) -> &'static str {
         _ if list == "buffers" => "application/octet-stream",
         [0x89, b'P', b'N', b'G', ..] => "image/png",
         [b'R', b'I', b'F', b'F', ..] => "image/webp",
+        [0xab, b'K', b'T', b'X', ..] => "image/ktx2",
         _ => "image/jpeg",
     }
 }

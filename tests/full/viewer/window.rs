@@ -186,7 +186,11 @@ fn killed_window_comes_back() {
     let mut viewer = Viewer::open_with(&screen, &arguments, Some(&config));
     assert_eq!(viewer.all("found_again").len(), 1);
     let baking = &viewer.all("baking")[0];
-    assert_eq!(baking["settings"]["layers"], json!(["direct", "indirect"]), "{baking}");
+    assert_eq!(
+        baking["settings"]["layers"],
+        json!(["direct", "indirect"]),
+        "{baking}"
+    );
     let found = position(&viewer.wait_for_bake().1);
     assert!(found.distance(last) < 1e-6, "{found}, {last}");
     viewer.hands("mousemove 900 300 key 3");

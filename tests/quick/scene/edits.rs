@@ -176,6 +176,11 @@ fn edits_out_of_range_are_refused() {
     let turned = |x, w| moved(0, DQuat::from_xyzw(x, 0.0, 0.0, w), DVec3::ZERO);
     let shifted = |object, x| moved(object, DQuat::IDENTITY, DVec3::X * x);
     let sizeless = Edit::Light(3, LightEdit::Size(LightSize::None));
+    let added = |change: fn(&mut Light)| {
+        let mut lamp = parts::point_light("new", DVec3::Y, Flux(1.0));
+        change(&mut lamp);
+        Edit::AddLight(Arc::new(lamp))
+    };
     for (edit, part) in [
         (strength(6, 1.0), "light 6"),
         (strength(3, 0.0), "light `large`"),
@@ -186,6 +191,15 @@ fn edits_out_of_range_are_refused() {
         (disc(1, 3.2), "up to π for suns"),
         (sphere(1, 0.1), "up to π for suns"),
         (sizeless, "light `large`"),
+        (
+            added(|lamp| lamp.size = LightSize::Radius { radius_m: -0.1 }),
+            "a radius above 0 m",
+        ),
+        (
+            added(|lamp| lamp.size = LightSize::Angle { diameter_rad: 0.1 }),
+            "a radius above 0 m",
+        ),
+        (added(|lamp| lamp.colour = rgb(-1.0, 3.0, 3.0)), "colour"),
         (strength(0, nan), "light `light`"),
         (strength(0, -1.0), "light `light`"),
         (strength(0, 0.0), "light `light`"),

@@ -17,16 +17,17 @@ use crate::units::LUMENS_PER_WATT;
 pub fn add_all(scene: &Scene, glb: &mut Glb, warnings: &mut Vec<Warning>) {
     for source in &scene.lights {
         let lost = match (&source.kind, &source.spectrum) {
-            (LightKind::Environment { .. }, _) => {
-                "is an environment, which glTF has no place for; it was left out"
-            }
-            (_, Some(_)) if named_spectrum(source).is_none() && stated(source).is_some() => {
-                "has a spectrum without a name; its colour was written instead"
-            }
-            _ => "",
+            (LightKind::Environment { .. }, _) => Some((
+                "is an environment, which glTF has no place for; it was left out",
+                "name it when the file is opened (--environment)",
+            )),
+            (_, Some(_)) if named_spectrum(source).is_none() && stated(source).is_some() => Some((
+                "has a spectrum without a name; its colour was written instead",
+                "name its spectrum in the `extras` of the light",
+            )),
+            _ => None,
         };
-        if !lost.is_empty() {
-            let remedy = "name it when the file is opened (--environment)";
+        if let Some((lost, remedy)) = lost {
             warnings.push(Warning::new(format!("light `{}`", source.name), lost, remedy));
         }
         add(source, scene.origin_world, glb);
