@@ -12,6 +12,7 @@ use support::tools::{set, settings, to};
 pub fn fill(t: &mut Table) {
     slabs_and_angles(t);
     bodies(t);
+    bars_below_a_slab(t);
     absorption(t);
     truncated(t);
 }
@@ -170,6 +171,30 @@ fn absorption(t: &mut Table) {
                 off(energy.absorbed, 1.0 - out)
             });
     }
+}
+
+/// Black bars between a slab and the floor, too narrow for the points of squares: photons take back what bundles lay down
+/// behind them.
+fn bars_below_a_slab(t: &mut Table) {
+    const PITCH_M: f64 = 1.0 / 80.0;
+    let mut random = random(3);
+    let (mut bars, mut hidden_m) = (Mesh::default(), 0.0);
+    for bar in 0..80 {
+        let width_m = PITCH_M * (0.1 + 0.3 * random());
+        let left_m = -0.5 + PITCH_M * f64::from(bar) + (PITCH_M - width_m) * random();
+        let middle = dvec3(left_m + 0.5 * width_m, 0.25, 0.0);
+        let bar = shapes::rectangle(middle, 0.6 * DVec3::Z, 0.5 * width_m * DVec3::X);
+        shapes::append(&mut bars, &bar);
+        hidden_m += width_m;
+    }
+    let black = Material {
+        base_colour: LinearSrgb::BLACK,
+        ..parts::mirror()
+    };
+    let scene = under_slab(1.5).with("bars", bars, black).sun(DVec3::NEG_Y);
+    t.case("bars-below-a-slab")
+        .bake(scene, 0.02, 16)
+        .watts((1.0 - hidden_m) * through_slab(1.5), 0.005);
 }
 
 /// What is given up is booked by its cause, and is part of the estimated error. Photons follow every branch, however weak.

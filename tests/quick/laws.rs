@@ -17,6 +17,7 @@ fn glass_keeps_its_laws() {
         "lamp-in-clear-glass",
         "lamp-in-tinted-glass",
         "stepped-floor-in-coloured-water",
+        "bars-below-a-slab",
         "given-up-by-depth",
     ];
     hold_some(glass::fill, &names);
