@@ -134,11 +134,11 @@ fn white_stays_white_in_every_picture() {
 
 fn white_stays_white(scene: &Scene) {
     let mut rig = or_skip!(Rig::at(AS_CPU, scene, &[]));
-    rig.renderer.set_dispersion(EffectSwitch::Off);
-    let by_one_index = at_rest(&mut rig, 1);
-    rig.renderer.set_dispersion(EffectSwitch::Auto);
     for pictures in 1..6 {
-        let seen = at_rest(&mut rig, pictures);
+        let [by_one_index, seen] = [EffectSwitch::Off, EffectSwitch::Auto].map(|switch| {
+            rig.renderer.set_dispersion(switch);
+            at_rest(&mut rig, pictures)
+        });
         let channels = seen.radiance.iter().flatten();
         let pairs = channels.zip(by_one_index.radiance.iter().flatten());
         let off: Vec<f32> = pairs.map(|(a, b)| (a / b - 1.0).abs()).collect();
