@@ -114,7 +114,8 @@ pub fn spot_falloff(cosine: f64, inner_cone_rad: f64, outer_cone_rad: f64) -> f6
 }
 
 impl Emitter {
-    /// Centre of a light, without its extent. `None` if it has no centre or emits nothing.
+    /// Centre of a light, without its extent; of a glowing surface, a point of its front that stands for all of it. `None`
+    /// if it has no centre or emits nothing.
     pub fn middle(light: &Light, scene: &Scene) -> Option<Self> {
         match light.kind {
             LightKind::Environment { .. } => None,
