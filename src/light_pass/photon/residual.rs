@@ -99,7 +99,7 @@ pub struct ResidualReport {
 
 impl ResidualPass<'_> {
     /// Carries the light towards a goal, the relative root mean square error of all maps together. Leaves the maps as
-    /// they are if rough surfaces scatter nearly all of it.
+    /// they are if bundles would carry too little of it.
     pub fn run(
         &self,
         goal: f64,
@@ -130,7 +130,7 @@ impl ResidualPass<'_> {
         };
         if squares.plan.bundled_part < least {
             report.is_left_to_photons = true;
-            report.pass.rays = squares.points.len() as u64;
+            report.pass.rays = (squares.points.len() - before) as u64;
             report.pass.trace_s.add(watch.elapsed());
             report.pass.cancelled = listener.control.is_cancelled();
             return report;

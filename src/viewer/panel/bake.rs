@@ -84,7 +84,7 @@ fn state_line(ui: &mut Ui, choices: &Choices, model: &Model) {
         BakeState::Cancelled => {
             drop(ui.colored_label(ATTENTION, "Cancelled; the maps are those of an earlier bake."))
         }
-        // A bake that is done belongs to the settings of its request, which may have changed since.
+        // Maps belong to the scene and the settings of their request; both may have changed since.
         BakeState::Done | BakeState::Idle if is_stale => {
             ui.colored_label(ATTENTION, "Settings changed since the last bake.");
         }
@@ -114,7 +114,6 @@ fn last_bake(ui: &mut Ui, last: &BakedLevel) {
          Maps of rising quality are shown until the bake is done.",
     );
 
-    // Only this bake's own work is counted: levels that were reused cost nothing.
     let hover = format!(
         "Rays that this bake traced up to here; those kept from earlier bakes are not counted. Build {:.2} s, \
          plan {:.2} s, trace {:.2} s, deposit {:.2} s; {:.2} s of CPU over all threads.",
@@ -184,7 +183,7 @@ pub fn two_digits(value: f64) -> String {
 }
 
 fn ledger(ui: &mut Ui, total: &EnergyLedger) {
-    // All flux is accounted for: what was emitted equals the sum of the other lines.
+    // What was emitted equals the sum of the other lines.
     let lines = [
         (
             "Emitted",
@@ -207,6 +206,11 @@ fn ledger(ui: &mut Ui, total: &EnergyLedger) {
             total.truncated.total(),
             "Flux that the bake gave up: depth limit, branch threshold, unresolved.",
         ),
+        (
+            "Chance",
+            total.sampling,
+            "What random choices of photons lost; negative if they gained. 0 in the mean.",
+        ),
     ];
 
     Grid::new("ledger")
@@ -221,7 +225,7 @@ fn ledger(ui: &mut Ui, total: &EnergyLedger) {
                 ui.end_row();
             }
 
-            // Sums are integers, so that a larger imbalance is no rounding but lost flux.
+            // Flux is summed in integers, so that a larger imbalance is no rounding but lost flux.
             let imbalance = total.relative_imbalance();
             let text = RichText::new(format!("{imbalance:.1e}"));
             let hover = "|emitted − sum of the others| / emitted; below 1e-6 the account is closed.";

@@ -329,9 +329,9 @@ fn ledgers_are_summed_and_gaps_told() {
             emitted: 2.0,
             deposited: 1.0,
             absorbed: 0.25,
-            escaped: 0.625,
+            escaped: 0.6875,
             truncated: with(Truncated::default(), |it| it.depth = 0.125),
-            sampling: 0.0,
+            sampling: -0.0625,
         },
         carried_w: CarriedFlux {
             bundles: 0.75,
@@ -347,14 +347,14 @@ fn ledgers_are_summed_and_gaps_told() {
         last.result.counts.rays = 1_234_567;
     });
     panel.open("Energy");
-    let told = "4.000000 W|2.000000 W|1.250000 W|0.500000 W|0.250000 W|0.0e0|Carried by bundles 75.0 %, photons 25.0 %|1,234,567 rays traced";
+    let told = "4.000000 W|2.000000 W|1.375000 W|0.500000 W|0.250000 W|-0.125000 W|0.0e0|Carried by bundles 75.0 %, photons 25.0 %|1,234,567 rays traced";
     panel.assert_says(&told.split('|').collect::<Vec<_>>());
     panel.tell_level(|last| {
         last.result.ledgers = vec![ledger.clone(); 2];
         last.result.ledgers[0].energy_w.escaped = 0.0;
     });
-    // 0.625 of 4 W.
-    panel.assert_says(&["1.6e-1"]);
+    // 0.6875 of 4 W.
+    panel.assert_says(&["1.7e-1"]);
 }
 
 #[test]
