@@ -474,7 +474,7 @@ impl BakeSettings {
         let is_continuous = self.wavelengths == Wavelengths::Continuous;
         let least_sigma = if self.estimator.refines() { 0.0 } else { 1e-6 };
 
-        // An option that the others leave without effect is refused, since whoever gives it expects one.
+        // Refused are options beyond their range, and options that the others leave without effect.
         let (option, what, remedy) = match self.sigma {
             Sigma::Constant(sigma) if !(least_sigma..=1e4).contains(&sigma) => (
                 "--sigma",

@@ -45,7 +45,7 @@ def gltf(lamp, scale, fault):
         extras.setdefault("angular_diameter_deg", min(math.degrees(lamp.angle), 180.0))
         return "KHR_lights_punctual", dict(entry, type="directional", intensity=brightest * LUMENS_PER_WATT), extras
 
-    # The power of a spot is that of its point without the cone: what the cone cuts off is not shared out within it.
+    # The power of a spot is that of a point lamp of the same intensity: its cone only cuts light off.
     if lamp.type in {"POINT", "SPOT"}:
         radius_m = lamp.shadow_soft_size
         extras.setdefault("radius_m", radius_m)

@@ -49,7 +49,7 @@ def put_back(context, export, folder, keeps_lamps, fault):
     if not shown:
         return 0
 
-    # All materials share one node group, and each gets one node, however many objects it covers.
+    # All materials share one node group, and each gets one node of it, however many objects have the material.
     group = light_map_group(load_tiles(files, folder), keeps_lamps)
     lost = {}
     for name, (part, sides) in shown.items():

@@ -89,12 +89,12 @@ fn surface_point(hit: Hit) -> SurfacePoint {
     point.shading_normal = select(point.geometric_normal, normalize(mixed), dot(mixed, mixed) > 0.0);
     point.interpolated_normal = point.shading_normal;
 
-    // Mean of the three edges: by how much the surface spreads the footprint of a reflected ray.
+    // The curvature is the mean of the bends along the three edges. It spreads the footprints of rays.
     point.curvature = (bend(triangle.a, triangle.b, normal_a, normal_b)
         + bend(triangle.b, triangle.c, normal_b, normal_c)
         + bend(triangle.c, triangle.a, normal_c, normal_a)) / 3.0;
 
-    // Coordinates and colours are linear over the triangle.
+    // Texture coordinates and colours are linear over the triangle.
     let uv_a = corner_uvs(first);
     let uv_b = corner_uvs(second);
     let uv_c = corner_uvs(third);
@@ -103,7 +103,7 @@ fn surface_point(hit: Hit) -> SurfacePoint {
         + corner_colour(third) * weight.z;
     point.uvs = uv_a * weight.x + uv_b * weight.y + uv_c * weight.z;
 
-    // Waves bend the normal and focus light, so that they change the curvature, too; normal maps only bend.
+    // Waves bend the normal and change the curvature, too; normal maps only bend the normal.
     if HAS_BUMPS {
         let record = object.bumps;
         if record != NO_IMAGE {
@@ -115,7 +115,7 @@ fn surface_point(hit: Hit) -> SurfacePoint {
         }
     }
 
-    // Rays have no screen derivatives: densities relate their footprint to texels.
+    // Rays have no screen derivatives: densities of texture coordinates relate their footprint to texels.
     point.uv_densities = vec2f(
         area_ratio(uv_a.xy, uv_b.xy, uv_c.xy, twice_area),
         area_ratio(uv_a.zw, uv_b.zw, uv_c.zw, twice_area),

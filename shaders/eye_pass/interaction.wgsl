@@ -127,7 +127,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
         ior_far = ior;
     }
 
-    // Beyond the critical angle, by the shading normal or by the triangle's plane, all light is reflected.
+    // Beyond the critical angle, which the shading normal decides first, all light is reflected.
     let eta = ior_far / ior_near;
     let cos_incident = -dot(incident, facing.shading);
     let cos_clamped = clamp(cos_incident, 0.0, 1.0);
@@ -138,7 +138,8 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
         return whole;
     }
 
-    // A shading normal may refract the ray back to the side that it came from; the triangle's normal then refracts it.
+    // A shading normal may refract the ray back to the side that it came from; the triangle's normal then refracts it,
+    // or reflects all light.
     var direction = refracted(incident, facing.shading, eta);
     if dot(direction, facing.geometric) >= 0.0 {
         if eta != 1.0 && scaled_cos2_transmitted(cos_geometric, eta) <= 0.0 {

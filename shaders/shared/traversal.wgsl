@@ -248,7 +248,7 @@ struct Search {
 // The nearest triangle before `limit`, from either side. Descends to a leaf first and then intersects its triangles, so
 // that neighbouring rays do the same at the same time.
 fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
-    // Triangles are met in local coordinates, boxes in those of the instance that is searched.
+    // Triangles are met in local coordinates, boxes in the node coordinates of the instance that is searched.
     let ray = sheared(origin, direction);
     let outside = slabs(origin, direction, 0.0);
     var boxes = outside;
@@ -258,7 +258,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
         var first = 0u;
         var end = 0u;
         loop {
-            // An instance has nodes of its own; entries of the stack above `outside` belong to it.
+            // An instance has nodes of its own; entries of the stack above `search.outside` belong to it.
             let node = nodes[search.index];
             if node.count == INSTANCE {
                 search.instance = node.first;
@@ -305,7 +305,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             var is_nearer = found.distance < search.best.distance
                 || (found.distance == search.best.distance && triangle.order < search.best_order);
 
-            // Where triangles touch back to back, their order is rounding error: the one that faces the ray is met.
+            // Where triangles of an object touch back to back, rounding orders them: the one that faces the ray is met.
             let is_near = abs(found.distance - search.best.distance) <= BOX_MARGIN;
             if found.triangle != NO_TRIANGLE && triangle.object == search.best_object && is_near {
                 is_nearer = faces_first(triangle, met(search.best), direction, is_nearer);
@@ -320,7 +320,7 @@ fn closest_hit(origin: vec3f, direction: vec3f, limit: f32) -> Hit {
             break;
         }
 
-        // Goes on with the last subtree that begins before the best hit. Leaving an instance restores the local ray.
+        // Goes on with the last subtree that begins before the best hit. Leaving an instance restores the local slabs.
         var has_next = false;
         while search.count > 0u && !has_next {
             if search.count == search.outside {

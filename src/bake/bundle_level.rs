@@ -30,8 +30,8 @@ use crate::transport::EffectSet;
 /// Relative RMSE up to which automatic maps are as fine as in a preview.
 const USUAL_MAP_ERROR: f64 = 0.03;
 
-/// Texels for the light of a cell of such a lattice: on the built-in scenes, 0.5 to 2 mm each, as fine as their
-/// caustics are seen to be.
+/// Texels for the light of a cell of the lattice that maps are made for: in a preview of the built-in scenes, 0.5 to 2
+/// mm each, as fine as their caustics are seen to be.
 const TEXELS_PER_CELL: f64 = 64.0;
 
 /// Goal of the first level, which gives the first picture.
@@ -259,7 +259,8 @@ impl CausticLayer<'_> {
         light.state.squares = Some(kept);
         light.state.fit_squares(self.squares_bytes(context));
 
-        // Where rough surfaces scatter nearly all of the light, bundles carry too little to be worth their squares.
+        // Where bundles carry too little of the light, as where rough surfaces scatter nearly all of it, photons take
+        // it over.
         let Some(Carried {
             report,
             bundles,

@@ -275,7 +275,7 @@ impl DirectCache {
         progress: &dyn Progress,
         control: &Control,
     ) -> DirectReport {
-        // Only charts whose sum is unknown are baked, with all lights at once in double precision.
+        // Layers that an earlier bake kept light by light are dropped, as there is no room for them.
         self.layers.clear();
         let missing: Vec<&DirectChart> = charts.values().filter(|chart| !self.is_summed(chart)).collect();
         let mut report = DirectReport {
@@ -283,7 +283,7 @@ impl DirectCache {
             complete: true,
         };
 
-        // The strengths of this bake are in the sums, so that each layer is needed for a moment only.
+        // Each layer is added at the strength of its light in this bake, and then dropped.
         let black = |chart: &&DirectChart| vec![LinearSrgb::BLACK; chart.map.texel_count()];
         let mut sums: Vec<Vec<LinearSrgb>> = missing.iter().map(black).collect();
         for source in &tracer.scene().lights {
@@ -295,7 +295,7 @@ impl DirectCache {
             }
         }
 
-        // Interrupted sums lack the light of lamps and are dropped.
+        // Interrupted sums lack light and are dropped.
         if report.complete {
             let sums = missing.iter().zip(sums);
             let sums = sums.map(|(chart, sum)| {

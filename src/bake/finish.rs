@@ -250,7 +250,7 @@ impl MapAssembler<'_> {
             }
         }
 
-        // Those share the memory that lit maps and the cache of direct light leave.
+        // These others share the memory that lit maps and the cache of direct light leave.
         let lights = |receiver: Receiver| {
             levels
                 .iter()
@@ -266,8 +266,8 @@ impl MapAssembler<'_> {
         let taken = memory.bytes(texels) + self.settings.direct_bytes();
         let left = self.settings.memory_bytes.saturating_sub(taken);
 
-        // If it is short, they are made coarser together. Coarse direct maps only weigh the error and are never shown,
-        // so that no one is warned.
+        // If it is short, they are made coarser together. Coarse direct maps only weigh the error or stand in for the
+        // first look, so that no one is warned.
         let requested = map_size::requested(&wishes);
         let sizes = map_size::fit(&wishes, (left, memory));
         for (&receiver, size) in &sizes {

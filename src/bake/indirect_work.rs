@@ -53,7 +53,7 @@ impl IndirectWork {
         maps: &[IlluminationMap],
         better: &mut dyn FnMut(&Self, &IndirectCache),
     ) -> bool {
-        // The rays between surfaces depend on geometry alone: those of earlier bakes are used again.
+        // The rays between surfaces do not depend on the lights: those of earlier bakes are used again.
         let watch = Stopwatch::start();
         let settings = bake.settings;
         cache.prepare(&bake.tracer, sizes, settings, most_texels(settings));
@@ -135,14 +135,14 @@ impl IndirectWork {
         maps: &mut [IlluminationMap],
         light_layers: &mut Vec<LightLayer>,
     ) {
-        // The parts of lights are solved over the same rays as the whole, so that they add up to it.
+        // The parts of lights take the other layers of `light_layers` as their sources, and then join them.
         let (Some(network), Some(solution)) = (cache.network(), &self.solution) else {
             return;
         };
         let mut parts = self.parts(network, maps, light_layers);
         light_layers.append(&mut parts);
 
-        // The noise of gather rays is independent of the caustic, so that errors add in squares.
+        // The noise of gather rays is independent of that of the caustic, so that errors add in squares.
         for map in maps {
             let Some(grid) = grid_of(network, map) else {
                 continue;
@@ -221,7 +221,7 @@ impl IndirectWork {
         };
         let percent = |share: f64| format!("{:.2} %", 100.0 * share);
 
-        // With albedos near 1, the Neumann series of bounces hardly falls.
+        // With albedos near 1, each bounce carries nearly as much light as the one before.
         if !solution.converged {
             warnings.push(Warning::new(
                 "indirect layer",

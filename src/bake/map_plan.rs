@@ -140,7 +140,8 @@ impl CausticLayer<'_> {
 
     /// As fine as the light requires; tiled where that takes less memory.
     fn automatic_wish(&self, receiver: Receiver, seen: &FootprintStatistics) -> Option<SizeRequest> {
-        // The map has to resolve footprints, and the shadow borders of direct light if that shares its texels.
+        // The map has to resolve footprints and direct light. Shadow borders count only with estimators whose maps may
+        // be tiled.
         let object = receiver.object();
         let mut times = self.sizes.doublings(receiver, seen, LARGEST_TILED_SIDE)?;
         let is_direct = self.plan.is_on(Effect::Direct);
@@ -154,7 +155,7 @@ impl CausticLayer<'_> {
             times = times.max(self.sizes.doublings_for_direct(object, self.settings) + finer);
         }
 
-        // The finest size that is small enough is taken: by tiles, which are coarse in the dark, or else as a dense
+        // The finest size that is small enough is taken: in tiles, which are coarse in the dark, or else as a dense
         // map.
         let borders = self.sizes.borders(receiver).filter(|_| finer > 0);
         for times in (0..=times).rev() {

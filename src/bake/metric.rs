@@ -95,8 +95,8 @@ impl CausticLayer<'_> {
             return Counts(BTreeMap::new());
         };
 
-        // The weights and scales of the metric are folded into one factor for each texel, so that a light's error is a
-        // plain sum over its texels.
+        // The weights and scales of the metric are folded into one factor for each texel, so that a light's squared
+        // error is a plain sum over its texels.
         let all_m2: f64 = blocks().map(|block| block.weight_m2(white)).sum();
         let counts = lit.iter().map(|(receiver, blocks, light)| {
             let of_block = |block: &BlockLight| {

@@ -174,7 +174,7 @@ impl Baker {
         let sizes = std::mem::replace(&mut self.sizes, ChartCache::new(scene.clone()));
         self.sizes = sizes.edited(scene.clone(), &change.shapes);
 
-        // Each cache goes with the kind of change that it depends on. Strength and colour of lights touch none.
+        // Each cache is dropped after the kinds of change that it depends on.
         let is_other = change.moves_paths() || !change.shares.is_empty();
         if change.moves_shadows {
             self.direct.clear();
@@ -455,7 +455,7 @@ impl Baker {
             }
         }
 
-        // Flux of lights at unit strength becomes irradiance of the lamps as they are.
+        // The flux of lights at unit strength becomes irradiance at their own strengths.
         let mut outcome = lamps.added_to(&outcome);
         outcome.counts.item_buffer_tests = item_buffer_tests;
         let mut clock = lamps.clock(&clock);

@@ -160,7 +160,8 @@ impl CausticLayer<'_> {
             return Some(FIRST_PHOTONS);
         };
 
-        // The variance is inversely proportional to the number of photons: it grows by the ratio of squared errors.
+        // The variance is inversely proportional to the number of photons, which therefore grows by the ratio of
+        // squared errors.
         let known = last.and_then(|level| {
             let error = level.error.as_ref()?.relative_rmse;
             let truncated = accuracy::truncated_share(&level.energy());
@@ -358,8 +359,8 @@ impl CausticLayer<'_> {
             segments += so_far;
         }
 
-        // Filtering costs the same however few photons are new, so that it is timed apart for the forecast of the next
-        // level.
+        // Filtering costs the same however few photons are new, so that it is timed apart: both times tell how many
+        // photons the next level can afford.
         let unit = unit.per(u64::from(photons) * HALVES as u64);
         let is_shard = context.role.is_shard();
         let began = Instant::now();

@@ -151,8 +151,7 @@ impl Showing<'_, '_> {
         self.bake_direct(&finish.direct_charts(&charts));
         let (mut maps, _) = finish.maps(levels, &charts, self.direct);
 
-        // Coarse indirect light is good enough to weigh errors: that of the first look, of the last bake, or of a
-        // glance.
+        // The indirect light of the first look, of the last bake or of a glance is good enough to weigh errors.
         if finish.plan.is_on(Effect::Indirect) {
             let known = match &self.first_look {
                 Some(look) => look.indirect(),

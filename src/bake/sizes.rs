@@ -405,8 +405,8 @@ impl ChartCache {
             })
             .collect();
 
-        // Borders are kept light by light, so that a light that moves leaves those of the others. Interrupted ones are
-        // not.
+        // Borders are kept light by light, so that a light that moves leaves those of the others. Those of an
+        // interrupted search are not kept.
         let mut shadow_rays = 0;
         for (light, source) in self.scene.lights.iter().enumerate() {
             let known = || self.borders.lock().unwrap_or_else(PoisonError::into_inner);

@@ -29,7 +29,7 @@ impl CausticLayer<'_> {
         }
 
         // A splat takes its footprint from its neighbours on the lattice. Rays from many places, or scattered by
-        // roughness, have no wavefront that it could be scaled to.
+        // roughness, form no wavefront, in which neighbours land side by side.
         let scene = self.tracer.scene();
         for light in self.lit() {
             let source = &scene.lights[light.light];

@@ -103,7 +103,7 @@ impl Spectra {
             return Ok(spectra);
         }
 
-        // Only lights that reach dispersive glass pay for wavelengths.
+        // Only lights that reach dispersive glass pay for wavelengths, unless the files are to hold the whole spectrum.
         for visible_light in &visibility.lights {
             let light = &scene.lights[visible_light.light];
             let reached = &visibility.reaches[visible_light.light].reached;

@@ -535,7 +535,7 @@ fn textures_text(folder: &str, report: &TextureReport) -> String {
     // Stored values are the quantity times 2^stops, a factor that programs have to divide by.
     let _ = writeln!(text, "values are in {} x 2^{}", index.unit, index.exposure_stops);
 
-    // Losses are listed only where there are any, so that they stand out among many files.
+    // Texels that lost light are counted only where there are any, so that they stand out among many files.
     for texture in &index.textures {
         let lost = &texture.lost;
         let _ = write!(text, "{:<28} {}x{}", texture.file, texture.width, texture.height);

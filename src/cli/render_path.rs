@@ -179,7 +179,7 @@ fn add_manner(text: &mut String, name: &str, times: &MannerTimes) {
         let _ = writeln!(text, "  the device cannot tell how long it takes");
     }
 
-    // Frames that created pipelines measure the start of the program, and would hide the cost of the others.
+    // Frames of the warm-up, which create pipelines, would hide the cost of the others.
     let warm_up_ms: f64 = times.warm_up.iter().map(|drawing| drawing.wall_ms).sum();
     let _ = writeln!(
         text,

@@ -214,7 +214,7 @@ pub fn decode(bytes: &[u8], location: &str) -> Result<FloatImage> {
     let layer = image.layer_data;
     let (width, height) = (layer.size.width(), layer.size.height());
 
-    // A subsampled channel has fewer samples than texels, and would lie beside the others.
+    // A subsampled channel has fewer samples than texels, so that it does not match the others.
     let mut channels: Vec<Channel> = Vec::new();
     for channel in &layer.channel_data.list {
         if channel.sample_data.len() != width * height {

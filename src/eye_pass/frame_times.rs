@@ -150,7 +150,7 @@ pub fn measure(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<Vec<MannerTimes>> {
-    // One target serves all switches, since each frame is finished and read back before the next one is drawn.
+    // One target serves all switches: each frame is finished, and read back if kept, before the next one is drawn.
     gpu.check_texture_size("picture", walk.view.width, walk.view.height)?;
     let size = [walk.view.width, walk.view.height, 1];
     let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC;
@@ -158,13 +158,13 @@ pub fn measure(
         .device
         .create_texture(&texture_of("frame", size, FORMAT, usage));
 
-    // Scene and maps are uploaded before any frame is timed; frames that create pipelines count as warm-up.
+    // Scene and maps are uploaded before any frame is timed.
     let manners = switches
         .iter()
         .map(|switch| TimedRenderer::new(gpu, walk, *switch));
     let mut manners = manners.collect::<Result<Vec<_>>>()?;
 
-    // All switches draw a camera before the next one, so that their times are of the same state of the device.
+    // All switches draw a camera before any of them draws the next one.
     for (frame, camera) in walk.cameras.iter().enumerate() {
         progress.advance(Stage::Picture, frame as u64, walk.cameras.len() as u64);
         let view = View {

@@ -219,7 +219,7 @@ impl VisibleLamp {
 
     /// Highlights of the lamp in a lobe that is wider than it.
     pub fn highlights(&self, lobe: &Lobe, mut met: impl FnMut(&Highlight)) {
-        // A lamp that is wider than the lobe is seen by the ray of the chain, so that each lamp is counted once.
+        // A lamp, or a patch of a panel, that is wider than the lobe is seen by the ray of the chain: each counts once.
         let of_patch = self.alpha_from(lobe.point);
         if of_patch >= lobe.alpha {
             return;
@@ -246,7 +246,7 @@ impl VisibleLamp {
             }
         };
 
-        // Only panels are divided: from nearby, the directions to their patches differ by more than a lobe.
+        // Only panels are divided into patches, of which each is smaller than the lobe.
         let (EmitterKind::Facet { position, normal }, Outline::Flat { across, down, shape }) =
             (self.emitter.kind, self.outline)
         else {

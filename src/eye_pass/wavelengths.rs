@@ -100,7 +100,7 @@ struct SeenSpectrum {
 
 impl SeenSpectrum {
     fn new() -> Self {
-        // What the eye sees of daylight at each wavelength, in linear sRGB relative to the white of the whole spectrum.
+        // What the eye sees of daylight, in linear sRGB: at each wavelength, and as the white of the whole spectrum.
         let knots = visible_knots();
         let daylight = illuminants::d65();
         let colour = |wavelength| {
@@ -109,7 +109,7 @@ impl SeenSpectrum {
         };
         let white = DVec3::from_array(integrate(&knots, |wavelength| colour(wavelength).to_array()));
 
-        // Column by column, the part of each primary's spectrum that falls into one nanometre.
+        // For each nanometre a matrix, whose columns are what the eye sees of each primary's spectrum there.
         let pieces: Vec<DMat3> = knots
             .windows(2)
             .map(|piece| {

@@ -25,8 +25,8 @@ const BUILD: BvhBuildParams = BvhBuildParams {
 /// Slot of no triangle.
 pub const NO_SLOT: u32 = u32::MAX;
 
-/// Rays that start farther from the centre than this many scene radii are advanced before the box tests, which would
-/// lose precision at that distance.
+/// Rays that start farther than this many radii from the centre of a scene or an instance are advanced before the box
+/// tests, or before they are transformed into object space: these would lose precision at that distance.
 pub const FAR_RADII: f64 = 4.0;
 
 /// A bounding volume hierarchy over triangles or boxes.

@@ -17,7 +17,7 @@ const USUAL_PER_LEVEL: f64 = 0.5;
 /// many times texels should be halved in length to be fine enough; tiled charts know this for each tile. Zero if texels
 /// are fine enough.
 pub fn variance_within(chart: &Chart, values: &[f64], halved: u32) -> Vec<f64> {
-    // A dense map is too coarse throughout; each tile of a tiled one knows how much it lost.
+    // A dense map is equally too coarse throughout; each tile of a tiled one knows how much it lost.
     let parts: Vec<Part> = match &chart.layout {
         None => vec![Part {
             texels: 0..values.len(),

@@ -85,7 +85,8 @@ impl Seam {
         let out_here = away(here[inner])?;
         let out_there = -away(there[(second + 2) % 3])?;
 
-        // Each chart maps this frame to map coordinates. Against one map and along the other leads across the seam.
+        // Each triangle takes this frame to map coordinates. Back from those of the near one and on to those of the far
+        // one leads across the seam.
         let map = |uvs, corners, out| {
             let rows = uv_from_world(uvs, corners)?;
             let column = |step: DVec3| DVec2::new(rows[0].dot(step), rows[1].dot(step));

@@ -172,8 +172,6 @@ pub fn spread(coarse: &FluxAccumulator, flux: &mut FluxAccumulator, layout: Opti
         })
         .collect();
     flux.texels_mut().copy_from_slice(&texels);
-
-    // Remainders of the division stay under their own coarse texel.
     let width = flux.width();
     for (index, (counts, share)) in coarse.texels().iter().zip(&shares).enumerate() {
         let (column, row) = ((index % across) << level, (index / across) << level);

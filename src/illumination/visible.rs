@@ -169,7 +169,8 @@ pub fn visible_error(
         return none();
     };
 
-    // Errors are relative to the luminance that makes them visible, and weigh as much as the light that they belong to.
+    // Errors are relative to the scale of the light that they are seen in, and weigh by the part of it that these
+    // layers make.
     let sums = lit.iter().map(|(light, squares)| {
         light
             .iter()

@@ -98,7 +98,8 @@ impl ItemBuffer {
             HiddenCellPolicy::Drop => builder.hidden(&faces),
         };
         let mut hidden_cells = 0;
-        // Cells in which nothing can be hidden; all lit cells if no opaque face may hide a caster anywhere.
+        // Cells in which nothing can be hidden; all lit cells under `HiddenCellPolicy::Keep`, or if no opaque face may
+        // hide a caster.
         let mut clear = lit;
         for (face, (doubtful, found)) in hidden.iter().enumerate() {
             clear[face] = faces[face].without(doubtful);
@@ -106,7 +107,8 @@ impl ItemBuffer {
             faces[face] = faces[face].without(&found.cells);
         }
 
-        // A caster is seen if it stands out in a doubtful cell, or touches a cell that nothing could hide.
+        // A caster is seen if it is not covered in some doubtful cell, or touches a cell in which nothing can be
+        // hidden.
         let seen_beside = |object: usize| hidden.iter().any(|(_, found)| found.seen.contains(&object));
         let is_any = faces.iter().any(|face| face.count() > 0);
         let seen: Vec<usize> = casters

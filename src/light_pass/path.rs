@@ -248,7 +248,7 @@ impl<'a> PathTracer<'a> {
             self.tracer
                 .interact_with(effects, &hit, segment.ray.direction, &segment.media, micro);
 
-        // Light that has not met a specular surface belongs to the direct layer; all later deposits are caustic light.
+        // What light deposits while it is straight belongs to the direct layer; all later deposits are caustic light.
         let deposit_w = flux_w * interaction.deposit;
         if segment.is_straight {
             // Flux deposited at the first hit is direct light, and so is what a body around the light absorbs of it.

@@ -346,7 +346,8 @@ impl ItemBufferBuilder<'_> {
             return (reach, None, stats);
         }
 
-        // The ray density of suns follows the distance from the visible casters to their farthest receiver.
+        // The ray density of suns scales with the distance from the casters that light can matter to, to their farthest
+        // receiver.
         let near = if visibly.is_empty() { &reach.seen } else { &visibly };
         let visible_light = VisibleLight {
             light,

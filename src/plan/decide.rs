@@ -20,7 +20,7 @@ pub struct LightReach {
     pub reached: Vec<(usize, Option<usize>)>,
 }
 
-/// Decides every effect. `sights` is in the order of `Scene::lights`.
+/// Decides every effect. `reaches` is in the order of `Scene::lights`.
 pub fn decide(scene: &Scene, settings: &BakeSettings, reaches: &[LightReach]) -> EffectPlan {
     // The light pass is decided first: without it, no effect on its paths is simulated.
     let decision = Decision {

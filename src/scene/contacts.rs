@@ -140,7 +140,7 @@ fn faces(scene: &Scene, before: Option<&Scene>) -> Vec<Face> {
         faces
     };
 
-    // Faces stay in the order of objects whatever the threads, and with them what moves.
+    // Faces stay in the order of objects, whatever the threads: the same ones move each time.
     (0..boxes.len())
         .into_par_iter()
         .flat_map_iter(of_object)

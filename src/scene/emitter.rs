@@ -114,8 +114,8 @@ pub fn spot_falloff(cosine: f64, inner_cone_rad: f64, outer_cone_rad: f64) -> f6
 }
 
 impl Emitter {
-    /// Centre of a light, without its extent; of a glowing surface, a point of its front that stands for all of it. `None`
-    /// if it has no centre or emits nothing.
+    /// Centre of a light, without its extent; of a glowing surface, a point of its front that stands for all of it.
+    /// `None` if it has no centre or emits nothing.
     pub fn middle(light: &Light, scene: &Scene) -> Option<Self> {
         match light.kind {
             LightKind::Environment { .. } => None,
@@ -269,7 +269,7 @@ impl<'a> EmitterSampler<'a> {
             (LightKind::Surface { .. }, _, square) => {
                 // Where an image varies the radiance, a sample has that of its texel; the middle has the mean.
                 let surface = self.surface.as_ref()?;
-                // Of surfaces that shine from both sides, the front.
+                // A surface that shines from both sides has its front where y is below 0.5.
                 let middle = DVec2::new(0.5, if surface.both_sides { 0.25 } else { 0.5 });
                 let (kind, brightness) = surface.facet(square.unwrap_or(middle))?;
                 let brightness = brightness.filter(|_| square.is_some());

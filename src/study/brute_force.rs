@@ -35,10 +35,11 @@ use crate::transport::Tracer;
 /// Range of the number of rays.
 pub const RAYS: std::ops::RangeInclusive<u64> = 1_000..=1_000_000_000_000;
 
-/// Bakes the caustic layer of a scene with about `rays` rays ([`RAYS`]), divided evenly among the lights. Of the
-/// settings, map resolution (which must be fixed), seed, item buffer, depth, branch threshold, threads and the switches
-/// of effects apply; it has no dispersion. Each map's `error` is the texel's standard error [W/m²], and its `estimated_relative_rmse` is the noise: the root mean square of these over
-/// the mean. Bit-identical for any number of threads.
+/// Bakes the caustic layer of a scene with about `rays` rays ([`RAYS`]), divided evenly among the lights, without
+/// dispersion. Of the settings, map resolution (which must be fixed), seed, item buffer, depth, branch threshold,
+/// threads and the switches of effects apply. Each map's `error` is the texel's standard error [W/m²], and its
+/// `estimated_relative_rmse` is the noise: the root mean square of these over the mean. Bit-identical for any number of
+/// threads.
 ///
 /// # Errors
 /// Settings or rays outside their ranges; an automatic map resolution; lights without finite power; threads that cannot
@@ -80,7 +81,8 @@ fn run(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<Bake> {
-    // Nothing specular is culled from the aim: a reference must not inherit what culling misses.
+    // Nothing specular is culled for light from one point or direction: a reference must not inherit what culling
+    // misses. The points of a lamp with a size are culled one by one.
     let scene = tracer.scene();
     let watch = Stopwatch::start();
     progress.advance(Stage::Plan, 0, 1);

@@ -52,8 +52,6 @@ pub fn convergence(
         sigma: estimator.default_sigma(),
         ..settings.clone()
     };
-
-    // Without a reference, a bake that is much denser than all variants stands for the truth.
     let densest = densities.last().copied().unwrap_or(1.0) * SELF_REFERENCE_FACTOR;
     let finest = at(estimators.last().copied().unwrap_or(settings.estimator), densest);
     let variants = estimators.iter().flat_map(|&estimator| {
@@ -212,7 +210,7 @@ pub fn spectrum(scene: &Scene, settings: &BakeSettings, wavelengths: &[u32]) -> 
         to(TARGET, Wavelengths::Continuous),
     );
 
-    // Without dispersion in the light pass, all variants would be the same bake.
+    // Without dispersion in the light pass, the wavelengths would make no difference.
     let finest = to(REFERENCE_TARGET, Wavelengths::Continuous);
     if !Baker::new(Arc::clone(&scene))?
         .plan(&finest)?

@@ -543,7 +543,7 @@ impl Tracer {
             ior_ratio: ior_near / ior_far,
         };
 
-        // Fresnel reflectance splits the flux, and the tint absorbs part of what enters.
+        // Fresnel reflectance splits the flux, and the tint absorbs part of what passes.
         let reflectance = fresnel::dielectric_reflectance(meeting.frame.cos_incident(incident), eta);
         if reflectance > 0.0 {
             meeting.add_reflection(effects, LinearSrgb::grey(reflectance));

@@ -324,7 +324,7 @@ impl App {
             self.request_redraw();
         }
 
-        // Commands are applied before drawing; those that need the window wait until the frame is shown.
+        // Commands are applied before drawing; file dialogs and saved pictures wait until the frame is shown.
         let of_window = self.model.act(commands, Instant::now());
         let before = std::mem::replace(&mut self.shown, self.model.maps_shown());
         if before.quantity != self.shown.quantity {
@@ -372,7 +372,7 @@ impl App {
 
     /// Runs panel and overlays in egui. Returns the commands of both and of keys; [`Model::act`] orders them.
     fn run_interface(&mut self) -> Option<(Painting, Vec<Command>)> {
-        // The panel tells of a lost device for a while. Lights that the mouse drags are edited like typed numbers.
+        // The panel tells of a lost device for a while. A light that the mouse drags is an edit, as typed numbers are.
         let lost = self.losses.last();
         self.model.picture.lost_device = lost.is_some_and(|loss| loss.elapsed() < LOSSES_WITHIN);
         let mut commands: Vec<Command> = self.model.placed().map(Command::Edit).into_iter().collect();

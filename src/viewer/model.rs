@@ -344,7 +344,7 @@ impl Model {
             has_maps |= self.take_worth(worth);
         }
 
-        // The log has one line per change of the state, not one per step of its progress.
+        // A bake that was cancelled or failed is logged once.
         if std::mem::discriminant(&state) != std::mem::discriminant(&self.state) {
             match &state {
                 BakeState::Cancelled => self.log.write("cancelled", Value::Null),

@@ -134,7 +134,7 @@ pub struct Navigator {
 impl Navigator {
     /// Starts at the scene camera of that name, else at the scene's first camera, else frames the whole scene.
     pub fn new(scene: &Scene, camera: Option<&str>) -> Self {
-        // Speeds and distances are in scene radii, so that scenes of all sizes are crossed in the same time.
+        // Speed of flight and distances are in scene radii, so that scenes of all sizes are crossed in the same time.
         let (low, high) = scene.inner_bounds().unwrap_or((DVec3::splat(-1.0), DVec3::ONE));
         let half_diagonal_m = 0.5 * (high - low).length();
         let radius_m = if half_diagonal_m > 0.0 {

@@ -85,7 +85,7 @@ impl NewLight {
         exposure_stops: f64,
         scene: &Scene,
     ) -> Light {
-        // The target gets the irradiance that is well exposed, whatever the exposure and the distance.
+        // The target gets an irradiance that suits the exposure, whatever the distance.
         let irradiance_w_m2 = SUITABLE_W_M2 * (-exposure_stops).exp2();
         let position = free_position(surfaces, target, radius_m);
         let way = target.point - position;

@@ -35,7 +35,7 @@ pub fn time_left_s(
         return None;
     };
 
-    // The course of the caustics tells nothing about indirect light, and that of an earlier request nothing about this.
+    // The course of the caustics tells nothing of indirect light, and that of an earlier request nothing of this one.
     let is_last = stage == Stage::Caustic && !is_wanted(&wanted.settings, LayerKind::Indirect);
     let elapsed_s = now.saturating_duration_since(since).as_secs_f64();
     let own = last.filter(|last| is_last && !last.is_final && last.request.is_same(wanted));

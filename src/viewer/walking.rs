@@ -162,7 +162,7 @@ fn beside_walls(eye: DVec3, wanted: DVec3, solid: &dyn Collider) -> Allowed {
             }
         }
 
-        // What leads into the wall is taken from the step first; the rest is pushed away, a little each time.
+        // What leads into the wall is taken from the step first. If that is not enough, the walker is pushed a little.
         let Some((missing_m, wall)) = worst else {
             return allowed;
         };

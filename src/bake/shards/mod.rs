@@ -58,7 +58,8 @@ pub trait ShardSource: Send + Sync {
 pub fn check(settings: &BakeSettings) -> Result<()> {
     settings.validate()?;
 
-    // Each shard sees a part of the light only, and would decide otherwise than the others under these settings.
+    // Each shard sees a part of the light only. Under the first three settings it would decide otherwise than the
+    // others.
     if let Some(target) = settings.max_error {
         return Err(Error::usage(
             "--max-error",

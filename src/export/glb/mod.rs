@@ -147,7 +147,7 @@ pub fn encode(
     maps: &[IlluminationMap],
     options: GlbOptions,
 ) -> Result<(Vec<u8>, GlbReport)> {
-    // Lamps that stay give their direct light by themselves, which the maps then must not hold.
+    // Lamps that stay light the scene by themselves: the maps then hold the caustics alone.
     let layers = layers_of(scene, maps, options)?;
     let Opened {
         mut glb,

@@ -105,7 +105,7 @@ impl Content {
             Some(part(vec![kind], kind.name(), layer.irradiance.clone()))
         };
 
-        // The layers add up to the map. Shares of lights may leave something out, and say so.
+        // The layers add up to the map. Shares of lights may leave something out, of which a warning tells.
         match self {
             Self::Sum => Ok((vec![part(kinds, "", map.total())], None)),
             Self::Layer(kind) => Ok((layer(kind).into_iter().collect(), None)),

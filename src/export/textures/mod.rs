@@ -198,7 +198,7 @@ impl Writer<'_> {
 
         let mut textures = Vec::new();
         for (number, page) in atlas::pack(&sizes, options, name)?.into_iter().enumerate() {
-            // One for each layer or lamp. All of a page have the same layout.
+            // One sheet for each layer or light; all sheets of a page have the same layout.
             let mut sheets: BTreeMap<String, Sheet> = BTreeMap::new();
             for &(map, place) in &page.places {
                 let (reader, entry) = maps[map];

@@ -164,7 +164,7 @@ impl<'a> LitScene<'a> {
                 continue;
             };
 
-            // Along the segment the footprint grows, and the medium absorbs (Beer and Lambert).
+            // Along the segment the footprint changes, and the medium absorbs (Beer and Lambert).
             path.cone.width_m += path.cone.spread_rad * distance_m;
             if CHAINS {
                 path.weight = path.weight * path.media.transmittance(self.tracer.scene(), distance_m);
@@ -201,7 +201,7 @@ impl<'a> LitScene<'a> {
             return seen;
         }
 
-        // The one direction that is traced would miss most lamps within a rough lobe: they are added as highlights.
+        // The one direction that is traced would miss most lamps within a rough lobe: the smaller ones are highlights.
         let shape = ChainSurface {
             curvature: tracer.curvature(hit) * side.sign(),
             alpha: tracer.lobe_alpha(hit),

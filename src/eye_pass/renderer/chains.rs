@@ -107,7 +107,7 @@ impl ChainScene {
             return Err(too_many_triangles(gpu, tracer.scene()));
         }
 
-        // The front is filled by `write_instances`, which is called after each move, too.
+        // The front of the nodes is filled by `write_instances`, which is called after each move, too.
         let mut made = Self {
             firsts,
             root: meshes[0].bvh.nodes.first().map(|root| placed(root, starts[0])),
@@ -139,7 +139,7 @@ impl ChainScene {
             return Err(refused(self.tracer.scene(), what));
         }
 
-        // Each leaf of the hierarchy over instances holds one of them, whose nodes follow that hierarchy.
+        // Each leaf of the hierarchy over instances holds one of them, whose record follows that hierarchy.
         let first = 3 + above.nodes.len();
         let over_instances = |node: &PackedNode| match node.count {
             0 => placed(node, (3, 0)),
@@ -161,7 +161,7 @@ impl ChainScene {
             (root, above) => vec![root.or(above).unwrap_or_default(); 3],
         };
 
-        // The indices above assume this order: three roots, the hierarchy over instances, the instances.
+        // The indices above assume this order: the root with two children, the hierarchy over instances, the instances.
         nodes.extend(above.nodes.iter().map(over_instances));
         nodes.extend(instances.iter().flat_map(|instance| self.instance(instance)));
         self.nodes.write_at(gpu, 0, &nodes);

@@ -297,7 +297,7 @@ impl Packing<'_> {
     /// Adds an object. Surfaces without maps share corners between neighbouring triangles and all instances of their
     /// mesh.
     fn add(&mut self, material: &Material, drawn: &Drawn) -> Vec<Segment> {
-        // Surfaces without maps have no seams: one set of corners serves all triangles and all instances of a mesh.
+        // Without a map there are no seams. A mesh that is larger than a page cannot share its corners.
         let mesh = &*drawn.mesh;
         let largest = mesh.positions.len().max(3 * mesh.triangles.len());
         if !material.surface.is_receiver() && largest <= self.page_corners {
@@ -314,7 +314,7 @@ impl Packing<'_> {
             return vec![segment];
         }
 
-        // Receivers have three corners per triangle, and continue on the next page where one is full.
+        // All others have three corners per triangle, and continue on the next page where one is full.
         let mut segments = Vec::new();
         let mut triangle = 0;
         while triangle < mesh.triangles.len() {

@@ -66,7 +66,7 @@ impl Images {
 
     /// Switches to the images of an edited scene; maps stay if the number of objects is unchanged.
     pub(super) fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Uploaded {
-        // Maps are kept by receiver, and another number of objects gives every receiver another index.
+        // Maps are kept by receiver, whose indices another number of objects changes.
         let mut uploaded = Uploaded::default();
         if self.maps.len() != 2 * scene.objects.len() {
             self.maps
@@ -257,7 +257,7 @@ impl Images {
     }
 
     fn write_table(&mut self, gpu: &Gpu) -> Uploaded {
-        // All records share one buffer, as shaders may read few; each is known by the index of its first word.
+        // All records share one buffer, as shaders may read few buffers; each is known by the index of its first word.
         let mut words = Vec::new();
         let (mut map_records, mut texture_records) = (Vec::new(), Vec::new());
         for map in &self.maps {

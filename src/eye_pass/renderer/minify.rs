@@ -22,7 +22,7 @@ pub(super) struct Minification {
 
 impl Minification {
     pub(super) fn of(chart: &Chart) -> Self {
-        // A surface that fills its map has texels of equal area and no islands: the sizes of its levels tell all.
+        // A surface that fills its map evenly has texels of equal area and no islands: sizes of levels tell all.
         let mut sizes = vec![[chart.width, chart.height]];
         if chart.is_full() {
             while let Some(&last) = sizes.last().filter(|size| is_halved(**size)) {

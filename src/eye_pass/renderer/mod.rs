@@ -130,7 +130,7 @@ impl Renderer {
             ));
         }
 
-        // What only some views need, as chains, environment and targets, is created with the first of these views.
+        // Chains, environment and targets are created with the first view that needs them.
         let geometry = Geometry::new(gpu, scene);
         let renderer = Self {
             sample_count,
@@ -158,7 +158,7 @@ impl Renderer {
             drawn: [0; 2],
         };
 
-        // Calls to the device do not fail; it reports errors to a callback, where they are collected.
+        // Calls to the device return no errors: a callback collects them.
         gpu.take_error().map_or(Ok(renderer), Err)
     }
 

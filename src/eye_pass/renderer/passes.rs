@@ -63,7 +63,7 @@ impl Renderer {
             .then(|| self.bind_chains(gpu, view, quality, sample))
             .flatten();
 
-        // The traced image is complete before the surface pass composes it; its samples are spread over its own pixels.
+        // The traced image is complete before the surfaces compose it; its samples are spread over its own pixels.
         if let Some(chains) = &through_scene {
             let traced = Frame {
                 jitter: jitter(view, sample.traced_offset(quality)),
@@ -72,7 +72,7 @@ impl Renderer {
             self.trace(encoder, &self.bind_frame(gpu, &traced), chains, &list);
         }
 
-        // The background is clamped, as half floats end at 65504.
+        // The target holds half floats, to whose range the background is clamped.
         let frame = self.bind_frame(gpu, &frame);
         let background = view
             .background
@@ -250,7 +250,7 @@ impl Renderer {
     }
 
     fn frame(&self, view: &View, radiance_scale: f64, sample: Sample, quality: EyeQuality) -> Frame {
-        // Without a traced image, its size is that of the frame.
+        // Without a traced image, its size is taken to be that of the frame.
         let camera = &view.camera;
         let size = [view.width, view.height].map(f64::from);
         let traced = self

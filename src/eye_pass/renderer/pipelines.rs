@@ -131,7 +131,7 @@ impl PipelineKey {
             other => other,
         };
 
-        // What the shader does not read is cleared: another key would compile the same pipeline a second time.
+        // Only surfaces that show themselves depend on their kind; only these and chains look up textures.
         let shows_itself = matches!(writes, RenderTarget::Own | RenderTarget::OwnUnderLights);
         let looks_up = match writes {
             RenderTarget::Own | RenderTarget::OwnUnderLights => surface != SurfaceKind::Mirror,

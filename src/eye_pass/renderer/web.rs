@@ -35,8 +35,8 @@ const PICTURE_HEIGHT: f64 = 1080.0;
 /// Most that the maps of all layers together take on the device as half floats [bytes]: browsers on phones give a page
 /// little, and files are sent.
 const MAP_BUDGET_BYTES: u64 = 64 << 20;
-/// Pictures of a view that differ in their wavelengths: the first, which may remain the only one, and as many as a
-/// still averages.
+/// Pictures of a view that differ in their wavelengths: the first, which may remain the only one, and as many as the
+/// page averages at rest.
 const PICTURES: u32 = 17;
 
 /// What pictures of a scene are made of, whatever the view.
@@ -96,10 +96,10 @@ impl WebScene {
         renderer.set_maps(&gpu, scene, maps)?;
         renderer.set_map_budget(MAP_BUDGET_BYTES);
 
-        // Detail is kept near the first camera of the scene or, without one, near a camera that frames it.
+        // What is far from the first camera, or from one that frames a scene without cameras, loses its finest levels
+        // where maps are beyond the budget.
         let outside = || Camera::framing("outside", scene.inner_bounds().unwrap_or_default(), 1.0);
         let camera = scene.cameras.first().cloned().unwrap_or_else(outside);
-        // What is far from the first camera loses its finest levels where maps are beyond the budget.
         let all: Vec<usize> = (0..renderer.objects.list.len()).collect();
         let pixel_rad = camera.vertical_fov_rad / PICTURE_HEIGHT;
         renderer
@@ -119,7 +119,7 @@ impl WebScene {
             renderer.make_chain_scene(&gpu);
         }
 
-        // The host fills the tiles of each map by the list of where they lie.
+        // The host fills the tiles of each map by a list of where they lie.
         let mut contents = renderer.web_contents(&gpu, camera)?;
         for receiver in maps.iter().map(|map| map.chart.receiver) {
             let tiles = renderer.objects.images.map(receiver).map(DeviceMap::tiles);
@@ -173,7 +173,7 @@ impl Renderer {
             }
         }
 
-        // Scenes without specular surfaces trace no chains.
+        // A scene without specular surfaces has no chains.
         if let Some(scene) = &self.chain_scene {
             contents.extend(scene.contents_without_corners());
             let start = scene.start(&View::new(camera, [1, 1]), &ChainLimits::default());
@@ -236,7 +236,7 @@ impl Renderer {
             json!({"centre_m": frame.centre.to_array(), "per_m": frame.scale, "first_mesh_node": first})
         });
 
-        // All that does not depend on the view, in words of WebGPU.
+        // The description holds what does not depend on the view, in words of WebGPU.
         let vertices = [CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT].map(|layout| vertices(&layout));
         let [map_pool, texture_pool] = self.objects.images.pool_sizes();
         let sky_strength = self.scene.sky().map(|(_, strength)| strength.to_array());

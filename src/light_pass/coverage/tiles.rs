@@ -63,7 +63,8 @@ pub fn deposit(triangles: &[FluxTriangle], layout: &TileLayout, texels: &mut [Fl
         .map(|(visits, (tile, rows, texels))| add(visits, triangles, &tile, rows, texels))
         .collect();
 
-    // Shares on several tiles were rounded down: the largest takes the rest, unless some lies beside the map.
+    // Shares on several tiles were rounded down: the largest takes the rest, unless a part of the triangle lies beside
+    // the map.
     let mut parts = Vec::new();
     for (added, more) in done {
         for (sum, channel) in report.deposited.iter_mut().zip(added) {

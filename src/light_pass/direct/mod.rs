@@ -452,8 +452,8 @@ impl<'a> Baker<'a> {
             });
         }
 
-        // The samples of a texel form one regular grid. Each triangle takes those within its overlap, and none is taken
-        // twice.
+        // The samples of a texel form one regular grid. Each triangle takes those within its overlap; off the
+        // diagonals, none is taken twice.
         let side = detail.side;
         let step = 1.0 / side as f64;
         let mut shadow_rays = 0;
@@ -470,7 +470,7 @@ impl<'a> Baker<'a> {
         shadow_rays
     }
 
-    /// Direct light at a map position [texels], the `index`th sample point of a texel with this hash. `look` begins
+    /// Direct light at a map position [texels], the `index`th sample point of a texel with this hash. `detail` begins
     /// with the number of sample points of a texel.
     fn sample(
         &self,

@@ -182,7 +182,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
                 .map(|place| centre + across * place.x + down * place.y);
             vec![Polygon::new(corners.collect(), normal, false)]
         }
-        // Every triangle adds its closed form at each sample point, which only few triangles are worth.
+        // At each sample point, the closed form of every triangle is computed, which pays for few triangles only.
         LightKind::Surface { object, .. } => {
             let mesh = scene.objects.get(object)?.in_scene();
             if mesh.triangle_count() > MAX_POLYGONS {
@@ -271,7 +271,8 @@ impl ExtendedLight {
         material: &Material,
     ) -> Option<IncidentLight> {
         match &self.places {
-            // A sample without a closed form stands for a patch of the light, since a point would be singular close by.
+            // A sample of a light without a closed form stands for a patch of it, since a point would be singular close
+            // by.
             LightSamples::Emitters { all, area_m2 } => {
                 let patch_m2 = if self.shape.is_some() {
                     0.0

@@ -180,7 +180,7 @@ impl TexelSearch<'_> {
         way: PathSignature,
         at: [Option<&Landing>; 5],
     ) -> Verdict {
-        // Bounds of where the path lands: those of its known arrivals, widened by what it may stray between them.
+        // Bounds of where the path is known to land, and its bend: how far it strays from them between the points.
         let there: Vec<&Landing> = at.into_iter().flatten().collect();
         let is_whole = there.len() == at.len();
         let start = (DVec2::INFINITY, DVec2::NEG_INFINITY);

@@ -80,8 +80,7 @@ impl Follower<'_> {
                 );
             }
 
-            // Of two branches, one is sampled in proportion to its share. Radiance, unlike flux, scales with the
-            // squared ratio of indices.
+            // Radiance, unlike flux, scales with the squared ratio of indices.
             let Some((branch, share)) = chosen(&interaction, material.surface, choice(2 * depth).x) else {
                 return found;
             };

@@ -325,7 +325,7 @@ impl Bundle {
         match &self.shape {
             Shape::Nothing => {}
             Shape::Cut(pieces) => {
-                // Place and flux are linear in a piece: one triangle is exact.
+                // Places are linear in a piece: one triangle has its exact image, with the mean of its light.
                 for piece in pieces {
                     let flux_w = mean(piece.nodes.map(|node| node.flux_w()));
                     let corners = piece.nodes.map(|node| node.place.as_dvec2());

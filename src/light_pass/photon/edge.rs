@@ -46,7 +46,7 @@ pub(super) fn finish(finder: &PathFinder, squares: &mut Squares, control: &Contr
                 own: Points::default(),
             };
 
-            // Counts the rays to other points of the lamp and wavelengths, and those of the bisections.
+            // Counts the rays from other points of the lamp and at other wavelengths, and those of the bisections.
             let mut more = (0, 0);
             for square in squares {
                 if control.is_cancelled() {

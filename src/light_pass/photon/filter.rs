@@ -292,8 +292,8 @@ impl Details {
         let pooled = self.cells.around(level, &power, (&areas, &above));
         drop(power);
 
-        // Wiener's share of each detail is added to the base. What is dropped of a detail that both halves have is
-        // bias.
+        // Wiener's share of each detail is added to the light of the coarser levels. What is dropped of a detail that
+        // both halves have is bias.
         let cells = refined
             .par_iter_mut()
             .zip(&whole)
@@ -380,8 +380,6 @@ impl Details {
             ratios[level] = self.cells.between(level, &ratios);
         }
         let ratios = self.cells.texels(&ratios);
-
-        // The mean error is distributed among the texels by their irradiance, in absolute units.
         let squares = of_texels
             .par_iter()
             .zip(&ratios)
@@ -441,7 +439,7 @@ fn put(
     takers: impl Fn(usize) -> [f64; 3] + Sync,
     is_signed: bool,
 ) -> Sums {
-    // The filter moves flux from texel to texel, but may neither create nor destroy any: sums of counts are exact.
+    // Flux only moves from texel to texel: sums of counts are exact, but for what no texel can take.
     let texels = map.texels_mut();
     let sums = |texels: &[FluxCount]| {
         let counts = texels.par_iter().map(|count| count.map(i128::from));

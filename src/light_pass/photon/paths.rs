@@ -216,7 +216,7 @@ impl PathFinder<'_> {
             return;
         }
 
-        // The medium absorbs along the way (Beer-Lambert); the surface splits what is left.
+        // The medium absorbs along the way (Beer–Lambert); the surface splits what is left.
         let mut flux_w = light.flux_w;
         if effects.absorption && light.media.absorbs(tracer.scene()) {
             flux_w = flux_w * light.media.transmittance(tracer.scene(), hit.distance_m);

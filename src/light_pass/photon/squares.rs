@@ -329,8 +329,8 @@ impl<'a> Surveyor<'a> {
                 .collect();
         }
         for round in 0..=MAX_ROUNDS {
-            // Each round plans anew, since finer squares leave less to photons. Without bundled light they would save
-            // nothing.
+            // Each round plans anew, since finer squares leave less to photons. Where no bundle carries light, finer
+            // squares would save nothing.
             mark_beside_edges(&mut squares.squares);
             squares.plan = self.plan(squares, goal);
             let plan = squares.plan;
@@ -391,7 +391,8 @@ impl<'a> Surveyor<'a> {
             squares.squares = after.collect();
         }
 
-        // Audits take at least a small part of this light to arrive: of a receiver seen edge-on, hardly any does.
+        // Emitted flux of the squares that are looked at closely. Audits take at least a small part of it to arrive: of
+        // a receiver seen edge-on, hardly any does.
         let close = squares
             .squares
             .iter()
@@ -462,7 +463,7 @@ impl<'a> Surveyor<'a> {
             ..Plan::default()
         };
 
-        // Light that bundles carry to their receivers, with its mean weight, and light that they lose.
+        // Light that bundles carry, as it is and weighted by its receivers, and light that none of them follows.
         let mut receivers = BTreeSet::new();
         let (mut weighted_w, mut bundled_w, mut lost_w) = (0.0, 0.0, 0.0);
         for square in &squares.squares {
@@ -475,7 +476,7 @@ impl<'a> Surveyor<'a> {
             }
         }
 
-        // Without bundled light, what photons found in the last level tells whether there is any.
+        // Without bundled light, what photons found in the last level tells whether any light arrives.
         plan.goal = goal;
         let by_photons_w = if bundled_w > 0.0 {
             0.0

@@ -270,7 +270,7 @@ impl<'a> PhotonWalk<'a> {
             return None;
         }
 
-        // The medium absorbs along the leg (Beer-Lambert); a dispersive surface leaves a single wavelength.
+        // The medium absorbs along the leg (Beer–Lambert); a dispersive surface leaves a single wavelength.
         let effects = self.rules.effects;
         let (sent_w, sent_hue) = (photon.flux_w, photon.hue);
         if effects.absorption && media.absorbs(scene) {

@@ -110,7 +110,7 @@ pub fn footprint(
         .scaled(area_m2 / std::f64::consts::PI)
     };
 
-    // Neighbours give an ellipse or, for discs, its area alone. A ray without any falls back on undeflected light.
+    // Neighbours give an ellipse or, for discs, its area alone.
     match kind {
         Footprint::Fixed => round(fixed_area_m2()),
         Footprint::Distance => round(unbent_area_m2()),

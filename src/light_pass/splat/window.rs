@@ -364,7 +364,7 @@ impl Window {
     /// Each texel gets its share rounded to counts, and the heaviest one the remainder, so that the sum is exact. What
     /// reaches beyond the map's border is folded back: the ray landed on the surface, and so does its light.
     pub fn add(&self, flux: FluxCount, size: (usize, usize), block: &mut Block) {
-        // Shares are rounded to counts. The fast rounding is for numbers below 2⁵¹ alone.
+        // The fast rounding is for numbers below 2⁵¹ alone.
         let mut rest = flux;
         let (mut heaviest, mut most) = ((0, 0), -1.0);
         let per_weight = 1.0 / self.sum;
@@ -414,8 +414,6 @@ impl Window {
                 }
             }
         }
-
-        // With the remainder, the sum of all texels is the splat's flux to the count.
         let texel = texel_mut(block, heaviest, size);
         for channel in 0..3 {
             texel[channel] += rest[channel];

@@ -33,14 +33,14 @@ const MOST_LIQUID_IOR: f64 = 1.4;
 pub fn find(objects: &mut [Object], materials: &[Material], load: &mut LoadContext) -> Vec<bool> {
     let material = |object: &Object| &materials[object.material];
 
-    // Instances share their mesh, so that each is tested for closedness once.
+    // Instances share a mesh, which is tested for closedness once.
     let mut closed = HashMap::new();
     let mut closes = |object: &Object| {
         let mesh = object.mesh();
         *closed.entry(Arc::as_ptr(mesh)).or_insert_with(|| is_closed(mesh))
     };
 
-    // Objects that bound a body by themselves come first; only what they leave open is pieced together with others.
+    // Objects that bound a body by themselves come first; only open ones are pieced together with others.
     let (mut turned, mut singled) = (Remade::default(), Remade::default());
     let mut bounds_body = vec![false; objects.len()];
     let mut open = Vec::new();

@@ -34,7 +34,7 @@ const READ: [&str; 21] = [
     "KHR_texture_transform",
 ];
 
-/// Extensions that are ignored with a warning even if the file requires them: the scene is the same without them.
+/// Extensions that are ignored with a warning even if the file requires them: only what they add is missed.
 const LEFT_OUT: [&str; 5] = [
     "KHR_animation_pointer",
     "KHR_materials_anisotropy",
@@ -83,7 +83,7 @@ pub fn loss(extension: &str, stated: &Value) -> Option<&'static str> {
 /// # Errors
 /// A required extension without which the scene cannot be read.
 pub fn check(required: &[String], used: &[String], load: &mut LoadContext) -> Result<()> {
-    // A file is refused if it requires what is not read, unless its scene is the same without that.
+    // A file is refused if it requires what is neither read nor can be left out.
     for extension in required {
         if !READ.contains(&extension.as_str()) && !LEFT_OUT.contains(&extension.as_str()) {
             return Err(Error::failure(

@@ -165,7 +165,7 @@ impl<'a> MaterialReader<'a, '_> {
             double_sided: self.source.double_sided,
         };
 
-        // Blending asks for the transmission that its texture leaves, a spectrum for the emission that its own leaves.
+        // The order counts: blending needs the transmission after its texture, a spectrum the emission after its own.
         self.vary(&mut material, transmission)?;
         self.blend(&mut material);
         self.glow(&mut material)?;
@@ -279,7 +279,7 @@ impl<'a> MaterialReader<'a, '_> {
     }
 
     fn volume(&mut self, extensions: &extension::Material) -> Option<Volume> {
-        // A broken thickness voids the volume, so that the mesh alone decides whether the glass is solid.
+        // A broken thickness voids the volume, as if the file stated none.
         let stated = extensions.volume.as_ref()?;
         let thickness = stated.thickness_factor.0;
         if thickness < 0.0 || !thickness.is_finite() {

@@ -174,7 +174,7 @@ fn read_deltas(data: &mut &[u8], control: Option<u8>, deltas: &mut [u8], element
             bits => {
                 let packed = take(data, GROUP * bits / 8)?;
 
-                // The largest number that fits stands for a delta that does not, and follows as a whole byte.
+                // The largest number that fits stands for a delta that does not fit, which follows as a whole byte.
                 let sentinel = (1 << bits) - 1;
                 for (index, delta) in deltas.iter_mut().enumerate() {
                     let at = index * bits;

@@ -190,7 +190,7 @@ fn read_scene(bytes: &[u8], path: &Path, options: &LoadOptions) -> Result<Scene>
         })
     });
 
-    // Waves lift vertices in the final coordinates of the scene, after a far one was moved to its centre.
+    // Waves lift vertices in the final coordinates of the scene, after the origin of a far one was moved.
     substance::warn_of_ranges(&scene, &mut load);
     rebase(&mut scene);
     waves::displace(&mut scene, &document.extras.nodes, &mut load);

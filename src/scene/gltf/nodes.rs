@@ -266,7 +266,7 @@ pub fn read_all(root: &Root, placed: &[PlacedNode], load: &mut LoadContext) -> (
 const PARALLEL_FOV_RAD: f64 = PI / 180.0;
 
 fn read_one(source: &Source, placed: &PlacedNode) -> std::result::Result<Camera, String> {
-    // Far behind its place, a narrow perspective frames the same height there as the orthographic camera.
+    // An orthographic camera is read as a narrow perspective far behind it, which frames the same height at its place.
     let (vertical_fov_rad, near_m, behind_m) =
         match (&source.type_, &source.perspective, &source.orthographic) {
             (Checked::Valid(Type::Perspective), Some(lens), _) => (widen(lens.yfov), widen(lens.znear), 0.0),

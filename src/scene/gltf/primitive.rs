@@ -403,7 +403,7 @@ fn read_local(
         return Ok(None);
     };
 
-    // Attributes of another number than the positions cost themselves, not the mesh.
+    // Attributes that differ in number from the positions are left out; the mesh stays.
     let normals: Option<Vec<DVec3>> =
         vertices.one_each((Semantic::Normals, "normals"), Formats::Float, count, load)?;
     let mut uv_sets = [None, None];
@@ -447,7 +447,7 @@ fn read_local(
         );
     }
 
-    // Only diffuse light is tinted per vertex, elsewhere by the mean. Colours that stay in the mesh leave a white
+    // Only diffuse surfaces are tinted per vertex, all others by the mean. Colours that stay in the mesh leave a white
     // factor to the material, which would apply them twice otherwise.
     if let Some(of_vertices) = colours.and_then(|colours| colours.of_vertices) {
         if has_colours {

@@ -59,7 +59,7 @@ impl App {
             graphics.main.set_style(self.model.map_style());
         }
 
-        // The log tells what it cost to show an edit.
+        // The log tells what it cost to show an edit or new maps.
         if is_new {
             let seconds = start.elapsed().as_secs_f64();
             self.model.log.write(
@@ -73,7 +73,7 @@ impl App {
             );
         }
 
-        // The right part of a comparison shows the same quantity; its maps are uploaded only where something changed.
+        // The right part of a comparison shows the same quantity; its maps are uploaded only if something changed.
         let style = self.model.map_style();
         let reference = self.model.reference.as_ref();
         let beside = reference.map(|reference| (Arc::clone(&reference.maps), style));

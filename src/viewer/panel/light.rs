@@ -42,7 +42,7 @@ pub fn show(ui: &mut Ui, index: usize, model: &Model, commands: &mut Vec<Command
     let mut push =
         |edit: Option<LightEdit>| commands.extend(edit.map(|edit| Command::Edit(Edit::Light(index, edit))));
 
-    // Each kind of light has rows for what can be changed; panels and surfaces keep their extent and colour.
+    // Each kind of light has rows for what can be changed: panels, surfaces and environments keep extent and colour.
     push(power(ui, kind, kind_of_file));
     let sizes = (&light.size, &of_file.size);
     let size = match kind {

@@ -193,7 +193,7 @@ fn one(ui: &mut Ui, wave: &mut Wave) -> Response {
         })
         .inner;
 
-    // Without an edit the direction stays as it is: its angle is rounded.
+    // Without an edit the direction stays as it is: on the way over the angle it would be rounded.
     if azimuth_deg != before {
         let azimuth = azimuth_deg.to_radians();
         wave.direction = DVec3::new(azimuth.sin(), 0.0, -azimuth.cos());

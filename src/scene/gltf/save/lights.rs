@@ -55,7 +55,7 @@ impl Edited<'_> {
             let entry = own_entry(origin, glb);
             glb.patch(&entry, &before, &after);
 
-            // Extras of the node precede those of the light: values go there, and what is removed goes from both.
+            // Extras of the node win over those of the light: values go there, and what is removed goes from both.
             for key in lights::EXTRAS {
                 let is_same = had.get(key) == has.get(key) && !(new_spectrum && key == spectrum::KEY);
                 let of_node = format!("/nodes/{}/extras/{key}", origin.node);

@@ -57,7 +57,7 @@ pub fn save(
     patch.objects()?;
     patch.placing.write(&file.document, patch.glb);
 
-    // An unchanged file is copied byte for byte. Nothing is written that does not read back as the edited scene.
+    // An unchanged .glb is copied byte for byte. Nothing is written that does not read back as the edited scene.
     let bytes = match file.is_binary && file.glb.json == before {
         true => file.bytes,
         false => file.glb.into_bytes()?,
@@ -122,7 +122,7 @@ impl Patch<'_> {
             }
         }
 
-        // A removed light leaves its node; its entry may serve others and stays.
+        // A removed light is taken from its node; its entry may serve others and stays.
         for place in &self.edited.light_list.removed {
             if let Some(origin) = origins.get(*place) {
                 let node = format!("/nodes/{}/extensions/{}", origin.node, origin.list);

@@ -36,7 +36,7 @@ pub fn written(material: &Material, shift: DVec3, warnings: &mut Vec<Warning>) -
         written["normalTexture"]["scale"] = json!(map.scale);
     }
 
-    // The rest needs extensions, or `extras` where glTF has none.
+    // The rest may need extensions, or `extras` where glTF has none.
     write_glow(material, &mut written);
     write_dielectric(material, &mut written);
     write_substance(material, &mut written, warnings);

@@ -83,7 +83,7 @@ fn add_object(object: &Object, still: Option<&Arc<Mesh>>, shift: DVec3, glb: &mu
         triangles,
     } = &**still.unwrap_or(object.mesh_in_scene());
 
-    // Positions lead back to world coordinates; normals are the same in both.
+    // Positions are written in world coordinates; normals are the same there as in the scene.
     let vectors = |list: &[DVec3], shift: DVec3| -> Vec<[f32; 3]> {
         let shifted = list.iter().map(|vector| (*vector + shift).as_vec3().to_array());
         shifted.collect()

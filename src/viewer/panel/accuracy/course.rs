@@ -251,7 +251,7 @@ fn draw(ui: &Ui, curve: &Curve, frame: &Frame) {
         write(right - vec2(2.0, 0.0), Align2::RIGHT_BOTTOM, label);
     }
 
-    // The doubt is a factor on time, which makes a band of equal width to both sides on a logarithmic axis.
+    // A forecast may be off by a factor of time, which makes a band as wide to both sides on a logarithmic axis.
     for pair in curve.future.windows(2) {
         let edge = |point: &Forecast, times: f64| frame.place(point.wall_s * times, point.target);
         let corners = [
