@@ -217,10 +217,10 @@ fn assert_whole(folder: &Path) {
 fn the_first_signal_keeps_what_there_is() {
     for (signal, code) in [("INT", 130), ("TERM", 143)] {
         let sandbox = Sandbox::new();
-        // A bake that takes minutes.
+        // A bake that takes an hour.
         let child = start(
             &sandbox,
-            "bake builtin:ring -o out --density 1e8 --map-resolution 32",
+            "bake builtin:ring -o out --density 1e10 --map-resolution 32",
         );
         // The first rays are let through.
         std::thread::sleep(Duration::from_millis(500));
