@@ -26,4 +26,5 @@ pub mod spectrum;
 pub mod spheres;
 mod squares;
 pub mod subcell_features;
+mod survey;
 pub mod walk;
