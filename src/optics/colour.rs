@@ -70,7 +70,9 @@ impl LinearSrgb {
 
     /// Decodes an 8-bit sRGB channel (IEC 61966-2-1) to linear light [0, 1].
     pub fn decode_channel(encoded: u8) -> f64 {
-        Self::decode(f64::from(encoded) / 255.0)
+        static DECODED: LazyLock<[f64; 256]> =
+            LazyLock::new(|| std::array::from_fn(|code| LinearSrgb::decode(code as f64 / 255.0)));
+        DECODED[usize::from(encoded)]
     }
 
     /// The same for an encoded channel in [0, 1].

@@ -43,7 +43,7 @@ pub use camera::Camera;
 pub use camera_path::{CameraPath, PathPlan};
 pub use edit::{Edit, EditState, LightEdit, MaterialEdit, why_light_stays};
 pub use environment::{Environment, SmoothIrradiance};
-pub use glow::Glow;
+pub use glow::{Glow, GlowPart};
 pub use gltf::guard::is_guarded;
 pub use gltf::{Glb, Opened};
 pub use light::{Light, LightKind, LightList, LightSize, PanelShape};

@@ -45,6 +45,11 @@ pub struct TextureRef {
 }
 
 impl Texture {
+    /// [texels].
+    pub fn size(&self) -> DVec2 {
+        DVec2::new(f64::from(self.width), f64::from(self.height))
+    }
+
     /// Linear-light colour at a texture coordinate.
     pub fn sample(&self, uv: DVec2) -> LinearSrgb {
         let (low, share) = self.between(uv);
@@ -87,7 +92,7 @@ impl Texture {
 
     /// Lower texel of the interpolation on both axes, and the weights of the upper ones, [0, 1].
     fn between(&self, uv: DVec2) -> (DVec2, DVec2) {
-        let place = uv * DVec2::new(f64::from(self.width), f64::from(self.height)) - 0.5;
+        let place = uv * self.size() - 0.5;
         let low = place.floor();
         let share = place - low;
         (low, if self.is_nearest { share.round() } else { share })

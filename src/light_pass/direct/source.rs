@@ -59,7 +59,7 @@ pub struct ExtendedLight {
 
 enum LightSamples {
     /// Each as if all light came from there.
-    Emitters { all: Vec<Emitter>, area_m2: f64 },
+    Emitters { all: Vec<Emitter>, bright_m2: f64 },
     /// Directions: half of a run sampled from the sky, half by the cosine at the surface.
     Sky {
         sky: Arc<Environment>,
@@ -157,7 +157,7 @@ impl LightSamples {
                 let all: Option<Vec<Emitter>> = squares().map(|square| places.sample(square)).collect();
                 Self::Emitters {
                     all: all?,
-                    area_m2: places.area_m2(),
+                    bright_m2: places.bright_area_m2(),
                 }
             }
         })
@@ -182,10 +182,12 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
                 .map(|place| centre + across * place.x + down * place.y);
             vec![Polygon::new(corners.collect(), normal, false)]
         }
-        // At each sample point, the closed form of every triangle is computed, which pays for few triangles only.
+        // At each sample point, the closed form of every triangle is computed, which pays for few triangles only. Few
+        // even samples would find the bright parts of a dark image.
         LightKind::Surface { object, .. } => {
             let mesh = scene.objects.get(object)?.in_scene();
-            if mesh.triangle_count() > MAX_POLYGONS {
+            let is_even = scene.glows.get(&object).is_none_or(|glow| glow.is_even());
+            if mesh.triangle_count() > MAX_POLYGONS || !is_even {
                 return None;
             }
             let both_sides = scene.material_of(object).double_sided;
@@ -273,11 +275,11 @@ impl ExtendedLight {
         match &self.places {
             // A sample of a light without a closed form stands for a patch of it, since a point would be singular close
             // by.
-            LightSamples::Emitters { all, area_m2 } => {
+            LightSamples::Emitters { all, bright_m2 } => {
                 let patch_m2 = if self.shape.is_some() {
                     0.0
                 } else {
-                    area_m2 / run.len() as f64
+                    bright_m2 / run.len() as f64
                 };
                 IncidentLight::of_patch(&all[index], point.position, patch_m2)
             }

@@ -127,7 +127,7 @@ impl<'a> PhotonLaunch<'a> {
     /// The domain of an extended light; `light` has unit strength.
     fn of_places(tracer: &'a Tracer, light: &'a Light, spheres: &'a Spheres, seed: u64) -> Self {
         let scene: &Scene = tracer.scene();
-        let places = EmitterSampler::new(light, scene);
+        let places = spheres.places(light, scene);
         let mut media = (0..MEDIUM_PROBES).filter_map(|probe| {
             let position = places
                 .sample(even_point(probe, LAMP_DIMENSION, seed))?

@@ -48,7 +48,7 @@ impl Spheres {
         let spheres = spheres(tracer.scene(), casters, MAX_SPHERES);
         let evenly = |sphere| GuidedSphere::new(sphere, |_| 1.0);
         let even = Self(spheres.into_iter().map(evenly).collect());
-        let places = EmitterSampler::new(light, tracer.scene());
+        let places = even.places(light, tracer.scene());
         let (low, high) = tracer.scene().bounds().unwrap_or_default();
         let across_m = (high - low).length();
         let meets = |index: u32| {
@@ -70,6 +70,15 @@ impl Spheres {
             })
         });
         Self(guided.collect())
+    }
+
+    /// Points of a light that shines on the spheres.
+    pub fn places<'a>(&self, light: &'a Light, scene: &'a Scene) -> EmitterSampler<'a> {
+        let balls = self
+            .0
+            .iter()
+            .map(|guided| (guided.sphere.centre, guided.sphere.radius_m));
+        EmitterSampler::new(light, scene).towards(balls)
     }
 
     pub fn is_empty(&self) -> bool {
