@@ -23,7 +23,6 @@ use crate::light_pass::photon::subcell_features::SubcellFeatures;
 use crate::light_pass::photon::walk::PhotonRules;
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::light_pass::visibility::VisibleLight;
-use crate::scene::LightSize;
 use crate::settings::{ErrorMetric, Estimator};
 use crate::transport::EffectSet;
 
@@ -120,9 +119,10 @@ impl CausticLayer<'_> {
                 ..self.rules(light, unit)
             },
             chart_for,
-            blur_rad: match self.tracer.scene().lights[light.light].size {
-                LightSize::Angle { diameter_rad } => diameter_rad,
-                LightSize::None | LightSize::Radius { .. } => 0.0,
+            blur_rad: if self.has_places(light) {
+                light.width_rad(self.tracer.scene())
+            } else {
+                0.0
             },
             cells: TEXELS_PER_CELL * cells,
             reach_m: (light.launch.is_fitted() && self.settings.max_error.is_some()).then(reach_m),

@@ -2,17 +2,17 @@
 
 use std::sync::{Arc, OnceLock};
 
-use glam::DVec3;
+use glam::{DMat2, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::pass_report::{Seconds, Stopwatch};
 use crate::geometry::sampling::even_point;
-use crate::light_pass::emitter::Emitter;
+use crate::light_pass::emitter::{Emitter, EmitterSampler};
 use crate::light_pass::item_buffer::{HiddenCellPolicy, ItemBuffer};
 use crate::light_pass::launch::Launch;
 use crate::light_pass::photon::spheres::Spheres;
 use crate::plan::{LightReach, SceneReach};
-use crate::scene::{Light, LightKind, Material, Scene};
+use crate::scene::{Light, LightKind, LightSize, Material, Scene};
 use crate::settings::ItemBufferKind;
 use crate::transport::{Tracer, media_at};
 
@@ -54,6 +54,45 @@ impl VisibleLight {
         let has_places = scene.lights[self.light].has_extent();
         (has_places && self.casters.contains(&object))
             || self.item_buffer.is_marked_towards(&self.launch, bounds)
+    }
+
+    /// Angular width of the light as its casters see it, in its narrowest direction and from the caster that sees it
+    /// narrowest [rad]; 0 for the sky.
+    pub fn width_rad(&self, scene: &Scene) -> f64 {
+        let light = &scene.lights[self.light];
+        if let LightSize::Angle { diameter_rad } = light.size {
+            return diameter_rad;
+        }
+        let sampler = EmitterSampler::new(light, scene);
+        let places = (0..WIDTH_PLACES).filter_map(|place| {
+            let emitter = sampler.sample(even_point(place, 0, PLACES_SEED))?;
+            emitter.kind.position()
+        });
+        let places: Vec<DVec3> = places.collect();
+        let middle = places.iter().sum::<DVec3>() / places.len() as f64;
+        let from_caster = |&caster: &usize| {
+            let (low, high) = scene.objects[caster].bounds()?;
+            let path = middle - low.midpoint(high);
+            let (x, y) = path.try_normalize()?.any_orthonormal_pair();
+
+            // The smaller eigenvalue of the places' covariance across the path; a line's length is the root of twelve
+            // of its standard deviations.
+            let across = places.iter().map(|place| *place - middle);
+            let across = across.map(|offset| DVec2::new(offset.dot(x), offset.dot(y)));
+            let moments = across.map(|at| DMat2::from_cols(at * at.x, at * at.y));
+            let covariance = moments.sum::<DMat2>() * (places.len() as f64).recip();
+            let half_trace = 0.5 * (covariance.x_axis.x + covariance.y_axis.y);
+            let apart = (half_trace * half_trace - covariance.determinant())
+                .max(0.0)
+                .sqrt();
+            Some((12.0 * (half_trace - apart).max(0.0)).sqrt() / path.length())
+        };
+        let narrowest = self
+            .casters
+            .iter()
+            .filter_map(from_caster)
+            .fold(f64::INFINITY, f64::min);
+        if narrowest.is_finite() { narrowest } else { 0.0 }
     }
 
     /// Spheres that photons are aimed at from all points of the light; `source` is the light of unit strength.
@@ -175,6 +214,9 @@ const PLACES: u32 = 16;
 
 /// Most sample points, tried while the first ones see nothing.
 const MAX_PLACES: u32 = 256;
+
+/// Points of a light whose spread tells its width.
+const WIDTH_PLACES: u32 = 64;
 
 /// Seed of the sample points.
 const PLACES_SEED: u64 = 0;

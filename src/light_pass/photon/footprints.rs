@@ -37,7 +37,7 @@ pub struct FootprintPass<'a> {
     pub chart_for: &'a ChartFor<'a>,
     /// Parts of each root of the launch domain whose footprints are asked for.
     pub cells: f64,
-    /// Angular diameter of the light.
+    /// Angular width of the light as casters see it.
     pub blur_rad: f64,
     /// Distance that the cells of a sun are made for [m]; `None` keeps them. Light that ends nearer has finer ones: a glass
     /// in a wide landscape throws light as fine as one in a room.
@@ -124,8 +124,12 @@ impl FootprintPass<'_> {
             let [a, b, c] = corners.map(|corner| corner / size);
             let flux_w = flux_w.luminance() * area;
             let map_share = 0.5 * (b - a).perp_dot(c - a).abs() / (area * self.cells);
-            statistics.add(receiver, flux_w, map_share * chart.area_m2, map_share);
+            if map_share <= 0.0 {
+                return;
+            }
             let detail_share = (map_share / nearer).max(blurred_share);
+            let map_share = map_share.max(blurred_share);
+            statistics.add(receiver, flux_w, map_share * chart.area_m2, map_share);
             statistics.add_spot(FootprintSample {
                 receiver,
                 bounds: (a.min(b).min(c), a.max(b).max(c)),
