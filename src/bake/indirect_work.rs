@@ -9,7 +9,7 @@ use super::sizes::ChartCache;
 use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Layer, Receiver};
 use crate::light_pass::indirect::{
-    Grid, MAX_BOUNCES, MIN_PASSES, Network, Resampling, Solution, TraceCounts,
+    Grid, MAX_BOUNCES, MIN_PASSES, Network, NoiseTolerance, Resampling, Solution, TraceCounts,
 };
 use crate::light_pass::pass_report::{Seconds, Stopwatch};
 use crate::optics::LinearSrgb;
@@ -30,6 +30,8 @@ pub(super) struct IndirectWork {
     seconds: Seconds,
     /// The solution that the last maps show.
     solution: Option<Solution>,
+    /// Its noise.
+    tolerance: NoiseTolerance,
     /// Passes per element.
     passes: Vec<u8>,
     /// Target of the relative error.
@@ -72,7 +74,7 @@ impl IndirectWork {
             let is_there = self.step(bake, &limited, cache, maps, &passes);
             let wanting = match &self.solution {
                 Some(solution) if is_there && !bake.control.is_cancelled() => {
-                    solution.wanting(target, &passes)
+                    self.tolerance.wanting(target, solution, &passes)
                 }
                 _ => Vec::new(),
             };
@@ -112,7 +114,10 @@ impl IndirectWork {
         self.counts.segments += after.segments - before.segments;
         self.loss = (after.truncated + after.lost as f64) / (after.rays as f64).max(1.0);
         if is_traced {
-            self.solution = Some(network.solve(&sources(network, maps), passes));
+            let sources = sources(network, maps);
+            let solution = network.solve(&sources, passes);
+            self.tolerance = network.tolerance(&solution, &sources, bake.settings.error_metric);
+            self.solution = Some(solution);
             self.passes = passes.to_vec();
         }
         is_traced
@@ -233,7 +238,7 @@ impl IndirectWork {
         }
 
         // Noise above the target matters only once no more rays follow.
-        if self.is_done && solution.relative_noise > self.target {
+        if self.is_done && self.tolerance.relative_noise > self.target {
             let rays = Network::rays_after(self.passes.iter().copied().max().unwrap_or(0));
             let remedy = if self.is_cramped {
                 "allow more --memory"
@@ -244,7 +249,7 @@ impl IndirectWork {
                 "indirect layer",
                 format!(
                     "its estimated error is {}, above the target of {}, with up to {rays} rays per texel of its grid",
-                    percent(solution.relative_noise),
+                    percent(self.tolerance.relative_noise),
                     percent(self.target)
                 ),
                 remedy,

@@ -19,6 +19,7 @@ mod network;
 mod path;
 mod resample;
 mod solve;
+mod tolerance;
 mod trace;
 
 pub use element::{Element, Elements};
@@ -26,4 +27,5 @@ pub use grid::Grid;
 pub use network::{MAX_PASSES, MIN_PASSES, Network};
 pub use resample::Resampling;
 pub use solve::{MAX_BOUNCES, Solution};
+pub use tolerance::NoiseTolerance;
 pub use trace::TraceCounts;

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::network::{MAX_PASSES, Network};
+use super::network::Network;
 use crate::optics::LinearSrgb;
 
 /// Maximum number of bounces.
@@ -19,13 +19,9 @@ pub struct Solution {
     /// Standard error of its luminance by element [W/m²], estimated from the rays of the element and of those around
     /// it.
     pub noise: Vec<f64>,
-    /// Mean luminance of E by area [W/m²].
-    pub mean: f64,
     pub bounces: u32,
     /// False if [`MAX_BOUNCES`] was not enough.
     pub converged: bool,
-    /// Root mean square of the noise by area, relative to the mean; 0 without light.
-    pub relative_noise: f64,
 }
 
 impl Network {
@@ -62,14 +58,11 @@ impl Network {
             .map(|element| self.noise(element, &sent, passes[element]))
             .collect();
         let noise = self.pooled(&lone, passes);
-        let (mean, relative_noise) = self.relative(&noise, &irradiance);
         Solution {
             irradiance,
             noise,
-            mean,
             bounces,
             converged,
-            relative_noise,
         }
     }
 
@@ -117,42 +110,5 @@ impl Network {
         }
         let largest = |sums: [f64; 3]| sums.into_iter().fold(0.0, f64::max);
         (largest(change), largest(mean))
-    }
-
-    /// Mean of E by area, and the root mean square of the noise relative to it.
-    fn relative(&self, noise: &[f64], irradiance: &[LinearSrgb]) -> (f64, f64) {
-        let (mut squares, mut flux_w, mut area_m2) = (0.0, 0.0, 0.0);
-        for grid in self.grids() {
-            for (index, element) in grid.elements.all().iter().enumerate() {
-                let number = grid.first + index;
-                squares += noise[number] * noise[number] * element.area_m2;
-                flux_w += irradiance[number].luminance() * element.area_m2;
-                area_m2 += element.area_m2;
-            }
-        }
-        if flux_w > 0.0 {
-            (flux_w / area_m2, (squares * area_m2).sqrt() / flux_w)
-        } else {
-            (0.0, 0.0)
-        }
-    }
-}
-
-impl Solution {
-    /// Elements that need more rays for a relative error of `target`, ascending. The limit of each is relative to its
-    /// own E, or to half the mean if it is darker. As long as the total error exceeds the target, the limit is stricter
-    /// for elements that contribute most to it.
-    pub fn wanting(&self, target: f64, passes: &[u8]) -> Vec<usize> {
-        let is_rough = self.relative_noise > target;
-        let most = |element: usize| {
-            let own = self.irradiance[element].luminance() / self.mean;
-            let alone = own.max(0.5);
-            // Errors in proportion to √E add up to the target.
-            let together = (0.5 * own.max(0.25)).sqrt();
-            target * self.mean * if is_rough { alone.min(together) } else { alone }
-        };
-        (0..passes.len())
-            .filter(|&element| passes[element] < MAX_PASSES && self.noise[element] > most(element))
-            .collect()
     }
 }
