@@ -8,7 +8,7 @@ use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Receiver};
 use crate::light_pass::ledger::LightLedger;
 use crate::plan::EffectPlan;
-use crate::settings::{ErrorMetric, LayerKind};
+use crate::settings::{BakeSettings, ErrorMetric, LayerKind};
 
 /// Why a bake ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -146,5 +146,15 @@ impl Bake {
     /// The estimated error of all maps, in a metric.
     pub fn estimated_error(&self, metric: ErrorMetric) -> Option<f64> {
         metric.of(self.estimated_visible, self.estimated_relative_rmse)
+    }
+
+    /// Whether refinement ended by the target, and the error of all layers meets it as well: the rays of indirect light
+    /// may not suffice.
+    pub fn has_met_target(&self, settings: &BakeSettings) -> bool {
+        let error = self.estimated_error(settings.error_metric);
+        let is_met = settings
+            .max_error
+            .is_none_or(|target| error.is_none_or(|error| error <= target));
+        self.stop_reason == StopReason::MaxError && is_met
     }
 }

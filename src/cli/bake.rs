@@ -238,7 +238,8 @@ pub fn summary(manifest: &Manifest, result: &Bake, folder: &str) -> String {
     let (visible, rmse) = (result.estimated_visible, result.estimated_relative_rmse);
     if let Some((visible, rmse)) = visible.zip(rmse) {
         let why = match result.stop_reason {
-            StopReason::MaxError => ": the target is met",
+            StopReason::MaxError if result.has_met_target(&manifest.settings) => ": the target is met",
+            StopReason::MaxError => ": the target is missed",
             StopReason::MaxTime => ": the time was up",
             StopReason::Memory => ": the target takes more memory",
             _ => "",

@@ -5,6 +5,7 @@
 mod bake {
     //! Bakes of reference scenes: against an independent solver, against the law of energy, against themselves.
 
+    mod glowing;
     mod instances;
     mod mixture;
     mod photon;

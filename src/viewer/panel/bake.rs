@@ -104,7 +104,7 @@ const SOONER: &str =
 
 /// Whether the bake reached its target error.
 fn has_converged(last: Option<&BakedLevel>) -> bool {
-    last.is_some_and(|last| last.result.stop_reason == StopReason::MaxError)
+    last.is_some_and(|last| last.result.has_met_target(&last.request.settings))
 }
 
 fn last_bake(ui: &mut Ui, last: &BakedLevel) {

@@ -3,6 +3,7 @@
 use nephroid::bake::Baker;
 use nephroid::illumination::{Chart, Receiver};
 use nephroid::light_pass::indirect::{MIN_PASSES, Network, TraceCounts};
+use nephroid::settings::ErrorMetric;
 
 use crate::bake::common::{self, all_bits, run, with_layers};
 use support::meshes::{cuboid, floor, inside_out, quad, sphere};
@@ -105,6 +106,32 @@ fn walls_take_all_that_a_lamp_sends() {
         let gathered = result.counts.gather_segments as f64 / result.counts.gather_rays as f64;
         assert!(!has_ball || gathered > 1.1, "rays go through the glass");
     }
+}
+
+/// A floor under a lamp gets a hundredth of its light by way of a ball of glass: beside the lamp's, the noise of so little
+/// is not seen, and takes fewer rays than for a layer of its own.
+#[test]
+fn noise_beside_bright_light_costs_no_rays() {
+    let parts = || {
+        let ball = sphere(dvec3(0.0, 0.5, 0.0), 0.3, 48, 24);
+        vec![
+            (floor(1.0, 0.0), diffuse(0.5)),
+            (ball, smooth(SurfaceKind::Dielectric)),
+        ]
+    };
+    let lamp = || point_light(dvec3(0.0, 2.0, 0.0), 5.0);
+    let all = [LayerKind::Caustic, LayerKind::Direct, LayerKind::Indirect];
+    let [alone, beside] = [ErrorMetric::Rmse, ErrorMetric::Visible].map(|metric| {
+        let settings = set(settings(&all, 64, 0.1), |settings| settings.error_metric = metric);
+        let result = bake(scene(parts(), vec![lamp()]), &settings);
+        assert!(
+            metric == ErrorMetric::Rmse || result.warnings.is_empty(),
+            "{:?}",
+            result.warnings
+        );
+        result.counts.gather_rays
+    });
+    assert!(4 * beside < alone, "{beside} and {alone} rays");
 }
 
 /// What comes from other surfaces where each element gets E = 1 W/m² from elsewhere, by paths over at most `max_depth`

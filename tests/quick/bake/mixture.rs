@@ -3,7 +3,7 @@
 use nephroid::optics::Glass;
 use nephroid::scene::{Glow, Variation};
 use support::floors::{image, texture_reference};
-use support::meshes::{floor, grid, quad};
+use support::meshes::{floor, quad};
 use support::scenes::{chart, direct, flux_w, light, scene};
 use support::tools::{bake, caustic, energy_fault, photons};
 
@@ -213,52 +213,6 @@ fn lamps_that_are_mostly_black_shine() {
     let result = bake(scene, &photons(3e5, 16));
     assert_eq!(energy_fault(&result), None);
     assert!(result.ledgers[0].energy_w.emitted > 0.0);
-}
-
-/// Single bright texels between the samples of their triangles' means: these have the weight that keeps photons from there
-/// from outshining all others.
-#[test]
-fn bright_spots_of_dark_triangles_have_weight() {
-    const SIDE: usize = 2048;
-    const CELLS: usize = 8;
-    let mut image = image(SIDE as u32, vec![[0, 0, 0, 255]; SIDE * SIDE], Wrap::ClampToEdge);
-    let spots: Vec<usize> = (1..SIDE * SIDE).step_by(100_003).collect();
-    for &spot in &spots {
-        image.rgba[spot] = [255; 4];
-    }
-    let lamp = Material {
-        emission_texture: Some(texture_reference()),
-        ..Material::default()
-    };
-    let mut sheet = grid(CELLS, CELLS, |u, v| dvec3(u, 0.0, v));
-    sheet.uv0 = Some(
-        sheet
-            .positions
-            .iter()
-            .map(|place| DVec2::new(place.x, place.z))
-            .collect(),
-    );
-    let mut scene = scene(vec![(sheet, lamp)], vec![]);
-    let glow = Glow::new(scene.objects[0].in_scene(), &texture_reference(), &image).expect("it glows");
-    scene.glows.insert(0, Arc::new(glow.clone()));
-    scene.textures.push(Arc::new(image));
-    for spot in spots {
-        let place = [spot % SIDE, spot / SIDE].map(|texel| (texel as f64 + 0.5) * CELLS as f64 / SIDE as f64);
-        let [(column, s), (row, t)] = place.map(|along| (along as usize, along.fract()));
-        let (second, barycentric) = match s >= t {
-            true => (0, [1.0 - s, s - t, t]),
-            false => (1, [1.0 - t, s, t - s]),
-        };
-        let triangle = 2 * (row * CELLS + column) + second;
-        let (relative, weight) = (
-            scene.glow_at(0, triangle, barycentric).luminance(),
-            glow.weights[triangle],
-        );
-        assert!(
-            relative > 1e3 && relative <= 16.0 * weight,
-            "{relative} for {weight}"
-        );
-    }
 }
 
 #[test]
