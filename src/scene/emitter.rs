@@ -176,7 +176,7 @@ impl<'a> EmitterSampler<'a> {
         self
     }
 
-    /// Outline of a light that faces one way; `None` for other lights.
+    /// Outline of a light that faces one way, or that looks as if it did, as a ball does; `None` for other lights.
     pub fn outline(&self) -> Option<PanelShape> {
         match self.light.kind {
             LightKind::Sun { .. } | LightKind::Spot { .. } => Some(PanelShape::Disc),
@@ -186,8 +186,14 @@ impl<'a> EmitterSampler<'a> {
                 let is_panel = surface.parallelogram.is_some() && !surface.both_sides;
                 is_panel.then_some(PanelShape::Rectangle)
             }
-            LightKind::Point { .. } | LightKind::Environment { .. } => None,
+            LightKind::Point { .. } => (self.light.ball_radius_m() > 0.0).then_some(PanelShape::Disc),
+            LightKind::Environment { .. } => None,
         }
+    }
+
+    /// The light.
+    pub fn light(&self) -> &'a Light {
+        self.light
     }
 
     /// Emitting area of an object, over all its emitting sides, or of a panel [m²]; 0 for other lights.
@@ -212,6 +218,11 @@ impl<'a> EmitterSampler<'a> {
         self.surface
             .as_ref()
             .map_or(self.area_m2(), |surface| surface.bright_area_m2)
+    }
+
+    /// The light's centre, as [`Emitter::middle`].
+    pub fn middle(&self) -> Option<Emitter> {
+        self.at(None)
     }
 
     fn at(&self, square: Option<DVec2>) -> Option<Emitter> {

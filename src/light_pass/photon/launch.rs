@@ -6,7 +6,7 @@
 
 use glam::DVec2;
 
-use super::spheres::Spheres;
+use super::spheres::{LampPoint, Spheres};
 use crate::geometry::Ray;
 use crate::geometry::cube_face::FaceMapping;
 use crate::geometry::sampling::{even_code, even_point, in_square, unfolded};
@@ -171,8 +171,8 @@ impl<'a> PhotonLaunch<'a> {
             }
             Domain::Spheres(lamp) => {
                 let seen = |square: DVec2| {
-                    let emitter = lamp.places.sample(square);
-                    emitter.map_or(0.0, |emitter| lamp.spheres.measure(&emitter))
+                    let point = LampPoint::of(&lamp.places, square);
+                    point.map_or(0.0, |point| lamp.spheres.measure(&point))
                 };
                 match seen(LAMP_MIDDLE) {
                     // The centre may face away.
@@ -239,9 +239,9 @@ impl<'a> PhotonLaunch<'a> {
                 })
             }
             Domain::Spheres(of) => {
-                let emitter = of.places.sample(lamp)?;
-                let light = of.spheres.aim_at(&emitter, root, square, of.across_m)?;
-                Some(of.start(&emitter, light))
+                let point = LampPoint::of(&of.places, lamp)?;
+                let light = of.spheres.aim_at(&point, root, square, of.across_m)?;
+                Some(of.start(&point.emitter, light))
             }
         }
     }
@@ -277,9 +277,9 @@ impl<'a> PhotonLaunch<'a> {
                 full_w,
             } => (launch, cells, full_w),
             Domain::Spheres(lamp) => {
-                let emitter = lamp.places.sample(self.lamp_place(index, seed))?;
-                let visible_light = lamp.spheres.aim(&emitter, place, lamp.across_m)?;
-                return Some(lamp.start(&emitter, visible_light));
+                let point = LampPoint::of(&lamp.places, self.lamp_place(index, seed))?;
+                let light = lamp.spheres.aim(&point, place, lamp.across_m)?;
+                return Some(lamp.start(&point.emitter, light));
             }
         };
         // All cells get equally many photons.
@@ -305,7 +305,7 @@ impl Lamp<'_> {
     fn start(&self, emitter: &Emitter, (ray, measure): (Ray, f64)) -> Start {
         let media = match (self.media, emitter.kind.position()) {
             (Some(media), _) => media,
-            (None, Some(position)) => media_at(self.tracer, position),
+            (None, Some(_)) => media_at(self.tracer, ray.origin),
             (None, None) => MediumStack::default(),
         };
         Start {

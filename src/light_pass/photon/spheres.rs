@@ -30,6 +30,74 @@ const PROBE_SEED: u64 = 0x7072_6f62_6573;
 /// Density of photons in a cell without hits, relative to one with hits.
 const RARE: f64 = 1.0 / 16.0;
 
+/// A point of a lamp, as rays are aimed from it.
+pub struct LampPoint {
+    /// The point or, of a ball of light, its centre.
+    pub emitter: Emitter,
+    ball: Option<BallPoint>,
+}
+
+/// A point of the disc as which a ball of light is seen.
+#[derive(Clone, Copy)]
+struct BallPoint {
+    radius_m: f64,
+    /// In the unit disc.
+    place: DVec2,
+}
+
+impl LampPoint {
+    /// By a point of the lamp's unit square; `None` if it emits nothing.
+    pub fn of(places: &EmitterSampler, square: DVec2) -> Option<Self> {
+        let radius_m = places.light().ball_radius_m();
+        let ball = (radius_m > 0.0).then(|| BallPoint {
+            radius_m,
+            place: on_disc(square),
+        });
+        let emitter = if ball.is_some() {
+            places.middle()
+        } else {
+            places.sample(square)
+        };
+        Some(Self {
+            emitter: emitter?,
+            ball,
+        })
+    }
+}
+
+impl BallPoint {
+    /// The line through a point in some direction [m] from the ball's centre, and through the disc that is seen from
+    /// there. Also the measure of lines relative to that of directions from the centre to such points, times the ball's
+    /// cross-section: a ball of even radiance shines evenly along all lines that meet it.
+    ///
+    /// `across` is any vector across these directions, roughly.
+    fn line_to(&self, centre: DVec3, (direction, distance_m): (DVec3, f64), across: DVec3) -> (Ray, f64) {
+        // Lines from the point that touch the ball meet the plane through its centre in a circle that is a little wider
+        // than the ball.
+        let slope = self.radius_m / distance_m;
+        let wider = 1.0 / (1.0 - slope * slope).sqrt();
+        let x = across.reject_from_normalized(direction).try_normalize();
+        let x = x.unwrap_or_else(|| direction.any_orthonormal_vector());
+        let place = self.place * (self.radius_m * wider);
+        let offset = x * place.x + direction.cross(x) * place.y;
+        let ahead = (direction * distance_m - offset).normalize();
+
+        // Of area on the far sphere and of the plane, a line sees the cosine; the solid angle of the plane's area falls
+        // with the squared distance.
+        let cosine2 = distance_m.powi(2) / (distance_m.powi(2) + place.length_squared());
+        let measure = (wider * cosine2).powi(2);
+
+        // It starts where it leaves the ball.
+        let nearest = offset - ahead * offset.dot(ahead);
+        let half_chord_m = (self.radius_m.powi(2) - nearest.length_squared()).max(0.0).sqrt();
+        let ray = Ray {
+            origin: centre + nearest + ahead * half_chord_m,
+            direction: ahead,
+        };
+        (ray, measure)
+    }
+}
+
 /// Bounding spheres of specular surfaces.
 #[derive(Clone, Debug, Default)]
 pub struct Spheres(Vec<GuidedSphere>);
@@ -52,8 +120,8 @@ impl Spheres {
         let (low, high) = tracer.scene().bounds().unwrap_or_default();
         let across_m = (high - low).length();
         let meets = |index: u32| {
-            let emitter = places.sample(even_point(index, LAMP_DIMENSION, PROBE_SEED))?;
-            let (ray, choice) = even.choose(&emitter, even_code(index, PROBE_SEED), across_m)?;
+            let point = LampPoint::of(&places, even_point(index, LAMP_DIMENSION, PROBE_SEED))?;
+            let (ray, choice) = even.choose(&point, even_code(index, PROBE_SEED), across_m)?;
             let hit = tracer.closest_hit(&ray)?;
             let surface = tracer.scene().material_of(hit.object).surface;
             surface.is_specular().then_some((choice.which, choice.cell))
@@ -87,14 +155,14 @@ impl Spheres {
 
     /// Solid angle that a point of a lamp illuminates towards the spheres [sr], or their cross-section in parallel
     /// light [m²].
-    pub fn measure(&self, emitter: &Emitter) -> f64 {
-        self.0.iter().map(|guided| guided.sphere.measure(emitter)).sum()
+    pub fn measure(&self, lamp: &LampPoint) -> f64 {
+        self.0.iter().map(|guided| guided.sphere.measure(lamp)).sum()
     }
 
     /// A ray from a point of a lamp towards one of the spheres, and the measure [sr or m²] that it represents. `None`
     /// also if the ray could have been aimed at an earlier sphere, to which it then belongs.
-    pub fn aim(&self, emitter: &Emitter, place: u64, across_m: f64) -> Option<(Ray, f64)> {
-        let (ray, choice) = self.choose(emitter, place, across_m)?;
+    pub fn aim(&self, lamp: &LampPoint, place: u64, across_m: f64) -> Option<(Ray, f64)> {
+        let (ray, choice) = self.choose(lamp, place, across_m)?;
         Some((ray, choice.measure))
     }
 
@@ -106,28 +174,35 @@ impl Spheres {
     /// `None` if nothing is emitted towards the sphere, or the ray belongs to an earlier one.
     pub(super) fn aim_at(
         &self,
-        emitter: &Emitter,
+        lamp: &LampPoint,
         which: usize,
         square: DVec2,
         across_m: f64,
     ) -> Option<(Ray, f64)> {
-        let measure = self.0.get(which)?.sphere.measure(emitter);
+        let measure = self.0.get(which)?.sphere.measure(lamp);
         if !(measure > 0.0 && measure.is_finite()) {
             return None;
         }
-        Some((self.ray(emitter, which, square, across_m)?, measure))
+        let (ray, share) = self.ray(lamp, which, square, across_m)?;
+        Some((ray, measure * share))
     }
 
-    fn choose(&self, emitter: &Emitter, place: u64, across_m: f64) -> Option<(Ray, Choice)> {
-        let choice = self.cell(emitter, place)?;
-        let ray = self.ray(emitter, choice.which, in_square(choice.place), across_m)?;
+    fn choose(&self, lamp: &LampPoint, place: u64, across_m: f64) -> Option<(Ray, Choice)> {
+        let mut choice = self.cell(lamp, place)?;
+        let (ray, share) = self.ray(lamp, choice.which, in_square(choice.place), across_m)?;
+        choice.measure *= share;
         Some((ray, choice))
     }
 
-    /// From a point of a lamp through a point of a sphere's square; `None` if the ray belongs to an earlier sphere.
-    fn ray(&self, emitter: &Emitter, which: usize, square: DVec2, across_m: f64) -> Option<Ray> {
+    /// From a point of a lamp through a point of a sphere's square, and the share of the square's measure that it stands
+    /// for; `None` if the ray belongs to an earlier sphere.
+    fn ray(&self, lamp: &LampPoint, which: usize, square: DVec2, across_m: f64) -> Option<(Ray, f64)> {
         let sphere = &self.0[which].sphere;
-        let ray = match emitter.kind {
+        let is_taken = |ray: &Ray| {
+            let mut earlier = self.0[..which].iter().map(|guided| &guided.sphere);
+            earlier.any(|sphere| sphere.has(ray, &lamp.emitter) && sphere.measure(lamp) > 0.0)
+        };
+        let ray = match lamp.emitter.kind {
             EmitterKind::Parallel { direction } => {
                 let (x, y) = direction.any_orthonormal_pair();
                 let offset = on_disc(square) * sphere.radius_m;
@@ -140,21 +215,33 @@ impl Spheres {
             | EmitterKind::Spot { position, .. }
             | EmitterKind::Facet { position, .. } => {
                 let axis = (sphere.centre - position).normalize_or(DVec3::Z);
+                let direction = in_cap(axis, sphere.half_angle_rad(position, lamp.ball), square);
+                if let Some(ball) = lamp.ball {
+                    let apart_m = position.distance(sphere.centre);
+                    let distance_m = if apart_m > sphere.radius_m + ball.radius_m {
+                        apart_m
+                    } else {
+                        // In all directions, any distance beyond the ball will do.
+                        apart_m.max(2.0 * ball.radius_m)
+                    };
+                    let across = axis.any_orthonormal_vector();
+                    let (ray, share) = ball.line_to(position, (direction, distance_m), across);
+                    // Lines that miss the sphere may meet another one, and then are aimed at it.
+                    return (sphere.has(&ray, &lamp.emitter) && !is_taken(&ray)).then_some((ray, share));
+                }
                 Ray {
                     origin: position,
-                    direction: in_cap(axis, sphere.half_angle_rad(position), square),
+                    direction,
                 }
             }
         };
-        let mut earlier = self.0[..which].iter().map(|guided| &guided.sphere);
-        let is_taken = earlier.any(|sphere| sphere.has(&ray, emitter) && sphere.measure(emitter) > 0.0);
-        (!is_taken).then_some(ray)
+        (!is_taken(&ray)).then_some((ray, 1.0))
     }
 
-    fn cell(&self, emitter: &Emitter, place: u64) -> Option<Choice> {
+    fn cell(&self, lamp: &LampPoint, place: u64) -> Option<Choice> {
         let mut measures = [0.0; MAX_SPHERES];
         for (measure, guided) in measures.iter_mut().zip(&self.0) {
-            *measure = guided.sphere.measure(emitter) * guided.before[CELLS];
+            *measure = guided.sphere.measure(lamp) * guided.before[CELLS];
         }
         let total: f64 = measures.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
@@ -220,7 +307,8 @@ struct Sphere {
 
 impl Sphere {
     /// Solid angle that an emitter illuminates towards the sphere [sr], or its cross-section in parallel light [m²].
-    fn measure(&self, emitter: &Emitter) -> f64 {
+    fn measure(&self, lamp: &LampPoint) -> f64 {
+        let LampPoint { emitter, ball } = lamp;
         let Some(position) = emitter.kind.position() else {
             return std::f64::consts::PI * self.radius_m * self.radius_m;
         };
@@ -230,7 +318,7 @@ impl Sphere {
         {
             return 0.0;
         }
-        let half_angle_rad = self.half_angle_rad(position);
+        let half_angle_rad = self.half_angle_rad(position, *ball);
         if let EmitterKind::Spot {
             direction,
             outer_cone_rad,
@@ -243,11 +331,15 @@ impl Sphere {
         cap_sr(half_angle_rad)
     }
 
-    /// Half-angle of the cone around the sphere [rad]; π from inside.
-    fn half_angle_rad(&self, position: DVec3) -> f64 {
+    /// Half-angle of the cone around the sphere [rad]; π from inside. From a ball of light, that of the points which its
+    /// lines towards the sphere pass at the distance of the sphere's centre.
+    fn half_angle_rad(&self, position: DVec3, ball: Option<BallPoint>) -> f64 {
         let distance_m = position.distance(self.centre);
-        if distance_m > self.radius_m {
-            (self.radius_m / distance_m).asin()
+        let ball_m = ball.map_or(0.0, |ball| ball.radius_m);
+        if distance_m > self.radius_m + ball_m {
+            // A line in the steepest direction starts at the rim of the ball, and so turns back by as much as that is
+            // aside.
+            ((self.radius_m + ball_m) / distance_m).asin() - (ball_m / distance_m).asin()
         } else {
             std::f64::consts::PI
         }
@@ -255,12 +347,11 @@ impl Sphere {
 
     /// Whether a ray of an emitter may have been aimed at the sphere.
     fn has(&self, ray: &Ray, emitter: &Emitter) -> bool {
-        let Some(position) = emitter.kind.position() else {
-            let towards = self.centre - ray.origin;
+        let towards = self.centre - ray.origin;
+        if emitter.kind.position().is_none() {
             let beside = towards - ray.direction * towards.dot(ray.direction);
             return beside.length_squared() <= self.radius_m * self.radius_m;
-        };
-        let towards = self.centre - position;
+        }
         let along = towards.dot(ray.direction);
         let distance2 = towards.length_squared();
         let radius2 = self.radius_m * self.radius_m;
