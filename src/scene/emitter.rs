@@ -136,7 +136,13 @@ pub struct EmitterSampler<'a> {
     scene: &'a Scene,
     /// Of an emissive object.
     surface: Option<Glowing<'a>>,
+    /// See [`Self::disc_radius_m`].
+    disc_radius_m: Option<f64>,
 }
+
+/// Distance in radii of a ball and a sphere together from which the lines between them are those between two discs, but
+/// for 3 % of the sphere's radius.
+const AFAR: f64 = 3.0;
 
 impl<'a> EmitterSampler<'a> {
     /// Prepares a light of a scene.
@@ -158,6 +164,7 @@ impl<'a> EmitterSampler<'a> {
             light,
             scene,
             surface,
+            disc_radius_m: None,
         }
     }
 
@@ -166,14 +173,27 @@ impl<'a> EmitterSampler<'a> {
         self.at(Some(square))
     }
 
-    /// The same for light towards balls alone, given by their centres and radii [m]: if all of them lie on one side of a
-    /// flat surface that shines from both, no sample is spent on the other.
+    /// The same for light towards spheres alone, given by their centres and radii [m]. If all of them lie on one side of
+    /// a flat surface that shines from both, no sample is spent on the other. From afar, a ball of light is a disc.
     #[must_use]
-    pub fn towards(mut self, balls: impl Iterator<Item = (DVec3, f64)>) -> Self {
+    pub fn towards(mut self, spheres: impl Iterator<Item = (DVec3, f64)> + Clone) -> Self {
         if let Some(surface) = &mut self.surface {
-            surface.choose_side(balls);
+            surface.choose_side(spheres.clone());
+        }
+        if let (LightKind::Point { position, .. }, LightSize::Radius { radius_m }) =
+            (self.light.kind, self.light.size)
+        {
+            let mut spheres = spheres;
+            let is_far =
+                |(centre, sphere_m): (DVec3, f64)| centre.distance(position) > AFAR * (radius_m + sphere_m);
+            self.disc_radius_m = spheres.all(is_far).then_some(radius_m);
         }
         self
+    }
+
+    /// Radius of a ball of light that is far from all that it shines on [m]; `None` for other lights.
+    pub fn disc_radius_m(&self) -> Option<f64> {
+        self.disc_radius_m
     }
 
     /// Outline of a light that faces one way, or that looks as if it did, as a ball does; `None` for other lights.
@@ -186,14 +206,9 @@ impl<'a> EmitterSampler<'a> {
                 let is_panel = surface.parallelogram.is_some() && !surface.both_sides;
                 is_panel.then_some(PanelShape::Rectangle)
             }
-            LightKind::Point { .. } => (self.light.ball_radius_m() > 0.0).then_some(PanelShape::Disc),
+            LightKind::Point { .. } => self.disc_radius_m.map(|_| PanelShape::Disc),
             LightKind::Environment { .. } => None,
         }
-    }
-
-    /// The light.
-    pub fn light(&self) -> &'a Light {
-        self.light
     }
 
     /// Emitting area of an object, over all its emitting sides, or of a panel [m²]; 0 for other lights.

@@ -131,14 +131,6 @@ impl Light {
         }
     }
 
-    /// Radius of a point light that is a ball of even radiance [m]; 0 for other lights.
-    pub fn ball_radius_m(&self) -> f64 {
-        match (self.kind, self.size) {
-            (LightKind::Point { .. }, LightSize::Radius { radius_m }) => radius_m,
-            _ => 0.0,
-        }
-    }
-
     /// Factor on its maps per channel: [`LightKind::strength`] times the colour.
     pub fn strength(&self) -> LinearSrgb {
         self.colour * self.kind.strength()

@@ -37,7 +37,7 @@ pub struct LampPoint {
     ball: Option<BallPoint>,
 }
 
-/// A point of the disc as which a ball of light is seen.
+/// A point of the disc as which a ball of light is seen from afar.
 #[derive(Clone, Copy)]
 struct BallPoint {
     radius_m: f64,
@@ -48,8 +48,7 @@ struct BallPoint {
 impl LampPoint {
     /// By a point of the lamp's unit square; `None` if it emits nothing.
     pub fn of(places: &EmitterSampler, square: DVec2) -> Option<Self> {
-        let radius_m = places.light().ball_radius_m();
-        let ball = (radius_m > 0.0).then(|| BallPoint {
+        let ball = places.disc_radius_m().map(|radius_m| BallPoint {
             radius_m,
             place: on_disc(square),
         });
@@ -217,13 +216,7 @@ impl Spheres {
                 let axis = (sphere.centre - position).normalize_or(DVec3::Z);
                 let direction = in_cap(axis, sphere.half_angle_rad(position, lamp.ball), square);
                 if let Some(ball) = lamp.ball {
-                    let apart_m = position.distance(sphere.centre);
-                    let distance_m = if apart_m > sphere.radius_m + ball.radius_m {
-                        apart_m
-                    } else {
-                        // In all directions, any distance beyond the ball will do.
-                        apart_m.max(2.0 * ball.radius_m)
-                    };
+                    let distance_m = position.distance(sphere.centre);
                     let across = axis.any_orthonormal_vector();
                     let (ray, share) = ball.line_to(position, (direction, distance_m), across);
                     // Lines that miss the sphere may meet another one, and then are aimed at it.
@@ -331,8 +324,8 @@ impl Sphere {
         cap_sr(half_angle_rad)
     }
 
-    /// Half-angle of the cone around the sphere [rad]; π from inside. From a ball of light, that of the points which its
-    /// lines towards the sphere pass at the distance of the sphere's centre.
+    /// Half-angle of the cone around the sphere [rad]; π from inside. From a ball of light that is far away, that of the
+    /// points which its lines towards the sphere pass at the distance of the sphere's centre.
     fn half_angle_rad(&self, position: DVec3, ball: Option<BallPoint>) -> f64 {
         let distance_m = position.distance(self.centre);
         let ball_m = ball.map_or(0.0, |ball| ball.radius_m);

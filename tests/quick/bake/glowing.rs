@@ -180,7 +180,7 @@ fn balls_of_light_are_glowing_spheres() {
         let off = off(&of_ball, &of_mesh, &by_ball);
         assert!(off < 0.15, "{radius_m} m: {off}");
         let rays = [&of_ball, &of_mesh].map(|bake| bake.counts.rays);
-        assert!(rays[0] < rays[1], "{rays:?}");
+        assert!(rays[0] <= rays[1], "{rays:?}");
     }
 }
 
