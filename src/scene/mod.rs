@@ -24,6 +24,7 @@ pub mod edit;
 pub mod emitter;
 pub mod environment;
 mod glow;
+mod glow_sampler;
 mod gltf;
 pub mod instances;
 pub mod light;
