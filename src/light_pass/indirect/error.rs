@@ -26,7 +26,8 @@ impl Network {
             pooled.extend((0..grid.elements.all().len()).map(|element| {
                 let rays = |element: usize| f64::from(Self::rays_after(passes[grid.first + element]));
                 let (mut sum, mut count) = (0.0, 0.0);
-                for near in around(grid, element) {
+                let (texel, piece) = place(grid, element);
+                for near in grid.around(texel, piece) {
                     sum += noise[grid.first + near].powi(2) * rays(near);
                     count += 1.0;
                 }
@@ -37,27 +38,18 @@ impl Network {
     }
 }
 
-/// An element and those of its piece in the eight texels around it.
-fn around(grid: &Grid, element: usize) -> impl Iterator<Item = usize> {
-    let steps = (-1..=1).flat_map(|down| (-1..=1).map(move |right| (right, down)));
-    steps.filter_map(move |step| beside(grid, element, step))
-}
-
-fn beside(grid: &Grid, element: usize, (right, down): (i64, i64)) -> Option<usize> {
+/// Column and row of an element's texel, and its piece.
+fn place(grid: &Grid, element: usize) -> ([i64; 2], u32) {
     let own = grid.elements.all()[element];
-    let (width, height) = (grid.chart.width as i64, grid.chart.height as i64);
-    let column = i64::from(own.texel) % width + right;
-    let row = i64::from(own.texel) / width + down;
-    let inside = (0..width).contains(&column) && (0..height).contains(&row);
-    inside
-        .then(|| grid.elements.find((row * width + column) as usize, own.piece))
-        .flatten()
+    let (texel, width) = (i64::from(own.texel), grid.chart.width as i64);
+    ([texel % width, texel / width], own.piece)
 }
 
 /// Error of linear interpolation between neighbours: an eighth of the second difference; at a border, an eighth of the
 /// first.
 fn bend(grid: &Grid, element: usize, (right, down): (i64, i64), value: &impl Fn(usize) -> f64) -> f64 {
-    let ends = [(right, down), (-right, -down)].map(|step| beside(grid, element, step));
+    let ([column, row], piece) = place(grid, element);
+    let ends = [1, -1].map(|sign| grid.element_in([column + sign * right, row + sign * down], piece));
     match ends {
         [Some(a), Some(b)] => (value(a) - 2.0 * value(element) + value(b)).abs() / 8.0,
         [Some(one), None] | [None, Some(one)] => (value(one) - value(element)).abs() / 8.0,

@@ -44,21 +44,37 @@ impl Grid {
     pub fn element_at(&self, triangle: usize, barycentric: [f64; 3]) -> Option<usize> {
         let uv = self.chart.uv(triangle, barycentric);
         let texel_of = |coordinate: f64, count: usize| {
-            ((coordinate * count as f64).floor().max(0.0) as usize).min(count - 1)
+            ((coordinate * count as f64).floor().max(0.0) as usize).min(count - 1) as i64
         };
-        let (width, height) = (self.chart.width, self.chart.height);
-        let (column, row) = (texel_of(uv.x, width), texel_of(uv.y, height));
-        let piece = self.pieces[triangle];
-        let own = self.elements.find(row * width + column, piece);
+        let texel = [
+            texel_of(uv.x, self.chart.width),
+            texel_of(uv.y, self.chart.height),
+        ];
         // Rounding may put the point just outside of the element's texel.
-        let beside = || {
-            let rows = row.saturating_sub(1)..(row + 2).min(height);
-            let mut texels = rows.flat_map(|row| {
-                (column.saturating_sub(1)..(column + 2).min(width)).map(move |column| row * width + column)
-            });
-            texels.find_map(|texel| self.elements.find(texel, piece))
-        };
-        own.or_else(beside).map(|index| self.first + index)
+        let index = self.nearest(texel, self.pieces[triangle])?;
+        Some(self.first + index)
+    }
+
+    /// Index of the element of a piece in a column and row of texels, which may lie outside the grid.
+    pub fn element_in(&self, [column, row]: [i64; 2], piece: u32) -> Option<usize> {
+        let (width, height) = (self.chart.width as i64, self.chart.height as i64);
+        if !(0..width).contains(&column) || !(0..height).contains(&row) {
+            return None;
+        }
+        self.elements.find((row * width + column) as usize, piece)
+    }
+
+    /// Elements of a piece in a texel and the eight around it, row by row.
+    pub fn around(&self, [column, row]: [i64; 2], piece: u32) -> impl Iterator<Item = usize> {
+        let texels = (row - 1..=row + 1)
+            .flat_map(move |row| (column - 1..=column + 1).map(move |column| [column, row]));
+        texels.filter_map(move |texel| self.element_in(texel, piece))
+    }
+
+    /// The element of a piece in a texel, or else one beside it.
+    pub fn nearest(&self, texel: [i64; 2], piece: u32) -> Option<usize> {
+        let own = self.element_in(texel, piece);
+        own.or_else(|| self.around(texel, piece).next())
     }
 
     /// A point of an element, uniform by area, from a point of the unit square; `None` if its triangle is degenerate.

@@ -160,17 +160,7 @@ impl<'a> Resampling<'a> {
         values: &[[f64; 3]],
         is_hidden: &impl Fn(usize) -> bool,
     ) -> [f64; 3] {
-        // Only elements of the texel's own piece take part: light is not interpolated across creases.
-        let (width, height) = (self.grid.chart.width as i64, self.grid.chart.height as i64);
-        let element = |column: i64, row: i64| {
-            let inside = (0..width).contains(&column) && (0..height).contains(&row);
-            inside
-                .then(|| self.grid.elements.find((row * width + column) as usize, piece))
-                .flatten()
-        };
-        let own = element(place.x.floor() as i64, place.y.floor() as i64);
-
-        // Bilinear weights, divided by the sum of those in use: at the border of a piece some of the four are missing.
+        // Only elements of the texel's own piece take part: light is not interpolated across creases. Bilinear weights, divided by the sum of those in use: at the border of a piece some of the four are missing.
         let low = (place - 0.5).floor();
         let part = place - 0.5 - low;
         // Weighted values and weights: of visible elements, then of hidden ones.
@@ -178,7 +168,8 @@ impl<'a> Resampling<'a> {
         for (right, across) in [(0, 1.0 - part.x), (1, part.x)] {
             for (down, along) in [(0, 1.0 - part.y), (1, part.y)] {
                 let weight = across * along;
-                let Some(found) = element(low.x as i64 + right, low.y as i64 + down) else {
+                let texel = [low.x as i64 + right, low.y as i64 + down];
+                let Some(found) = self.grid.element_in(texel, piece) else {
                     continue;
                 };
                 let (sum, weights) = &mut sums[usize::from(is_hidden(found))];
@@ -195,13 +186,7 @@ impl<'a> Resampling<'a> {
             return sum.map(|channel| channel / weights);
         }
         // A sliver beyond the last element centre of its piece.
-        let around = (-1..=1).flat_map(|down| (-1..=1).map(move |right| (right, down)));
-        let nearest = own.or_else(|| {
-            let mut near = around.filter_map(|(right, down)| {
-                element(place.x.floor() as i64 + right, place.y.floor() as i64 + down)
-            });
-            near.next()
-        });
+        let nearest = self.grid.nearest(place.floor().as_i64vec2().to_array(), piece);
         nearest.map_or([0.0; 3], |found| values[found])
     }
 }

@@ -71,6 +71,11 @@ pub fn read_all(
     Ok(materials)
 }
 
+/// Whether a stated thickness is one; without it, the mesh decides what is solid.
+fn is_thick(thickness: f32) -> bool {
+    thickness > 0.0 && thickness.is_finite()
+}
+
 /// Textures that a material is read with, whatever it is made of.
 fn textures(source: &Source) -> impl Iterator<Item = Index<Texture>> {
     let pbr = &source.pbr_metallic_roughness;
@@ -153,7 +158,7 @@ impl<'a> MaterialReader<'a, '_> {
             is_solid_by_shape: extensions
                 .volume
                 .as_ref()
-                .is_some_and(|volume| volume.thickness_factor.0 == 0.0),
+                .is_some_and(|volume| !is_thick(volume.thickness_factor.0)),
             emitted_radiance: self.emission(extensions),
             emission_texture: None,
             emission_spectrum: None,
@@ -279,15 +284,13 @@ impl<'a> MaterialReader<'a, '_> {
     }
 
     fn volume(&mut self, extensions: &extension::Material) -> Option<Volume> {
-        // A broken thickness voids the volume, as if the file stated none.
         let stated = extensions.volume.as_ref()?;
         let thickness = stated.thickness_factor.0;
-        if thickness < 0.0 || !thickness.is_finite() {
+        if thickness != 0.0 && !is_thick(thickness) {
             self.warn(
                 format!("its thickness of {thickness} was read as 0"),
                 "use a positive thickness",
             );
-            return None;
         }
 
         // Absorption is −ln(colour) / distance: a distance of 0 or a black colour would make it infinite.

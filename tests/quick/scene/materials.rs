@@ -28,7 +28,7 @@ fn surfaces_are_classified() {
         solid["KHR_materials_volume"] = json!({ "thicknessFactor": thickness });
         solid
     };
-    let (solid, flat) = (with_thickness(0.1), with_thickness(0.0));
+    let [solid, flat, broken] = [0.1, 0.0, -1.0].map(with_thickness);
     let (none, unlit) = (json!({}), json!({ "KHR_materials_unlit": {} }));
     use SurfaceKind::{Coated, Dielectric, Diffuse, Mirror, ThinWall};
     for (metallic, roughness, extensions, expected, warned) in [
@@ -43,6 +43,7 @@ fn surfaces_are_classified() {
         (0.0, 0.0, &solid, Dielectric, ""),
         (0.0, 0.0, &clear, ThinWall, "thin pane"),
         (0.0, 0.0, &flat, ThinWall, "thin pane"),
+        (0.0, 0.0, &broken, ThinWall, "thickness of -1 was read as 0"),
         (0.0, 0.31, &none, Diffuse, ""),
         (0.0, 0.6, &solid, Dielectric, ""),
         (0.0, 1.0, &solid, Dielectric, ""),
