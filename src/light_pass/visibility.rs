@@ -344,7 +344,7 @@ impl ItemBufferBuilder<'_> {
         // A light with extent looks from several of its points; further ones are tried only while no caster is seen.
         let scene = self.culler.tracer.scene();
         let casters: Arc<[usize]> = self.reach.casters(light).into();
-        let places: Vec<(u32, Emitter)> = self.places(light).collect();
+        let places = self.places(light);
         let (usual, more) = places.split_at(places.partition_point(|(place, _)| *place < PLACES));
         let view_from = |(_, emitter): &(u32, Emitter)| self.culler.view(emitter, &casters);
         let views: Vec<Option<View>> = usual.par_iter().map(view_from).collect();
@@ -427,23 +427,22 @@ impl ItemBufferBuilder<'_> {
 
     /// Emitters to look from: several sample points of a light with extent, otherwise its only one. All points of a
     /// surface light with an image get its mean radiance: any of them may represent its power, and may be black.
-    fn places(&self, light: usize) -> impl Iterator<Item = (u32, Emitter)> {
+    fn places(&self, light: usize) -> Vec<(u32, Emitter)> {
         let scene = self.culler.tracer.scene();
         let source = scene.lights[light].of_unit_strength();
-        let many = self.sizes && source.has_extent();
+        let sampler = EmitterSampler::new(&source, scene);
+        if !(self.sizes && source.has_extent()) {
+            return sampler.middle().map(|middle| (0, middle)).into_iter().collect();
+        }
         let is_surface = matches!(source.kind, LightKind::Surface { .. });
-        let mean = Emitter::middle(&source, scene).filter(|_| is_surface);
+        let mean = sampler.middle().filter(|_| is_surface);
         let mean = mean.map(|middle| middle.strength);
-        (0..if many { MAX_PLACES } else { 1 }).filter_map(move |place| {
-            let emitter = if many {
-                Emitter::sample(&source, scene, even_point(place, 0, PLACES_SEED))
-            } else {
-                Emitter::middle(&source, scene)
-            };
-            let mut emitter = emitter?;
-            emitter.strength = mean.unwrap_or(emitter.strength);
-            Some((place, emitter))
-        })
+        let places = (0..MAX_PLACES).filter_map(|place| {
+            let emitter = sampler.sample(even_point(place, 0, PLACES_SEED))?;
+            let strength = mean.unwrap_or(emitter.strength);
+            Some((place, Emitter { strength, ..emitter }))
+        });
+        places.collect()
     }
 }
 

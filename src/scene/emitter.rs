@@ -122,11 +122,6 @@ impl Emitter {
             _ => EmitterSampler::new(light, scene).at(None),
         }
     }
-
-    /// Samples a light at a point of the unit square; `None` if it emits nothing.
-    pub fn sample(light: &Light, scene: &Scene, square: DVec2) -> Option<Self> {
-        EmitterSampler::new(light, scene).sample(square)
-    }
 }
 
 /// A light prepared for many samples.

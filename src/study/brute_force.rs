@@ -19,7 +19,7 @@ use crate::illumination::gutter::fill_gutter;
 use crate::illumination::map::estimated_relative_rmse;
 use crate::illumination::parametrisation::parametrise;
 use crate::illumination::{Chart, IlluminationMap, Receiver};
-use crate::light_pass::emitter::Emitter;
+use crate::light_pass::emitter::EmitterSampler;
 use crate::light_pass::ledger_sum::Account;
 use crate::light_pass::pass_report::{PassReport, Stopwatch};
 use crate::light_pass::path::{Arrival, PathLimits};
@@ -207,6 +207,7 @@ impl Run<'_> {
     fn light(&self, light: &VisibleLight) -> PassReport {
         // A lamp with a size is the mean of points on it, each of which sends all of its light.
         let source = self.tracer.scene().lights[light.light].of_unit_strength();
+        let sampler = EmitterSampler::new(&source, self.tracer.scene());
         let has_places = self.sizes && source.has_extent();
         let places = if has_places { PLACES } else { 1 };
         let of_place = |index: usize| {
@@ -222,7 +223,8 @@ impl Run<'_> {
             }
             // Each half set has its own positions, evenly spread.
             let square = even_point(place as u32, 0, of_half);
-            let there = Emitter::sample(&source, self.tracer.scene(), square)
+            let there = sampler
+                .sample(square)
                 .filter(|_| !self.control.is_cancelled())
                 .and_then(|emitter| {
                     light.from_place(self.tracer, (self.item_buffer, CullMode::Reachable), &emitter)

@@ -1,6 +1,7 @@
 //! Surfaces that glow are the lamps that they look like.
 
-use nephroid::scene::emitter::{Emitter, EmitterKind};
+use nephroid::geometry::sampling::even_point;
+use nephroid::scene::emitter::{EmitterKind, EmitterSampler};
 use nephroid::scene::{Glow, PanelShape};
 use support::floors::{image, texture_reference};
 use support::meshes::{floor, grid, quad, sphere};
@@ -116,10 +117,10 @@ fn bright_texels_are_sampled_as_often_as_they_shine() {
     // The sheet has an area of 1 m².
     let whole = scene.lights[0].strength().luminance();
     let samples = 40_000_u32;
+    let sampler = EmitterSampler::new(&scene.lights[0], &scene);
     let (mut sum, mut most) = (0.0, 0.0_f64);
     for index in 0..samples {
-        let square = nephroid::geometry::sampling::even_point(index, 0, 1);
-        let sample = Emitter::sample(&scene.lights[0], &scene, square).expect("it shines");
+        let sample = sampler.sample(even_point(index, 0, 1)).expect("it shines");
         assert!(matches!(sample.kind, EmitterKind::Facet { .. }));
         sum += sample.strength.luminance();
         most = most.max(sample.strength.luminance());
