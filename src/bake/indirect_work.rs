@@ -1,5 +1,7 @@
 //! Schedules indirect light after the layers that it is gathered from.
 
+use glam::DVec3;
+
 use super::PreparedBake;
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
@@ -9,7 +11,7 @@ use super::sizes::ChartCache;
 use crate::error::Warning;
 use crate::illumination::{IlluminationMap, Layer, Receiver};
 use crate::light_pass::indirect::{
-    Grid, MAX_BOUNCES, MIN_PASSES, Network, NoiseTolerance, Resampling, Solution, TraceCounts,
+    Grid, MAX_BOUNCES, MIN_PASSES, Network, NoiseSmoothing, NoiseTolerance, Resampling, Solution, TraceCounts,
 };
 use crate::light_pass::pass_report::{Seconds, Stopwatch};
 use crate::optics::LinearSrgb;
@@ -144,7 +146,10 @@ impl IndirectWork {
         let (Some(network), Some(solution)) = (cache.network(), &self.solution) else {
             return;
         };
-        let mut parts = self.parts(network, maps, light_layers);
+        // Where rays did not suffice, light is smoothed. Its error is that of the rays.
+        let smoothing = NoiseSmoothing::new(network, solution, &self.tolerance, self.target);
+        let smoothed = smoothing.of(network, &solution.irradiance);
+        let mut parts = self.parts(network, &smoothing, maps, light_layers);
         light_layers.append(&mut parts);
 
         // The noise of gather rays is independent of that of the caustic, so that errors add in squares.
@@ -164,7 +169,7 @@ impl IndirectWork {
             };
             map.layers.push(Layer {
                 kind: LayerKind::Indirect,
-                irradiance: on_map(network, grid, map, solution),
+                irradiance: on_map(network, grid, map, &smoothed),
             });
         }
     }
@@ -173,6 +178,7 @@ impl IndirectWork {
     fn parts(
         &self,
         network: &Network,
+        smoothing: &NoiseSmoothing,
         maps: &[IlluminationMap],
         light_layers: &[LightLayer],
     ) -> Vec<LightLayer> {
@@ -194,6 +200,7 @@ impl IndirectWork {
                 add_sources(network, map, of_light(map.chart.receiver), &mut sources);
             }
             let solution = network.solve(&sources, &self.passes);
+            let smoothed = smoothing.of(network, &solution.irradiance);
             for map in maps {
                 let Some(grid) = grid_of(network, map) else {
                     continue;
@@ -202,7 +209,7 @@ impl IndirectWork {
                     receiver: map.chart.receiver,
                     light,
                     kind: LayerKind::Indirect,
-                    irradiance: on_map(network, grid, map, &solution),
+                    irradiance: on_map(network, grid, map, &smoothed),
                 });
             }
         }
@@ -278,9 +285,9 @@ impl IndirectWork {
 }
 
 /// Indirect light on a map [W/m²].
-fn on_map(network: &Network, grid: &Grid, map: &IlluminationMap, solution: &Solution) -> Vec<[f32; 3]> {
+fn on_map(network: &Network, grid: &Grid, map: &IlluminationMap, irradiance: &[DVec3]) -> Vec<[f32; 3]> {
     let own = grid.first..grid.first + grid.elements.all().len();
-    let values: Vec<[f64; 3]> = solution.irradiance[own].iter().map(|e| e.to_array()).collect();
+    let values: Vec<[f64; 3]> = irradiance[own].iter().map(DVec3::to_array).collect();
     let is_hidden = |element: usize| network.is_hidden(grid.first + element);
     Resampling::new(grid, &map.chart).to_map(&values, is_hidden)
 }

@@ -26,7 +26,7 @@ impl Network {
             pooled.extend((0..grid.elements.all().len()).map(|element| {
                 let rays = |element: usize| f64::from(Self::rays_after(passes[grid.first + element]));
                 let (mut sum, mut count) = (0.0, 0.0);
-                let (texel, piece) = place(grid, element);
+                let (texel, piece) = grid.place(element);
                 for near in grid.around(texel, piece) {
                     sum += noise[grid.first + near].powi(2) * rays(near);
                     count += 1.0;
@@ -38,17 +38,10 @@ impl Network {
     }
 }
 
-/// Column and row of an element's texel, and its piece.
-fn place(grid: &Grid, element: usize) -> ([i64; 2], u32) {
-    let own = grid.elements.all()[element];
-    let (texel, width) = (i64::from(own.texel), grid.chart.width as i64);
-    ([texel % width, texel / width], own.piece)
-}
-
 /// Error of linear interpolation between neighbours: an eighth of the second difference; at a border, an eighth of the
 /// first.
 fn bend(grid: &Grid, element: usize, (right, down): (i64, i64), value: &impl Fn(usize) -> f64) -> f64 {
-    let ([column, row], piece) = place(grid, element);
+    let ([column, row], piece) = grid.place(element);
     let ends = [1, -1].map(|sign| grid.element_in([column + sign * right, row + sign * down], piece));
     match ends {
         [Some(a), Some(b)] => (value(a) - 2.0 * value(element) + value(b)).abs() / 8.0,

@@ -55,6 +55,13 @@ impl Grid {
         Some(self.first + index)
     }
 
+    /// Column and row of an element's texel, and its piece.
+    pub fn place(&self, element: usize) -> ([i64; 2], u32) {
+        let own = self.elements.all()[element];
+        let (texel, width) = (i64::from(own.texel), self.chart.width as i64);
+        ([texel % width, texel / width], own.piece)
+    }
+
     /// Index of the element of a piece in a column and row of texels, which may lie outside the grid.
     pub fn element_in(&self, [column, row]: [i64; 2], piece: u32) -> Option<usize> {
         let (width, height) = (self.chart.width as i64, self.chart.height as i64);

@@ -35,6 +35,15 @@ impl NoiseTolerance {
     }
 }
 
+impl NoiseTolerance {
+    /// Squared noise over its limit, by element; empty without light.
+    pub(super) fn squared_excess(&self, target: f64, noise: &[f64]) -> Vec<f64> {
+        let limits = self.limits.iter().zip(noise);
+        let excess = limits.map(|(limit, noise)| (noise / (target * limit.alone)).powi(2));
+        excess.collect()
+    }
+}
+
 impl Network {
     /// How much noise a solution for these sources [W/m²] may have.
     pub fn tolerance(

@@ -2,7 +2,7 @@
 
 use nephroid::bake::Baker;
 use nephroid::illumination::{Chart, Receiver};
-use nephroid::light_pass::indirect::{MIN_PASSES, Network, TraceCounts};
+use nephroid::light_pass::indirect::{MIN_PASSES, Network, NoiseSmoothing, TraceCounts};
 use nephroid::settings::ErrorMetric;
 
 use crate::bake::common::{self, all_bits, run, with_layers};
@@ -141,17 +141,61 @@ fn under_even_light(
     maps: &[(usize, usize)],
     max_depth: u32,
 ) -> (Vec<LinearSrgb>, TraceCounts) {
+    let (network, passes) = traced(parts, maps, max_depth);
+    let solved = network.solve(&vec![LinearSrgb::WHITE; passes.len()], &passes);
+    (solved.irradiance, network.counts())
+}
+
+/// The same rays, and the passes of each element.
+fn traced(parts: Vec<(Mesh, Material)>, maps: &[(usize, usize)], max_depth: u32) -> (Network, Vec<u8>) {
     let scene = Arc::new(scene(parts, vec![]));
     let tracer = Tracer::new(Arc::clone(&scene));
     let chart =
         |&(object, side): &(usize, usize)| Arc::new(support::scenes::chart(&tracer, object, side, side));
     let charts: Vec<Arc<Chart>> = maps.iter().map(chart).collect();
     let mut network = Network::new(&scene, &charts);
-    let count = network.element_count();
-    let passes = vec![MIN_PASSES; count];
+    let passes = vec![MIN_PASSES; network.element_count()];
     assert!(network.trace(&tracer, &passes, (max_depth, 0), &(), &Control::default()));
-    let solved = network.solve(&vec![LinearSrgb::WHITE; count], &passes);
-    (solved.irradiance, network.counts())
+    (network, passes)
+}
+
+/// Single rays that meet a bright focus by way of glass are no dots on the floor, but their flux is there. What is exact
+/// enough stays as it is.
+#[test]
+fn noise_beyond_the_target_is_spread() {
+    let side = 64;
+    let ball = sphere(dvec3(0.0, 0.5, 0.0), 0.3, 48, 24);
+    let parts = vec![
+        (floor(1.0, 0.0), diffuse(0.5)),
+        (ball, smooth(SurfaceKind::Dielectric)),
+    ];
+    let (network, passes) = traced(parts, &[(0, side)], 64);
+    let mut sources = vec![LinearSrgb::BLACK; passes.len()];
+    sources[side / 2 * (side + 1)] = LinearSrgb::grey(1000.0);
+    let solution = network.solve(&sources, &passes);
+    let tolerance = network.tolerance(&solution, &sources, ErrorMetric::Rmse);
+    let areas_m2 = || network.grids().iter().flat_map(|grid| grid.elements.all());
+    let smoothed = |target: f64| {
+        let smoothing = NoiseSmoothing::new(&network, &solution, &tolerance, target);
+        let all = smoothing.of(&network, &solution.irradiance);
+        all.into_iter().map(|e| e.y).collect::<Vec<f64>>()
+    };
+    let flux_w = |values: &[f64]| {
+        let all = values.iter().zip(areas_m2());
+        all.map(|(e, element)| e * element.area_m2).sum::<f64>()
+    };
+    let roughness = |values: &[f64]| {
+        let rows = values.chunks(side);
+        let steps = rows.flat_map(|row| row.windows(2).map(|pair| (pair[1] - pair[0]).powi(2)));
+        steps.sum::<f64>()
+    };
+    let plain: Vec<f64> = solution.irradiance.iter().map(|e| e.g).collect();
+    let spread = smoothed(0.03);
+    assert_close(flux_w(&spread), flux_w(&plain), 1e-9, "flux");
+    let [before, after] = [&plain, &spread].map(|values| roughness(values));
+    assert!(20.0 * after < before, "{after} for {before}");
+    assert!(spread.iter().all(|e| *e >= 0.0));
+    assert!(smoothed(1e6) == plain);
 }
 
 /// In light that is the same everywhere, what stands in it (glass, a mirror, coat) changes nothing.
