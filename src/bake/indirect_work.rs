@@ -1,7 +1,5 @@
 //! Schedules indirect light after the layers that it is gathered from.
 
-use glam::DVec3;
-
 use super::PreparedBake;
 use super::caustic::CausticOutcome;
 use super::clock::Clock;
@@ -285,9 +283,9 @@ impl IndirectWork {
 }
 
 /// Indirect light on a map [W/m²].
-fn on_map(network: &Network, grid: &Grid, map: &IlluminationMap, irradiance: &[DVec3]) -> Vec<[f32; 3]> {
+fn on_map(network: &Network, grid: &Grid, map: &IlluminationMap, irradiance: &[LinearSrgb]) -> Vec<[f32; 3]> {
     let own = grid.first..grid.first + grid.elements.all().len();
-    let values: Vec<[f64; 3]> = irradiance[own].iter().map(DVec3::to_array).collect();
+    let values: Vec<[f64; 3]> = irradiance[own].iter().map(|e| e.to_array()).collect();
     let is_hidden = |element: usize| network.is_hidden(grid.first + element);
     Resampling::new(grid, &map.chart).to_map(&values, is_hidden)
 }

@@ -131,10 +131,12 @@ impl VisibleLamp {
     }
 
     fn of(light: &Light, scene: &Scene) -> Option<Self> {
+        let outline = Outline::of(light)?;
+        let sampler = EmitterSampler::new(light, scene);
         Some(Self {
-            outline: Outline::of(light)?,
-            emitter: Emitter::middle(light, scene)?,
-            area_m2: EmitterSampler::new(light, scene).area_m2(),
+            outline,
+            emitter: sampler.middle()?,
+            area_m2: sampler.area_m2(),
         })
     }
 

@@ -117,10 +117,7 @@ impl Emitter {
     /// Centre of a light, without its extent; of a glowing surface, a point of its front that stands for all of it.
     /// `None` if it has no centre or emits nothing.
     pub fn middle(light: &Light, scene: &Scene) -> Option<Self> {
-        match light.kind {
-            LightKind::Environment { .. } => None,
-            _ => EmitterSampler::new(light, scene).at(None),
-        }
+        EmitterSampler::new(light, scene).middle()
     }
 }
 

@@ -4,8 +4,9 @@ use nephroid::eye_pass::reference::{ChainLimits, EyeRays, ReferenceSettings, ren
 use nephroid::eye_pass::ToneMap;
 use nephroid::illumination::{Chart, Layer, Receiver, UvSet, parametrise};
 use nephroid::light_pass::direct::{DirectLayer, bake_direct};
-use nephroid::scene::{Environment, Object, PanelShape, Volume};
+use nephroid::scene::{Environment, Glow, Object, PanelShape, Volume};
 
+use crate::floors::texture_reference;
 use crate::prelude::*;
 
 /// A scene of meshes, each with its own material.
@@ -89,6 +90,18 @@ pub fn panel(centre: DVec3, [across, down]: [DVec3; 2], shape: PanelShape, radia
         shape,
         radiance: Radiance(radiance),
     })
+}
+
+/// Lets an emissive object shine: evenly, or by an image, which becomes the texture of
+/// [`texture_reference`](crate::floors::texture_reference) if there is none yet.
+pub fn let_glow(scene: &mut Scene, object: usize, image: Option<Texture>) {
+    if let Some(image) = image {
+        let glow = Glow::new(scene.objects[object].in_scene(), &texture_reference(), &image);
+        scene.glows.insert(object, Arc::new(glow.expect("it glows")));
+        scene.textures.push(Arc::new(image));
+    }
+    let radiance = Radiance(scene.emitted_radiance(object).luminance());
+    scene.lights.push(light(LightKind::Surface { object, radiance }));
 }
 
 /// A scene in the light of a sky alone.

@@ -160,7 +160,8 @@ impl<'a> Resampling<'a> {
         values: &[[f64; 3]],
         is_hidden: &impl Fn(usize) -> bool,
     ) -> [f64; 3] {
-        // Only elements of the texel's own piece take part: light is not interpolated across creases. Bilinear weights, divided by the sum of those in use: at the border of a piece some of the four are missing.
+        // Only elements of the texel's own piece take part: light is not interpolated across creases. Bilinear weights
+        // are divided by the sum of those in use: at the border of a piece some of the four are missing.
         let low = (place - 0.5).floor();
         let part = place - 0.5 - low;
         // Weighted values and weights: of visible elements, then of hidden ones.

@@ -1,9 +1,7 @@
 //! Smooths indirect light where its rays did not suffice: single rays that met a bright focus by way of glass would
 //! show as dots. Flux is conserved.
 
-use std::ops::{AddAssign, Mul, Sub, SubAssign};
-
-use glam::DVec3;
+use std::ops::{AddAssign, Mul, Sub};
 
 use super::network::Network;
 use super::solve::Solution;
@@ -41,8 +39,8 @@ impl NoiseSmoothing {
     }
 
     /// E of all elements [W/m²], smoothed.
-    pub fn of(&self, network: &Network, irradiance: &[LinearSrgb]) -> Vec<DVec3> {
-        let mut smoothed: Vec<DVec3> = irradiance.iter().map(|e| DVec3::from(e.to_array())).collect();
+    pub fn of(&self, network: &Network, irradiance: &[LinearSrgb]) -> Vec<LinearSrgb> {
+        let mut smoothed = irradiance.to_vec();
         if self.excess.is_empty() {
             return smoothed;
         }
@@ -62,7 +60,7 @@ impl Network {
     /// other loses.
     fn mix<V>(&self, values: &mut [V], step: i64, share: impl Fn(usize) -> f64)
     where
-        V: AddAssign + Copy + Mul<f64, Output = V> + Sub<Output = V> + SubAssign,
+        V: AddAssign + Copy + Mul<f64, Output = V> + Sub<Output = V>,
     {
         let before = values.to_vec();
         for grid in self.grids() {
@@ -82,7 +80,7 @@ impl Network {
                     let mixed_m2 = own_m2.min(other_m2) * share(a).min(share(b)) / 9.0;
                     let flow = (before[b] - before[a]) * mixed_m2;
                     values[a] += flow * own_m2.recip();
-                    values[b] -= flow * other_m2.recip();
+                    values[b] += flow * -other_m2.recip();
                 }
             }
         }

@@ -33,9 +33,7 @@ impl NoiseTolerance {
             .filter(|&element| solution.noise[element] > most(&self.limits[element]))
             .collect()
     }
-}
 
-impl NoiseTolerance {
     /// Squared noise over its limit, by element; empty without light.
     pub(super) fn squared_excess(&self, target: f64, noise: &[f64]) -> Vec<f64> {
         let limits = self.limits.iter().zip(noise);

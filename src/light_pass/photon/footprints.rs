@@ -124,6 +124,7 @@ impl FootprintPass<'_> {
             let [a, b, c] = corners.map(|corner| corner / size);
             let flux_w = flux_w.luminance() * area;
             let map_share = 0.5 * (b - a).perp_dot(c - a).abs() / (area * self.cells);
+            // Light that is seen edge-on has no detail to resolve.
             if map_share <= 0.0 {
                 return;
             }

@@ -141,11 +141,9 @@ impl Spheres {
 
     /// Points of a light that shines on the spheres.
     pub fn places<'a>(&self, light: &'a Light, scene: &'a Scene) -> EmitterSampler<'a> {
-        let balls = self
-            .0
-            .iter()
-            .map(|guided| (guided.sphere.centre, guided.sphere.radius_m));
-        EmitterSampler::new(light, scene).towards(balls)
+        let spheres = self.0.iter().map(|guided| &guided.sphere);
+        let spheres = spheres.map(|sphere| (sphere.centre, sphere.radius_m));
+        EmitterSampler::new(light, scene).towards(spheres)
     }
 
     pub fn is_empty(&self) -> bool {

@@ -178,7 +178,7 @@ fn noise_beyond_the_target_is_spread() {
     let smoothed = |target: f64| {
         let smoothing = NoiseSmoothing::new(&network, &solution, &tolerance, target);
         let all = smoothing.of(&network, &solution.irradiance);
-        all.into_iter().map(|e| e.y).collect::<Vec<f64>>()
+        all.into_iter().map(|e| e.g).collect::<Vec<f64>>()
     };
     let flux_w = |values: &[f64]| {
         let all = values.iter().zip(areas_m2());

@@ -1,11 +1,11 @@
 //! Surfaces that glow are the lamps that they look like.
 
 use nephroid::geometry::sampling::even_point;
+use nephroid::scene::PanelShape;
 use nephroid::scene::emitter::{EmitterKind, EmitterSampler};
-use nephroid::scene::{Glow, PanelShape};
 use support::floors::{image, texture_reference};
 use support::meshes::{floor, grid, quad, sphere};
-use support::scenes::{chart, diffuse, direct, flux_w, light, panel, point_light, scene, surface};
+use support::scenes::{chart, diffuse, direct, flux_w, let_glow, panel, point_light, scene, surface};
 use support::tools::{bake, caustic, energy_fault, map_of, set, to};
 
 use crate::prelude::*;
@@ -38,13 +38,7 @@ fn below(lamp: Mesh, material: Material, image: Option<Texture>) -> Scene {
     };
     let parts = vec![(floor(1.0, 0.0), diffuse(0.5)), (ball, glass), (lamp, material)];
     let mut scene = scene(parts, vec![]);
-    if let Some(image) = image {
-        let glow = Glow::new(scene.objects[2].in_scene(), &texture_reference(), &image);
-        scene.glows.insert(2, Arc::new(glow.expect("it glows")));
-        scene.textures.push(Arc::new(image));
-    }
-    let radiance = Radiance(scene.emitted_radiance(2).luminance());
-    scene.lights = vec![light(LightKind::Surface { object: 2, radiance })];
+    let_glow(&mut scene, 2, image);
     scene
 }
 

@@ -1,10 +1,10 @@
 //! Surfaces that change from place to place are the sum of their parts.
 
 use nephroid::optics::Glass;
-use nephroid::scene::{Glow, Variation};
+use nephroid::scene::Variation;
 use support::floors::{image, texture_reference};
 use support::meshes::{floor, quad};
-use support::scenes::{chart, direct, flux_w, light, scene};
+use support::scenes::{chart, direct, flux_w, let_glow, scene};
 use support::tools::{bake, caustic, energy_fault, photons};
 
 use crate::prelude::*;
@@ -183,15 +183,7 @@ fn shone_by(image: Option<Texture>) -> f64 {
         vec![(floor(2.0, 0.0), Material::default()), (hanging, lamp)],
         vec![],
     );
-    if let Some(image) = image {
-        let glow = Glow::new(scene.objects[1].in_scene(), &texture_reference(), &image);
-        scene.glows.insert(1, Arc::new(glow.expect("it glows")));
-        scene.textures.push(Arc::new(image));
-    }
-    let radiance = Radiance(scene.emitted_radiance(1).luminance());
-    scene
-        .lights
-        .push(light(LightKind::Surface { object: 1, radiance }));
+    let_glow(&mut scene, 1, image);
     let tracer = Tracer::new(Arc::new(scene));
     let chart = chart(&tracer, 0, 16, 16);
     flux_w(&chart, &direct(&tracer, &chart))
@@ -206,10 +198,8 @@ fn lamps_that_are_mostly_black_shine() {
     let lamp = &mut scene.materials[2];
     lamp.emitted_radiance = LinearSrgb::grey(10.0);
     lamp.emission_texture = Some(texture_reference());
-    let glow = Glow::new(scene.objects[2].in_scene(), &texture_reference(), &image);
-    scene.glows.insert(2, Arc::new(glow.expect("it glows")));
-    let radiance = Radiance(scene.emitted_radiance(2).luminance());
-    scene.lights = vec![light(LightKind::Surface { object: 2, radiance })];
+    scene.lights.clear();
+    let_glow(&mut scene, 2, Some(image));
     let result = bake(scene, &photons(3e5, 16));
     assert_eq!(energy_fault(&result), None);
     assert!(result.ledgers[0].energy_w.emitted > 0.0);
