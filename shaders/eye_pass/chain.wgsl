@@ -28,7 +28,19 @@ struct Gaze {
     wavelength: u32,
     // GGX α of the surface that it left, which has added the highlights of lamps smaller than its lobe.
     alpha: f32,
+    // Rough surfaces met so far.
+    lobes: u32,
+    // One of COAT_*.
+    coat: u32,
 }
+
+// Whether a path has been reflected off a rough coat. Light that comes to one by way of mirrors and glass is a caustic,
+// which its map has: the few rays of its lobe would turn it into bright dots.
+const COAT_NONE: u32 = 0u;
+// The coat was the last surface: lamps and glowing objects are seen.
+const COAT_LAST: u32 = 1u;
+// A mirror or glass came after it: they are not.
+const COAT_BEFORE: u32 = 2u;
 
 struct Seen {
     hit: Hit,
@@ -93,6 +105,16 @@ fn largest(v: vec3f) -> f32 {
     return max(v.x, max(v.y, v.z));
 }
 
+fn coat_after(gaze: Gaze, point: SurfacePoint, branch: Branch) -> u32 {
+    // What passes through a hole keeps the lobe, too.
+    let is_in_lobe = branch.alpha > 0.0;
+    let is_reflected = is_in_lobe && branch.spread_added > 0.0;
+    if gaze.coat == COAT_NONE && is_reflected && has_map(objects[point.object].surface) {
+        return COAT_LAST;
+    }
+    return select(gaze.coat, COAT_BEFORE, gaze.coat == COAT_LAST && !is_in_lobe);
+}
+
 fn onward(gaze: Gaze, point: SurfacePoint, branch: Branch) -> Gaze {
     let bent = branch.spread_per_width * gaze.width;
     return Gaze(
@@ -105,6 +127,8 @@ fn onward(gaze: Gaze, point: SurfacePoint, branch: Branch) -> Gaze {
         branch.media,
         gaze.wavelength,
         branch.alpha,
+        gaze.lobes + u32(branch.spread_added > 0.0),
+        coat_after(gaze, point, branch),
     );
 }
 
@@ -215,7 +239,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
             }
 
             // Lamps are no surfaces: they are seen on the way, but not by the eye directly.
-            if walk.gaze.depth > 0u {
+            if walk.gaze.depth > 0u && walk.gaze.coat != COAT_BEFORE {
                 let lamps = walk.gaze.weight * lamps_on(walk.gaze, seen.distance);
                 walk.radiance += shown(lamps, walk.gaze.wavelength);
             }
@@ -228,8 +252,11 @@ fn chain_radiance(first: Gaze) -> vec3f {
             walk.gaze.weight *= medium_transmittance(walk.gaze.media, seen.distance * start.unit_m);
             walk.gaze.width += walk.gaze.spread * seen.distance;
 
-            // Emission is seen at any surface, whether the path ends on it or goes on.
+            // Emission is seen at any surface, whether the path ends on it or goes on, unless it is a highlight.
             var emitted = object.emitted_radiance;
+            if HAS_LOBES && is_shown_otherwise(walk.gaze, object) {
+                emitted = vec3f(0.0);
+            }
             if object.glow != NO_IMAGE {
                 let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
                 let level = footprint_look_level(object.glow, point.uv_densities, walk.gaze.width, cos_view);
@@ -264,8 +291,9 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 walk.radiance += shown(gaze.weight * own, gaze.wavelength);
             }
             if HAS_LOBES && next.reflection.alpha > 0.0 {
-                let facing = face(point, gaze.direction);
-                let reflected = largest(gaze.weight * next.reflection.share);
+                let facing = face(point, gaze, 0.0);
+                let cos_view = -dot(gaze.direction, facing.shading);
+                let reflected = largest(gaze.weight * reflectance_of(next.facets, cos_view, colour));
                 let gloss = Gloss(point, facing, next.reflection.alpha, next.facets, colour, reflected);
                 walk.radiance += shown(gaze.weight * highlights(gloss, gaze), gaze.wavelength);
             }

@@ -19,8 +19,9 @@ struct Frame {
     fault: f32,
     // Radiance of mirrors while chains are switched off.
     stand_in: f32,
-    padding0: f32,
-    padding1: f32,
+    // Number among the frames of the same view.
+    picture: u32,
+    padding0: u32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;

@@ -109,6 +109,17 @@ fn seen_panel(light: LightRecord, gaze: Gaze) -> SeenLamp {
     return SeenLamp(light.strength * (share / area_m2), distance);
 }
 
+// Whether what an object emits is a highlight of the surface that a ray left, or a caustic on a coat before it.
+fn is_shown_otherwise(gaze: Gaze, object: ObjectRecord) -> bool {
+    if gaze.coat == COAT_BEFORE {
+        return true;
+    }
+    if gaze.alpha == 0.0 || object.lamp == 0u {
+        return false;
+    }
+    return alpha_from(lights[start.light_count + object.lamp - 1u], gaze.origin) < gaze.alpha;
+}
+
 // Radiance of the lamps between a surface that a path has left and the next one at `reach`, averaged over the footprint.
 fn lamps_on(gaze: Gaze, reach: f32) -> vec3f {
     var sum = vec3f(0.0);
@@ -169,8 +180,8 @@ struct Gloss {
     reflected: f32,
 }
 
-// Reflected radiance of a lamp, or of a patch of it at a place.
-fn highlight_from(light: LightRecord, place: vec3f, patch_m2: f32, gloss: Gloss, gaze: Gaze) -> vec3f {
+// Reflected radiance of a lamp, or of a patch of it at a place, which lies this deep below its surface.
+fn highlight_from(light: LightRecord, place: vec3f, patch_m2: f32, depth: f32, gloss: Gloss, gaze: Gaze) -> vec3f {
     var to_light = -light.place;
     var reach = FAR_AWAY;
     var across_beam = 1.0;
@@ -178,13 +189,15 @@ fn highlight_from(light: LightRecord, place: vec3f, patch_m2: f32, gloss: Gloss,
         let offset = place - gloss.point.place;
         let far = length(offset);
         to_light = offset / max(far, 1e-20);
-        reach = far * (1.0 - BEFORE_SURFACE);
+        reach = (far - depth) * (1.0 - BEFORE_SURFACE);
         let far_m = far * start.unit_m;
         across_beam = falloff(light, -to_light) / max(far_m * far_m + patch_m2 / PI, 1e-20);
     }
     let to_eye = -gaze.direction;
     let size = alpha_from(light, gloss.point.place);
-    let response = ggx_reflection(gloss.facing.shading, to_eye, to_light, gloss.alpha * gloss.alpha + size * size);
+    // The cone of a pixel is the same for all of a picture's surfaces.
+    let cone = select(0.0, 0.25 * gaze.spread, gaze.lobes > 0u);
+    let response = ggx_reflection(gloss.facing.shading, to_eye, to_light, gloss.alpha * gloss.alpha + size * size + cone * cone);
     let is_bright = response * gloss.reflected >= DIMMEST_HIGHLIGHT && across_beam > 0.0;
     if !is_bright || dot(to_light, gloss.facing.geometric) <= 0.0 {
         return vec3f(0.0);
@@ -200,7 +213,7 @@ fn highlight_from(light: LightRecord, place: vec3f, patch_m2: f32, gloss: Gloss,
 // Reflected radiance of the lamps that are smaller than the lobe of a rough surface.
 fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
     var sum = vec3f(0.0);
-    for (var index = 0u; index < start.light_count; index += 1u) {
+    for (var index = 0u; index < start.light_count + start.glow_count; index += 1u) {
         let light = lights[index];
         if light.outline == OUTLINE_SURFACE || alpha_from(light, gloss.point.place) >= gloss.alpha {
             continue;
@@ -210,6 +223,8 @@ fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
         let count = select(1u, PATCHES * PATCHES, is_panel);
         // The corners of a grid lie outside of an ellipse.
         let share = 1.0 / f32(count - select(0u, 4u, is_ellipse));
+        // To a corner of the cube around a glowing object.
+        let depth = select(0.0, sqrt(3.0) * light.radius, index >= start.light_count);
         let patch_m2 = panel_area(light) * start.unit_m * start.unit_m * share;
         for (var number = 0u; number < count; number += 1u) {
             let cell = vec2f(f32(number % PATCHES), f32(number / PATCHES));
@@ -217,7 +232,7 @@ fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
             if !is_ellipse || length(at) < 1.0 {
                 // A round lamp has no axes.
                 let place = light.place + light.across * at.x + light.down * at.y;
-                sum += share * highlight_from(light, place, patch_m2, gloss, gaze);
+                sum += share * highlight_from(light, place, patch_m2, depth, gloss, gaze);
             }
         }
     }

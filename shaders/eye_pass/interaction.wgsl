@@ -6,6 +6,8 @@ struct Facing {
     geometric: vec3f,
     // The geometric normal where the shading normal faces away from the ray.
     shading: vec3f,
+    // Of the microfacet that is met; the shading normal of smooth surfaces.
+    facet: vec3f,
 }
 
 // A continuation of the path. `share` is the fraction of radiance; 0 for no branch.
@@ -17,7 +19,7 @@ struct Branch {
     // `spread_added`.
     spread_per_width: f32,
     spread_factor: f32,
-    // Spread due to roughness: an approximation that blurs maps and textures, but no edges.
+    // Spread due to roughness, more than 0 where it scatters at a microfacet.
     spread_added: f32,
     // GGX α of a rough surface whose highlights are added where the branch begins; else 0.
     alpha: f32,
@@ -46,12 +48,17 @@ fn reflectance_of(facets: Facets, cos_incident: f32, tint: vec3f) -> vec3f {
     return facets.metal * metal_reflectance(cos_incident, tint) + wall + coat;
 }
 
-fn face(point: SurfacePoint, incident: vec3f) -> Facing {
+fn face(point: SurfacePoint, gaze: Gaze, alpha: f32) -> Facing {
+    let incident = gaze.direction;
     let front = dot(incident, point.geometric_normal) < 0.0;
     let geometric = select(-point.geometric_normal, point.geometric_normal, front);
     let towards = dot(point.shading_normal, geometric) >= 0.0;
     let shading = select(-point.shading_normal, point.shading_normal, towards);
-    return Facing(front, geometric, select(geometric, shading, dot(incident, shading) < 0.0));
+    let about = select(geometric, shading, dot(incident, shading) < 0.0);
+    if alpha > 0.0 {
+        return Facing(front, geometric, about, visible_facet(facet_point(gaze.lobes), alpha, incident, about));
+    }
+    return Facing(front, geometric, about, about);
 }
 
 fn no_branch() -> Branch {
@@ -63,13 +70,13 @@ const SMOOTH_ROUGHNESS: f32 = 0.01;
 
 // GGX α; 0 of smooth surfaces.
 fn lobe_alpha(roughness: f32) -> f32 {
-    return select(0.0, roughness * roughness, roughness > SMOOTH_ROUGHNESS);
+    return select(0.0, roughness * roughness, HAS_LOBES && roughness > SMOOTH_ROUGHNESS);
 }
 
-// Angle between the reflections off microfacets that are tilted by atan α one way and the other; half of all
-// microfacets are tilted less.
-fn lobe_rad(alpha: f32) -> f32 {
-    return 4.0 * atan(alpha);
+// Spread of a reflection at a microfacet: what it keeps of the angle between the reflections off microfacets that are
+// tilted by atan α one way and the other. All of it at later rough surfaces, of which each path sees one microfacet.
+fn lobe_rad(alpha: f32, lobes: u32) -> f32 {
+    return select(1.0, kept_width(), lobes == 0u) * 4.0 * atan(alpha);
 }
 
 // Factors of transmission, roughness and metallic from an image, at the footprint of the ray.
@@ -91,21 +98,29 @@ fn mixture_at(point: SurfacePoint, gaze: Gaze, factors: vec3f) -> Mixture {
 
 fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f, alpha: f32) -> Branch {
     let incident = gaze.direction;
-    var direction = mirrored(incident, facing.shading);
-    if dot(direction, facing.geometric) <= 0.0 {
+    var direction = mirrored(incident, facing.facet);
+    if alpha > 0.0 {
+        direction = out_of(out_of(direction, facing.shading, 1.0), facing.geometric, 1.0);
+    } else if dot(direction, facing.geometric) <= 0.0 {
         direction = mirrored(incident, facing.geometric);
     }
     let curvature = select(-point.curvature, point.curvature, facing.front);
-    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, lobe_rad(alpha), alpha);
+    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, lobe_rad(alpha, gaze.lobes), alpha);
 }
 
 fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alpha: f32) -> Interaction {
     let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
-    let reflectance = thin_wall_reflectance(-dot(gaze.direction, facing.shading), eta);
+    let reflectance = thin_wall_reflectance(-dot(gaze.direction, facing.facet), eta);
+    // A rough wall sends on the mirror image of what it reflects.
+    var direction = gaze.direction;
+    if alpha > 0.0 {
+        let back = out_of(mirrored(direction, facing.facet), facing.shading, 1.0);
+        direction = out_of(mirrored(back, facing.shading), facing.geometric, -1.0);
+    }
     return Interaction(
         0.0,
         reflection(point, facing, gaze, vec3f(reflectance), alpha),
-        Branch(gaze.direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, lobe_rad(alpha), 0.0),
+        Branch(direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, lobe_rad(alpha, gaze.lobes), 0.0),
         Facets(0.0, 0.0, 1.0, eta),
     );
 }
@@ -127,9 +142,9 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
         ior_far = ior;
     }
 
-    // Beyond the critical angle, which the shading normal decides first, all light is reflected.
+    // Beyond the critical angle, which the facet's normal decides first, all light is reflected.
     let eta = ior_far / ior_near;
-    let cos_incident = -dot(incident, facing.shading);
+    let cos_incident = -dot(incident, facing.facet);
     let cos_clamped = clamp(cos_incident, 0.0, 1.0);
     let cos_geometric = clamp(-dot(incident, facing.geometric), 0.0, 1.0);
     let facets = Facets(0.0, 1.0, 0.0, eta);
@@ -140,8 +155,10 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
 
     // A shading normal may refract the ray back to the side that it came from; the triangle's normal then refracts it,
     // or reflects all light.
-    var direction = refracted(incident, facing.shading, eta);
-    if dot(direction, facing.geometric) >= 0.0 {
+    var direction = refracted(incident, facing.facet, eta);
+    if alpha > 0.0 {
+        direction = out_of(out_of(direction, facing.shading, -1.0), facing.geometric, -1.0);
+    } else if dot(direction, facing.geometric) >= 0.0 {
         if eta != 1.0 && scaled_cos2_transmitted(cos_geometric, eta) <= 0.0 {
             return whole;
         }
@@ -162,7 +179,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
             beyond,
             curvature * (1.0 / eta - 1.0),
             1.0 / eta,
-            0.5 * abs(1.0 / eta - 1.0) * lobe_rad(alpha),
+            0.5 * abs(1.0 / eta - 1.0) * lobe_rad(alpha, gaze.lobes),
             0.0,
         ),
         facets,
@@ -187,7 +204,7 @@ fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors:
     } else if mixture.hole > 0.0 {
         met.transmission = Branch(gaze.direction, vec3f(mixture.hole), gaze.media, 0.0, 1.0, 0.0, gaze.alpha);
     }
-    let cos_incident = -dot(gaze.direction, facing.shading);
+    let cos_incident = -dot(gaze.direction, facing.facet);
     let coat = mixture.coat * dielectric_reflectance(cos_incident, eta);
     let back = mixture.metal * metal_reflectance(cos_incident, tint) + vec3f(mixture.body * coat);
     met.reflection = reflection(point, facing, gaze, met.reflection.share + back, alpha);
@@ -200,12 +217,12 @@ fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors:
 }
 
 fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
-    // Fresnel shares follow the shading normal, which bumps perturb.
+    // Fresnel shares follow the facet, about a shading normal that bumps perturb.
     let object = objects[point.object];
-    let facing = face(point, gaze.direction);
-    let cos_incident = -dot(gaze.direction, facing.shading);
     let factors = factors_at(point, gaze);
     let alpha = lobe_alpha(object.roughness * factors.y);
+    let facing = face(point, gaze, alpha);
+    let cos_incident = -dot(gaze.direction, facing.facet);
 
     // `own` is what a coat lets out of the diffuse body; surfaces without such a body have none.
     switch object.surface {

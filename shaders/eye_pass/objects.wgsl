@@ -27,8 +27,9 @@ struct ObjectRecord {
     solid: u32,
     // Texture reference of its emission.
     glow: u32,
+    // Number of the lamp that stands for it, from 1 on; 0 for none.
+    lamp: u32,
     padding0: u32,
-    padding1: u32,
     // Rows of the transform from mesh to scene coordinates.
     row_x: vec4f,
     row_y: vec4f,

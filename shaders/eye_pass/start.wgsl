@@ -9,9 +9,10 @@ struct ChainStart {
     max_depth: u32,
     branching_depth: u32,
     light_count: u32,
+    // Of lamps that stand for glowing objects; they follow after the lights.
+    glow_count: u32,
     padding0: u32,
     padding1: u32,
-    padding2: u32,
 }
 
 @group(1) @binding(0) var<uniform> start: ChainStart;

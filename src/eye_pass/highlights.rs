@@ -4,9 +4,9 @@
 //! lamp fills. Bulbs and suns that are smaller than the footprint are spread over a disc of its size. The image of a
 //! lamp thus holds the same energy at any resolution, and lamps without extent are seen too.
 //!
-//! At a rough surface that would show the lamp through one direction of a whole lobe. A lamp that is smaller than the
-//! lobe is a highlight there instead: the lobe times the lamp's irradiance, with a shadow ray, to which clear surfaces
-//! are opaque, as they are to direct light.
+//! The rays that leave a rough surface are too few to meet a lamp that is smaller than the lobe. It is a highlight there
+//! instead: the lobe times the lamp's irradiance, with a shadow ray, to which clear surfaces are opaque, as they are to
+//! direct light. Glowing objects count as lamps there, and are not seen by the rays that leave the surface.
 
 use std::f64::consts::PI;
 
@@ -57,6 +57,8 @@ pub struct Lobe {
     pub normal: DVec3,
     /// GGX α, > 0.
     pub alpha: f64,
+    /// Spread of the cone that sees it [rad], which widens its highlights.
+    pub seen_by: f64,
 }
 
 /// Unshadowed reflection of one lamp, or of a patch of it.
@@ -74,9 +76,11 @@ pub struct Highlight {
     pub irradiance: LinearSrgb,
 }
 
-/// A lamp without glowing surface.
+/// A lamp without glowing surface, or one that stands for a glowing object in the lobes of rough surfaces.
 #[derive(Clone, Debug)]
 pub struct VisibleLamp {
+    /// The glowing object.
+    object: Option<usize>,
     /// The whole lamp, from its centre.
     emitter: Emitter,
     outline: Outline,
@@ -130,10 +134,28 @@ impl VisibleLamp {
         lamps.filter_map(|light| Self::of(light, scene)).collect()
     }
 
+    /// What stands for the glowing objects of a scene.
+    pub fn glowing(scene: &Scene) -> Vec<Self> {
+        let lamp = |(object, light): (usize, Light)| {
+            let lamp = Self::of(&light, scene)?;
+            Some(Self {
+                object: Some(object),
+                ..lamp
+            })
+        };
+        glows(scene).into_iter().filter_map(lamp).collect()
+    }
+
+    /// Whether it stands for an object in the lobe that a cone comes from.
+    pub fn replaces(&self, object: usize, cone: &RayCone) -> bool {
+        self.object == Some(object) && self.alpha_from(cone.ray.origin) < cone.alpha
+    }
+
     fn of(light: &Light, scene: &Scene) -> Option<Self> {
         let outline = Outline::of(light)?;
         let sampler = EmitterSampler::new(light, scene);
         Some(Self {
+            object: None,
             outline,
             emitter: sampler.middle()?,
             area_m2: sampler.area_m2(),
@@ -227,8 +249,10 @@ impl VisibleLamp {
             return;
         }
 
-        // A lobe as wide as the real one and the patch together.
-        let alpha_squared = lobe.alpha * lobe.alpha + of_patch * of_patch;
+        // A lobe as wide as the real one, the patch and the cone together: a tilt of α turns a ray by 4 α from edge to
+        // edge.
+        let of_cone = 0.25 * lobe.seen_by;
+        let alpha_squared = lobe.alpha * lobe.alpha + of_patch * of_patch + of_cone * of_cone;
 
         // The shadow ray ends short of the lamp, whose own glowing surface would block it.
         let mut from = |emitter: &Emitter, patch_m2: f64| {
@@ -240,7 +264,7 @@ impl VisibleLamp {
             if response > 0.0 && across_beam > 0.0 {
                 met(&Highlight {
                     to_light,
-                    distance_m: distance_m * (1.0 - BEFORE_SURFACE),
+                    distance_m: (distance_m - self.depth_m()) * (1.0 - BEFORE_SURFACE),
                     half: (lobe.to_eye + to_light).normalize(),
                     response,
                     irradiance: emitter.strength * across_beam,
@@ -267,6 +291,15 @@ impl VisibleLamp {
         }
     }
 
+    /// Depth of its centre below the surface of a glowing object that it stands for, at most [m]: to a corner of the cube
+    /// around it.
+    fn depth_m(&self) -> f64 {
+        match (self.object, self.outline) {
+            (Some(_), Outline::Round { radius_m }) => 3.0_f64.sqrt() * radius_m,
+            _ => 0.0,
+        }
+    }
+
     /// GGX α of a lobe as wide as a lamp, or a patch of a panel, is seen from a point: half the tangent of its angular
     /// radius, as a microfacet's tilt turns its reflection twice as far.
     fn alpha_from(&self, point: DVec3) -> f64 {
@@ -282,6 +315,18 @@ impl VisibleLamp {
         };
         0.5 * radius / distance.max(f64::MIN_POSITIVE)
     }
+}
+
+/// Glowing objects and the lamps that stand for them; an object that shines from two sides comes twice.
+pub(super) fn glows(scene: &Scene) -> Vec<(usize, Light)> {
+    let mut glows = Vec::new();
+    for light in &scene.lights {
+        if let LightKind::Surface { object, .. } = light.kind {
+            let lamps = EmitterSampler::new(light, scene).from_afar();
+            glows.extend(lamps.into_iter().map(|lamp| (object, lamp)));
+        }
+    }
+    glows
 }
 
 /// Centres of the patches of a panel in the coordinates of its half-axes.

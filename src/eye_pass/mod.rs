@@ -1,5 +1,6 @@
 //! The eye pass: from diffuse surfaces through specular ones into the eye (DS*E).
 
+mod facets;
 #[cfg(feature = "gpu")]
 pub mod frame_times;
 pub mod highlights;

@@ -6,7 +6,7 @@ use crate::scene::{Camera, Material, Scene};
 /// Decides [`Effect::Chains`] for a camera and the `aspect` = width/height of its picture: on if the bounding box of a
 /// specular surface may be visible. Without a camera, on if there is any specular surface.
 pub fn chains(scene: &Scene, camera: Option<(&Camera, f64)>, switch: EffectSwitch) -> EffectLine {
-    let is_specular = |material: &Material| material.surface.is_specular();
+    let is_specular = |material: &Material| material.seen_surface().is_specular();
     let seen = first_seen(scene, camera, is_specular).map(|object| &scene.objects[object].name);
     let (on, reason) = match (switch, seen, camera) {
         (EffectSwitch::Off, _, _) => (false, "switched off by the user".into()),

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::glow_sampler::GlowSampler;
-use super::{Light, LightKind, LightSize, PanelShape, Scene};
+use super::{Light, LightKind, LightSize, PanelShape, Scene, watertight};
 use crate::optics::LinearSrgb;
 
 /// Source of the rays of one wavefront.
@@ -201,6 +201,22 @@ impl<'a> EmitterSampler<'a> {
             LightKind::Point { .. } => self.disc_radius_m.map(|_| PanelShape::Disc),
             LightKind::Environment { .. } => None,
         }
+    }
+
+    /// Lamps that shine from afar as an emissive object does, for rough surfaces; empty for other lights.
+    pub fn from_afar(&self) -> Vec<Light> {
+        let (LightKind::Surface { object, radiance }, Some(surface)) = (self.light.kind, &self.surface)
+        else {
+            return Vec::new();
+        };
+        let has_inside = surface.both_sides && watertight::is_closed(self.scene.objects[object].mesh());
+        let lamps = surface.from_afar(radiance, has_inside).into_iter();
+        let lamp = |(kind, size)| Light {
+            kind,
+            size,
+            ..self.light.clone()
+        };
+        lamps.map(lamp).collect()
     }
 
     /// Emitting area of an object, over all its emitting sides, or of a panel [m²]; 0 for other lights.

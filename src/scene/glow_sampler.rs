@@ -2,9 +2,10 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{GlowPart, InScene, Scene};
+use super::{GlowPart, InScene, LightKind, LightSize, PanelShape, Scene};
 use crate::geometry::ray;
 use crate::optics::LinearSrgb;
+use crate::units::{Radiance, RadiantIntensity};
 
 /// An emissive object, prepared for many samples.
 #[derive(Debug)]
@@ -139,6 +140,43 @@ impl<'a> GlowSampler<'a> {
         })
     }
 
+    /// Lamps that shine from afar as it does at a mean radiance: a panel for each side of a parallelogram, else a ball
+    /// around it, which sends as much light in all directions. `has_inside`: its other side faces its inside.
+    pub(super) fn from_afar(&self, radiance: Radiance, has_inside: bool) -> Vec<(LightKind, LightSize)> {
+        let Some(parallelogram) = self.parallelogram else {
+            let Some((low, high)) = self.mesh.bounds() else {
+                return Vec::new();
+            };
+            // The mean of a convex body's projected area is a quarter of its surface; what its inside sends stays there.
+            let area_m2 = if has_inside { self.area_m2 } else { self.area_m2() };
+            let ball = LightKind::Point {
+                position: 0.5 * (low + high),
+                intensity: RadiantIntensity(0.25 * radiance.0 * area_m2),
+            };
+            let radius_m = 0.5 * (high - low).max_element();
+            return vec![(ball, LightSize::Radius { radius_m })];
+        };
+        let normal = self.mesh.face_normal(0) * self.side;
+        let [centre, across, down] = parallelogram.half_axes(self.mesh);
+        let front = across * across.cross(down).dot(normal).signum();
+        let sides: &[f64] = if self.both_sides { &[1.0, -1.0] } else { &[1.0] };
+        let panel = |side: &f64| {
+            let shape = PanelShape::Rectangle;
+            let across = front * *side;
+            (
+                LightKind::Panel {
+                    centre,
+                    across,
+                    down,
+                    shape,
+                    radiance,
+                },
+                LightSize::None,
+            )
+        };
+        sides.iter().map(panel).collect()
+    }
+
     /// A triangle, a point in it, and the weight of its part.
     fn place(&self, square: DVec2) -> Option<(usize, [f64; 3], f64)> {
         // Parts of no weight are never chosen, trailing ones included.
@@ -192,6 +230,13 @@ impl Parallelogram {
             }
         }
         None
+    }
+
+    /// Its centre, and from there to the middles of two sides [m].
+    fn half_axes(self, mesh: InScene) -> [DVec3; 3] {
+        let corners = mesh.corners(0);
+        let [start, own, end] = self.0[0].map(|corner| corners[corner]);
+        [0.5 * (start + end), 0.5 * (own - start), 0.5 * (end - own)]
     }
 
     /// Uniform: a triangle and a point in it, by a point of the unit square.

@@ -8,14 +8,17 @@ use crate::optics::{Glass, LinearSrgb, Metal, Nanometres};
 use glam::DVec2;
 use std::sync::Arc;
 
-/// Largest roughness (glTF's, α = roughness²) at which the coat over a diffuse body reflects; rougher surfaces are pure
-/// Lambert.
+/// Largest roughness (glTF's, α = roughness²) at which light reflects off the coat over a diffuse body; rougher surfaces
+/// are pure Lambert to the light pass: at 4 %, their wide lobes cast no caustics.
 pub const SPECULAR_ROUGHNESS_LIMIT: f64 = 0.3;
+
+/// Largest roughness at which pictures show the reflection of a coat. Rougher ones hardly differ from a lighter body.
+pub const GLOSSY_ROUGHNESS_LIMIT: f64 = 0.6;
 
 /// Largest roughness at which metals reflect in a lobe; rougher ones are pure Lambert. Transmissive surfaces have a
 /// lobe at any roughness. At this limit the lobe is as wide as Lambert's: of light incident at 0, 30, 60 and 75°, 15,
-/// 29, 44 and 46 % goes elsewhere than by Lambert, and at no roughness less than 11, 23, 31 and 32 %. Pictures would
-/// err more, since the eye sees metals as mirrors.
+/// 29, 44 and 46 % goes elsewhere than by Lambert, and at no roughness less than 11, 23, 31 and 32 %. The map of a metal
+/// that counts as matte shows the caustics on it, which its lobe would miss.
 pub const METAL_ROUGHNESS_LIMIT: f64 = 0.6;
 
 /// Largest roughness treated as smooth: the lobe is some hundredths of a degree wide.
@@ -116,6 +119,9 @@ pub struct Material {
     pub emission_spectrum: Option<Arc<Spectrum>>,
     /// Share of the surface that the coat covers, [0, 1]; multiplies the reflection of a coated one.
     pub coat: f64,
+    /// Largest roughness at which the coat reflects: [`SPECULAR_ROUGHNESS_LIMIT`] for light, [`GLOSSY_ROUGHNESS_LIMIT`]
+    /// as the eye sees it.
+    pub coat_roughness_limit: f64,
     /// Waves that perturb the normals of specular surfaces; irradiance is always that of the surface itself.
     pub waves: Option<Waves>,
     /// Normal map, to the same effect. On diffuse surfaces it shades pictures: see [`Self::relief`].
@@ -203,6 +209,17 @@ impl Material {
         }
     }
 
+    /// Surface class that the eye sees: coated where light finds it matte, but highlights and reflections are visible.
+    pub fn seen_surface(&self) -> SurfaceKind {
+        let is_body = self.surface == SurfaceKind::Diffuse && self.metallic < 0.5 && self.transmission < 0.5;
+        let is_glossy = self.roughness > SPECULAR_ROUGHNESS_LIMIT && self.roughness <= GLOSSY_ROUGHNESS_LIMIT;
+        if is_body && is_glossy && self.coat > 0.0 {
+            SurfaceKind::Coated
+        } else {
+            self.surface
+        }
+    }
+
     /// Whether the same share of it is clear everywhere, and the rest diffuse.
     fn is_partly_clear(&self) -> bool {
         self.metallic < 0.5 && self.transmission >= EVEN && self.transmission <= 1.0 - EVEN
@@ -286,6 +303,7 @@ impl Default for Material {
             emission_texture: None,
             emission_spectrum: None,
             coat: 1.0,
+            coat_roughness_limit: SPECULAR_ROUGHNESS_LIMIT,
             waves: None,
             normal_map: None,
             double_sided: true,
@@ -358,7 +376,7 @@ impl Material {
             clear,
             body: (there - metal - clear).max(0.0),
             hole: 1.0 - there,
-            coat: if roughness <= SPECULAR_ROUGHNESS_LIMIT {
+            coat: if roughness <= self.coat_roughness_limit {
                 self.coat
             } else {
                 0.0

@@ -96,6 +96,17 @@ impl Scene {
         &self.materials[self.objects[object].material]
     }
 
+    /// The scene of the eye pass: each material has the class that the eye sees.
+    #[must_use]
+    pub fn as_seen(&self) -> Self {
+        let mut seen = self.clone();
+        for material in &mut seen.materials {
+            material.surface = material.seen_surface();
+            material.coat_roughness_limit = material::GLOSSY_ROUGHNESS_LIMIT;
+        }
+        seen
+    }
+
     /// The object that stands for the body of glass that an object bounds: itself, unless several objects bound it.
     pub fn body_of(&self, object: usize) -> usize {
         self.objects[object].body.unwrap_or(object)

@@ -196,6 +196,15 @@ impl Tracer {
         }
     }
 
+    /// The same scene [as the eye sees it](Scene::as_seen).
+    #[must_use]
+    pub fn as_seen(&self) -> Self {
+        Self {
+            scene: Arc::new(self.scene.as_seen()),
+            ..self.clone()
+        }
+    }
+
     /// The same scene without its clear bodies: rays pass straight through them.
     #[must_use]
     pub fn without_clear_bodies(&self) -> Self {

@@ -37,6 +37,7 @@ pub fn all() -> Vec<Law> {
         within_a_plate(),
         within_a_ball(),
         between_mirrors(),
+        rough_in_an_even_sky(),
     ]
 }
 
@@ -152,6 +153,36 @@ pub fn under_a_sheet_of_water() -> Law {
 pub fn within_a_body_of_water() -> Law {
     let body = shapes::cuboid(dvec3(-90.0, -0.5, -90.0), dvec3(90.0, 1.0, 90.0));
     looking_up("within a body of water", body)
+}
+
+/// Rough mirrors and panes that absorb nothing, whose lobes see the same sky and each other: they cannot be told from it.
+fn rough_in_an_even_sky() -> Law {
+    let rough = |material: Material, roughness: f64| Material { roughness, ..material };
+    let pane = Material {
+        surface: SurfaceKind::ThinWall,
+        volume: None,
+        ..parts::dielectric("pane", GLASS)
+    };
+    let mut scene = Scene {
+        name: "rough".into(),
+        ..Default::default()
+    };
+    for (roughness, x) in [(0.05, -0.8), (0.2, 0.0), (0.6, 0.8)] {
+        let ball = shapes::sphere(dvec3(x, 0.3, 0.0), 0.3, 4);
+        parts::add(&mut scene, "ball", ball, rough(parts::mirror(), roughness));
+        let sheet = shapes::rectangle(dvec3(x, 0.3, 0.7), DVec3::X * 0.3, dvec3(0.0, 0.2, 0.1));
+        parts::add(&mut scene, "pane", sheet, rough(pane.clone(), roughness));
+    }
+    Law {
+        name: "rough in an even sky",
+        scene,
+        view: square_view(dvec3(0.3, 0.8, 2.5), dvec3(0.0, 0.3, 0.0), 0.5, 40),
+        expected: Box::new(|_| Some(SKY)),
+        most: SKY,
+        // What the panes reflect more than four times.
+        left_out: 0.01,
+        ends_black: false,
+    }
 }
 
 /// Transmittance and reflectance of a plate, summed over all orders.

@@ -33,6 +33,7 @@ pub fn surface(surface: SurfaceKind, ior: f64) -> Material {
     Material {
         surface,
         ior,
+        roughness: if surface.is_specular() { 0.0 } else { 1.0 },
         base_colour: LinearSrgb::WHITE,
         ..Material::default()
     }

@@ -6,6 +6,7 @@ mod radiance;
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use super::facets::FacetPoints;
 use super::highlights::RayCone;
 use super::view::{Picture, View};
 use crate::effect::EffectSwitch;
@@ -16,8 +17,7 @@ use crate::optics::LinearSrgb;
 use crate::progress::{Control, Progress, Stage};
 use crate::scene::Camera;
 use crate::transport::{MediumStack, Tracer, media_at};
-use radiance::SpectralScene;
-use radiance::{LitScene, visible_hit};
+use radiance::{EyeSample, LitScene, SpectralScene, visible_hit};
 
 pub use radiance::{ChainLimits, EyeRays};
 
@@ -85,6 +85,7 @@ pub fn render_counted(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<(Picture, EyeRays)> {
+    let tracer = &tracer.as_seen();
     let lit = LitScene::new(tracer, maps, view.background, settings.limits);
     let sides = settings.samples_per_side.max(1);
     let spectra = SpectralScene::of_samples(tracer, settings.wavelengths, sides * sides);
@@ -115,15 +116,21 @@ fn trace<const CHAINS: bool>(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<(Picture, EyeRays)> {
-    // Samples lie on a regular grid. Each has wavelengths of its own: their mean covers the spectrum more densely.
+    // Samples lie on a regular grid. Each has wavelengths and microfacets of its own: their mean covers spectrum and
+    // lobes more densely.
     let (view, side) = (looks.view, looks.sides);
     let done = AtomicU64::new(0);
     let pixel = |column: u32, row: u32, rays: &mut EyeRays| {
         let mut sum = LinearSrgb::BLACK;
         for (sample, spectrum) in (0..).zip(&looks.spectra) {
             let within = [sample % side, sample / side].map(|s| (f64::from(s) + 0.5) / f64::from(side));
-            let cone = eye_cone(view, [column, row], within);
-            sum += lit.radiance::<CHAINS>(cone, media, spectrum, rays);
+            let sample = EyeSample {
+                cone: eye_cone(view, [column, row], within),
+                media,
+                spectrum,
+                facets: FacetPoints::of_sample([column, row], sample, side * side),
+            };
+            sum += lit.radiance::<CHAINS>(&sample, rays);
         }
         let mean = sum / f64::from(side * side);
         mean.to_array().map(|channel| channel as f32)

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::effect::EffectSwitch;
+use crate::eye_pass::facets::{FacetPoint, FacetPoints};
 use crate::eye_pass::highlights::{Lobe, RayCone, VisibleLamp};
 use crate::eye_pass::relief::ReliefLights;
 use crate::eye_pass::wavelengths::{self, SeenWavelength};
@@ -11,7 +12,7 @@ use crate::illumination::lookup::in_chart;
 use crate::illumination::{Chart, IlluminationMap, Receiver, Side};
 use crate::optics::LinearSrgb;
 use crate::scene::SurfaceKind;
-use crate::transport::{Branch, Event, MediumStack, SurfaceHit, Tracer};
+use crate::transport::{Branch, EffectSet, Event, Interaction, MediumStack, SurfaceHit, Tracer};
 
 /// Highlights that reflect a smaller radiance per irradiance [1/sr] are left out: a thousandth of a white surface in
 /// the same light has 0.0003.
@@ -25,6 +26,9 @@ pub struct ChainLimits {
     pub branch_threshold: f64,
     /// Number of specular surfaces on a chain at which both branches are followed; beyond, only the stronger one is.
     pub branching_depth: u32,
+    /// Whether a rough surface is seen by all microfacets of a sample even where it is dim, as on the device; else by
+    /// fewer there.
+    pub every_facet: bool,
     /// Off: mirrors show only their emission, coated surfaces their diffuse part, and clear bodies are left out. Auto
     /// and on are equivalent, since chains need no preparation.
     pub switch: EffectSwitch,
@@ -36,6 +40,7 @@ impl Default for ChainLimits {
             max_depth: 32,
             branch_threshold: 1e-4,
             branching_depth: u32::MAX,
+            every_facet: false,
             switch: EffectSwitch::Auto,
         }
     }
@@ -73,6 +78,7 @@ pub struct LitScene<'a> {
     emitted: Vec<LinearSrgb>,
     relief: ReliefLights,
     lamps: Vec<VisibleLamp>,
+    glowing: Vec<VisibleLamp>,
     background: LinearSrgb,
     limits: ChainLimits,
 }
@@ -81,6 +87,16 @@ pub struct LitScene<'a> {
 struct MapTotal<'a> {
     chart: &'a Chart,
     irradiance: Vec<[f32; 3]>,
+}
+
+/// One sample of a pixel.
+pub struct EyeSample<'a> {
+    pub cone: RayCone,
+    /// Media around the eye.
+    pub media: MediumStack,
+    /// Wavelengths of the path from the first dispersive surface on.
+    pub spectrum: &'a SpectralScene,
+    pub facets: FacetPoints,
 }
 
 /// One ray of a chain, traced from the eye.
@@ -92,8 +108,24 @@ struct EyePath<'a> {
     weight: LinearSrgb,
     /// Specular surfaces met so far.
     depth: u32,
+    /// Rough ones among them.
+    lobes: u32,
+    /// The microfacet, once the first rough one is met.
+    facet: Option<FacetPoint>,
+    coat: CoatPassed,
     /// The wavelength that is traced; `None` before the path splits into wavelengths.
     at: Option<&'a SceneAtWavelength>,
+}
+
+/// Whether a path has been reflected off a rough coat. Light that comes to one by way of mirrors and glass is a caustic,
+/// which its map has: the few rays of its lobe would turn it into bright dots.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum CoatPassed {
+    None,
+    /// The coat was the last surface: lamps and glowing objects are seen.
+    Last,
+    /// A mirror or glass came after it: they are not.
+    Before,
 }
 
 impl EyePath<'_> {
@@ -104,6 +136,21 @@ impl EyePath<'_> {
             Some(at) => at.seen.of(brought),
             None => brought,
         }
+    }
+
+    /// Part of a lobe's width that the footprint keeps: all of it where one microfacet stands for the lobe.
+    fn kept_width(&self) -> f64 {
+        match (self.lobes, self.facet) {
+            (1, Some(facet)) => facet.kept_width(),
+            _ => 1.0,
+        }
+    }
+
+    /// Largest share of the pixel that a branch of an interaction carries.
+    fn carried_on(&self, met: &Interaction) -> f64 {
+        let branches = [&met.reflection, &met.transmission].into_iter().flatten();
+        let carried = branches.map(|branch| self.brings(branch.share).max_channel());
+        carried.fold(0.0, f64::max)
     }
 }
 
@@ -130,29 +177,26 @@ impl<'a> LitScene<'a> {
             emitted: emitted.collect(),
             relief: ReliefLights::of(tracer.scene()),
             lamps: VisibleLamp::all(tracer.scene()),
+            glowing: VisibleLamp::glowing(tracer.scene()),
             background,
             limits,
         }
     }
 
-    /// Radiance [W/(m² sr)] that arrives within a cone, which starts within `media` and splits into the wavelengths of
-    /// `spectrum` at the first dispersive surface. Without `CHAINS` the ray ends at the first surface that is not
-    /// clear.
-    pub fn radiance<const CHAINS: bool>(
-        &self,
-        cone: RayCone,
-        media: MediumStack,
-        spectrum: &SpectralScene,
-        rays: &mut EyeRays,
-    ) -> LinearSrgb {
+    /// Radiance [W/(m² sr)] that arrives within the cone of a sample. Without `CHAINS` the ray ends at the first surface
+    /// that is not clear.
+    pub fn radiance<const CHAINS: bool>(&self, sample: &EyeSample<'_>, rays: &mut EyeRays) -> LinearSrgb {
         // Paths that wait form a stack, so that long chains need no deep recursion.
         rays.camera_rays += 1;
         let mut seen = LinearSrgb::BLACK;
         let mut waiting = vec![EyePath {
-            cone,
-            media,
+            cone: sample.cone,
+            media: sample.media,
             weight: LinearSrgb::WHITE,
             depth: 0,
+            lobes: 0,
+            facet: None,
+            coat: CoatPassed::None,
             at: None,
         }];
         while let Some(mut path) = waiting.pop() {
@@ -171,13 +215,13 @@ impl<'a> LitScene<'a> {
             }
 
             // At the first dispersive surface the path becomes one path per wavelength, each with indices of its own.
-            if CHAINS && path.at.is_none() && spectrum.splits_at(self.tracer, &hit, &path.media) {
-                for at in &spectrum.wavelengths {
+            if CHAINS && path.at.is_none() && sample.spectrum.splits_at(self.tracer, &hit, &path.media) {
+                for at in &sample.spectrum.wavelengths {
                     let at = Some(at);
-                    seen += self.meet::<CHAINS>(EyePath { at, ..path }, &hit, &mut waiting, rays);
+                    seen += self.meet::<CHAINS>(sample, EyePath { at, ..path }, &hit, &mut waiting, rays);
                 }
             } else {
-                seen += self.meet::<CHAINS>(path, &hit, &mut waiting, rays);
+                seen += self.meet::<CHAINS>(sample, path, &hit, &mut waiting, rays);
             }
         }
         seen
@@ -186,33 +230,78 @@ impl<'a> LitScene<'a> {
     /// Radiance that a surface itself adds to a path. The branches to follow are pushed onto `waiting`.
     fn meet<'b, const CHAINS: bool>(
         &self,
+        sample: &EyeSample<'_>,
         path: EyePath<'b>,
         hit: &SurfaceHit,
         waiting: &mut Vec<EyePath<'b>>,
         rays: &mut EyeRays,
     ) -> LinearSrgb {
-        // The surface shows its emission and its diffuse light, less what its coat keeps from leaving.
+        // A surface without branches shows its emission and its diffuse light.
         let incident = path.cone.ray.direction;
         let tracer = path.at.map_or(self.tracer, |at| &at.tracer);
-        let interaction = tracer.interact(hit, incident, &path.media);
+        let smooth = tracer.interact(hit, incident, &path.media);
         let side = Side::met(incident, hit.geometric_normal);
-        let mut seen = path.brings(self.own_radiance(hit, side, interaction.leaving));
-        if !CHAINS || (interaction.reflection.is_none() && interaction.transmission.is_none()) {
-            return seen;
+        let emission = path.brings(self.emission(&path, hit));
+        if !CHAINS || (smooth.reflection.is_none() && smooth.transmission.is_none()) {
+            return emission + path.brings(self.own_radiance(hit, side, smooth.leaving));
         }
-
-        // The one direction that is traced would miss most lamps within a rough lobe: the smaller ones are highlights.
         let shape = ChainSurface {
             curvature: tracer.curvature(hit) * side.sign(),
             alpha: tracer.lobe_alpha(hit),
+            has_map: tracer.scene().material_of(hit.object).surface.is_receiver(),
         };
-        if let Some(reflection) = interaction.reflection.filter(|_| shape.alpha > 0.0) {
-            seen += path.brings(self.highlights(tracer, &path, hit, &reflection, shape.alpha));
+        if shape.alpha == 0.0 {
+            self.go_on(&path, &smooth, &shape, waiting, rays);
+            return emission + path.brings(self.own_radiance(hit, side, smooth.leaving));
         }
 
+        // The first rough surface is seen by many of its microfacets, the later ones by one for each of those.
+        let facets: Vec<FacetPoint> = match path.facet {
+            Some(facet) => vec![facet],
+            None => {
+                let share = if self.limits.every_facet {
+                    1.0
+                } else {
+                    path.carried_on(&smooth)
+                };
+                let count = sample.facets.count_for(share);
+                (0..count).map(|index| sample.facets.point(index)).collect()
+            }
+        };
+        let mut leaving = LinearSrgb::BLACK;
+        for &facet in &facets {
+            let at = Some(facet.at(path.lobes));
+            let met = tracer.interact_with(EffectSet::EVERYTHING, hit, incident, &path.media, at);
+            leaving += met.leaving / facets.len() as f64;
+            let of_facet = EyePath {
+                weight: path.weight / facets.len() as f64,
+                lobes: path.lobes + 1,
+                facet: Some(facet),
+                ..path
+            };
+            self.go_on(&of_facet, &met, &shape, waiting, rays);
+        }
+        let mut seen = emission + path.brings(self.own_radiance(hit, side, leaving));
+
+        // So few directions would miss most lamps that are smaller than the lobe: those are highlights.
+        if let Some(reflection) = &smooth.reflection {
+            seen += path.brings(self.highlights(tracer, &path, hit, reflection, shape.alpha));
+        }
+        seen
+    }
+
+    /// Pushes the branches of a path that are to be followed onto `waiting`.
+    fn go_on<'b>(
+        &self,
+        path: &EyePath<'b>,
+        met: &Interaction,
+        shape: &ChainSurface,
+        waiting: &mut Vec<EyePath<'b>>,
+        rays: &mut EyeRays,
+    ) {
         // Beyond the branching depth only the stronger branch goes on: the paths would double at each surface.
-        let [back, through] = [interaction.reflection, interaction.transmission]
-            .map(|branch| branch.and_then(|branch| self.followed(&path, &branch, &shape)));
+        let [back, through] = [met.reflection, met.transmission]
+            .map(|branch| branch.and_then(|branch| self.followed(path, &branch, shape)));
         let is_through_stronger = match (&back, &through) {
             (Some(back), Some(through)) => through.weight.max_channel() >= back.weight.max_channel(),
             _ => through.is_some(),
@@ -225,12 +314,11 @@ impl<'a> LitScene<'a> {
             rays.rays_by_wavelength += u64::from(next.at.is_some());
             waiting.push(next);
         }
-        seen
     }
 
     /// Contribution of the lamps between a surface that a path has left and the next one.
     fn lamps_on(&self, path: &EyePath<'_>, reach_m: f64) -> LinearSrgb {
-        if path.depth == 0 {
+        if path.depth == 0 || path.coat == CoatPassed::Before {
             return LinearSrgb::BLACK;
         }
         let mut seen = LinearSrgb::BLACK;
@@ -259,12 +347,14 @@ impl<'a> LitScene<'a> {
             to_eye: -incident,
             normal,
             alpha,
+            // That of a pixel is the same for all of a picture's surfaces.
+            seen_by: if path.lobes > 0 { path.cone.spread_rad } else { 0.0 },
         };
 
         // Highlights too dim to be seen get no shadow ray: the throughput of the chain's own reflection decides.
         let reflected = (path.weight * reflection.share).max_channel();
         let mut seen = LinearSrgb::BLACK;
-        for lamp in &self.lamps {
+        for lamp in self.lamps.iter().chain(&self.glowing) {
             lamp.highlights(&lobe, |highlight| {
                 let is_seen = highlight.response * reflected >= DIMMEST_HIGHLIGHT;
                 let ray = hit.spawn(highlight.to_light);
@@ -305,15 +395,28 @@ impl<'a> LitScene<'a> {
         }
     }
 
-    /// Emission, plus diffuse radiance L = ρE/π of the map, of which the coat lets `share` out.
-    fn own_radiance(&self, hit: &SurfaceHit, side: Side, share: LinearSrgb) -> LinearSrgb {
+    /// Emission that is not shown as a highlight of the surface that the ray left.
+    fn emission(&self, path: &EyePath<'_>, hit: &SurfaceHit) -> LinearSrgb {
+        let is_highlight = || {
+            self.glowing
+                .iter()
+                .any(|lamp| lamp.replaces(hit.object, &path.cone))
+        };
+        if self.emitted[hit.object] == LinearSrgb::BLACK || path.coat == CoatPassed::Before || is_highlight()
+        {
+            return LinearSrgb::BLACK;
+        }
         let scene = self.tracer.scene();
-        let emitted = self.emitted[hit.object] * scene.glow_at(hit.object, hit.triangle, hit.barycentric);
+        self.emitted[hit.object] * scene.glow_at(hit.object, hit.triangle, hit.barycentric)
+    }
+
+    /// Diffuse radiance L = ρE/π of the map, of which the coat lets `share` out.
+    fn own_radiance(&self, hit: &SurfaceHit, side: Side, share: LinearSrgb) -> LinearSrgb {
         let Some(map) = self.maps[Receiver::new(hit.object, side).index()]
             .as_ref()
             .filter(|_| share != LinearSrgb::BLACK)
         else {
-            return emitted;
+            return LinearSrgb::BLACK;
         };
         let chart = map.chart;
         let uv = chart.uv(hit.triangle, hit.barycentric);
@@ -322,7 +425,7 @@ impl<'a> LitScene<'a> {
             let normals = [hit.interpolated_normal, bent].map(|normal| normal * side.sign());
             irradiance = self.relief.shaded(irradiance, hit.point, normals);
         }
-        emitted + share * self.tracer.base_colour(hit) * irradiance / std::f64::consts::PI
+        share * self.tracer.base_colour(hit) * irradiance / std::f64::consts::PI
     }
 
     /// The path along a branch; `None` beyond the limits. Refraction scales radiance by the square of n on the eye's
@@ -338,11 +441,12 @@ impl<'a> LitScene<'a> {
             && weight.max_channel() > 0.0
             && weight.max_channel() >= self.limits.branch_threshold;
         within.then(|| EyePath {
-            cone: surface.bent(&path.cone, branch),
+            cone: surface.bent(&path.cone, branch, path.kept_width()),
+            coat: surface.coat_after(path.coat, branch.event),
             media: branch.media,
             weight,
             depth: path.depth + 1,
-            at: path.at,
+            ..*path
         })
     }
 }
@@ -353,13 +457,24 @@ struct ChainSurface {
     curvature: f64,
     /// GGX α; 0 where the surface is smooth.
     alpha: f64,
+    /// Whether it has an illumination map.
+    has_map: bool,
 }
 
 impl ChainSurface {
-    /// The cone along a branch, which starts as wide as another arrives.
-    fn bent(&self, cone: &RayCone, branch: &Branch) -> RayCone {
+    fn coat_after(&self, before: CoatPassed, event: Event) -> CoatPassed {
+        let is_in_lobe = event.is_reflection() && self.alpha > 0.0;
+        match before {
+            CoatPassed::None if is_in_lobe && self.has_map => CoatPassed::Last,
+            CoatPassed::Last if !is_in_lobe && event != Event::Passage => CoatPassed::Before,
+            before => before,
+        }
+    }
+
+    /// The cone along a branch, which starts as wide as another arrives and keeps a part of the lobe's width.
+    fn bent(&self, cone: &RayCone, branch: &Branch, kept: f64) -> RayCone {
         // Between the reflections off microfacets that are tilted by atan α one way and the other.
-        let lobe_rad = 4.0 * self.alpha.atan();
+        let lobe_rad = kept * 4.0 * self.alpha.atan();
         let (spread_rad, alpha) = match branch.event {
             Event::Reflection | Event::TotalInternalReflection => {
                 let of_shape = 2.0 * self.curvature * cone.width_m;

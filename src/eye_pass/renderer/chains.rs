@@ -13,7 +13,7 @@ use super::uniforms::{ChainStart, LightRecord, Node, SeenWavelengths, Triangle};
 use super::web::Content;
 use crate::error::{Error, Result};
 use crate::eye_pass::View;
-use crate::eye_pass::highlights::Outline;
+use crate::eye_pass::highlights::{self, Outline};
 use crate::eye_pass::reference::ChainLimits;
 use crate::geometry::PackedNode;
 use crate::geometry::bvh::Frame;
@@ -55,6 +55,7 @@ pub(super) struct ChainScene {
     triangles: Storage,
     lights: Storage,
     light_count: u32,
+    glow_count: u32,
     bytes: u64,
 }
 
@@ -117,6 +118,7 @@ impl ChainScene {
             triangles: Storage::new(gpu, "triangles"),
             lights: Storage::new(gpu, "lights"),
             light_count: 0,
+            glow_count: 0,
             bytes: 0,
             tracer,
         };
@@ -279,14 +281,19 @@ impl ChainScene {
         Some(bind_group(gpu, "chains", layout, resources))
     }
 
-    /// Uploads the lamps of a scene, whose direct light comes from their centres. An environment is left out.
+    /// Uploads the lamps of a scene, whose direct light comes from their centres, and those that stand for glowing
+    /// objects. An environment is left out.
     pub(super) fn set_lights(&mut self, gpu: &Gpu, scene: &Scene) {
         let record = |light: &Light| {
             let record = self.record(&Emitter::middle(light, scene)?, scene);
             Some(self.outlined(record, Outline::of(light)))
         };
-        let records: Vec<LightRecord> = scene.lights.iter().filter_map(record).collect();
-        self.light_count = records.len() as u32;
+        let mut records: Vec<LightRecord> = scene.lights.iter().filter_map(record).collect();
+        let lights = records.len();
+        let glows = highlights::glows(scene);
+        records.extend(glows.iter().filter_map(|(_, lamp)| record(lamp)));
+        self.light_count = lights as u32;
+        self.glow_count = (records.len() - lights) as u32;
         self.lights.write(gpu, &records);
     }
 
@@ -341,6 +348,7 @@ impl ChainScene {
             max_depth: limits.max_depth,
             branching_depth: limits.branching_depth.min(MAX_BRANCHING),
             light_count: self.light_count,
+            glow_count: self.glow_count,
             ..Default::default()
         }
     }

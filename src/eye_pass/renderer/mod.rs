@@ -131,12 +131,13 @@ impl Renderer {
         }
 
         // Chains, environment and targets are created with the first view that needs them.
-        let geometry = Geometry::new(gpu, scene);
+        let scene = Arc::new(scene.as_seen());
+        let geometry = Geometry::new(gpu, &scene);
         let renderer = Self {
             sample_count,
-            scene: Arc::new(scene.clone()),
             tone_mapping: ToneMappingPipelines::new(gpu, colour_format),
-            objects: Objects::new(gpu, scene, &geometry, MAP_BUDGET_BYTES),
+            objects: Objects::new(gpu, &scene, &geometry, MAP_BUDGET_BYTES),
+            scene,
             geometry,
             surfaces: SurfacePipelines::new(gpu, sample_count),
             chain_scene: None,
@@ -168,6 +169,7 @@ impl Renderer {
     /// # Errors
     /// An error of the device.
     pub fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Result<Uploaded> {
+        let scene = &scene.as_seen();
         let mut uploaded = Uploaded::default();
         self.lights_are_stale = true;
         if self.scene.triangle_count() != scene.triangle_count() {
@@ -408,7 +410,8 @@ impl Renderer {
                 has_sky: self.shows_sky(),
                 is_dispersive: self.dispersion != EffectSwitch::Off && !self.objects.glasses.is_empty(),
                 has_lobes: (0..self.scene.objects.len())
-                    .any(|object| self.scene.material_of(object).is_rough()),
+                    .map(|object| self.scene.material_of(object))
+                    .any(|material| material.is_rough() && material.is_specular()),
                 has_mask: self.objects.list.iter().any(Appearance::has_mask),
                 is_logarithmic: self.map_style.is_logarithmic(),
             },

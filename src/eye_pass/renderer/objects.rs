@@ -9,6 +9,7 @@ use super::maps::ShownMap;
 use super::paging::Uploaded;
 use super::uniforms::{ObjectRecord, rgb};
 use crate::error::{Error, Result};
+use crate::eye_pass::highlights;
 use crate::gpu::Gpu;
 use crate::illumination::false_colours::ColourScale;
 use crate::illumination::{Chart, Receiver};
@@ -68,6 +69,9 @@ impl Objects {
             .map(|object| Appearance::of(scene, object, geometry.rows(object)))
             .collect();
         self.number_glasses(scene);
+        for (number, (object, _)) in (1..).zip(highlights::glows(scene)) {
+            self.list[object].record.lamp = number;
+        }
         uploaded += self.write_records(gpu);
         uploaded
     }

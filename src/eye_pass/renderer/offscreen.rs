@@ -9,7 +9,7 @@ use super::{EyeCounts, EyeQuality, MapStyle, Renderer};
 use crate::effect::{Effect, EffectSwitch, EffectSwitches};
 use crate::error::Result;
 use crate::eye_pass::highlights::VisibleLamp;
-use crate::eye_pass::{Picture, View};
+use crate::eye_pass::{Picture, View, facets};
 use crate::gpu::{Gpu, readback};
 use crate::illumination::IlluminationMap;
 use crate::scene::Scene;
@@ -51,7 +51,7 @@ impl Renderer {
     }
 
     /// Mean radiance of `samples_per_side`² samples per pixel, at the same positions as in the CPU eye pass. Averages
-    /// at least 16 frames if chains split into wavelengths, since each frame traces only a few of them.
+    /// more frames if chains split into wavelengths or meet rough surfaces, since each frame traces only a few of them.
     ///
     /// # Errors
     /// Those of [`radiance`](Self::radiance).
@@ -101,13 +101,17 @@ impl Renderer {
         Ok(picture)
     }
 
-    /// Number of frames for `places` samples per pixel, enough to cover the spectrum.
+    /// Number of frames for `places` samples per pixel, enough to cover the spectrum and the lobes of rough surfaces.
     fn pictures(&self, view: &View, places: u32) -> u32 {
         let draw_state = self.draw_state();
         let is_chain = |object: &usize| draw_state.is_specular(&self.objects.list[*object]);
-        let has_chains = || visible_objects(&self.objects, view).iter().any(is_chain);
-        if draw_state.flags.is_dispersive && has_chains() {
-            MIN_PARTED.div_ceil(places) * places
+        let needed = match draw_state.flags {
+            flags if flags.has_lobes => facets::PER_PIXEL,
+            flags if flags.is_dispersive => MIN_PARTED,
+            _ => return places,
+        };
+        if visible_objects(&self.objects, view).iter().any(is_chain) {
+            needed.div_ceil(places) * places
         } else {
             places
         }

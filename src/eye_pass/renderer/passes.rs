@@ -292,6 +292,7 @@ impl Renderer {
             },
             colour_scale: self.map_style.colour_scale().map(|number| number as f32),
             fault: (radiance_scale / view.exposure_stops.exp2()) as f32,
+            picture: sample.picture,
             ..Frame::default()
         }
     }

@@ -46,8 +46,9 @@ shader_struct! {
         fault: f32,
         /// Radiance of mirrors while chains are switched off [W/(m² sr)].
         stand_in: f32,
-        padding0: f32,
-        padding1: f32,
+        /// Number among the frames of the same view.
+        picture: u32,
+        padding0: u32,
     }
 }
 
@@ -84,9 +85,10 @@ shader_struct! {
         branching_depth: u32,
         /// Number of lights.
         light_count: u32,
+        /// Number of lamps that stand for glowing objects; they follow after the lights.
+        glow_count: u32,
         padding0: u32,
         padding1: u32,
-        padding2: u32,
     }
 }
 
@@ -147,8 +149,9 @@ shader_struct! {
         solid: u32,
         /// Texture reference of its emission.
         glow: u32,
+        /// Number of the lamp that stands for it, from 1 on; 0 for none.
+        lamp: u32,
         padding0: u32,
-        padding1: u32,
         /// Rows of the transform from mesh to scene coordinates.
         row_x: [f32; 4],
         row_y: [f32; 4],

@@ -17,7 +17,7 @@ use super::substance::{self, Composition};
 use super::{coat, extensions, extras, spectrum, waves};
 use crate::error::Result;
 use crate::optics::LinearSrgb;
-use crate::scene::material::METAL_ROUGHNESS_LIMIT;
+use crate::scene::material::{METAL_ROUGHNESS_LIMIT, SPECULAR_ROUGHNESS_LIMIT};
 use crate::scene::{Material, SurfaceKind, Volume};
 use crate::units::LUMENS_PER_WATT;
 
@@ -163,6 +163,7 @@ impl<'a> MaterialReader<'a, '_> {
             emission_texture: None,
             emission_spectrum: None,
             coat: 1.0,
+            coat_roughness_limit: SPECULAR_ROUGHNESS_LIMIT,
             normal_map: self.normal_map()?,
             waves: self
                 .stated(waves::KEY)
@@ -185,6 +186,7 @@ impl<'a> MaterialReader<'a, '_> {
             material.variation = None;
             SurfaceKind::Varied
         } else {
+            material.coat = 0.0;
             SurfaceKind::Diffuse
         };
 
@@ -195,7 +197,7 @@ impl<'a> MaterialReader<'a, '_> {
         material.is_solid_by_shape &= material.volume.is_some();
 
         // What covers a surface depends on its class.
-        let is_coat = matches!(material.surface, SurfaceKind::Coated | SurfaceKind::Varied);
+        let is_coat = matches!(material.seen_surface(), SurfaceKind::Coated | SurfaceKind::Varied);
         if let (true, Some(specular)) = (is_coat, &extensions.specular) {
             material.coat = self.specular_weight(specular)?;
         }

@@ -12,8 +12,11 @@ use support::chain_laws;
 use support::floors::{
     diffuse, floor, floor_map, floor_scene, four_colours, from_above, image, lambert, texture_reference,
 };
+use support::meshes::quad;
 use support::prelude::*;
-use support::scenes::{bits, lamps_of_all_kinds, light, limited, map_of, middles, seen, under_sky, view};
+use support::scenes::{
+    bits, lamps_of_all_kinds, let_glow, light, limited, map_of, middles, seen, under_sky, view,
+};
 
 /// Rounding of one half float; the map and the picture are one each.
 const HALF: f64 = 1.0 / 2048.0;
@@ -54,7 +57,7 @@ fn sampled(name: &'static str, map: IlluminationMap, size: u32) -> Case {
 fn on_cpu(case: &Case, samples_per_side: u32) -> Picture {
     let settings = ReferenceSettings {
         samples_per_side,
-        ..limited(|limits| limits.branching_depth = AS_CPU.branching_depth)
+        ..limited(|limits| (limits.branching_depth, limits.every_facet) = (AS_CPU.branching_depth, true))
     };
     let tracer = Tracer::new(Arc::new(case.scene.clone()));
     seen(&tracer, &case.maps, &case.view, &settings).0
@@ -84,6 +87,7 @@ fn under(name: &'static str, surface: SurfaceKind, base_colour: LinearSrgb, heig
         surface,
         base_colour,
         metallic: if surface == SurfaceKind::Mirror { 1.0 } else { 0.0 },
+        roughness: 0.0,
         ..Default::default()
     });
     scene.objects.push(floor("sheet", 1, height_m));
@@ -187,7 +191,7 @@ fn masks() -> Vec<Case> {
         (SurfaceKind::Mirror, SurfaceKind::Diffuse, 0.4),
     ] {
         let mut case = under("sheet with holes", surface, LinearSrgb::WHITE, 0.5);
-        case.scene.materials[0].surface = below;
+        (case.scene.materials[0].surface, case.scene.materials[0].roughness) = (below, 0.0);
         case.scene.textures.push(holes.clone().into());
         let sheet = &mut case.scene.materials[1];
         (sheet.base_colour_texture, sheet.double_sided) = (Some(texture_reference()), true);
@@ -221,7 +225,8 @@ fn mixtures() -> Vec<Case> {
             surface: SurfaceKind::Varied,
         });
         case.maps.push(floor_map(1, 1, 1, vec![[2.0, 1.0, 4.0]]));
-        (case.of_peak, case.few) = (0.01, 0.004);
+        // Each of 64 rays of a pixel may turn at an outline.
+        (case.of_peak, case.few) = (0.01, 0.02);
         case
     };
     [(0.8, None), (0.0, Some(0.7))].into_iter().map(of).collect()
@@ -244,7 +249,8 @@ fn reliefs() -> Vec<Case> {
     let lamps = [
         LightKind::Environment { scale: 0.5 },
         LightKind::Point {
-            position: dvec3(0.3, 0.4, 0.6),
+            // Out of view: seen through the pane it would be far brighter than the relief.
+            position: dvec3(1.3, 0.4, 0.6),
             intensity: RadiantIntensity(1.0),
         },
         LightKind::Sun {
@@ -295,10 +301,33 @@ fn highlights() -> Vec<Case> {
         let (eye, target) = (dvec3(0.5, 0.6, 1.7), dvec3(0.5, 0.0, 0.5));
         case.view = view(eye, target, 0.6, [120, 80]);
         case.view.background = rgb(0.2, 0.1, 0.4);
-        (case.tolerance, case.of_peak, case.few) = (0.01, 0.003, 0.01);
+        (case.tolerance, case.of_peak, case.few) = (0.01, 0.003, 0.02);
         case
     };
-    [0.0, 0.2, 0.5].map(of).into()
+    let mut cases: Vec<Case> = [0.0, 0.2, 0.5].map(of).into();
+
+    // A glossy floor below a glowing sheet, and below a glowing ball.
+    for (name, shape) in [
+        (
+            "sheet",
+            quad(dvec3(0.4, 0.7, -0.4), DVec3::X * 0.2, DVec3::Z * 0.15),
+        ),
+        ("bulb", shapes::sphere(dvec3(0.5, 0.7, -0.3), 0.05, 3)),
+    ] {
+        let mut case = of(0.5);
+        let glowing = with(Material::default(), |it| {
+            it.emitted_radiance = LinearSrgb::grey(90.0)
+        });
+        let scene = &mut case.scene;
+        scene.lights.clear();
+        let coat = with(diffuse(ALBEDO), |it| it.roughness = 0.5);
+        scene.materials[0] = coat;
+        parts::add(scene, name, shape, glowing);
+        let_glow(scene, 3, None);
+        case.maps = even([3.0, 2.0, 1.0]);
+        cases.push(case);
+    }
+    cases
 }
 
 /// A mirror ball and a glass ball over a dark floor, the sky ahead, and back over the seam of its image with the pole in

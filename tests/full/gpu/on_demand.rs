@@ -15,6 +15,7 @@ fn hall() -> (Scene, Vec<IlluminationMap>) {
     let mut scene = floor_scene(diffuse(rgb(0.8, 0.5, 0.2)));
     let coat = Material {
         surface: SurfaceKind::Coated,
+        roughness: 0.0,
         base_colour: LinearSrgb::grey(0.5),
         emitted_radiance: rgb(0.1, 0.2, 0.3),
         ..Default::default()

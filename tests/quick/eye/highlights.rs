@@ -7,7 +7,7 @@ use nephroid::transport::{EffectSet, NormalSource};
 use crate::prelude::*;
 use support::chain_laws::direction;
 use support::meshes::{floor, quad};
-use support::scenes::{lamps_of_all_kinds, point_light, scene, seen, sun, view};
+use support::scenes::{lamps_of_all_kinds, let_glow, point_light, scene, seen, sun, view};
 
 /// Where bulbs and panels are [m].
 const LAMP: DVec3 = dvec3(0.1, 1.0, -1.3);
@@ -148,6 +148,41 @@ fn rough_mirrors_show_lamps_as_their_microfacets_do() {
             // The comparison sees another roughness.
             let [off, _, sum] = compared(&shown(&with_roughness(1.2 * roughness)).radiance, &expected);
             assert!(off / sum > 0.2, "{what}: {}", off / sum);
+        }
+    }
+}
+
+/// A glowing sheet and a glowing ball leave the highlights of a panel and of a bulb.
+#[test]
+fn glowing_objects_have_the_highlights_of_lamps() {
+    let view = view(dvec3(0.0, 0.9, 1.2), DVec3::ZERO, 0.7, [24, 18]);
+    let [bulb, _, panel, _] = &lamps_of_all_kinds(LAMP)[..] else {
+        panic!("they are four");
+    };
+    let radiance = 2.0 / (PI * 0.04 * 0.04);
+    let (across, down) = (DVec3::X * 0.12, dvec3(0.0, 0.1, 0.12));
+    let sheet = quad(LAMP - 0.5 * (across + down), across, down);
+    for (lamp, mesh, radiance) in [
+        (bulb, shapes::sphere(LAMP, 0.04, 4), radiance),
+        (panel, sheet, 40.0),
+    ] {
+        for roughness in [0.2, 0.35, 0.5] {
+            let lit = scene(vec![(floor(50.0, 0.0), mirror(roughness))], vec![lamp.clone()]);
+            let glowing = with(Material::default(), |it| {
+                (it.base_colour, it.emitted_radiance) = (LinearSrgb::BLACK, LinearSrgb::grey(radiance));
+            });
+            let parts = vec![(floor(50.0, 0.0), mirror(roughness)), (mesh.clone(), glowing)];
+            let mut shining = scene(parts, vec![]);
+            let_glow(&mut shining, 1, None);
+            let [lit, shining] = [lit, shining].map(|scene| {
+                let tracer = Tracer::new(Arc::new(scene));
+                seen(&tracer, &[], &view, &ReferenceSettings::default())
+                    .0
+                    .radiance
+            });
+            let lit: Vec<[f64; 3]> = lit.iter().map(|pixel| pixel.map(f64::from)).collect();
+            let [off, _, sum] = compared(&shining, &lit);
+            assert!(off < 0.02 * sum, "{:?} at {roughness}: {}", lamp.kind, off / sum);
         }
     }
 }

@@ -154,7 +154,7 @@ fn meshes_beyond_a_buffer_are_drawn_whole() {
         mesh.uv0 = Some(mesh.positions.iter().map(uv).collect());
         mesh
     };
-    let pane = with(Material::default(), |it| it.surface = SurfaceKind::ThinWall);
+    let pane = support::scenes::surface(SurfaceKind::ThinWall, 1.5);
     let mut scene = Scene::default();
     parts::add(&mut scene, "floor", sheet(0.0), diffuse(LinearSrgb::WHITE));
     parts::add(&mut scene, "pane", sheet(0.5), pane);
