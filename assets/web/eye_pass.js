@@ -235,7 +235,7 @@ export class EyePass {
       level_bias: [count === 0 ? 0 : -1], pixel_rad: [(2 * halfHeight) / tracedHeight], jitter: jitter(offset),
       traced_width: [tracedWidth], traced_height: [tracedHeight], traced_per_pixel: perPixel,
       traced_offset: offset.map((place, axis) => (place - tracedOffset[axis]) * perPixel[axis]),
-      colour_scale: [low, 1 / (high - low)], fault: [1], stand_in: [STAND_IN / exposure], picture: new Uint32Array([count]),
+      colour_scale: [low, 1 / (high - low)], fault: [1], stand_in: [STAND_IN / exposure], picture: new Uint32Array([count]), sky_cut: [scene.sky_cut / (scene.textures.sky?.scale ?? 1)],
     };
     write(device, uniforms.frame, scene.Frame, frame);
     write(device, uniforms.tracedFrame, scene.Frame, { ...frame, jitter: jitter(tracedOffset) });

@@ -244,7 +244,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 walk.radiance += shown(lamps, walk.gaze.wavelength);
             }
             if !meets {
-                let beyond = walk.gaze.weight * background(walk.gaze.direction);
+                let beyond = walk.gaze.weight * background(walk.gaze.direction, walk.gaze.alpha <= SKY_SUN_ALPHA);
                 walk.radiance += shown(beyond, walk.gaze.wavelength);
                 break;
             }

@@ -21,10 +21,14 @@ struct Frame {
     stand_in: f32,
     // Number among the frames of the same view.
     picture: u32,
-    padding0: u32,
+    // Luminance above which a pixel of the sky belongs to a sun, at the environment's own scale.
+    sky_cut: f32,
 }
 
 @group(0) @binding(0) var<uniform> frame: Frame;
+
+// Luminance of linear sRGB.
+const LUMINANCE = vec3f(0.2126390, 0.7151687, 0.0721923);
 
 // Largest value written [scaled radiance]: half floats end at 65504.
 const LARGEST: f32 = 32768.0;

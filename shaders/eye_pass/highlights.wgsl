@@ -4,6 +4,8 @@
 const POINT_RADIUS_RAD: f32 = 2e-4;
 // A lamp lies on a ray if it is nearer than the next surface by this part of the distance.
 const BEFORE_SURFACE: f32 = 1e-4;
+// Lobes of a larger GGX α show the suns of a sky as highlights.
+const SKY_SUN_ALPHA: f32 = 0.02;
 // Patches across and down a panel that are highlights of their own.
 const PATCHES: u32 = 4u;
 // Highlights that reflect a smaller radiance per irradiance [1/sr] are left out.
@@ -213,7 +215,7 @@ fn highlight_from(light: LightRecord, place: vec3f, patch_m2: f32, depth: f32, g
 // Reflected radiance of the lamps that are smaller than the lobe of a rough surface.
 fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
     var sum = vec3f(0.0);
-    for (var index = 0u; index < start.light_count + start.glow_count; index += 1u) {
+    for (var index = 0u; index < start.light_count + start.lobe_lamp_count; index += 1u) {
         let light = lights[index];
         if light.outline == OUTLINE_SURFACE || alpha_from(light, gloss.point.place) >= gloss.alpha {
             continue;

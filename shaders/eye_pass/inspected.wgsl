@@ -14,8 +14,6 @@ const INSPECTED_MAP_UV: u32 = 5u;
 
 // Colour of surfaces without a map.
 const NO_MAP: vec3f = vec3f(0.01);
-// Luminance weights of linear sRGB.
-const LUMINANCE: vec3f = vec3f(0.2126390, 0.7151687, 0.0721923);
 
 // False colour of a quantity; frame.colour_scale holds the start of the scale and the factor of distances from it.
 fn false_colour(quantity: f32) -> vec3f {

@@ -1,5 +1,5 @@
 // Uniform background radiance.
 
-fn background(direction: vec3f) -> vec3f {
+fn background(direction: vec3f, has_suns: bool) -> vec3f {
     return frame.background;
 }

@@ -6,7 +6,6 @@ const SKY_WORDS: u32 = 1u;
 const LAMP_WORDS: u32 = 13u;
 const WORDS_OF_LAMP: u32 = 24u;
 const MAX_GAIN: f32 = 4.0;
-const LUMINANCE: vec3f = vec3f(0.2126390, 0.7151687, 0.0721923);
 
 fn table_vector(at: u32) -> vec3f {
     return vec3f(table_float(at), table_float(at + 1u), table_float(at + 2u));

@@ -5,13 +5,17 @@
 
 const TAU: f32 = 6.2831855;
 
-fn sky_pixel(column: i32, row: i32, size: vec2i) -> vec3f {
+// A pixel, darkened to a luminance of at most `cut`.
+fn sky_pixel(column: i32, row: i32, size: vec2i, cut: f32) -> vec3f {
     // Wraps around horizontally, clamps at the poles.
     let place = vec2i((column + size.x) % size.x, clamp(row, 0, size.y - 1));
-    return textureLoad(sky, place, 0).rgb;
+    let pixel = textureLoad(sky, place, 0).rgb;
+    return pixel * min(cut / max(dot(pixel, LUMINANCE), 1e-30), 1.0);
 }
 
-fn background(direction: vec3f) -> vec3f {
+// Without its suns where these are highlights.
+fn background(direction: vec3f, has_suns: bool) -> vec3f {
+    let cut = select(frame.sky_cut, 3e38, has_suns);
     let size = vec2i(textureDimensions(sky));
     let turns = atan2(direction.x, -direction.z) / TAU;
     let polar = atan2(length(direction.xz), direction.y);
@@ -20,7 +24,7 @@ fn background(direction: vec3f) -> vec3f {
     let low = floor(place);
     let share = place - low;
     let at = vec2i(low);
-    let upper = mix(sky_pixel(at.x, at.y, size), sky_pixel(at.x + 1, at.y, size), share.x);
-    let lower = mix(sky_pixel(at.x, at.y + 1, size), sky_pixel(at.x + 1, at.y + 1, size), share.x);
+    let upper = mix(sky_pixel(at.x, at.y, size, cut), sky_pixel(at.x + 1, at.y, size, cut), share.x);
+    let lower = mix(sky_pixel(at.x, at.y + 1, size, cut), sky_pixel(at.x + 1, at.y + 1, size, cut), share.x);
     return frame.background * mix(upper, lower, share.y);
 }

@@ -17,5 +17,5 @@ fn behind(@builtin(vertex_index) index: u32) -> Behind {
 fn sky_drawn(fragment: Behind) -> @location(0) vec4f {
     let within = fragment.within + frame.jitter;
     let direction = frame.forward + within.x * frame.right + within.y * frame.up;
-    return vec4f(scaled(background(normalize(direction))), 1.0);
+    return vec4f(scaled(background(normalize(direction), true)), 1.0);
 }

@@ -9,8 +9,8 @@ struct ChainStart {
     max_depth: u32,
     branching_depth: u32,
     light_count: u32,
-    // Of lamps that stand for glowing objects; they follow after the lights.
-    glow_count: u32,
+    // Of lamps that are highlights alone; they follow after the lights.
+    lobe_lamp_count: u32,
     padding0: u32,
     padding1: u32,
 }

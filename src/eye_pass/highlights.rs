@@ -15,14 +15,18 @@ use glam::{DVec2, DVec3};
 use crate::geometry::Ray;
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, EmitterKind, EmitterSampler};
+use crate::scene::environment::suns::{self, SkySun};
 use crate::scene::{Light, LightKind, LightSize, PanelShape, Scene};
 use crate::transport::ggx_reflection;
+use crate::units::Irradiance;
 
 /// Angular radius of lamps without extent where a focus leaves no footprint [rad]: a fifth of a pixel of 1 mrad.
 const POINT_RADIUS_RAD: f64 = 2e-4;
 /// A lamp lies on a ray if it is nearer than the next surface by this part of the distance: panels often lie on the
 /// glowing surface that shows them.
 const BEFORE_SURFACE: f64 = 1e-4;
+/// Lobes of a larger GGX α show the suns of a sky as highlights: half the tangent of their radius.
+pub const SKY_SUN_ALPHA: f64 = 0.5 * suns::TAN_RADIUS;
 /// Patches across and down a panel that are highlights of their own.
 const PATCHES: u32 = 4;
 
@@ -134,16 +138,13 @@ impl VisibleLamp {
         lamps.filter_map(|light| Self::of(light, scene)).collect()
     }
 
-    /// What stands for the glowing objects of a scene.
-    pub fn glowing(scene: &Scene) -> Vec<Self> {
-        let lamp = |(object, light): (usize, Light)| {
+    /// What stands for the glowing objects and the suns of a sky in the lobes of rough surfaces.
+    pub fn in_lobes(scene: &Scene) -> Vec<Self> {
+        let lamp = |(object, light): (Option<usize>, Light)| {
             let lamp = Self::of(&light, scene)?;
-            Some(Self {
-                object: Some(object),
-                ..lamp
-            })
+            Some(Self { object, ..lamp })
         };
-        glows(scene).into_iter().filter_map(lamp).collect()
+        lamps_in_lobes(scene).into_iter().filter_map(lamp).collect()
     }
 
     /// Whether it stands for an object in the lobe that a cone comes from.
@@ -317,16 +318,37 @@ impl VisibleLamp {
     }
 }
 
-/// Glowing objects and the lamps that stand for them; an object that shines from two sides comes twice.
-pub(super) fn glows(scene: &Scene) -> Vec<(usize, Light)> {
-    let mut glows = Vec::new();
+/// Lamps that stand for glowing objects, and for the suns of a sky; an object that shines from two sides has two.
+pub(super) fn lamps_in_lobes(scene: &Scene) -> Vec<(Option<usize>, Light)> {
+    let mut lamps = Vec::new();
     for light in &scene.lights {
-        if let LightKind::Surface { object, .. } = light.kind {
-            let lamps = EmitterSampler::new(light, scene).from_afar();
-            glows.extend(lamps.into_iter().map(|lamp| (object, lamp)));
+        match (light.kind, &scene.environment) {
+            (LightKind::Surface { object, .. }, _) => {
+                let all = EmitterSampler::new(light, scene).from_afar();
+                lamps.extend(all.into_iter().map(|lamp| (Some(object), lamp)));
+            }
+            (LightKind::Environment { .. }, Some(sky)) => {
+                lamps.extend(sky.suns().suns.iter().map(|sun| (None, of_sky(light, sun))));
+            }
+            _ => {}
         }
     }
-    glows
+    lamps
+}
+
+/// The light of a sun in a sky.
+fn of_sky(sky: &Light, sun: &SkySun) -> Light {
+    Light {
+        colour: sky.strength() * sun.irradiance,
+        kind: LightKind::Sun {
+            direction: -sun.to_sun,
+            normal_irradiance: Irradiance(1.0),
+        },
+        size: LightSize::Angle {
+            diameter_rad: 2.0 * suns::TAN_RADIUS.atan(),
+        },
+        ..sky.clone()
+    }
 }
 
 /// Centres of the patches of a panel in the coordinates of its half-axes.

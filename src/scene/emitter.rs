@@ -453,7 +453,7 @@ impl Scene {
         let squares = (0..count)
             .map(|index| DVec2::new(place(index % ENVIRONMENT_SIDE), place(index / ENVIRONMENT_SIDE)));
         let sum = squares.fold(LinearSrgb::BLACK, |sum, square| {
-            sum + environment.smooth_radiance(direction_of(square))
+            sum + environment.smooth_radiance(direction_of(square), f64::INFINITY)
         });
         strength * sum * (4.0 * std::f64::consts::PI / f64::from(count))
     }

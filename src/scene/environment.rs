@@ -2,6 +2,7 @@
 
 mod clear_sky;
 mod file;
+pub mod suns;
 
 use std::f64::consts::{PI, TAU};
 
@@ -11,6 +12,7 @@ use crate::optics::LinearSrgb;
 
 pub use clear_sky::clear_sky;
 pub use file::read;
+pub use suns::SkySuns;
 
 /// Radiance from infinity as an equirectangular image. Column 0 begins at −z and columns advance towards +x, so that
 /// the image centre is +z; row 0 is at +y, up.
@@ -27,6 +29,7 @@ pub struct Environment {
     /// ∫ L dω of the luminance [W/m²].
     total: f64,
     smooth: SmoothIrradiance,
+    suns: SkySuns,
 }
 
 /// Irradiance of an unoccluded surface as a linear function of its normal: the first two bands of spherical harmonics
@@ -73,6 +76,7 @@ impl Environment {
             columns: Vec::with_capacity(width * height),
             total: 0.0,
             smooth: SmoothIrradiance::default(),
+            suns: SkySuns::NONE,
         };
 
         // Directions of columns are the same in all rows.
@@ -118,6 +122,7 @@ impl Environment {
         if total > 0.0 {
             environment.rows.iter_mut().for_each(|share| *share /= total);
         }
+        environment.suns = SkySuns::of(&environment);
         Some(environment)
     }
 
@@ -141,8 +146,26 @@ impl Environment {
         &self.smooth
     }
 
+    /// Its small bright spots.
+    pub fn suns(&self) -> &SkySuns {
+        &self.suns
+    }
+
+    /// Unit, of the middle of a pixel.
+    fn direction(&self, column: usize, row: usize) -> DVec3 {
+        let (sine, cosine) = ((row as f64 + 0.5) / self.height as f64 * PI).sin_cos();
+        let (across, ahead) = ((column as f64 + 0.5) / self.width as f64 * TAU).sin_cos();
+        DVec3::new(sine * across, cosine, -sine * ahead)
+    }
+
     fn pixel(&self, column: usize, row: usize) -> LinearSrgb {
         LinearSrgb::from(self.radiance[row * self.width + column].map(f64::from))
+    }
+
+    /// A pixel, darkened to a luminance of at most `cut`.
+    fn pixel_below(&self, cut: f64, column: usize, row: usize) -> LinearSrgb {
+        let pixel = self.pixel(column, row);
+        pixel * (cut / pixel.luminance()).min(1.0)
     }
 
     fn pixel_solid_angle_sr(&self, row: usize) -> f64 {
@@ -158,8 +181,8 @@ impl Environment {
     }
 
     /// Radiance seen in a unit direction [W/(m² sr)], interpolated bilinearly between pixel centres: around the image,
-    /// but not across the poles. `sky.wgsl` does the same.
-    pub fn smooth_radiance(&self, direction: DVec3) -> LinearSrgb {
+    /// but not across the poles. Pixels count by a luminance of at most `cut`. `sky.wgsl` does the same.
+    pub fn smooth_radiance(&self, direction: DVec3, cut: f64) -> LinearSrgb {
         let size = DVec2::new(self.width as f64, self.height as f64);
         let place = coordinates(direction) * size - 0.5;
         let low = place.floor();
@@ -167,7 +190,7 @@ impl Environment {
         let row = |row: f64| row.clamp(0.0, size.y - 1.0) as usize;
         let column = |column: f64| (column.rem_euclid(size.x) as usize).min(self.width - 1);
         let along = |row: usize| {
-            let [left, right] = [low.x, low.x + 1.0].map(|x| self.pixel(column(x), row));
+            let [left, right] = [low.x, low.x + 1.0].map(|x| self.pixel_below(cut, column(x), row));
             left * (1.0 - share.x) + right * share.x
         };
         along(row(low.y)) * (1.0 - share.y) + along(row(low.y + 1.0)) * share.y

@@ -1,10 +1,8 @@
 //! Radiance along a ray: DS*E chains followed from the eye.
 
-use glam::DVec3;
-
 use crate::effect::EffectSwitch;
 use crate::eye_pass::facets::{FacetPoint, FacetPoints};
-use crate::eye_pass::highlights::{Lobe, RayCone, VisibleLamp};
+use crate::eye_pass::highlights::{self, Lobe, RayCone, VisibleLamp};
 use crate::eye_pass::relief::ReliefLights;
 use crate::eye_pass::wavelengths::{self, SeenWavelength};
 use crate::geometry::Ray;
@@ -177,7 +175,7 @@ impl<'a> LitScene<'a> {
             emitted: emitted.collect(),
             relief: ReliefLights::of(tracer.scene()),
             lamps: VisibleLamp::all(tracer.scene()),
-            glowing: VisibleLamp::glowing(tracer.scene()),
+            glowing: VisibleLamp::in_lobes(tracer.scene()),
             background,
             limits,
         }
@@ -204,7 +202,7 @@ impl<'a> LitScene<'a> {
             let next = nearest::<CHAINS>(self.tracer, path.cone.ray);
             seen += self.lamps_on(&path, next.map_or(f64::INFINITY, |(_, distance_m)| distance_m));
             let Some((hit, distance_m)) = next else {
-                seen += path.brings(self.beyond(path.cone.ray.direction));
+                seen += path.brings(self.beyond(&path.cone));
                 continue;
             };
 
@@ -387,10 +385,18 @@ impl<'a> LitScene<'a> {
         media.transmittance(self.tracer.scene(), distance_m)
     }
 
-    /// Radiance of the environment or the background [W/(m² sr)].
-    fn beyond(&self, direction: DVec3) -> LinearSrgb {
+    /// Radiance of the environment, less its suns where they are highlights, or of the background [W/(m² sr)].
+    fn beyond(&self, cone: &RayCone) -> LinearSrgb {
         match self.tracer.scene().sky() {
-            Some((sky, strength)) => strength * sky.smooth_radiance(direction),
+            Some((sky, strength)) => {
+                let has_highlights = cone.alpha > highlights::SKY_SUN_ALPHA;
+                let cut = if has_highlights {
+                    sky.suns().cut
+                } else {
+                    f64::INFINITY
+                };
+                strength * sky.smooth_radiance(cone.ray.direction, cut)
+            }
             None => self.background,
         }
     }

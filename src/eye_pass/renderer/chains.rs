@@ -55,7 +55,7 @@ pub(super) struct ChainScene {
     triangles: Storage,
     lights: Storage,
     light_count: u32,
-    glow_count: u32,
+    lobe_lamp_count: u32,
     bytes: u64,
 }
 
@@ -118,7 +118,7 @@ impl ChainScene {
             triangles: Storage::new(gpu, "triangles"),
             lights: Storage::new(gpu, "lights"),
             light_count: 0,
-            glow_count: 0,
+            lobe_lamp_count: 0,
             bytes: 0,
             tracer,
         };
@@ -281,8 +281,8 @@ impl ChainScene {
         Some(bind_group(gpu, "chains", layout, resources))
     }
 
-    /// Uploads the lamps of a scene, whose direct light comes from their centres, and those that stand for glowing
-    /// objects. An environment is left out.
+    /// Uploads the lamps of a scene, whose direct light comes from their centres, and those that are highlights alone. Of an
+    /// environment, only its suns are among these.
     pub(super) fn set_lights(&mut self, gpu: &Gpu, scene: &Scene) {
         let record = |light: &Light| {
             let record = self.record(&Emitter::middle(light, scene)?, scene);
@@ -290,10 +290,10 @@ impl ChainScene {
         };
         let mut records: Vec<LightRecord> = scene.lights.iter().filter_map(record).collect();
         let lights = records.len();
-        let glows = highlights::glows(scene);
-        records.extend(glows.iter().filter_map(|(_, lamp)| record(lamp)));
+        let in_lobes = highlights::lamps_in_lobes(scene);
+        records.extend(in_lobes.iter().filter_map(|(_, lamp)| record(lamp)));
         self.light_count = lights as u32;
-        self.glow_count = (records.len() - lights) as u32;
+        self.lobe_lamp_count = (records.len() - lights) as u32;
         self.lights.write(gpu, &records);
     }
 
@@ -348,7 +348,7 @@ impl ChainScene {
             max_depth: limits.max_depth,
             branching_depth: limits.branching_depth.min(MAX_BRANCHING),
             light_count: self.light_count,
-            glow_count: self.glow_count,
+            lobe_lamp_count: self.lobe_lamp_count,
             ..Default::default()
         }
     }

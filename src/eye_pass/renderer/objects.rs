@@ -69,8 +69,10 @@ impl Objects {
             .map(|object| Appearance::of(scene, object, geometry.rows(object)))
             .collect();
         self.number_glasses(scene);
-        for (number, (object, _)) in (1..).zip(highlights::glows(scene)) {
-            self.list[object].record.lamp = number;
+        for (number, (object, _)) in (1..).zip(highlights::lamps_in_lobes(scene)) {
+            if let Some(object) = object {
+                self.list[object].record.lamp = number;
+            }
         }
         uploaded += self.write_records(gpu);
         uploaded

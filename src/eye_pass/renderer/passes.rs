@@ -293,8 +293,15 @@ impl Renderer {
             colour_scale: self.map_style.colour_scale().map(|number| number as f32),
             fault: (radiance_scale / view.exposure_stops.exp2()) as f32,
             picture: sample.picture,
+            sky_cut: self.sky_cut(),
             ..Frame::default()
         }
+    }
+
+    /// Luminance above which a pixel of the sky belongs to a sun [W/(m² sr)].
+    pub(super) fn sky_cut(&self) -> f32 {
+        let sky = self.scene.environment.as_ref();
+        sky.map_or(f32::MAX, |sky| sky.suns().cut.min(f64::from(f32::MAX)) as f32)
     }
 
     fn bind_frame(&self, gpu: &Gpu, frame: &Frame) -> wgpu::BindGroup {

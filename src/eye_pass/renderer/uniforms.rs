@@ -48,7 +48,8 @@ shader_struct! {
         stand_in: f32,
         /// Number among the frames of the same view.
         picture: u32,
-        padding0: u32,
+        /// Luminance above which a pixel of the sky belongs to a sun [W/(m² sr)], at the environment's own scale.
+        sky_cut: f32,
     }
 }
 
@@ -85,8 +86,8 @@ shader_struct! {
         branching_depth: u32,
         /// Number of lights.
         light_count: u32,
-        /// Number of lamps that stand for glowing objects; they follow after the lights.
-        glow_count: u32,
+        /// Number of lamps that are highlights alone: those of glowing objects and skies. They follow after the lights.
+        lobe_lamp_count: u32,
         padding0: u32,
         padding1: u32,
     }

@@ -252,6 +252,7 @@ impl Renderer {
             "pictures": PICTURES,
             "local": local,
             "background": sky_strength.unwrap_or_default(),
+            "sky_cut": self.sky_cut(),
         });
 
         // The host finds the fields that it reads and writes by their offsets.

@@ -327,6 +327,13 @@ fn highlights() -> Vec<Case> {
         case.maps = even([3.0, 2.0, 1.0]);
         cases.push(case);
     }
+
+    // A rough mirror under a sky with a sun in it.
+    let mut pixels = vec![[0.5, 0.7, 1.0]; 64 * 32];
+    pixels[12 * 64 + 5] = [2e4; 3];
+    let mut case = of(0.5);
+    case.scene = under_sky(case.scene, Environment::new(64, 32, pixels), 1.5);
+    cases.push(case);
     cases
 }
 

@@ -1,13 +1,13 @@
 //! Lamps in mirrors: their images keep their energy, and rough mirrors show them as sampled microfacets do.
 
 use nephroid::eye_pass::reference::ReferenceSettings;
-use nephroid::scene::PanelShape;
+use nephroid::scene::{Environment, PanelShape};
 use nephroid::transport::{EffectSet, NormalSource};
 
 use crate::prelude::*;
 use support::chain_laws::direction;
 use support::meshes::{floor, quad};
-use support::scenes::{lamps_of_all_kinds, let_glow, point_light, scene, seen, sun, view};
+use support::scenes::{lamps_of_all_kinds, let_glow, point_light, scene, seen, sun, under_sky, view};
 
 /// Where bulbs and panels are [m].
 const LAMP: DVec3 = dvec3(0.1, 1.0, -1.3);
@@ -184,6 +184,50 @@ fn glowing_objects_have_the_highlights_of_lamps() {
             let [off, _, sum] = compared(&shining, &lit);
             assert!(off < 0.02 * sum, "{:?} at {roughness}: {}", lamp.kind, off / sum);
         }
+    }
+}
+
+/// A bright spot in the image of a sky leaves the highlight of a sun before the rest of it, which a smooth mirror shows as
+/// it is.
+#[test]
+fn suns_of_skies_have_the_highlights_of_suns() {
+    let view = view(dvec3(0.0, 0.9, 1.2), DVec3::ZERO, 0.7, [24, 18]);
+    let (width, height, column, row) = (256, 128, 3, 40);
+    let image = |spot: f32| {
+        let mut pixels = vec![[0.5, 0.7, 1.0]; width * height];
+        pixels[row * width + column] = [spot; 3];
+        Environment::new(width, height, pixels).expect("a sound image")
+    };
+    let sky = |image: Environment, roughness: f64| {
+        let lit = scene(vec![(floor(50.0, 0.0), mirror(roughness))], vec![]);
+        under_sky(lit, Some(image), 1.0)
+    };
+    let turned = |index: usize, count: usize| (index as f64 + 0.5) / count as f64;
+    let (polar, azimuth) = (turned(row, height) * PI, turned(column, width) * TAU);
+    let to_sun = dvec3(
+        polar.sin() * azimuth.sin(),
+        polar.cos(),
+        -polar.sin() * azimuth.cos(),
+    );
+    let solid_angle_sr = TAU / width as f64 * PI / height as f64 * polar.sin();
+    for roughness in [0.25, 0.35, 0.5] {
+        let seen = |scene: Scene| {
+            let tracer = Tracer::new(Arc::new(scene));
+            seen(&tracer, &[], &view, &ReferenceSettings::default())
+                .0
+                .radiance
+        };
+        let found = seen(sky(image(2e5), roughness));
+        let mut lit = sky(image(0.7), roughness);
+        let mut lamp = sun(-to_sun, 2e5 * solid_angle_sr);
+        lamp.size = LightSize::Angle { diameter_rad: 0.08 };
+        lit.lights.push(lamp);
+        let expected: Vec<[f64; 3]> = seen(lit).iter().map(|pixel| pixel.map(f64::from)).collect();
+        let [off, _, sum] = compared(&found, &expected);
+        assert!(off < 0.01 * sum, "{roughness}: {}", off / sum);
+        // The highlight is most of what is seen.
+        let [off, ..] = compared(&seen(sky(image(0.7), roughness)), &expected);
+        assert!(off > 0.3 * sum, "{roughness}: {}", off / sum);
     }
 }
 
