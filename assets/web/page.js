@@ -12,7 +12,7 @@ const LEVELS = [[1, 1], [1, 0.5], [1, 0.25], [0.5, 0.25], [0.5, 0.125], [0.5, 0]
 // A moving picture that takes longer is drawn coarser, a faster one finer; above the last, without what is traced [ms].
 const LATE_MS = 50, EARLY_MS = 14, HOPELESS_MS = 400;
 // Pictures of a view at rest, each through other places of its pixels; surfaces that split chains, moving and at rest.
-const MOST_PICTURES = 16, BRANCHING = [2, 4];
+const MOST_PICTURES = 64, BRANCHING = [2, 4];
 const by = (id) => document.getElementById(id);
 const about = JSON.parse(by("about").textContent);
 const query = new URLSearchParams(location.search);

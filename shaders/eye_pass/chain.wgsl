@@ -26,7 +26,8 @@ struct Gaze {
     media: vec4u,
     // Number of the wavelength that is traced; 0 for all of them.
     wavelength: u32,
-    // GGX α of the surface that it left, which has added the highlights of lamps smaller than its lobe.
+    // GGX α of the lobe that it comes from. Above 0, all lamps smaller than the lobe are highlights of the surface that
+    // reflected it; below 0, it passed through the surface.
     alpha: f32,
     // Rough surfaces met so far.
     lobes: u32,
@@ -244,7 +245,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 walk.radiance += shown(lamps, walk.gaze.wavelength);
             }
             if !meets {
-                let beyond = walk.gaze.weight * background(walk.gaze.direction, walk.gaze.alpha <= SKY_SUN_ALPHA);
+                let beyond = walk.gaze.weight * background(walk.gaze.direction, abs(walk.gaze.alpha) <= SKY_SUN_ALPHA);
                 walk.radiance += shown(beyond, walk.gaze.wavelength);
                 break;
             }

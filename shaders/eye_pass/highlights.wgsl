@@ -6,6 +6,8 @@ const POINT_RADIUS_RAD: f32 = 2e-4;
 const BEFORE_SURFACE: f32 = 1e-4;
 // Lobes of a larger GGX α show the suns of a sky as highlights.
 const SKY_SUN_ALPHA: f32 = 0.02;
+// A glowing object counts as a ball where a lobe as wide has a smaller GGX α.
+const LARGEST_BALL: f32 = 0.1;
 // Patches across and down a panel that are highlights of their own.
 const PATCHES: u32 = 4u;
 // Highlights that reflect a smaller radiance per irradiance [1/sr] are left out.
@@ -56,6 +58,13 @@ fn alpha_from(light: LightRecord, place: vec3f) -> f32 {
         radius = max(length(light.across), length(light.down)) / f32(PATCHES);
     }
     return 0.5 * radius / max(distance(light.place, place), 1e-20);
+}
+
+// Whether a lamp, one of those of glowing objects and skies or another, is smaller than a lobe seen from a place, and far
+// enough for what it stands for.
+fn is_smaller(light: LightRecord, is_of_lobe: bool, alpha: f32, place: vec3f) -> bool {
+    let is_ball = is_of_lobe && light.kind != LIGHT_SUN && light.outline == OUTLINE_ROUND;
+    return alpha_from(light, place) < select(alpha, min(alpha, LARGEST_BALL), is_ball);
 }
 
 // What a lamp shows to a ray that sees it at `distance`, infinite for suns.
@@ -111,7 +120,7 @@ fn seen_panel(light: LightRecord, gaze: Gaze) -> SeenLamp {
     return SeenLamp(light.strength * (share / area_m2), distance);
 }
 
-// Whether what an object emits is a highlight of the surface that a ray left, or a caustic on a coat before it.
+// Whether an object counts as a lamp in the lobe that a ray comes from, or its light as a caustic on a coat before it.
 fn is_shown_otherwise(gaze: Gaze, object: ObjectRecord) -> bool {
     if gaze.coat == COAT_BEFORE {
         return true;
@@ -119,17 +128,24 @@ fn is_shown_otherwise(gaze: Gaze, object: ObjectRecord) -> bool {
     if gaze.alpha == 0.0 || object.lamp == 0u {
         return false;
     }
-    return alpha_from(lights[start.light_count + object.lamp - 1u], gaze.origin) < gaze.alpha;
+    return is_smaller(lights[start.light_count + object.lamp - 1u], true, abs(gaze.alpha), gaze.origin);
 }
 
 // Radiance of the lamps between a surface that a path has left and the next one at `reach`, averaged over the footprint.
 fn lamps_on(gaze: Gaze, reach: f32) -> vec3f {
     var sum = vec3f(0.0);
-    for (var index = 0u; index < start.light_count; index += 1u) {
+    // Those of glowing objects and skies count behind rough surfaces only.
+    let count = start.light_count + select(0u, start.lobe_lamp_count, gaze.alpha < 0.0);
+    for (var index = 0u; index < count; index += 1u) {
         let light = lights[index];
-        if light.outline == OUTLINE_SURFACE || alpha_from(light, gaze.origin) < gaze.alpha {
+        let is_of_lobe = index >= start.light_count;
+        let is_small = is_smaller(light, is_of_lobe, abs(gaze.alpha), gaze.origin);
+        if light.outline == OUTLINE_SURFACE || (gaze.alpha > 0.0 && is_small) || (is_of_lobe && !is_small) {
             continue;
         }
+        // The surface of a glowing object itself ends the reach.
+        let depth = sqrt(3.0) * light.radius + 2.0 * BEFORE_SURFACE * reach;
+        let beyond = reach + select(0.0, depth, is_of_lobe);
         var seen: SeenLamp;
         if light.kind == LIGHT_SUN {
             seen = seen_sun(light, gaze);
@@ -138,7 +154,7 @@ fn lamps_on(gaze: Gaze, reach: f32) -> vec3f {
         } else {
             seen = seen_panel(light, gaze);
         }
-        if largest(seen.radiance) > 0.0 && (seen.distance < reach * (1.0 - BEFORE_SURFACE) || reach >= FAR_AWAY) {
+        if largest(seen.radiance) > 0.0 && (seen.distance < beyond * (1.0 - BEFORE_SURFACE) || reach >= FAR_AWAY) {
             sum += seen.radiance * left_after(gaze.media, seen.distance);
         }
     }
@@ -217,7 +233,8 @@ fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
     var sum = vec3f(0.0);
     for (var index = 0u; index < start.light_count + start.lobe_lamp_count; index += 1u) {
         let light = lights[index];
-        if light.outline == OUTLINE_SURFACE || alpha_from(light, gloss.point.place) >= gloss.alpha {
+        let is_of_lobe = index >= start.light_count;
+        if light.outline == OUTLINE_SURFACE || !is_smaller(light, is_of_lobe, gloss.alpha, gloss.point.place) {
             continue;
         }
         let is_panel = light.outline != OUTLINE_ROUND;
@@ -226,7 +243,7 @@ fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
         // The corners of a grid lie outside of an ellipse.
         let share = 1.0 / f32(count - select(0u, 4u, is_ellipse));
         // To a corner of the cube around a glowing object.
-        let depth = select(0.0, sqrt(3.0) * light.radius, index >= start.light_count);
+        let depth = select(0.0, sqrt(3.0) * light.radius, is_of_lobe);
         let patch_m2 = panel_area(light) * start.unit_m * start.unit_m * share;
         for (var number = 0u; number < count; number += 1u) {
             let cell = vec2f(f32(number % PATCHES), f32(number / PATCHES));

@@ -21,7 +21,7 @@ struct Branch {
     spread_factor: f32,
     // Spread due to roughness, more than 0 where it scatters at a microfacet.
     spread_added: f32,
-    // GGX α of a rough surface whose highlights are added where the branch begins; else 0.
+    // As of Gaze.
     alpha: f32,
 }
 
@@ -120,7 +120,7 @@ fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alpha
     return Interaction(
         0.0,
         reflection(point, facing, gaze, vec3f(reflectance), alpha),
-        Branch(direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, lobe_rad(alpha, gaze.lobes), 0.0),
+        Branch(direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, lobe_rad(alpha, gaze.lobes), -alpha),
         Facets(0.0, 0.0, 1.0, eta),
     );
 }
@@ -169,18 +169,19 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
     // Radiance scales by the square of n on the ray's side over n on the far side.
     let share = tint * ((1.0 - reflectance) / (eta * eta));
     let curvature = select(-point.curvature, point.curvature, facing.front);
+    // A facet's tilt turns a refracted ray by |1/eta - 1| times the tilt, and a reflected one by twice the tilt.
+    let narrower = 0.5 * abs(1.0 / eta - 1.0);
     return Interaction(
         0.0,
         reflection(point, facing, gaze, vec3f(reflectance), alpha),
-        // A facet's tilt turns a refracted ray by |1/eta - 1| times the tilt, and a reflected one by twice the tilt.
         Branch(
             direction,
             share,
             beyond,
             curvature * (1.0 / eta - 1.0),
             1.0 / eta,
-            0.5 * abs(1.0 / eta - 1.0) * lobe_rad(alpha, gaze.lobes),
-            0.0,
+            narrower * lobe_rad(alpha, gaze.lobes),
+            -narrower * alpha,
         ),
         facets,
     );

@@ -6,7 +6,8 @@
 //!
 //! The rays that leave a rough surface are too few to meet a lamp that is smaller than the lobe. It is a highlight there
 //! instead: the lobe times the lamp's irradiance, with a shadow ray, to which clear surfaces are opaque, as they are to
-//! direct light. Glowing objects count as lamps there, and are not seen by the rays that leave the surface.
+//! direct light. Glowing objects and the suns of a sky count as lamps there, and are not seen by the rays that leave the
+//! surface. Behind a rough pane or interface, which has no highlights, they are seen as lamps by the cones of the rays.
 
 use std::f64::consts::PI;
 
@@ -27,6 +28,8 @@ const POINT_RADIUS_RAD: f64 = 2e-4;
 const BEFORE_SURFACE: f64 = 1e-4;
 /// Lobes of a larger GGX α show the suns of a sky as highlights: half the tangent of their radius.
 pub const SKY_SUN_ALPHA: f64 = 0.5 * suns::TAN_RADIUS;
+/// A glowing object counts as a ball where a lobe as wide has a smaller GGX α: five radii away.
+const LARGEST_BALL: f64 = 0.1;
 /// Patches across and down a panel that are highlights of their own.
 const PATCHES: u32 = 4;
 
@@ -38,9 +41,27 @@ pub struct RayCone {
     pub width_m: f64,
     /// Growth of the width per length [rad]; negative where the cone narrows.
     pub spread_rad: f64,
-    /// GGX α of the surface that the ray left, whose highlights are those of all lamps smaller than its lobe; 0 without
-    /// highlights.
-    pub alpha: f64,
+    pub lobe: LobeLeft,
+}
+
+/// The lobe that a ray comes from, with the GGX α of a reflection as wide.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum LobeLeft {
+    /// The ray left a smooth surface or the eye.
+    None,
+    /// All lamps that are smaller than the lobe are highlights of the surface that reflected the ray.
+    Reflection(f64),
+    Transmission(f64),
+}
+
+impl LobeLeft {
+    /// 0 without a lobe.
+    pub fn alpha(self) -> f64 {
+        match self {
+            Self::None => 0.0,
+            Self::Reflection(alpha) | Self::Transmission(alpha) => alpha,
+        }
+    }
 }
 
 impl RayCone {
@@ -149,7 +170,28 @@ impl VisibleLamp {
 
     /// Whether it stands for an object in the lobe that a cone comes from.
     pub fn replaces(&self, object: usize, cone: &RayCone) -> bool {
-        self.object == Some(object) && self.alpha_from(cone.ray.origin) < cone.alpha
+        self.object == Some(object) && self.is_smaller_than(cone.lobe.alpha(), cone.ray.origin)
+    }
+
+    /// Whether it is smaller than a lobe seen from a point, and far enough for what it stands for.
+    fn is_smaller_than(&self, alpha: f64, point: DVec3) -> bool {
+        let most = match (self.object, self.outline) {
+            (Some(_), Outline::Round { .. }) => LARGEST_BALL,
+            _ => f64::INFINITY,
+        };
+        self.alpha_from(point) < alpha.min(most)
+    }
+
+    /// [`seen`](Self::seen) of what stands for a glowing object or a sun of the sky.
+    pub fn seen_in_lobe(&self, cone: &RayCone, reach_m: f64) -> Option<(LinearSrgb, f64)> {
+        match cone.lobe {
+            LobeLeft::Transmission(alpha) if self.is_smaller_than(alpha, cone.ray.origin) => {
+                // The surface of the object itself ends the reach.
+                let beyond_m = reach_m * (1.0 + 2.0 * BEFORE_SURFACE) + self.depth_m();
+                self.seen(cone, beyond_m)
+            }
+            _ => None,
+        }
     }
 
     fn of(light: &Light, scene: &Scene) -> Option<Self> {
@@ -172,7 +214,7 @@ impl VisibleLamp {
     /// Radiance [W/(m² sr)] that a cone sees, averaged over it, with the distance of the lamp [m]. `reach_m`: distance
     /// of the next surface, infinite if there is none.
     pub fn seen(&self, cone: &RayCone, reach_m: f64) -> Option<(LinearSrgb, f64)> {
-        if self.alpha_from(cone.ray.origin) < cone.alpha {
+        if matches!(cone.lobe, LobeLeft::Reflection(alpha) if self.is_smaller_than(alpha, cone.ray.origin)) {
             return None;
         }
         match self.outline {
@@ -245,10 +287,10 @@ impl VisibleLamp {
     /// Highlights of the lamp in a lobe that is wider than it.
     pub fn highlights(&self, lobe: &Lobe, mut met: impl FnMut(&Highlight)) {
         // A lamp, or a patch of a panel, that is wider than the lobe is seen by the ray of the chain: each counts once.
-        let of_patch = self.alpha_from(lobe.point);
-        if of_patch >= lobe.alpha {
+        if !self.is_smaller_than(lobe.alpha, lobe.point) {
             return;
         }
+        let of_patch = self.alpha_from(lobe.point);
 
         // A lobe as wide as the real one, the patch and the cone together: a tilt of α turns a ray by 4 α from edge to
         // edge.

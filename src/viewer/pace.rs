@@ -22,7 +22,7 @@ const MIN_SAMPLES: u32 = 4;
 /// Refinement pauses for this time after input.
 const PAUSE: Duration = Duration::from_millis(400);
 /// Time for which samples beyond the minimum are added.
-const REFINES_FOR: Duration = Duration::from_secs(2);
+const REFINES_FOR: Duration = Duration::from_secs(4);
 
 /// Chooses the quality of each picture from the GPU times of earlier ones.
 #[derive(Clone, Debug)]

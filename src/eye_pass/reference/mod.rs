@@ -7,7 +7,7 @@ use rayon::iter::{IntoParallelIterator, ParallelIterator};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use super::facets::FacetPoints;
-use super::highlights::RayCone;
+use super::highlights::{LobeLeft, RayCone};
 use super::view::{Picture, View};
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
@@ -190,7 +190,7 @@ fn eye_cone(view: &View, pixel: [u32; 2], within: [f64; 2]) -> RayCone {
         ray,
         width_m: spread_rad * view.camera.near_m,
         spread_rad,
-        alpha: 0.0,
+        lobe: LobeLeft::None,
     }
 }
 

@@ -2,7 +2,7 @@
 
 use crate::effect::EffectSwitch;
 use crate::eye_pass::facets::{FacetPoint, FacetPoints};
-use crate::eye_pass::highlights::{self, Lobe, RayCone, VisibleLamp};
+use crate::eye_pass::highlights::{self, Lobe, LobeLeft, RayCone, VisibleLamp};
 use crate::eye_pass::relief::ReliefLights;
 use crate::eye_pass::wavelengths::{self, SeenWavelength};
 use crate::geometry::Ray;
@@ -76,7 +76,8 @@ pub struct LitScene<'a> {
     emitted: Vec<LinearSrgb>,
     relief: ReliefLights,
     lamps: Vec<VisibleLamp>,
-    glowing: Vec<VisibleLamp>,
+    /// What stands for glowing objects and the suns of a sky in lobes.
+    lobe_lamps: Vec<VisibleLamp>,
     background: LinearSrgb,
     limits: ChainLimits,
 }
@@ -175,7 +176,7 @@ impl<'a> LitScene<'a> {
             emitted: emitted.collect(),
             relief: ReliefLights::of(tracer.scene()),
             lamps: VisibleLamp::all(tracer.scene()),
-            glowing: VisibleLamp::in_lobes(tracer.scene()),
+            lobe_lamps: VisibleLamp::in_lobes(tracer.scene()),
             background,
             limits,
         }
@@ -320,10 +321,13 @@ impl<'a> LitScene<'a> {
             return LinearSrgb::BLACK;
         }
         let mut seen = LinearSrgb::BLACK;
-        for lamp in &self.lamps {
-            if let Some((radiance, distance_m)) = lamp.seen(&path.cone, reach_m) {
-                seen += path.brings(radiance * self.transmittance(&path.media, distance_m));
-            }
+        let lamps = self.lamps.iter().map(|lamp| lamp.seen(&path.cone, reach_m));
+        let in_lobe = self
+            .lobe_lamps
+            .iter()
+            .map(|lamp| lamp.seen_in_lobe(&path.cone, reach_m));
+        for (radiance, distance_m) in lamps.chain(in_lobe).flatten() {
+            seen += path.brings(radiance * self.transmittance(&path.media, distance_m));
         }
         seen
     }
@@ -352,7 +356,7 @@ impl<'a> LitScene<'a> {
         // Highlights too dim to be seen get no shadow ray: the throughput of the chain's own reflection decides.
         let reflected = (path.weight * reflection.share).max_channel();
         let mut seen = LinearSrgb::BLACK;
-        for lamp in self.lamps.iter().chain(&self.glowing) {
+        for lamp in self.lamps.iter().chain(&self.lobe_lamps) {
             lamp.highlights(&lobe, |highlight| {
                 let is_seen = highlight.response * reflected >= DIMMEST_HIGHLIGHT;
                 let ray = hit.spawn(highlight.to_light);
@@ -385,12 +389,11 @@ impl<'a> LitScene<'a> {
         media.transmittance(self.tracer.scene(), distance_m)
     }
 
-    /// Radiance of the environment, less its suns where they are highlights, or of the background [W/(m² sr)].
+    /// Radiance of the environment, less its suns where they count as lamps, or of the background [W/(m² sr)].
     fn beyond(&self, cone: &RayCone) -> LinearSrgb {
         match self.tracer.scene().sky() {
             Some((sky, strength)) => {
-                let has_highlights = cone.alpha > highlights::SKY_SUN_ALPHA;
-                let cut = if has_highlights {
+                let cut = if cone.lobe.alpha() > highlights::SKY_SUN_ALPHA {
                     sky.suns().cut
                 } else {
                     f64::INFINITY
@@ -404,7 +407,7 @@ impl<'a> LitScene<'a> {
     /// Emission that is not shown as a highlight of the surface that the ray left.
     fn emission(&self, path: &EyePath<'_>, hit: &SurfaceHit) -> LinearSrgb {
         let is_highlight = || {
-            self.glowing
+            self.lobe_lamps
                 .iter()
                 .any(|lamp| lamp.replaces(hit.object, &path.cone))
         };
@@ -481,27 +484,31 @@ impl ChainSurface {
     fn bent(&self, cone: &RayCone, branch: &Branch, kept: f64) -> RayCone {
         // Between the reflections off microfacets that are tilted by atan α one way and the other.
         let lobe_rad = kept * 4.0 * self.alpha.atan();
-        let (spread_rad, alpha) = match branch.event {
+        let (spread_rad, lobe) = match branch.event {
             Event::Reflection | Event::TotalInternalReflection => {
                 let of_shape = 2.0 * self.curvature * cone.width_m;
-                (cone.spread_rad + of_shape + lobe_rad, self.alpha)
+                let lobe = LobeLeft::Reflection(self.alpha);
+                (cone.spread_rad + of_shape + lobe_rad, lobe)
             }
             Event::Refraction => {
                 let ratio = branch.ior_ratio;
                 let of_shape = (ratio - 1.0) * self.curvature * cone.width_m;
+                // A facet's tilt turns a refracted ray by |ratio − 1| times the tilt, and a reflected one by twice the
+                // tilt.
+                let narrower = 0.5 * (ratio - 1.0).abs();
                 (
-                    cone.spread_rad * ratio + of_shape + 0.5 * (ratio - 1.0).abs() * lobe_rad,
-                    0.0,
+                    cone.spread_rad * ratio + of_shape + narrower * lobe_rad,
+                    LobeLeft::Transmission(narrower * self.alpha),
                 )
             }
-            Event::ThinTransmission => (cone.spread_rad + lobe_rad, 0.0),
-            Event::Passage => (cone.spread_rad, cone.alpha),
+            Event::ThinTransmission => (cone.spread_rad + lobe_rad, LobeLeft::Transmission(self.alpha)),
+            Event::Passage => (cone.spread_rad, cone.lobe),
         };
         RayCone {
             ray: branch.ray,
             width_m: cone.width_m,
             spread_rad,
-            alpha,
+            lobe,
         }
     }
 }
