@@ -366,7 +366,7 @@ pub(super) fn lamps_in_lobes(scene: &Scene) -> Vec<(Option<usize>, Light)> {
     for light in &scene.lights {
         match (light.kind, &scene.environment) {
             (LightKind::Surface { object, .. }, _) => {
-                let all = EmitterSampler::new(light, scene).from_afar();
+                let all = EmitterSampler::new(light, scene).stand_ins();
                 lamps.extend(all.into_iter().map(|lamp| (Some(object), lamp)));
             }
             (LightKind::Environment { .. }, Some(sky)) => {

@@ -204,13 +204,13 @@ impl<'a> EmitterSampler<'a> {
     }
 
     /// Lamps that shine from afar as an emissive object does, for rough surfaces; empty for other lights.
-    pub fn from_afar(&self) -> Vec<Light> {
+    pub fn stand_ins(&self) -> Vec<Light> {
         let (LightKind::Surface { object, radiance }, Some(surface)) = (self.light.kind, &self.surface)
         else {
             return Vec::new();
         };
         let has_inside = surface.both_sides && watertight::is_closed(self.scene.objects[object].mesh());
-        let lamps = surface.from_afar(radiance, has_inside).into_iter();
+        let lamps = surface.stand_ins(radiance, has_inside).into_iter();
         let lamp = |(kind, size)| Light {
             kind,
             size,

@@ -142,7 +142,7 @@ impl<'a> GlowSampler<'a> {
 
     /// Lamps that shine from afar as it does at a mean radiance: a panel for each side of a parallelogram, else a ball
     /// around it, which sends as much light in all directions. `has_inside`: its other side faces its inside.
-    pub(super) fn from_afar(&self, radiance: Radiance, has_inside: bool) -> Vec<(LightKind, LightSize)> {
+    pub(super) fn stand_ins(&self, radiance: Radiance, has_inside: bool) -> Vec<(LightKind, LightSize)> {
         let Some(parallelogram) = self.parallelogram else {
             let Some((low, high)) = self.mesh.bounds() else {
                 return Vec::new();

@@ -294,7 +294,6 @@ impl Renderer {
             fault: (radiance_scale / view.exposure_stops.exp2()) as f32,
             picture: sample.picture,
             sky_cut: self.sky_cut(),
-            ..Frame::default()
         }
     }
 
