@@ -245,7 +245,8 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 walk.radiance += shown(lamps, walk.gaze.wavelength);
             }
             if !meets {
-                let beyond = walk.gaze.weight * background(walk.gaze.direction, abs(walk.gaze.alpha) <= SKY_SUN_ALPHA);
+                let has_suns = abs(walk.gaze.alpha) <= SKY_SUN_ALPHA && walk.gaze.coat != COAT_BEFORE;
+                let beyond = walk.gaze.weight * background(walk.gaze.direction, has_suns);
                 walk.radiance += shown(beyond, walk.gaze.wavelength);
                 break;
             }

@@ -8,7 +8,7 @@ const BEFORE_SURFACE: f32 = 1e-4;
 const SKY_SUN_ALPHA: f32 = 0.02;
 // A glowing object counts as a ball where a lobe as wide has a smaller GGX α.
 const LARGEST_BALL: f32 = 0.1;
-// Patches across and down a panel that are highlights of their own.
+// Most patches across and down a panel that are highlights of their own.
 const PATCHES: u32 = 4u;
 // Highlights that reflect a smaller radiance per irradiance [1/sr] are left out.
 const DIMMEST_HIGHLIGHT: f32 = 3e-4;
@@ -198,24 +198,34 @@ struct Gloss {
     reflected: f32,
 }
 
-// Reflected radiance of a lamp, or of a patch of it at a place, which lies this deep below its surface.
-fn highlight_from(light: LightRecord, place: vec3f, patch_m2: f32, depth: f32, gloss: Gloss, gaze: Gaze) -> vec3f {
+// A lamp, or a patch of it.
+struct Patch {
+    place: vec3f,
+    area_m2: f32,
+    // Below the surface of the lamp.
+    depth: f32,
+    // GGX α of a lobe as wide as it is seen.
+    alpha: f32,
+}
+
+// Reflected radiance of a patch.
+fn highlight_from(light: LightRecord, piece: Patch, gloss: Gloss, gaze: Gaze) -> vec3f {
     var to_light = -light.place;
     var reach = FAR_AWAY;
     var across_beam = 1.0;
     if light.kind != LIGHT_SUN {
-        let offset = place - gloss.point.place;
+        let offset = piece.place - gloss.point.place;
         let far = length(offset);
         to_light = offset / max(far, 1e-20);
-        reach = (far - depth) * (1.0 - BEFORE_SURFACE);
+        reach = (far - piece.depth) * (1.0 - BEFORE_SURFACE);
         let far_m = far * start.unit_m;
-        across_beam = falloff(light, -to_light) / max(far_m * far_m + patch_m2 / PI, 1e-20);
+        across_beam = falloff(light, -to_light) / max(far_m * far_m + piece.area_m2 / PI, 1e-20);
     }
     let to_eye = -gaze.direction;
-    let size = alpha_from(light, gloss.point.place);
     // The cone of a pixel is the same for all of a picture's surfaces.
     let cone = select(0.0, 0.25 * gaze.spread, gaze.lobes > 0u);
-    let response = ggx_reflection(gloss.facing.shading, to_eye, to_light, gloss.alpha * gloss.alpha + size * size + cone * cone);
+    let alpha_squared = gloss.alpha * gloss.alpha + piece.alpha * piece.alpha + cone * cone;
+    let response = ggx_reflection(gloss.facing.shading, to_eye, to_light, alpha_squared);
     let is_bright = response * gloss.reflected >= DIMMEST_HIGHLIGHT && across_beam > 0.0;
     if !is_bright || dot(to_light, gloss.facing.geometric) <= 0.0 {
         return vec3f(0.0);
@@ -237,21 +247,28 @@ fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
         if light.outline == OUTLINE_SURFACE || !is_smaller(light, is_of_lobe, gloss.alpha, gloss.point.place) {
             continue;
         }
+        // Panels have as few patches as are half as wide as the lobe.
         let is_panel = light.outline != OUTLINE_ROUND;
         let is_ellipse = light.outline == OUTLINE_ELLIPSE;
-        let count = select(1u, PATCHES * PATCHES, is_panel);
-        // The corners of a grid lie outside of an ellipse.
-        let share = 1.0 / f32(count - select(0u, 4u, is_ellipse));
+        let whole = alpha_from(light, gloss.point.place) * select(1.0, f32(PATCHES), is_panel);
+        var sides = 1u;
+        while is_panel && sides < PATCHES && whole > 0.5 * gloss.alpha * f32(sides) {
+            sides *= 2u;
+        }
+        let count = sides * sides;
+        // The corners of a grid of four by four lie outside of an ellipse.
+        let share = 1.0 / f32(count - select(0u, 4u, is_ellipse && sides == PATCHES));
         // To a corner of the cube around a glowing object.
         let depth = select(0.0, sqrt(3.0) * light.radius, is_of_lobe);
         let patch_m2 = panel_area(light) * start.unit_m * start.unit_m * share;
         for (var number = 0u; number < count; number += 1u) {
-            let cell = vec2f(f32(number % PATCHES), f32(number / PATCHES));
-            let at = (cell + 0.5) * (2.0 / f32(PATCHES)) - 1.0;
+            let cell = vec2f(f32(number % sides), f32(number / sides));
+            let at = (cell + 0.5) * (2.0 / f32(sides)) - 1.0;
             if !is_ellipse || length(at) < 1.0 {
                 // A round lamp has no axes.
                 let place = light.place + light.across * at.x + light.down * at.y;
-                sum += share * highlight_from(light, place, patch_m2, depth, gloss, gaze);
+                let piece = Patch(place, patch_m2, depth, whole / f32(sides));
+                sum += share * highlight_from(light, piece, gloss, gaze);
             }
         }
     }

@@ -30,7 +30,7 @@ const BEFORE_SURFACE: f64 = 1e-4;
 pub const SKY_SUN_ALPHA: f64 = 0.5 * suns::TAN_RADIUS;
 /// A glowing object counts as a ball where a lobe as wide has a smaller GGX α: five radii away.
 const LARGEST_BALL: f64 = 0.1;
-/// Patches across and down a panel that are highlights of their own.
+/// Most patches across and down a panel that are highlights of their own.
 const PATCHES: u32 = 4;
 
 /// A ray with the cone of directions that it stands for.
@@ -290,7 +290,8 @@ impl VisibleLamp {
         if !self.is_smaller_than(lobe.alpha, lobe.point) {
             return;
         }
-        let of_patch = self.alpha_from(lobe.point);
+        let sides = self.patches_across(lobe.alpha, lobe.point);
+        let of_patch = self.alpha_from(lobe.point) * f64::from(PATCHES) / f64::from(sides);
 
         // A lobe as wide as the real one, the patch and the cone together: a tilt of α turns a ray by 4 α from edge to
         // edge.
@@ -321,7 +322,7 @@ impl VisibleLamp {
         else {
             return from(&self.emitter, 0.0);
         };
-        let places = patches(shape);
+        let places = patches(shape, sides);
         let share = 1.0 / places.len() as f64;
         let patch_m2 = self.area_m2 * share;
         for place in places {
@@ -332,6 +333,19 @@ impl VisibleLamp {
             let strength = self.emitter.strength * share;
             from(&Emitter { kind, strength }, patch_m2);
         }
+    }
+
+    /// Patches across and down a panel: as few as are half as wide as the lobe. Other lamps are as wide as their patches.
+    fn patches_across(&self, alpha: f64, point: DVec3) -> u32 {
+        let Outline::Flat { .. } = self.outline else {
+            return PATCHES;
+        };
+        let whole = self.alpha_from(point) * f64::from(PATCHES);
+        let mut sides = 1;
+        while sides < PATCHES && whole > 0.5 * alpha * f64::from(sides) {
+            sides *= 2;
+        }
+        sides
     }
 
     /// Depth of its centre below the surface of a glowing object that it stands for, at most [m]: to a corner of the cube
@@ -394,10 +408,9 @@ fn of_sky(sky: &Light, sun: &SkySun) -> Light {
 }
 
 /// Centres of the patches of a panel in the coordinates of its half-axes.
-fn patches(shape: PanelShape) -> Vec<DVec2> {
-    let centre = |step: u32| (f64::from(step) + 0.5) * 2.0 / f64::from(PATCHES) - 1.0;
-    let all =
-        (0..PATCHES * PATCHES).map(|patch| DVec2::new(centre(patch % PATCHES), centre(patch / PATCHES)));
+fn patches(shape: PanelShape, sides: u32) -> Vec<DVec2> {
+    let centre = |step: u32| (f64::from(step) + 0.5) * 2.0 / f64::from(sides) - 1.0;
+    let all = (0..sides * sides).map(|patch| DVec2::new(centre(patch % sides), centre(patch / sides)));
     all.filter(|place| shape == PanelShape::Rectangle || place.length() < 1.0)
         .collect()
 }

@@ -203,7 +203,7 @@ impl<'a> LitScene<'a> {
             let next = nearest::<CHAINS>(self.tracer, path.cone.ray);
             seen += self.lamps_on(&path, next.map_or(f64::INFINITY, |(_, distance_m)| distance_m));
             let Some((hit, distance_m)) = next else {
-                seen += path.brings(self.beyond(&path.cone));
+                seen += path.brings(self.beyond(&path));
                 continue;
             };
 
@@ -390,15 +390,13 @@ impl<'a> LitScene<'a> {
     }
 
     /// Radiance of the environment, less its suns where they count as lamps, or of the background [W/(m² sr)].
-    fn beyond(&self, cone: &RayCone) -> LinearSrgb {
+    fn beyond(&self, path: &EyePath<'_>) -> LinearSrgb {
+        let is_in_lobe = path.cone.lobe.alpha() > highlights::SKY_SUN_ALPHA;
         match self.tracer.scene().sky() {
             Some((sky, strength)) => {
-                let cut = if cone.lobe.alpha() > highlights::SKY_SUN_ALPHA {
-                    sky.suns().cut
-                } else {
-                    f64::INFINITY
-                };
-                strength * sky.smooth_radiance(cone.ray.direction, cut)
+                let has_suns = !is_in_lobe && path.coat != CoatPassed::Before;
+                let cut = if has_suns { f64::INFINITY } else { sky.suns().cut };
+                strength * sky.smooth_radiance(path.cone.ray.direction, cut)
             }
             None => self.background,
         }

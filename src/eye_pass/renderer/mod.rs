@@ -169,24 +169,24 @@ impl Renderer {
     /// # Errors
     /// An error of the device.
     pub fn set_scene(&mut self, gpu: &Gpu, scene: &Scene) -> Result<Uploaded> {
-        let scene = &scene.as_seen();
+        let scene = Arc::new(scene.as_seen());
         let mut uploaded = Uploaded::default();
         self.lights_are_stale = true;
         if self.scene.triangle_count() != scene.triangle_count() {
             self.refusal = None;
         }
         if self.objects.list.len() == scene.objects.len() {
-            let triangles = self.geometry.set_scene(gpu, scene);
+            let triangles = self.geometry.set_scene(gpu, &scene);
             let mut objects = self.scene.objects.iter().zip(&scene.objects);
             let is_moved = objects.any(|(was, is)| !was.stands_as(is));
             self.chain_scene_is_stale |= is_moved || triangles != Uploaded::default();
             uploaded += triangles;
         } else {
-            self.geometry = Geometry::new(gpu, scene);
+            self.geometry = Geometry::new(gpu, &scene);
             self.chain_scene = None;
         }
-        uploaded += self.objects.set_scene(gpu, scene, &self.geometry);
-        self.scene = Arc::new(scene.clone());
+        uploaded += self.objects.set_scene(gpu, &scene, &self.geometry);
+        self.scene = scene;
         self.drawn_view = None;
         gpu.take_error().map_or(Ok(uploaded), Err)
     }

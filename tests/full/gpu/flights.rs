@@ -66,7 +66,7 @@ fn fly(scene: &Scene) -> Option<[f64; 2]> {
         let view = View {
             tone_map: ToneMap::Neutral,
             background,
-            ..view_of(camera.clone(), [96, 64])
+            ..view_of(camera.clone(), [48, 32])
         };
         rig.drawn(&view);
         let picture = rig.sampled(&view, side);
