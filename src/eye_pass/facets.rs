@@ -43,10 +43,11 @@ impl FacetPoints {
         }
     }
 
-    /// Number of points for a share of the pixel: a share of them suffices.
+    /// Number of points for a share of the pixel. A dim lobe may still hold what is bright, so that its grain would need no
+    /// fewer; the square root is a compromise with time.
     pub fn count_for(self, share: f64) -> u32 {
         let most = PER_PIXEL.div_ceil(self.samples);
-        ((share * f64::from(most)).ceil() as u32).clamp(1, most)
+        ((share.sqrt() * f64::from(most)).ceil() as u32).clamp(1, most)
     }
 
     pub fn point(self, index: u32) -> FacetPoint {

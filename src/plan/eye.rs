@@ -4,14 +4,22 @@ use super::{Effect, EffectLine, EffectSwitch};
 use crate::scene::{Camera, Material, Scene};
 
 /// Decides [`Effect::Chains`] for a camera and the `aspect` = width/height of its picture: on if the bounding box of a
-/// specular surface may be visible. Without a camera, on if there is any specular surface.
+/// specular or glossy surface may be visible. Without a camera, on if there is any.
 pub fn chains(scene: &Scene, camera: Option<(&Camera, f64)>, switch: EffectSwitch) -> EffectLine {
     let is_specular = |material: &Material| material.seen_surface().is_specular();
-    let seen = first_seen(scene, camera, is_specular).map(|object| &scene.objects[object].name);
-    let (on, reason) = match (switch, seen, camera) {
+    let found = first_seen(scene, camera, is_specular).map(|object| {
+        let is_glossy = !scene.material_of(object).surface.is_specular();
+        (
+            &scene.objects[object].name,
+            if is_glossy { "glossy" } else { "specular" },
+        )
+    });
+    let (on, reason) = match (switch, found, camera) {
         (EffectSwitch::Off, _, _) => (false, "switched off by the user".into()),
-        (_, Some(name), Some((camera, _))) => (true, format!("`{name}` is in view of `{}`", camera.name)),
-        (_, Some(name), None) => (true, format!("`{name}` is specular")),
+        (_, Some((name, _)), Some((camera, _))) => {
+            (true, format!("`{name}` is in view of `{}`", camera.name))
+        }
+        (_, Some((name, kind)), None) => (true, format!("`{name}` is {kind}")),
         (EffectSwitch::On, None, _) => (true, "switched on by the user".into()),
         (EffectSwitch::Auto, None, Some(_)) => (false, "nothing specular is in view".into()),
         (EffectSwitch::Auto, None, None) => (false, "nothing in the scene is specular".into()),
