@@ -26,8 +26,8 @@ struct Gaze {
     media: vec4u,
     // Number of the wavelength that is traced; 0 for all of them.
     wavelength: u32,
-    // GGX α of the lobe that it comes from. Above 0, all lamps smaller than the lobe are highlights of the surface that
-    // reflected it; below 0, it passed through the surface.
+    // Above 0, it comes from a rough surface whose highlights are those of lamps smaller than a reflection of this GGX α;
+    // below 0, it passed through a rough surface and sees them as lamps.
     alpha: f32,
     // Rough surfaces met so far.
     lobes: u32,
@@ -296,7 +296,7 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 let facing = face(point, gaze, 0.0);
                 let cos_view = -dot(gaze.direction, facing.shading);
                 let reflected = largest(gaze.weight * reflectance_of(next.facets, cos_view, colour));
-                let gloss = Gloss(point, facing, next.reflection.alpha, next.facets, colour, reflected);
+                let gloss = Gloss(point, facing, next.facets.alpha, next.facets, colour, reflected);
                 walk.radiance += shown(gaze.weight * highlights(gloss, gaze), gaze.wavelength);
             }
             goes_on = go_on(&walk, point, next);

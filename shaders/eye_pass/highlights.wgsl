@@ -204,8 +204,15 @@ struct Patch {
     area_m2: f32,
     // Below the surface of the lamp.
     depth: f32,
-    // GGX α of a lobe as wide as it is seen.
+    // GGX α of a lobe as wide as it is seen; 0 in tails.
     alpha: f32,
+    // Tilt of the microfacets that count, at least.
+    least_tilt: f32,
+}
+
+// Tangent of the angle between the unit normal of a microfacet and that of its surface.
+fn tilt(facet: vec3f, normal: vec3f) -> f32 {
+    return length(cross(facet, normal)) / max(dot(facet, normal), 1e-30);
 }
 
 // Reflected radiance of a patch.
@@ -227,30 +234,36 @@ fn highlight_from(light: LightRecord, piece: Patch, gloss: Gloss, gaze: Gaze) ->
     let alpha_squared = gloss.alpha * gloss.alpha + piece.alpha * piece.alpha + cone * cone;
     let response = ggx_reflection(gloss.facing.shading, to_eye, to_light, alpha_squared);
     let is_bright = response * gloss.reflected >= DIMMEST_HIGHLIGHT && across_beam > 0.0;
-    if !is_bright || dot(to_light, gloss.facing.geometric) <= 0.0 {
+    let half = normalize(to_eye + to_light);
+    let is_tilted = tilt(half, gloss.facing.shading) >= piece.least_tilt;
+    if !is_bright || !is_tilted || dot(to_light, gloss.facing.geometric) <= 0.0 {
         return vec3f(0.0);
     }
     if closest_hit(leave(gloss.point, to_light), to_light, reach).triangle != NO_TRIANGLE {
         return vec3f(0.0);
     }
-    let cos_facet = dot(normalize(to_eye + to_light), to_light);
+    let cos_facet = dot(half, to_light);
     let reflectance = reflectance_of(gloss.facets, cos_facet, gloss.tint);
     return light.strength * left_after(gaze.media, reach) * reflectance * (across_beam * response);
 }
 
-// Reflected radiance of the lamps that are smaller than the lobe of a rough surface.
+// Reflected radiance of the lamps that are smaller than the lobe of a rough surface, and of others in its tails.
 fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
     var sum = vec3f(0.0);
     for (var index = 0u; index < start.light_count + start.lobe_lamp_count; index += 1u) {
         let light = lights[index];
         let is_of_lobe = index >= start.light_count;
-        if light.outline == OUTLINE_SURFACE || !is_smaller(light, is_of_lobe, gloss.alpha, gloss.point.place) {
+        if light.outline == OUTLINE_SURFACE || !is_smaller(light, is_of_lobe, 1e30, gloss.point.place) {
             continue;
         }
+        // Of a lamp that is wider than the lobe, rays see what microfacets reflect that are tilted less.
+        let size = alpha_from(light, gloss.point.place);
+        let is_small = size < gloss.alpha;
+        let least_tilt = select(2.0 * size, 0.0, is_small);
         // Panels have as few patches as are half as wide as the lobe.
         let is_panel = light.outline != OUTLINE_ROUND;
         let is_ellipse = light.outline == OUTLINE_ELLIPSE;
-        let whole = alpha_from(light, gloss.point.place) * select(1.0, f32(PATCHES), is_panel);
+        let whole = size * select(1.0, f32(PATCHES), is_panel);
         var sides = 1u;
         while is_panel && sides < PATCHES && whole > 0.5 * gloss.alpha * f32(sides) {
             sides *= 2u;
@@ -267,7 +280,7 @@ fn highlights(gloss: Gloss, gaze: Gaze) -> vec3f {
             if !is_ellipse || length(at) < 1.0 {
                 // A round lamp has no axes.
                 let place = light.place + light.across * at.x + light.down * at.y;
-                let piece = Patch(place, patch_m2, depth, whole / f32(sides));
+                let piece = Patch(place, patch_m2, depth, select(0.0, whole / f32(sides), is_small), least_tilt);
                 sum += share * highlight_from(light, piece, gloss, gaze);
             }
         }

@@ -32,6 +32,8 @@ struct Facets {
     coat: f32,
     wall: f32,
     eta: f32,
+    // GGX α; 0 of smooth surfaces.
+    alpha: f32,
 }
 
 struct Interaction {
@@ -105,7 +107,8 @@ fn reflection(point: SurfacePoint, facing: Facing, gaze: Gaze, share: vec3f, alp
         direction = mirrored(incident, facing.geometric);
     }
     let curvature = select(-point.curvature, point.curvature, facing.front);
-    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, lobe_rad(alpha, gaze.lobes), alpha);
+    let widest = select(0.0, max(alpha, 0.5 * tilt(normalize(direction - incident), facing.shading)), alpha > 0.0);
+    return Branch(direction, share, gaze.media, 2.0 * curvature, 1.0, lobe_rad(alpha, gaze.lobes), widest);
 }
 
 fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alpha: f32) -> Interaction {
@@ -121,7 +124,7 @@ fn thin_wall(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alpha
         0.0,
         reflection(point, facing, gaze, vec3f(reflectance), alpha),
         Branch(direction, tint * (1.0 - reflectance), gaze.media, 0.0, 1.0, lobe_rad(alpha, gaze.lobes), -alpha),
-        Facets(0.0, 0.0, 1.0, eta),
+        Facets(0.0, 0.0, 1.0, eta, alpha),
     );
 }
 
@@ -147,7 +150,7 @@ fn dielectric(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, alph
     let cos_incident = -dot(incident, facing.facet);
     let cos_clamped = clamp(cos_incident, 0.0, 1.0);
     let cos_geometric = clamp(-dot(incident, facing.geometric), 0.0, 1.0);
-    let facets = Facets(0.0, 1.0, 0.0, eta);
+    let facets = Facets(0.0, 1.0, 0.0, eta, alpha);
     let whole = Interaction(0.0, reflection(point, facing, gaze, vec3f(1.0), alpha), no_branch(), facets);
     if eta != 1.0 && scaled_cos2_transmitted(cos_clamped, eta) <= 0.0 {
         return whole;
@@ -193,7 +196,7 @@ fn varied(point: SurfacePoint, facing: Facing, gaze: Gaze, tint: vec3f, factors:
     let alpha = lobe_alpha(object.roughness * factors.y);
     let mixture = mixture_at(point, gaze, factors);
     let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
-    var met = Interaction(0.0, no_branch(), no_branch(), Facets(0.0, 0.0, 0.0, eta));
+    var met = Interaction(0.0, no_branch(), no_branch(), Facets(0.0, 0.0, 0.0, eta, alpha));
     if mixture.clear > 0.0 {
         if object.solid != 0u {
             met = dielectric(point, facing, gaze, tint, alpha);
@@ -229,14 +232,14 @@ fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
     switch object.surface {
         case SURFACE_MIRROR: {
             let share = metal_reflectance(cos_incident, tint);
-            let facets = Facets(1.0, 0.0, 0.0, 1.0);
+            let facets = Facets(1.0, 0.0, 0.0, 1.0, alpha);
             return Interaction(0.0, reflection(point, facing, gaze, share, alpha), no_branch(), facets);
         }
         case SURFACE_COATED: {
             let eta = ior_of(point.object, gaze.wavelength) / medium_ior(gaze.media, gaze.wavelength);
             let reflectance = object.coat * dielectric_reflectance(cos_incident, eta);
             let back = reflection(point, facing, gaze, vec3f(reflectance), alpha);
-            return Interaction(1.0 - reflectance, back, no_branch(), Facets(0.0, object.coat, 0.0, eta));
+            return Interaction(1.0 - reflectance, back, no_branch(), Facets(0.0, object.coat, 0.0, eta, alpha));
         }
         case SURFACE_THIN_WALL: {
             return thin_wall(point, facing, gaze, tint, alpha);
@@ -248,7 +251,7 @@ fn interact(point: SurfacePoint, gaze: Gaze, tint: vec3f) -> Interaction {
             return varied(point, facing, gaze, tint, factors);
         }
         default: {
-            return Interaction(1.0, no_branch(), no_branch(), Facets(0.0, 0.0, 0.0, 1.0));
+            return Interaction(1.0, no_branch(), no_branch(), Facets(0.0, 0.0, 0.0, 1.0, 0.0));
         }
     }
 }

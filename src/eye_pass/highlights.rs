@@ -6,7 +6,8 @@
 //!
 //! The rays that leave a rough surface are too few to meet a lamp that is smaller than the lobe. It is a highlight there
 //! instead: the lobe times the lamp's irradiance, with a shadow ray, to which clear surfaces are opaque, as they are to
-//! direct light. Glowing objects and the suns of a sky count as lamps there, and are not seen by the rays that leave the
+//! direct light. So is a larger one in the lobe's tails: for microfacets that are tilted further than a reflection of the
+//! lamp is wide. Rays see it by the others. Glowing objects and the suns of a sky count as lamps there, and are not seen by the rays that leave the
 //! surface. Behind a rough pane or interface, which has no highlights, they are seen as lamps by the cones of the rays.
 
 use std::f64::consts::PI;
@@ -44,13 +45,14 @@ pub struct RayCone {
     pub lobe: LobeLeft,
 }
 
-/// The lobe that a ray comes from, with the GGX α of a reflection as wide.
+/// The lobe that a ray comes from: lamps smaller than a reflection of this GGX α are seen otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum LobeLeft {
     /// The ray left a smooth surface or the eye.
     None,
-    /// All lamps that are smaller than the lobe are highlights of the surface that reflected the ray.
+    /// As highlights of the surface that reflected the ray.
     Reflection(f64),
+    /// As lamps, however small.
     Transmission(f64),
 }
 
@@ -284,18 +286,26 @@ impl VisibleLamp {
         (share > 0.0).then_some((radiance, distance_m))
     }
 
-    /// Highlights of the lamp in a lobe that is wider than it.
+    /// Highlights of the lamp in a lobe that is wider than it, or in the tails of one that is not.
     pub fn highlights(&self, lobe: &Lobe, mut met: impl FnMut(&Highlight)) {
-        // A lamp, or a patch of a panel, that is wider than the lobe is seen by the ray of the chain: each counts once.
-        if !self.is_smaller_than(lobe.alpha, lobe.point) {
+        // Of a lamp, or a patch of a panel, that is wider than the lobe, rays see what microfacets reflect that are tilted
+        // less: each counts once.
+        let is_small = self.is_smaller_than(lobe.alpha, lobe.point);
+        let least_tilt = if is_small {
+            0.0
+        } else {
+            2.0 * self.alpha_from(lobe.point)
+        };
+        if !self.is_smaller_than(f64::INFINITY, lobe.point) {
             return;
         }
         let sides = self.patches_across(lobe.alpha, lobe.point);
         let of_patch = self.alpha_from(lobe.point) * f64::from(PATCHES) / f64::from(sides);
 
         // A lobe as wide as the real one, the patch and the cone together: a tilt of α turns a ray by 4 α from edge to
-        // edge.
+        // edge. Tails vary little over a patch.
         let of_cone = 0.25 * lobe.seen_by;
+        let of_patch = if is_small { of_patch } else { 0.0 };
         let alpha_squared = lobe.alpha * lobe.alpha + of_patch * of_patch + of_cone * of_cone;
 
         // The shadow ray ends short of the lamp, whose own glowing surface would block it.
@@ -305,11 +315,13 @@ impl VisibleLamp {
                 return;
             };
             let response = ggx_reflection(lobe.normal, lobe.to_eye, to_light, alpha_squared);
-            if response > 0.0 && across_beam > 0.0 {
+            let half = (lobe.to_eye + to_light).normalize();
+            let is_tilted = tilt(half, lobe.normal) >= least_tilt;
+            if response > 0.0 && across_beam > 0.0 && is_tilted {
                 met(&Highlight {
                     to_light,
                     distance_m: (distance_m - self.depth_m()) * (1.0 - BEFORE_SURFACE),
-                    half: (lobe.to_eye + to_light).normalize(),
+                    half,
                     response,
                     irradiance: emitter.strength * across_beam,
                 });
@@ -372,6 +384,11 @@ impl VisibleLamp {
         };
         0.5 * radius / distance.max(f64::MIN_POSITIVE)
     }
+}
+
+/// Tangent of the angle between the unit normal of a microfacet and that of its surface.
+pub fn tilt(facet: DVec3, normal: DVec3) -> f64 {
+    facet.cross(normal).length() / facet.dot(normal).max(f64::MIN_POSITIVE)
 }
 
 /// Lamps that stand for glowing objects, and for the suns of a sky; an object that shines from two sides has two.

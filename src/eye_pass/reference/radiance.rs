@@ -332,7 +332,8 @@ impl<'a> LitScene<'a> {
         seen
     }
 
-    /// Reflected radiance [W/(m² sr)] of the lamps that are smaller than the lobe of a rough surface.
+    /// Reflected radiance [W/(m² sr)] of the lamps that are smaller than the lobe of a rough surface, and of others in its
+    /// tails.
     fn highlights(
         &self,
         tracer: &Tracer,
@@ -485,7 +486,13 @@ impl ChainSurface {
         let (spread_rad, lobe) = match branch.event {
             Event::Reflection | Event::TotalInternalReflection => {
                 let of_shape = 2.0 * self.curvature * cone.width_m;
-                let lobe = LobeLeft::Reflection(self.alpha);
+                let facet = (branch.ray.direction - cone.ray.direction).normalize();
+                let tilt = if self.alpha > 0.0 {
+                    highlights::tilt(facet, branch.normal)
+                } else {
+                    0.0
+                };
+                let lobe = LobeLeft::Reflection(self.alpha.max(0.5 * tilt));
                 (cone.spread_rad + of_shape + lobe_rad, lobe)
             }
             Event::Refraction => {

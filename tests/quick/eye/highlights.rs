@@ -2,7 +2,7 @@
 
 use nephroid::eye_pass::reference::ReferenceSettings;
 use nephroid::scene::{Environment, PanelShape};
-use nephroid::transport::{EffectSet, NormalSource};
+use nephroid::transport::{EffectSet, NormalSource, ggx_reflection};
 
 use crate::prelude::*;
 use support::chain_laws::direction;
@@ -150,6 +150,48 @@ fn rough_mirrors_show_lamps_as_their_microfacets_do() {
             assert!(off / sum > 0.2, "{what}: {}", off / sum);
         }
     }
+}
+
+/// Rays see a lamp that is wider than the lobe, but around its image the tails of the lobe are smooth: the mean over
+/// points of the lamp.
+#[test]
+fn narrow_lobes_have_smooth_tails() {
+    let view = view(dvec3(0.0, 0.9, 1.2), dvec3(0.02, 0.0, 0.01), 0.4, [80, 60]);
+    let (roughness, radius_m, intensity): (f64, f64, f64) = (0.09, 0.04, 2.0);
+    let bulb = lamps_of_all_kinds(LAMP).swap_remove(0);
+    let parts = vec![(floor(50.0, 0.0), mirror(roughness))];
+    let tracer = Tracer::new(Arc::new(scene(parts, vec![bulb])));
+    let shown = seen(&tracer, &[], &view, &ReferenceSettings::default())
+        .0
+        .radiance;
+    let (mut off, mut sum) = (0.0, 0.0);
+    for (pixel, found) in shown.iter().enumerate() {
+        let (origin, direction) = (view.camera.position, direction(&view, pixel));
+        let point = origin - direction * (origin.y / direction.y);
+        let (x, y) = (LAMP - point).normalize().any_orthonormal_pair();
+        let of_place = |place: DVec2| {
+            let offset = LAMP + radius_m * (x * place.x + y * place.y) - point;
+            let to_lamp = offset.normalize();
+            let response = ggx_reflection(DVec3::Y, -direction, to_lamp, roughness.powi(4));
+            let cosine = (to_lamp - direction).normalize().dot(to_lamp);
+            let reflectance = 0.7 + 0.3 * (1.0 - cosine).powi(5);
+            intensity / offset.length_squared() * response * reflectance
+        };
+        let places = (0..400).map(|place| dvec2(f64::from(place % 20), f64::from(place / 20)) / 9.5 - 1.0);
+        let within: Vec<f64> = places
+            .filter(|place| place.length() < 1.0)
+            .map(of_place)
+            .collect();
+        let expected = within.iter().sum::<f64>() / within.len() as f64;
+        // Beside the image of the lamp.
+        if expected < 0.001 * intensity / (PI * radius_m * radius_m) {
+            let ratio = f64::from(found[1]) / expected;
+            assert!(expected < 1e-3 || (0.5..2.0).contains(&ratio), "{pixel}: {ratio}");
+            off += (f64::from(found[1]) - expected).abs();
+            sum += expected;
+        }
+    }
+    assert!(sum > 0.0 && off < 0.1 * sum, "{}", off / sum);
 }
 
 /// A glowing sheet and a glowing ball leave the highlights of a panel and of a bulb.
