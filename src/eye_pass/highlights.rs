@@ -177,11 +177,15 @@ impl VisibleLamp {
 
     /// Whether it is smaller than a lobe seen from a point, and far enough for what it stands for.
     fn is_smaller_than(&self, alpha: f64, point: DVec3) -> bool {
-        let most = match (self.object, self.outline) {
+        self.alpha_from(point) < alpha.min(self.largest())
+    }
+
+    /// GGX α of a lobe as wide as it may be seen at most.
+    fn largest(&self) -> f64 {
+        match (self.object, self.outline) {
             (Some(_), Outline::Round { .. }) => LARGEST_BALL,
             _ => f64::INFINITY,
-        };
-        self.alpha_from(point) < alpha.min(most)
+        }
     }
 
     /// [`seen`](Self::seen) of what stands for a glowing object or a sun of the sky.
@@ -290,22 +294,21 @@ impl VisibleLamp {
     pub fn highlights(&self, lobe: &Lobe, mut met: impl FnMut(&Highlight)) {
         // Of a lamp, or a patch of a panel, that is wider than the lobe, rays see what microfacets reflect that are tilted
         // less: each counts once.
-        let is_small = self.is_smaller_than(lobe.alpha, lobe.point);
-        let least_tilt = if is_small {
-            0.0
-        } else {
-            2.0 * self.alpha_from(lobe.point)
-        };
-        if !self.is_smaller_than(f64::INFINITY, lobe.point) {
+        let size = self.alpha_from(lobe.point);
+        if size >= self.largest() {
             return;
         }
-        let sides = self.patches_across(lobe.alpha, lobe.point);
-        let of_patch = self.alpha_from(lobe.point) * f64::from(PATCHES) / f64::from(sides);
+        let sides = self.patches_across(lobe.alpha, size);
+        let (least_tilt, of_patch) = if size < lobe.alpha {
+            (0.0, size * f64::from(PATCHES) / f64::from(sides))
+        } else {
+            // Tails vary little over a patch.
+            (2.0 * size, 0.0)
+        };
 
         // A lobe as wide as the real one, the patch and the cone together: a tilt of α turns a ray by 4 α from edge to
-        // edge. Tails vary little over a patch.
+        // edge.
         let of_cone = 0.25 * lobe.seen_by;
-        let of_patch = if is_small { of_patch } else { 0.0 };
         let alpha_squared = lobe.alpha * lobe.alpha + of_patch * of_patch + of_cone * of_cone;
 
         // The shadow ray ends short of the lamp, whose own glowing surface would block it.
@@ -347,12 +350,13 @@ impl VisibleLamp {
         }
     }
 
-    /// Patches across and down a panel: as few as are half as wide as the lobe. Other lamps are as wide as their patches.
-    fn patches_across(&self, alpha: f64, point: DVec3) -> u32 {
+    /// Patches across and down a panel, of which the smallest have the α `size`: as few as are half as wide as the lobe.
+    /// Other lamps are as wide as their patches.
+    fn patches_across(&self, alpha: f64, size: f64) -> u32 {
         let Outline::Flat { .. } = self.outline else {
             return PATCHES;
         };
-        let whole = self.alpha_from(point) * f64::from(PATCHES);
+        let whole = size * f64::from(PATCHES);
         let mut sides = 1;
         while sides < PATCHES && whole > 0.5 * alpha * f64::from(sides) {
             sides *= 2;

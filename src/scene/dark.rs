@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use super::watertight::{is_closed, volume_m3};
+use super::watertight::volume_m3;
 use super::{LightKind, Scene};
 use crate::error::Warning;
 use crate::geometry::enclosure::{Bounds, winding_number};
@@ -88,7 +88,7 @@ fn enclosing(scene: &Scene, place: DVec3) -> Option<usize> {
         };
         is_within((place, place))
             && scene.material_of(index).is_opaque()
-            && is_closed(object.mesh())
+            && object.is_closed()
             && is_inside()
             && !holds_others()
     })

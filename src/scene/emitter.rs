@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::glow_sampler::GlowSampler;
-use super::{Light, LightKind, LightSize, PanelShape, Scene, watertight};
+use super::{Light, LightKind, LightSize, PanelShape, Scene};
 use crate::optics::LinearSrgb;
 
 /// Source of the rays of one wavefront.
@@ -209,7 +209,7 @@ impl<'a> EmitterSampler<'a> {
         else {
             return Vec::new();
         };
-        let has_inside = surface.both_sides && watertight::is_closed(self.scene.objects[object].mesh());
+        let has_inside = surface.both_sides && self.scene.objects[object].is_closed();
         let lamps = surface.stand_ins(radiance, has_inside).into_iter();
         let lamp = |(kind, size)| Light {
             kind,

@@ -7,7 +7,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::mesh::{InScene, Placement};
-use super::{Mesh, Scene, instances};
+use super::{Mesh, Scene, instances, watertight};
 
 /// One mesh primitive of one node: the unit that has a material and, if light reaches it, an illumination map.
 #[derive(Clone, Debug)]
@@ -48,6 +48,7 @@ struct Found {
     mesh: OnceLock<Arc<Mesh>>,
     bounds: OnceLock<Option<(DVec3, DVec3)>>,
     can_share: OnceLock<bool>,
+    is_closed: OnceLock<bool>,
 }
 
 impl fmt::Debug for Found {
@@ -185,6 +186,15 @@ impl Object {
     /// Bounding box in scene coordinates, as minimum and maximum corner [m]; `None` without vertices.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         *self.shape.found.bounds.get_or_init(|| self.in_scene().bounds())
+    }
+
+    /// Whether its mesh is [closed](watertight::is_closed).
+    pub fn is_closed(&self) -> bool {
+        *self
+            .shape
+            .found
+            .is_closed
+            .get_or_init(|| watertight::is_closed(self.mesh()))
     }
 
     /// Whether the mesh can be traced and drawn in its own coordinates, shared with other objects.
