@@ -14,9 +14,9 @@ const TILE_GROUPS = 9;
 const LEAST_BYTES = 256;
 // Chains are traced in bands that take about so long [ms], so that a picture at rest can be given up for another.
 const BAND_MS = 100;
-const STORED = ["objects", "image_table", "corners", "map_uvs", "indices", "lights"];
+const STORED = ["objects", "image_table", "corners", "map_uvs", "indices", "lights", "seen_lamps"];
 // Bindings of each group in turn: uniforms, storage buffers, textures and arrays of textures.
-const GROUPS = { frame: "ussaa", traced: "ussssssu", composed: "t", sky: "t", nothing: "", mean: "utt", shown: "tu" };
+const GROUPS = { frame: "ussaa", traced: "ussssssu", composed: "t", sky: "t", lamps: "s", nothing: "", mean: "utt", shown: "tu" };
 const KINDS = { u: { buffer: { type: "uniform" } }, s: { buffer: { type: "read-only-storage" } },
   t: { texture: { sampleType: "unfilterable-float" } }, a: { texture: { sampleType: "unfilterable-float", viewDimension: "2d-array" } } };
 
@@ -111,13 +111,13 @@ export class EyePass {
   module(label) { return (this.modules[label] ??= this.device.createShaderModule({ label, code: this.scene.programs[label] })); }
 
   // A pipeline, made when it is first needed.
-  pipeline(key, groups, vertex, { program, entry, format, constants, cull = "none", depth, samples: count = 1 }) {
+  pipeline(key, groups, vertex, { program, entry, format, constants, cull = "none", depth, samples: count = 1, blend, buffers }) {
     if (!this.pipelines.has(key)) {
-      const { formats, vertices } = this.scene, module = this.module(program);
+      const { formats } = this.scene, module = this.module(program);
       const made = this.device.createRenderPipelineAsync({
         label: key, layout: this.device.createPipelineLayout({ bindGroupLayouts: groups.map((name) => this.layouts[name]) }),
-        vertex: { module, entryPoint: vertex, buffers: vertex === "place" ? vertices : [] },
-        ...(entry && { fragment: { module, entryPoint: entry, constants, targets: format ? [{ format }] : [] } }),
+        vertex: { module, entryPoint: vertex, buffers },
+        ...(entry && { fragment: { module, entryPoint: entry, constants, targets: format ? [{ format, blend }] : [] } }),
         primitive: { cullMode: cull }, multisample: { count },
         ...(depth && { depthStencil: { format: formats.depth, depthWriteEnabled: depth[0], depthCompare: depth[1] } }),
       });
@@ -128,16 +128,19 @@ export class EyePass {
 
   // Everything that pictures of these draws need.
   async makePipelines(lists, toneMap, isResting) {
-    const { scene: { draws, pipelines, formats, samples, tone_maps: toneMaps }, device } = this;
+    const { scene: { draws, pipelines, formats, samples, tone_maps: toneMaps, vertices, lamps }, device } = this;
     const groups = { traced: ["frame", "traced", ...(this.sky ? ["sky"] : [])], composed: ["frame", "composed"] };
     const surfaces = lists.flatMap((list) => draws[list]).map(([key]) =>
-      this.pipeline(key, groups[pipelines[key].entry] ?? ["frame"], "place", pipelines[key]));
+      this.pipeline(key, groups[pipelines[key].entry] ?? ["frame"], "place", { ...pipelines[key], buffers: vertices }));
     const mean = { program: "accumulated", entry: "accumulated", format: formats.mean };
     const display = { program: "tone_mapping", entry: "to_display", format: this.screenFormat, constants: toneMaps[toneMap] };
     const others = [this.pipeline(toneMap, ["shown"], "cover", display)];
     if (isResting) others.push(this.pipeline("mean", ["mean"], "cover", mean));
     const behind = { program: "sky", entry: "sky_drawn", format: formats.radiance, depth: [false, "always"], samples };
     if (this.sky) others.push(this.pipeline("sky", ["frame", "nothing", "sky"], "behind", behind));
+    const added = { srcFactor: "one", dstFactor: "one" }, blend = { color: added, alpha: added };
+    const seen = { program: "lamps", entry: "lamp_drawn", format: formats.radiance, depth: [false, "greater-equal"], samples, blend, buffers: lamps.vertices };
+    others.push(this.pipeline("lamps", ["frame", "lamps"], "lamp_corner", seen));
     const compute = { module: this.module("summed"), entryPoint: "summed" };
     this.summed ??= await device.createComputePipelineAsync({ layout: "auto", compute });
     this.isFresh = surfaces.some((made) => made instanceof Promise);
@@ -291,7 +294,7 @@ export class EyePass {
   }
 
   drawSurfaces(encoder, sides, lists, { colours }) {
-    const { targets } = this;
+    const { targets, scene } = this;
     const pass = encoder.beginRenderPass({
       colorAttachments: [{ ...cleared(targets.samples), resolveTarget: targets.radiance, storeOp: "discard" }],
       depthStencilAttachment: { view: targets.depth, depthClearValue: 0, depthLoadOp: "clear", depthStoreOp: "discard" },
@@ -305,6 +308,11 @@ export class EyePass {
       }
       pass.setBindGroup(1, targets.composed);
       lists.forEach((list) => this.drawEach(pass, list));
+      if (colours) return;
+      pass.setPipeline(this.pipelines.get("lamps"));
+      pass.setBindGroup(1, this.bind("lamps", [this.buffers.seen_lamps]));
+      pass.setVertexBuffer(0, this.buffers.seen_lamps);
+      pass.draw(...scene.lamps.draw);
     });
   }
 

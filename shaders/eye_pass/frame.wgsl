@@ -27,11 +27,13 @@ struct Frame {
 
 @group(0) @binding(0) var<uniform> frame: Frame;
 
+const PI: f32 = 3.14159265358979;
+
 // Luminance of linear sRGB.
 const LUMINANCE = vec3f(0.2126390, 0.7151687, 0.0721923);
 
-// Largest value written [scaled radiance]: half floats end at 65504.
-const LARGEST: f32 = 32768.0;
+// Largest value written [scaled radiance]: half floats end at 65504, and up to three lamps are added to it.
+const LARGEST: f32 = 16384.0 - 16.0;
 
 // Magenta at any exposure, in place of values that are not finite.
 fn fault_colour() -> vec3f {

@@ -1,9 +1,5 @@
-// Lamps in mirrors, in glass and on glossy surfaces; twin of eye_pass/highlights.rs. Lengths are local unless noted.
+// Lamps in mirrors and glass, and on glossy surfaces; twin of eye_pass/highlights.rs. Lengths are local unless noted.
 
-// Angular radius of lamps without extent where a focus leaves no footprint [rad].
-const POINT_RADIUS_RAD: f32 = 2e-4;
-// A lamp lies on a ray if it is nearer than the next surface by this part of the distance.
-const BEFORE_SURFACE: f32 = 1e-4;
 // Lobes of a larger GGX α show the suns of a sky as highlights.
 const SKY_SUN_ALPHA: f32 = 0.02;
 // A glowing object counts as a ball where a lobe as wide has a smaller GGX α.
@@ -12,41 +8,6 @@ const LARGEST_BALL: f32 = 0.1;
 const PATCHES: u32 = 4u;
 // Highlights that reflect a smaller radiance per irradiance [1/sr] are left out.
 const DIMMEST_HIGHLIGHT: f32 = 3e-4;
-
-// Radius of the disc with the area of a square footprint.
-fn disc_of(width: f32) -> f32 {
-    return abs(width) / sqrt(PI);
-}
-
-// Share of a disc, the footprint, that lies within another at an offset.
-fn share_of_disc(offset: f32, radius: f32, disc: f32) -> f32 {
-    let footprint = max(disc, 1e-3 * radius);
-    if offset >= radius + footprint {
-        return 0.0;
-    }
-    let small = min(radius, footprint);
-    let large = max(radius, footprint);
-    if offset <= large - small {
-        return small * small / (footprint * footprint);
-    }
-    // The lens between two circles.
-    let squares = vec2f(small * small, large * large);
-    let cosines = (offset * offset + squares - squares.yx) / (2.0 * offset * vec2f(small, large));
-    let angles = acos(clamp(cosines, vec2f(-1.0), vec2f(1.0)));
-    return dot(squares, angles - sin(angles) * cos(angles)) / (PI * footprint * footprint);
-}
-
-// Share of an interval of a half-width about a place that lies between -1 and 1.
-fn share_of_side(place: f32, half_width: f32) -> f32 {
-    let low = max(place - half_width, -1.0);
-    let high = min(place + half_width, 1.0);
-    return max(high - low, 0.0) / (2.0 * half_width);
-}
-
-// 0 of round lamps.
-fn panel_area(light: LightRecord) -> f32 {
-    return length(cross(light.across, light.down)) * select(4.0, PI, light.outline == OUTLINE_ELLIPSE);
-}
 
 // GGX α of a lobe as wide as a lamp, or a patch of a panel, is seen from a place.
 fn alpha_from(light: LightRecord, place: vec3f) -> f32 {
@@ -67,59 +28,6 @@ fn is_smaller(light: LightRecord, is_of_lobe: bool, alpha: f32, place: vec3f) ->
     return alpha_from(light, place) < select(alpha, min(alpha, LARGEST_BALL), is_ball);
 }
 
-// What a lamp shows to a ray that sees it at `distance`, infinite for suns.
-struct SeenLamp {
-    radiance: vec3f,
-    distance: f32,
-}
-
-fn seen_sun(light: LightRecord, gaze: Gaze) -> SeenLamp {
-    let cosine = -dot(light.place, gaze.direction);
-    if cosine <= 0.0 {
-        return SeenLamp(vec3f(0.0), 0.0);
-    }
-    let offset = length(gaze.direction / cosine + light.place);
-    let footprint = disc_of(gaze.spread);
-    let radius = max(max(light.radius, POINT_RADIUS_RAD), footprint);
-    let share = share_of_disc(offset, radius, footprint);
-    return SeenLamp(light.strength * (share * (1.0 + radius * radius) / (PI * radius * radius)), FAR_AWAY);
-}
-
-fn seen_bulb(light: LightRecord, gaze: Gaze) -> SeenLamp {
-    let to_lamp = light.place - gaze.origin;
-    let along = dot(to_lamp, gaze.direction);
-    if along <= 0.0 {
-        return SeenLamp(vec3f(0.0), 0.0);
-    }
-    let offset = length(to_lamp - gaze.direction * along);
-    let footprint = disc_of(gaze.width + gaze.spread * along);
-    let radius = max(max(light.radius, POINT_RADIUS_RAD * along), footprint);
-    let share = share_of_disc(offset, radius, footprint) * falloff(light, -gaze.direction);
-    let radius_m = radius * start.unit_m;
-    return SeenLamp(light.strength * (share / (PI * radius_m * radius_m)), along);
-}
-
-fn seen_panel(light: LightRecord, gaze: Gaze) -> SeenLamp {
-    let normal = cross(light.across, light.down);
-    let slope = dot(gaze.direction, normal);
-    let to_lamp = light.place - gaze.origin;
-    let distance = dot(to_lamp, normal) / min(slope, -1e-30);
-    if slope >= 0.0 || distance <= 0.0 {
-        return SeenLamp(vec3f(0.0), 0.0);
-    }
-    let from_centre = gaze.direction * distance - to_lamp;
-    let along = vec2f(dot(cross(from_centre, light.down), normal), dot(cross(light.across, from_centre), normal));
-    let place = along / dot(normal, normal);
-    let width = 0.5 * abs(gaze.width + gaze.spread * distance);
-    let widths = max(width / vec2f(length(light.across), length(light.down)), vec2f(1e-3));
-    var share = share_of_side(place.x, widths.x) * share_of_side(place.y, widths.y);
-    if light.outline == OUTLINE_ELLIPSE {
-        share = share_of_disc(length(place), 1.0, 2.0 * sqrt(widths.x * widths.y / PI));
-    }
-    let area_m2 = panel_area(light) * start.unit_m * start.unit_m;
-    return SeenLamp(light.strength * (share / area_m2), distance);
-}
-
 // Whether an object counts as a lamp in the lobe that a ray comes from, or its light as a caustic on a coat before it.
 fn is_shown_otherwise(gaze: Gaze, object: ObjectRecord) -> bool {
     if gaze.coat == COAT_BEFORE {
@@ -134,6 +42,7 @@ fn is_shown_otherwise(gaze: Gaze, object: ObjectRecord) -> bool {
 // Radiance of the lamps between a surface that a path has left and the next one at `reach`, averaged over the footprint.
 fn lamps_on(gaze: Gaze, reach: f32) -> vec3f {
     var sum = vec3f(0.0);
+    let cone = Cone(gaze.origin, gaze.width, gaze.direction, gaze.spread, start.unit_m);
     // Those of glowing objects and skies count behind rough surfaces only.
     let count = start.light_count + select(0u, start.lobe_lamp_count, gaze.alpha < 0.0);
     for (var index = 0u; index < count; index += 1u) {
@@ -146,16 +55,10 @@ fn lamps_on(gaze: Gaze, reach: f32) -> vec3f {
         // The surface of a glowing object itself ends the reach.
         let depth = sqrt(3.0) * light.radius + 2.0 * BEFORE_SURFACE * reach;
         let beyond = reach + select(0.0, depth, is_of_lobe);
-        var seen: SeenLamp;
-        if light.kind == LIGHT_SUN {
-            seen = seen_sun(light, gaze);
-        } else if light.outline == OUTLINE_ROUND {
-            seen = seen_bulb(light, gaze);
-        } else {
-            seen = seen_panel(light, gaze);
-        }
-        if largest(seen.radiance) > 0.0 && (seen.distance < beyond * (1.0 - BEFORE_SURFACE) || reach >= FAR_AWAY) {
-            sum += seen.radiance * left_after(gaze.media, seen.distance);
+        let seen = seen_lamp(light, cone);
+        let distance = select(seen.distance, FAR_AWAY, light.kind == LIGHT_SUN);
+        if largest(seen.radiance) > 0.0 && (distance < beyond * (1.0 - BEFORE_SURFACE) || reach >= FAR_AWAY) {
+            sum += seen.radiance * left_after(gaze.media, distance);
         }
     }
     return sum;

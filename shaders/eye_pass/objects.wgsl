@@ -43,8 +43,6 @@ const SURFACE_THIN_WALL: u32 = 3u;
 const SURFACE_COATED: u32 = 4u;
 const SURFACE_VARIED: u32 = 5u;
 
-const PI: f32 = 3.14159265358979;
-
 @group(0) @binding(1) var<storage, read> objects: array<ObjectRecord>;
 
 // Transforms a mesh normal to the scene and normalises it, given the rows of the transform. Outside stays outside under

@@ -1,14 +1,17 @@
-//! Lamps in mirrors, in glass and on glossy surfaces; twin of `shaders/eye_pass/highlights.wgsl`.
+//! Lamps as they are seen: directly if they have an extent, in mirrors, in glass and on glossy surfaces; twin of
+//! `shaders/eye_pass/lamps.wgsl` and `highlights.wgsl`.
 //!
 //! A ray of a chain stands for a cone, the footprint of its pixel, and sees a lamp by the share of the cone that the
 //! lamp fills. Bulbs and suns that are smaller than the footprint are spread over a disc of its size. The image of a
-//! lamp thus holds the same energy at any resolution, and lamps without extent are seen too.
+//! lamp thus holds the same energy at any resolution, and lamps without extent are seen too, though not by the eye
+//! directly.
 //!
 //! The rays that leave a rough surface are too few to meet a lamp that is smaller than the lobe. It is a highlight there
 //! instead: the lobe times the lamp's irradiance, with a shadow ray, to which clear surfaces are opaque, as they are to
 //! direct light. So is a larger one in the lobe's tails: for microfacets that are tilted further than a reflection of the
-//! lamp is wide. Rays see it by the others. Glowing objects and the suns of a sky count as lamps there, and are not seen by the rays that leave the
-//! surface. Behind a rough pane or interface, which has no highlights, they are seen as lamps by the cones of the rays.
+//! lamp is wide. Rays see it by the others. Glowing objects and the suns of a sky count as lamps there, and are not seen
+//! by the rays that leave the surface. Behind a rough pane or interface, which has no highlights, they are seen as lamps
+//! by the cones of the rays.
 
 use std::f64::consts::PI;
 
@@ -152,6 +155,15 @@ impl Outline {
             LightKind::Point { .. } | LightKind::Spot { .. } => Some(Self::Round { radius_m: radius }),
         }
     }
+
+    /// Whether the eye sees it directly.
+    pub(super) fn has_extent(&self) -> bool {
+        match *self {
+            Self::Angle { tan_radius } => tan_radius > 0.0,
+            Self::Round { radius_m } => radius_m > 0.0,
+            Self::Flat { .. } => true,
+        }
+    }
 }
 
 impl VisibleLamp {
@@ -215,6 +227,11 @@ impl VisibleLamp {
     #[cfg(feature = "gpu")]
     pub(super) fn strength(&self) -> LinearSrgb {
         self.emitter.strength
+    }
+
+    /// Whether the eye sees it directly.
+    pub fn has_extent(&self) -> bool {
+        self.outline.has_extent()
     }
 
     /// Radiance [W/(m² sr)] that a cone sees, averaged over it, with the distance of the lamp [m]. `reach_m`: distance

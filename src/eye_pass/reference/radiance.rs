@@ -317,11 +317,16 @@ impl<'a> LitScene<'a> {
 
     /// Contribution of the lamps between a surface that a path has left and the next one.
     fn lamps_on(&self, path: &EyePath<'_>, reach_m: f64) -> LinearSrgb {
-        if path.depth == 0 || path.coat == CoatPassed::Before {
+        if path.coat == CoatPassed::Before {
             return LinearSrgb::BLACK;
         }
+        // The eye does not see points directly.
         let mut seen = LinearSrgb::BLACK;
-        let lamps = self.lamps.iter().map(|lamp| lamp.seen(&path.cone, reach_m));
+        let lamps = self
+            .lamps
+            .iter()
+            .filter(|lamp| path.depth > 0 || lamp.has_extent());
+        let lamps = lamps.map(|lamp| lamp.seen(&path.cone, reach_m));
         let in_lobe = self
             .lobe_lamps
             .iter()

@@ -19,7 +19,7 @@ use crate::geometry::PackedNode;
 use crate::geometry::bvh::Frame;
 use crate::gpu::Gpu;
 use crate::scene::emitter::Emitter;
-use crate::scene::{Light, Object, PanelShape, Scene};
+use crate::scene::{Light, Object, Scene};
 use crate::transport::{MediumStack, PackedInstance, PackedMesh, Tracer, media_at};
 
 /// Capacity of the traversal stack; `STACK` in the shader.
@@ -286,7 +286,7 @@ impl ChainScene {
     pub(super) fn set_lights(&mut self, gpu: &Gpu, scene: &Scene) {
         let record = |light: &Light| {
             let record = self.record(&Emitter::middle(light, scene)?, scene);
-            Some(self.outlined(record, Outline::of(light)))
+            Some(record.outlined(Outline::of(light), self.unit_m()))
         };
         let mut records: Vec<LightRecord> = scene.lights.iter().filter_map(record).collect();
         let lights = records.len();
@@ -308,31 +308,6 @@ impl ChainScene {
                 .map_or([0.0; 3], |body| absorption_per_m(scene.material_of(body))),
             ior: within.ior(scene) as f32,
             ..LightRecord::of(emitter, |place| self.local(place))
-        }
-    }
-
-    /// A lamp with its outline; without one it is an emissive surface.
-    fn outlined(&self, record: LightRecord, outline: Option<Outline>) -> LightRecord {
-        let local = |axis: DVec3| (axis / self.unit_m()).as_vec3().to_array();
-        match outline {
-            None => LightRecord { outline: 3, ..record },
-            Some(Outline::Angle { tan_radius }) => LightRecord {
-                radius: tan_radius as f32,
-                ..record
-            },
-            Some(Outline::Round { radius_m }) => LightRecord {
-                radius: (radius_m / self.unit_m()) as f32,
-                ..record
-            },
-            Some(Outline::Flat { across, down, shape }) => LightRecord {
-                across: local(across),
-                down: local(down),
-                outline: match shape {
-                    PanelShape::Rectangle => 1,
-                    PanelShape::Disc => 2,
-                },
-                ..record
-            },
         }
     }
 

@@ -61,7 +61,11 @@ pub(super) const OBJECT_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::Vertex
     ],
 };
 
-const fn attribute(shader_location: u32, offset: usize, format: wgpu::VertexFormat) -> wgpu::VertexAttribute {
+pub(super) const fn attribute(
+    shader_location: u32,
+    offset: usize,
+    format: wgpu::VertexFormat,
+) -> wgpu::VertexAttribute {
     wgpu::VertexAttribute {
         format,
         offset: offset as u64,

@@ -15,6 +15,7 @@ mod chains;
 mod draws;
 mod geometry;
 mod images;
+mod lamps;
 mod maps;
 mod minify;
 mod objects;
@@ -47,6 +48,7 @@ use self::chains::ChainScene;
 use self::draws::DrawState;
 use self::draws::Sample;
 use self::geometry::Geometry;
+use self::lamps::SeenLamps;
 use self::maps::ShownMap;
 use self::objects::{Appearance, Objects};
 use self::pipelines::{PipelineFlags, SurfacePipelines};
@@ -64,8 +66,8 @@ use crate::scene::Scene;
 
 /// Default memory budget of illumination maps on the device [bytes].
 const MAP_BUDGET_BYTES: u64 = 1 << 30;
-/// Storage buffers that every fragment shader reads.
-const MIN_BUFFERS: u32 = 2;
+/// Storage buffers that fragment shaders read even without chains.
+const MIN_BUFFERS: u32 = 3;
 
 #[derive(Debug)]
 pub struct Renderer {
@@ -84,6 +86,7 @@ pub struct Renderer {
     /// Why chains are not drawn although they were requested.
     refusal: Option<Error>,
     sky: Option<Sky>,
+    lamps: SeenLamps,
     targets: Option<Targets>,
     traced: Option<Targets>,
     mean: Option<Mean>,
@@ -133,6 +136,7 @@ impl Renderer {
         // Chains, environment and targets are created with the first view that needs them.
         let scene = Arc::new(scene.as_seen());
         let geometry = Geometry::new(gpu, &scene);
+        let lamps = SeenLamps::new(gpu, &scene);
         let renderer = Self {
             sample_count,
             tone_mapping: ToneMappingPipelines::new(gpu, colour_format),
@@ -145,6 +149,7 @@ impl Renderer {
             lights_are_stale: true,
             refusal: None,
             sky: None,
+            lamps,
             targets: None,
             traced: None,
             mean: None,
@@ -186,6 +191,7 @@ impl Renderer {
             self.chain_scene = None;
         }
         uploaded += self.objects.set_scene(gpu, &scene, &self.geometry);
+        self.lamps.set_scene(gpu, &scene);
         self.scene = scene;
         self.drawn_view = None;
         gpu.take_error().map_or(Ok(uploaded), Err)

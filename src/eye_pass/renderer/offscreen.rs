@@ -147,13 +147,12 @@ impl Renderer {
         }
     }
 
-    /// Largest radiance of lamps in mirrors and glass [W/(m² sr)]. It depends on the view, so the limit is taken; without
-    /// lit surfaces, that of white ones that a lamp lights from 1 m.
+    /// Largest radiance of lamps [W/(m² sr)], of which those without extent are seen in mirrors and glass alone. It depends
+    /// on the view, so the limit is taken; without lit surfaces, that of white ones that a lamp lights from 1 m.
     fn peak_of_lamps(&self) -> f64 {
-        if !self.draw_state().has_specular(&self.objects) {
-            return 0.0;
-        }
+        let has_specular = self.draw_state().has_specular(&self.objects);
         let lamps = VisibleLamp::all(&self.scene).into_iter();
+        let lamps = lamps.filter(|lamp| has_specular || lamp.has_extent());
         let strongest = lamps.map(|lamp| lamp.strength().max_channel()).reduce(f64::max);
         let lit = match self.objects.peak_radiance {
             0.0 => strongest.map(|strength| strength / std::f64::consts::PI),

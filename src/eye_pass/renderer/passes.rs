@@ -22,8 +22,8 @@ use crate::eye_pass::{View, wavelengths};
 use crate::gpu::Gpu;
 use crate::optics::LinearSrgb;
 
-/// Largest scaled radiance of a background, well below the largest half float, 65504.
-const LARGEST_SCALED: f64 = 32768.0;
+/// Largest scaled radiance of a background; `LARGEST` in `frame.wgsl`.
+const LARGEST_SCALED: f64 = 16368.0;
 /// Level bias that always selects the finest level.
 const FINEST: f64 = -64.0;
 /// Exposed radiance of mirrors while chains are switched off [1].
@@ -97,6 +97,9 @@ impl Renderer {
             pass.set_bind_group(1, chains, &[]);
         }
         self.draw_each(&mut pass, &own);
+        if self.map_style == MapStyle::Lit {
+            self.lamps.draw(gpu, &mut pass);
+        }
         drop(pass);
         self.drawn = [list.surfaces.len(), list.specular_objects];
         self.targets = Some(targets);
@@ -156,6 +159,8 @@ impl Renderer {
             self.make_everything(gpu);
         }
         self.make_sky(gpu);
+        self.lamps
+            .make(gpu, &self.surfaces.frame_layout, self.sample_count);
         let visible = visible_objects(&self.objects, view);
         let pixel_rad = view.camera.vertical_fov_rad / f64::from(view.height);
         self.objects

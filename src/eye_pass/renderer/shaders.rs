@@ -19,7 +19,7 @@ macro_rules! chains {
             "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
             "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
             "eye_pass/mixture" "eye_pass/light_record" "eye_pass/relief" "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/facets" "eye_pass/interaction"
-            "eye_pass/highlights" $background "eye_pass/chain" "eye_pass/traced"
+            "eye_pass/lamps" "eye_pass/highlights" $background "eye_pass/chain" "eye_pass/traced"
         }
     };
 }
@@ -54,6 +54,11 @@ pub(super) const PARTED_UNDER_SKY: Program =
 /// An environment behind all surfaces.
 pub(super) const SKY: Program = program! { "sky":
     "eye_pass/frame" "eye_pass/sky" "eye_pass/sky_drawn"
+};
+
+/// Lamps in front of surfaces.
+pub(super) const LAMPS: Program = program! { "lamps":
+    "shared/srgb" "shared/refraction" "eye_pass/frame" "eye_pass/light_record" "eye_pass/lamps" "eye_pass/lamps_drawn"
 };
 
 /// Surfaces without reflections, with traced direct light.
@@ -143,6 +148,7 @@ mod tests {
             PARTED,
             PARTED_UNDER_SKY,
             SKY,
+            LAMPS,
             COMPOSED,
             ACCUMULATED,
             SUMMED,
@@ -201,7 +207,11 @@ mod tests {
             entry_point,
             constants: Vec::new(),
         };
-        let mut all = vec![alone(ACCUMULATED, "accumulated"), alone(SKY, "sky_drawn")];
+        let mut all = vec![
+            alone(ACCUMULATED, "accumulated"),
+            alone(SKY, "sky_drawn"),
+            alone(LAMPS, "lamp_drawn"),
+        ];
         for writes in targets() {
             for kind in KINDS {
                 for flags in 0..128 {

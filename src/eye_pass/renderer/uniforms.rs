@@ -2,11 +2,13 @@
 
 use glam::DVec3;
 
+use crate::eye_pass::highlights::Outline;
 use crate::eye_pass::wavelengths::SeenWavelength;
 use crate::gpu::layout::shader_struct;
 use crate::optics::LinearSrgb;
 use crate::optics::glass::Dispersion;
 use crate::optics::spectrum::xyz::Matrix3;
+use crate::scene::PanelShape;
 use crate::scene::emitter::{Emitter, EmitterKind};
 
 shader_struct! {
@@ -303,6 +305,32 @@ impl LightRecord {
                 kind: 3,
                 axis: single(normal),
                 ..record
+            },
+        }
+    }
+
+    /// With its outline, in coordinates of which a unit has a length [m]; without one it is an emissive surface.
+    pub(super) fn outlined(self, outline: Option<Outline>, unit_m: f64) -> Self {
+        let placed = |axis: DVec3| (axis / unit_m).as_vec3().to_array();
+        // Outlines are numbered as `OUTLINE_*` of `light_record.wgsl`.
+        match outline {
+            None => Self { outline: 3, ..self },
+            Some(Outline::Angle { tan_radius }) => Self {
+                radius: tan_radius as f32,
+                ..self
+            },
+            Some(Outline::Round { radius_m }) => Self {
+                radius: (radius_m / unit_m) as f32,
+                ..self
+            },
+            Some(Outline::Flat { across, down, shape }) => Self {
+                across: placed(across),
+                down: placed(down),
+                outline: match shape {
+                    PanelShape::Rectangle => 1,
+                    PanelShape::Disc => 2,
+                },
+                ..self
             },
         }
     }

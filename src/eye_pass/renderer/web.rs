@@ -10,9 +10,10 @@ use strum::VariantArray;
 use super::accumulation;
 use super::draws::{Draw, DrawList};
 use super::geometry::{CORNER_LAYOUT, MAP_UV_LAYOUT, OBJECT_LAYOUT};
+use super::lamps::{CORNERS, LAMP_LAYOUT};
 use super::maps::DeviceMap;
 use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT, PipelineKey, RenderTarget};
-use super::shaders::{ACCUMULATED, SKY, SUMMED, TONE_MAPPING};
+use super::shaders::{ACCUMULATED, LAMPS, SKY, SUMMED, TONE_MAPPING};
 use super::uniforms::{
     ChainStart, DisplayWhite, Frame, MapTile, Node, ObjectRecord, SeenWavelengths, Triangle,
 };
@@ -157,6 +158,7 @@ impl Renderer {
                 Content::plain(&(0..PICTURES).map(seen).collect::<Vec<_>>()),
             ),
             ("white", Content::plain(&[DisplayWhite::new(&IDENTITY)])),
+            ("seen_lamps", Content::plain(self.lamps.bytes())),
         ];
 
         // Vertices are read back from the idle device, as the renderer keeps no copy of them.
@@ -207,7 +209,7 @@ impl Renderer {
     fn web_description(&self, all: &[usize]) -> Value {
         // Full-screen passes have no draws that would name their programs.
         let (mut programs, mut pipelines, mut draws) = (Map::new(), Map::new(), Map::new());
-        for program in [ACCUMULATED, SUMMED, TONE_MAPPING, SKY] {
+        for program in [ACCUMULATED, SUMMED, TONE_MAPPING, SKY, LAMPS] {
             programs.insert(program.name.into(), program.wgsl().into());
         }
 
@@ -245,6 +247,7 @@ impl Renderer {
             "pipelines": pipelines,
             "draws": draws,
             "vertices": vertices,
+            "lamps": {"vertices": [self::vertices(&LAMP_LAYOUT)], "draw": [CORNERS, self.lamps.count()]},
             "tone_maps": tone_maps.collect::<Map<_, _>>(),
             "formats": {"radiance": word(HDR_FORMAT), "depth": word(DEPTH_FORMAT), "mean": word(accumulation::FORMAT)},
             "textures": {"map_tiles": {"size": map_pool}, "texture_tiles": {"size": texture_pool}},

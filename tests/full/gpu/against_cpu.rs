@@ -306,6 +306,14 @@ fn highlights() -> Vec<Case> {
     };
     let mut cases: Vec<Case> = [0.0, 0.2, 0.5].map(of).into();
 
+    // The lamps themselves: two in front of the floor, one behind a ball, and the sun beyond all.
+    let mut case = of(0.0);
+    case.view = View {
+        background: case.view.background,
+        ..view(dvec3(0.5, 0.2, 1.7), dvec3(0.5, 0.45, 0.0), 0.9, [120, 80])
+    };
+    cases.push(case);
+
     // A glossy floor below a glowing sheet, and below a glowing ball.
     for (name, shape) in [
         (

@@ -1,4 +1,4 @@
-//! Lamps in mirrors: their images keep their energy, and rough mirrors show them as sampled microfacets do.
+//! Lamps, seen directly and in mirrors: they keep their energy, and rough mirrors show them as sampled microfacets do.
 
 use nephroid::eye_pass::reference::ReferenceSettings;
 use nephroid::scene::{Environment, PanelShape};
@@ -290,24 +290,48 @@ fn at_the_eye(tracer: &Tracer, view: &View) -> f64 {
 fn images_of_lamps_keep_their_energy() {
     let unsized_lamps = [point_light(LAMP, 2.0), sun(dvec3(0.0, -0.6, 0.8), 3.0)];
     for lamp in lamps_of_all_kinds(LAMP).into_iter().chain(unsized_lamps) {
-        for (size, places) in [(20, 40), (100, 10), (400, 2)] {
-            let parts = vec![(floor(50.0, 0.0), mirror(0.0))];
-            let tracer = Tracer::new(Arc::new(scene(parts, vec![lamp.clone()])));
-            let mut ratio = 0.0;
-            for place in 0..places {
-                let shift = 0.05 * f64::from(place) / f64::from(places);
-                let view = view(dvec3(shift, 0.9, 1.2), dvec3(-shift, 0.0, 0.0), 0.9, [size, size]);
-                let expected = expected_at(&lamp, &view);
-                ratio += at_the_eye(&tracer, &view) / expected / f64::from(places);
-            }
-            near(ratio, 1.0, 0.03, (&lamp.kind, size));
-        }
+        assert_energy(&lamp, true, &|shift| {
+            (dvec3(shift, 0.9, 1.2), dvec3(-shift, 0.0, 0.0))
+        });
     }
 }
 
-/// Irradiance that the image of a lamp brings to a plane at the eye that faces the view [W/m²].
-fn expected_at(lamp: &Light, view: &View) -> f64 {
-    let mirrored = |it: DVec3| dvec3(it.x, -it.y, it.z);
+#[test]
+fn lamps_keep_their_energy_before_the_eye() {
+    for lamp in lamps_of_all_kinds(LAMP) {
+        // Over a pixel of the smallest picture, across and down.
+        assert_energy(&lamp, false, &|shift| {
+            let aside = dvec3(1.9 * shift, 0.09 * (shift / 0.004).fract(), 0.0);
+            (dvec3(0.0, 0.2, 0.5), LAMP + aside)
+        });
+    }
+    // Points have no size that could be seen.
+    for lamp in [point_light(LAMP, 2.0), sun(dvec3(0.0, -0.6, 0.8), 3.0)] {
+        let tracer = Tracer::new(Arc::new(scene(vec![], vec![lamp])));
+        let view = view(dvec3(0.0, 0.2, 0.5), LAMP, 0.9, [100, 100]);
+        assert_eq!(at_the_eye(&tracer, &view), 0.0);
+    }
+}
+
+/// A lamp, or its image in a floor that mirrors, from eyes that look at targets, both by a shift [m].
+fn assert_energy(lamp: &Light, is_mirrored: bool, eye_and_target: &dyn Fn(f64) -> (DVec3, DVec3)) {
+    for (size, places) in [(20, 40), (100, 10), (400, 2)] {
+        let parts = vec![(floor(50.0, 0.0), mirror(0.0))];
+        let tracer = Tracer::new(Arc::new(scene(parts, vec![lamp.clone()])));
+        let mut ratio = 0.0;
+        for place in 0..places {
+            let (eye, target) = eye_and_target(0.05 * f64::from(place) / f64::from(places));
+            let view = view(eye, target, 0.9, [size, size]);
+            let expected = expected_at(lamp, &view, is_mirrored);
+            ratio += at_the_eye(&tracer, &view) / expected / f64::from(places);
+        }
+        near(ratio, 1.0, 0.03, (&lamp.kind, size));
+    }
+}
+
+/// Irradiance that a lamp or its image brings to a plane at the eye that faces the view [W/m²].
+fn expected_at(lamp: &Light, view: &View, is_mirrored: bool) -> f64 {
+    let mirrored = |it: DVec3| dvec3(it.x, if is_mirrored { -it.y } else { it.y }, it.z);
     let eye = view.camera.position;
     let (to_image, irradiance) = match lamp.kind {
         LightKind::Sun {
@@ -338,7 +362,7 @@ fn expected_at(lamp: &Light, view: &View) -> f64 {
         other => panic!("no such lamp here: {other:?}"),
     };
     let grazing = (1.0 - to_image.y.abs()).powi(5);
-    let reflectance = 0.7 + 0.3 * grazing;
+    let reflectance = if is_mirrored { 0.7 + 0.3 * grazing } else { 1.0 };
     irradiance * reflectance * to_image.dot(view.camera.forward)
 }
 
