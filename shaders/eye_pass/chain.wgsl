@@ -117,18 +117,20 @@ fn coat_after(gaze: Gaze, point: SurfacePoint, branch: Branch) -> u32 {
 }
 
 fn onward(gaze: Gaze, point: SurfacePoint, branch: Branch) -> Gaze {
-    let bent = branch.spread_per_width * gaze.width;
+    // What a lobe has widened comes to no focus, as if the cone grew from here on.
+    let bent = gaze.spread * branch.spread_factor + branch.spread_per_width * gaze.width;
+    let is_widened = branch.spread_added > 0.0;
     return Gaze(
         leave(point, branch.direction),
         gaze.depth + 1u,
         branch.direction,
-        gaze.width,
+        select(gaze.width, abs(gaze.width), is_widened),
         gaze.weight * branch.share,
-        gaze.spread * branch.spread_factor + bent + branch.spread_added,
+        select(bent, abs(bent) + branch.spread_added, is_widened),
         branch.media,
         gaze.wavelength,
         branch.alpha,
-        gaze.lobes + u32(branch.spread_added > 0.0),
+        gaze.lobes + u32(is_widened),
         coat_after(gaze, point, branch),
     );
 }

@@ -66,7 +66,7 @@ pub fn maps(
     Ok(maps)
 }
 
-/// Samples across and down per pixel.
+/// Samples across and down per pixel of a graphics card.
 const SAMPLES_PER_SIDE: u32 = 2;
 
 /// What makes pictures without a graphics card.
@@ -157,12 +157,11 @@ fn by_cpu(
 ) -> Result<(Picture, String)> {
     let tracer = Tracer::new(scene.clone());
     let settings = ReferenceSettings {
-        samples_per_side: SAMPLES_PER_SIDE,
         limits: ChainLimits {
             switch: effects.get(Effect::Chains),
             ..ChainLimits::default()
         },
-        ..ReferenceSettings::switched(effects.get(Effect::Dispersion))
+        ..ReferenceSettings::still(effects.get(Effect::Dispersion))
     };
     let picture = reference::render(&tracer, maps, view, &settings, &console.bar(), console.control())?;
     Ok((picture, CPU.into()))

@@ -15,6 +15,7 @@ pub mod white_balance;
 
 use std::sync::Arc;
 
+use crate::effect::EffectSwitch;
 use crate::error::Result;
 use crate::illumination::IlluminationMap;
 use crate::progress::{Control, Progress};
@@ -25,7 +26,7 @@ use reference::ReferenceSettings;
 pub use view::{Picture, ToneMap, View};
 pub use white_balance::WhiteBalance;
 
-/// Renders a view of a scene lit by its maps, on the CPU, with four samples per pixel.
+/// Renders a view of a scene lit by its maps, on the CPU, with four samples per pixel and more where these differ.
 ///
 /// # Errors
 /// It was cancelled.
@@ -36,10 +37,7 @@ pub fn render(
     progress: &dyn Progress,
     control: &Control,
 ) -> Result<Picture> {
-    let settings = ReferenceSettings {
-        samples_per_side: 2,
-        ..ReferenceSettings::default()
-    };
+    let settings = ReferenceSettings::still(EffectSwitch::Auto);
     reference::render(
         &Tracer::new(scene.clone()),
         maps,

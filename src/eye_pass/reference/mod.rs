@@ -26,16 +26,22 @@ pub use radiance::{ChainLimits, EyeRays};
 pub struct ReferenceSettings {
     /// Samples across and down a pixel, > 0. A single sample goes through the pixel centre, as in rasterisation.
     pub samples_per_side: u32,
+    /// Samples across and down that are added to a pixel whose first ones differ visibly; 0 for none.
+    pub added_per_side: u32,
     pub limits: ChainLimits,
     /// Wavelengths traced per sample, from the first dispersive surface on; 0 traces a single path by the refractive
-    /// indices at 587.56 nm.
+    /// indices at 587.56 nm. Added samples share as many as the first ones had.
     pub wavelengths: u32,
 }
 
 impl ReferenceSettings {
-    /// The default, without wavelengths if dispersion is switched off.
-    pub fn switched(dispersion: EffectSwitch) -> Self {
-        let settings = Self::default();
+    /// For pictures that are kept, without wavelengths if dispersion is switched off.
+    pub fn still(dispersion: EffectSwitch) -> Self {
+        let settings = Self {
+            samples_per_side: 2,
+            added_per_side: 4,
+            ..Self::default()
+        };
         match dispersion {
             EffectSwitch::Auto | EffectSwitch::On => settings,
             EffectSwitch::Off => Self {
@@ -50,11 +56,16 @@ impl Default for ReferenceSettings {
     fn default() -> Self {
         Self {
             samples_per_side: 1,
+            added_per_side: 0,
             limits: ChainLimits::default(),
             wavelengths: 16,
         }
     }
 }
+
+/// Samples of a pixel differ visibly if they are further apart on a display, whose white is 1: half of a step between
+/// greys that is just seen beside an edge.
+const VISIBLE: f64 = 1.0 / 16.0;
 
 /// Renders a view of a scene lit by its illumination maps. The result does not depend on the number of threads.
 ///
@@ -87,85 +98,179 @@ pub fn render_counted(
 ) -> Result<(Picture, EyeRays)> {
     let tracer = &tracer.as_seen();
     let lit = LitScene::new(tracer, maps, view.background, settings.limits);
-    let sides = settings.samples_per_side.max(1);
-    let spectra = SpectralScene::of_samples(tracer, settings.wavelengths, sides * sides);
-    let looks = Looks { view, sides, spectra };
-    match settings.limits.switch {
-        EffectSwitch::Auto | EffectSwitch::On => {
-            let media = media_at(tracer, view.camera.position);
-            trace::<true>(&lit, media, &looks, progress, control)
-        }
-        // Clear bodies are left out, so that the camera is inside none.
-        EffectSwitch::Off => trace::<false>(&lit, MediumStack::default(), &looks, progress, control),
+    // Clear bodies are left out without chains, so that the camera is inside none.
+    let media = match settings.limits.switch {
+        EffectSwitch::Auto | EffectSwitch::On => media_at(tracer, view.camera.position),
+        EffectSwitch::Off => MediumStack::default(),
+    };
+    let side = settings.samples_per_side.max(1);
+    let canvas = Canvas {
+        lit: &lit,
+        media,
+        view,
+        passes: if settings.added_per_side > 0 { 2 } else { 1 },
+        progress,
+        control,
+    };
+
+    // Samples lie on a regular grid.
+    let (mut pixels, mut rays) =
+        canvas.sampled(&Grid::new(tracer, side, settings.wavelengths), 0, |_| true)?;
+    if settings.added_per_side > 0 {
+        // An exposure that suits the picture tells which of its pixels have samples that differ visibly.
+        let exposure = canvas.picture(&pixels).auto_exposure_stops().exp2();
+        let added = settings.added_per_side;
+        let wavelengths = (settings.wavelengths * side * side).div_ceil(added * added);
+        let grid = Grid::new(tracer, added, wavelengths);
+        let (more, more_rays) = canvas.sampled(&grid, 1, |pixel| pixels[pixel].is_uneven(exposure))?;
+        pixels
+            .iter_mut()
+            .zip(&more)
+            .for_each(|(pixel, more)| pixel.add(more));
+        rays = rays + more_rays;
     }
+    Ok((canvas.picture(&pixels), rays))
 }
 
-/// Sampling of a picture.
-struct Looks<'a> {
-    view: &'a View,
-    /// Samples across and down a pixel.
-    sides: u32,
-    /// One per sample of a pixel.
+/// Places of the samples within a pixel. Each has wavelengths and microfacets of its own: their mean covers spectrum and
+/// lobes more densely.
+struct Grid {
+    side: u32,
+    /// One per sample.
     spectra: Vec<SpectralScene>,
 }
 
-fn trace<const CHAINS: bool>(
-    lit: &LitScene<'_>,
-    media: MediumStack,
-    looks: &Looks<'_>,
-    progress: &dyn Progress,
-    control: &Control,
-) -> Result<(Picture, EyeRays)> {
-    // Samples lie on a regular grid. Each has wavelengths and microfacets of its own: their mean covers spectrum and
-    // lobes more densely.
-    let (view, side) = (looks.view, looks.sides);
-    let done = AtomicU64::new(0);
-    let pixel = |column: u32, row: u32, rays: &mut EyeRays| {
-        let mut sum = LinearSrgb::BLACK;
-        for (sample, spectrum) in (0..).zip(&looks.spectra) {
-            let within = [sample % side, sample / side].map(|s| (f64::from(s) + 0.5) / f64::from(side));
-            let sample = EyeSample {
-                cone: eye_cone(view, [column, row], within),
-                media,
-                spectrum,
-                facets: FacetPoints::of_sample([column, row], sample, side * side),
-            };
-            sum += lit.radiance::<CHAINS>(&sample, rays);
-        }
-        let mean = sum / f64::from(side * side);
-        mean.to_array().map(|channel| channel as f32)
-    };
+impl Grid {
+    fn new(tracer: &Tracer, side: u32, wavelengths: u32) -> Self {
+        let spectra = SpectralScene::of_samples(tracer, wavelengths, side * side);
+        Self { side, spectra }
+    }
+}
 
-    // A row is one task: long enough to outweigh its overhead, short enough to cancel the picture quickly.
-    let rows: Vec<(Vec<[f32; 3]>, EyeRays)> = (0..view.height)
-        .into_par_iter()
-        .map(|row| {
-            let mut rays = EyeRays::default();
-            if control.is_cancelled() {
-                return (Vec::new(), rays);
-            }
-            let pixels = (0..view.width)
-                .map(|column| pixel(column, row, &mut rays))
-                .collect();
-            let rows_done = done.fetch_add(1, Ordering::Relaxed) + 1;
-            progress.advance(Stage::Picture, rows_done, u64::from(view.height));
-            (pixels, rays)
-        })
-        .collect();
+/// What the samples of a pixel have seen [W/(m² sr)].
+#[derive(Clone, Copy, Default)]
+struct SeenPixel {
+    sum: LinearSrgb,
+    count: u32,
+    /// Smallest and largest value of each channel.
+    range: [[f64; 3]; 2],
+}
 
-    // A cancelled picture has empty rows.
-    if control.is_cancelled() {
-        return Err(Error::cancelled("picture"));
+impl SeenPixel {
+    fn add_sample(&mut self, radiance: LinearSrgb) {
+        let channels = radiance.to_array();
+        let [low, high] = if self.count == 0 {
+            [channels; 2]
+        } else {
+            self.range
+        };
+        let of_each = |bound: [f64; 3], choice: fn(f64, f64) -> f64| {
+            std::array::from_fn(|channel| choice(bound[channel], channels[channel]))
+        };
+        self.range = [of_each(low, f64::min), of_each(high, f64::max)];
+        self.sum += radiance;
+        self.count += 1;
     }
 
-    // Rows are put together in order, whichever thread finished them first.
-    let rays = rows.iter().fold(EyeRays::default(), |sum, (_, rays)| sum + *rays);
-    let picture = Picture {
-        width: view.width,
-        height: view.height,
-        radiance: rows.into_iter().flat_map(|(pixels, _)| pixels).collect(),
-    };
-    Ok((picture, rays))
+    fn add(&mut self, other: &Self) {
+        self.sum += other.sum;
+        self.count += other.count;
+    }
+
+    /// Whether samples differ visibly at an exposure.
+    fn is_uneven(&self, exposure: f64) -> bool {
+        let display = |value: f64| value * exposure / (1.0 + value * exposure);
+        let [low, high] = self.range.map(|channels| channels.map(display));
+        (0..3).any(|channel| high[channel] - low[channel] > VISIBLE)
+    }
+}
+
+/// A view that is being sampled.
+struct Canvas<'a> {
+    lit: &'a LitScene<'a>,
+    /// Around the eye.
+    media: MediumStack,
+    view: &'a View,
+    /// Over all of its rows.
+    passes: u64,
+    progress: &'a dyn Progress,
+    control: &'a Control,
+}
+
+impl Canvas<'_> {
+    /// One pass over all pixels, of which it samples those that are `chosen`.
+    ///
+    /// # Errors
+    /// It was cancelled.
+    fn sampled(
+        &self,
+        grid: &Grid,
+        pass: u64,
+        chosen: impl Fn(usize) -> bool + Sync,
+    ) -> Result<(Vec<SeenPixel>, EyeRays)> {
+        // A row is one task: long enough to outweigh its overhead, short enough to cancel the picture quickly.
+        let (width, height) = (self.view.width, self.view.height);
+        let done = AtomicU64::new(pass * u64::from(height));
+        let rows: Vec<(Vec<SeenPixel>, EyeRays)> = (0..height)
+            .into_par_iter()
+            .map(|row| {
+                let mut rays = EyeRays::default();
+                if self.control.is_cancelled() {
+                    return (Vec::new(), rays);
+                }
+                let pixel = |column: u32| {
+                    let is_chosen = chosen(row as usize * width as usize + column as usize);
+                    if is_chosen {
+                        self.pixel(grid, [column, row], &mut rays)
+                    } else {
+                        SeenPixel::default()
+                    }
+                };
+                let pixels = (0..width).map(pixel).collect();
+                let rows_done = done.fetch_add(1, Ordering::Relaxed) + 1;
+                self.progress
+                    .advance(Stage::Picture, rows_done, self.passes * u64::from(height));
+                (pixels, rays)
+            })
+            .collect();
+
+        // A cancelled picture has empty rows.
+        if self.control.is_cancelled() {
+            return Err(Error::cancelled("picture"));
+        }
+
+        // Rows are put together in order, whichever thread finished them first.
+        let rays = rows.iter().fold(EyeRays::default(), |sum, (_, rays)| sum + *rays);
+        Ok((rows.into_iter().flat_map(|(pixels, _)| pixels).collect(), rays))
+    }
+
+    fn pixel(&self, grid: &Grid, place: [u32; 2], rays: &mut EyeRays) -> SeenPixel {
+        let mut seen = SeenPixel::default();
+        for (index, spectrum) in (0..).zip(&grid.spectra) {
+            let within = [index % grid.side, index / grid.side];
+            let within = within.map(|step| (f64::from(step) + 0.5) / f64::from(grid.side));
+            let sample = EyeSample {
+                cone: eye_cone(self.view, place, within),
+                media: self.media,
+                spectrum,
+                facets: FacetPoints::of_sample(place, index, grid.side * grid.side),
+            };
+            seen.add_sample(self.lit.radiance(&sample, rays));
+        }
+        seen
+    }
+
+    fn picture(&self, pixels: &[SeenPixel]) -> Picture {
+        let mean = |pixel: &SeenPixel| pixel.sum / f64::from(pixel.count.max(1));
+        Picture {
+            width: self.view.width,
+            height: self.view.height,
+            radiance: pixels
+                .iter()
+                .map(|pixel| mean(pixel).to_array().map(|channel| channel as f32))
+                .collect(),
+        }
+    }
 }
 
 /// The object seen at each pixel centre, row 0 at the top; `None` for the background.

@@ -80,6 +80,7 @@ pub struct LitScene<'a> {
     lobe_lamps: Vec<VisibleLamp>,
     background: LinearSrgb,
     limits: ChainLimits,
+    has_chains: bool,
 }
 
 /// The sum of all layers of a map.
@@ -179,12 +180,13 @@ impl<'a> LitScene<'a> {
             lobe_lamps: VisibleLamp::in_lobes(tracer.scene()),
             background,
             limits,
+            has_chains: limits.switch != EffectSwitch::Off,
         }
     }
 
-    /// Radiance [W/(m² sr)] that arrives within the cone of a sample. Without `CHAINS` the ray ends at the first surface
+    /// Radiance [W/(m² sr)] that arrives within the cone of a sample. Without chains the ray ends at the first surface
     /// that is not clear.
-    pub fn radiance<const CHAINS: bool>(&self, sample: &EyeSample<'_>, rays: &mut EyeRays) -> LinearSrgb {
+    pub fn radiance(&self, sample: &EyeSample<'_>, rays: &mut EyeRays) -> LinearSrgb {
         // Paths that wait form a stack, so that long chains need no deep recursion.
         rays.camera_rays += 1;
         let mut seen = LinearSrgb::BLACK;
@@ -200,7 +202,7 @@ impl<'a> LitScene<'a> {
         }];
         while let Some(mut path) = waiting.pop() {
             // Lamps are no surfaces: each segment of a chain sees those that lie before its end.
-            let next = nearest::<CHAINS>(self.tracer, path.cone.ray);
+            let next = nearest(self.tracer, path.cone.ray, self.has_chains);
             seen += self.lamps_on(&path, next.map_or(f64::INFINITY, |(_, distance_m)| distance_m));
             let Some((hit, distance_m)) = next else {
                 seen += path.brings(self.beyond(&path));
@@ -209,25 +211,28 @@ impl<'a> LitScene<'a> {
 
             // Along the segment the footprint changes, and the medium absorbs (Beer and Lambert).
             path.cone.width_m += path.cone.spread_rad * distance_m;
-            if CHAINS {
+            if self.has_chains {
                 path.weight = path.weight * path.media.transmittance(self.tracer.scene(), distance_m);
             }
 
             // At the first dispersive surface the path becomes one path per wavelength, each with indices of its own.
-            if CHAINS && path.at.is_none() && sample.spectrum.splits_at(self.tracer, &hit, &path.media) {
+            if self.has_chains
+                && path.at.is_none()
+                && sample.spectrum.splits_at(self.tracer, &hit, &path.media)
+            {
                 for at in &sample.spectrum.wavelengths {
                     let at = Some(at);
-                    seen += self.meet::<CHAINS>(sample, EyePath { at, ..path }, &hit, &mut waiting, rays);
+                    seen += self.meet(sample, EyePath { at, ..path }, &hit, &mut waiting, rays);
                 }
             } else {
-                seen += self.meet::<CHAINS>(sample, path, &hit, &mut waiting, rays);
+                seen += self.meet(sample, path, &hit, &mut waiting, rays);
             }
         }
         seen
     }
 
     /// Radiance that a surface itself adds to a path. The branches to follow are pushed onto `waiting`.
-    fn meet<'b, const CHAINS: bool>(
+    fn meet<'b>(
         &self,
         sample: &EyeSample<'_>,
         path: EyePath<'b>,
@@ -241,7 +246,7 @@ impl<'a> LitScene<'a> {
         let smooth = tracer.interact(hit, incident, &path.media);
         let side = Side::met(incident, hit.geometric_normal);
         let emission = path.brings(self.emission(&path, hit));
-        if !CHAINS || (smooth.reflection.is_none() && smooth.transmission.is_none()) {
+        if !self.has_chains || (smooth.reflection.is_none() && smooth.transmission.is_none()) {
             return emission + path.brings(self.own_radiance(hit, side, smooth.leaving));
         }
         let shape = ChainSurface {
@@ -488,7 +493,7 @@ impl ChainSurface {
     fn bent(&self, cone: &RayCone, branch: &Branch, kept: f64) -> RayCone {
         // Between the reflections off microfacets that are tilted by atan α one way and the other.
         let lobe_rad = kept * 4.0 * self.alpha.atan();
-        let (spread_rad, lobe) = match branch.event {
+        let (spread_rad, widened_rad, lobe) = match branch.event {
             Event::Reflection | Event::TotalInternalReflection => {
                 let of_shape = 2.0 * self.curvature * cone.width_m;
                 let facet = (branch.ray.direction - cone.ray.direction).normalize();
@@ -498,7 +503,7 @@ impl ChainSurface {
                     0.0
                 };
                 let lobe = LobeLeft::Reflection(self.alpha.max(0.5 * tilt));
-                (cone.spread_rad + of_shape + lobe_rad, lobe)
+                (cone.spread_rad + of_shape, lobe_rad, lobe)
             }
             Event::Refraction => {
                 let ratio = branch.ior_ratio;
@@ -507,16 +512,24 @@ impl ChainSurface {
                 // tilt.
                 let narrower = 0.5 * (ratio - 1.0).abs();
                 (
-                    cone.spread_rad * ratio + of_shape + narrower * lobe_rad,
+                    cone.spread_rad * ratio + of_shape,
+                    narrower * lobe_rad,
                     LobeLeft::Transmission(narrower * self.alpha),
                 )
             }
-            Event::ThinTransmission => (cone.spread_rad + lobe_rad, LobeLeft::Transmission(self.alpha)),
-            Event::Passage => (cone.spread_rad, cone.lobe),
+            Event::ThinTransmission => (cone.spread_rad, lobe_rad, LobeLeft::Transmission(self.alpha)),
+            Event::Passage => (cone.spread_rad, 0.0, cone.lobe),
+        };
+
+        // What a lobe has widened comes to no focus, as if the cone grew from here on.
+        let (width_m, spread_rad) = if widened_rad > 0.0 {
+            (cone.width_m.abs(), spread_rad.abs() + widened_rad)
+        } else {
+            (cone.width_m, spread_rad)
         };
         RayCone {
             ray: branch.ray,
-            width_m: cone.width_m,
+            width_m,
             spread_rad,
             lobe,
         }
@@ -526,11 +539,11 @@ impl ChainSurface {
 /// The nearest visible surface, with its distance from the ray's origin [m]. Backs of single-sided opaque surfaces are
 /// not visible.
 pub fn visible_hit(tracer: &Tracer, ray: Ray) -> Option<(SurfaceHit, f64)> {
-    nearest::<true>(tracer, ray)
+    nearest(tracer, ray, true)
 }
 
-/// The nearest visible surface; without `CHAINS`, clear ones are skipped too.
-fn nearest<const CHAINS: bool>(tracer: &Tracer, mut ray: Ray) -> Option<(SurfaceHit, f64)> {
+/// The nearest visible surface; without chains, clear ones are skipped too.
+fn nearest(tracer: &Tracer, mut ray: Ray, has_chains: bool) -> Option<(SurfaceHit, f64)> {
     let mut passed_m = 0.0;
     loop {
         let hit = tracer.closest_hit(&ray)?;
@@ -538,7 +551,7 @@ fn nearest<const CHAINS: bool>(tracer: &Tracer, mut ray: Ray) -> Option<(Surface
         let back = hit.geometric_normal.dot(ray.direction) > 0.0;
         passed_m += hit.distance_m;
         let is_drawn = if material.surface.is_clear() {
-            CHAINS
+            has_chains
         } else {
             !back || material.has_back()
         };
