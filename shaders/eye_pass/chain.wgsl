@@ -262,8 +262,10 @@ fn chain_radiance(first: Gaze) -> vec3f {
                 emitted = vec3f(0.0);
             }
             if object.glow != NO_IMAGE {
+                // The wide footprints of lobes would mix what lies beside in the image alone, of any brightness.
                 let cos_view = abs(dot(point.geometric_normal, walk.gaze.direction));
-                let level = footprint_look_level(object.glow, point.uv_densities, walk.gaze.width, cos_view);
+                let width = select(walk.gaze.width, 0.0, walk.gaze.lobes > 0u);
+                let level = footprint_look_level(object.glow, point.uv_densities, width, cos_view);
                 emitted *= looked_up(object.glow, point.uvs, level).rgb;
             }
             walk.radiance += shown(walk.gaze.weight * emitted, walk.gaze.wavelength);
