@@ -7,7 +7,7 @@ import os
 
 import numpy as np
 
-from kit import File, box, facets, join, lathe, mesh, moved, noise, rect, ring, rotation, sheet, unit
+from kit import File, box, facets, fractal, join, lathe, mesh, moved, noise, rect, ring, rotation, sheet, unit
 from lens import relief
 
 A = np.array
@@ -16,7 +16,7 @@ UP = A([0.0, 1.0, 0.0])
 # The sun stands 31 degrees high: lower, the glasses throw their light too far; higher, the pool leaves the wall dark.
 SUN = unit([0.76, -0.50, 0.36])
 SUN_W_PER_M2, SUN_COLOUR = 9.0, [1.0, 0.80, 0.52]
-SKY_W_PER_M2, SKY_COLOUR = 1.8, [0.90, 1.0, 1.12]
+SKY_W_PER_M2, SKY_COLOUR = 4.5, [1.0, 1.0, 1.0]
 
 ROOM_X, ROOM_Z, HEIGHT = (-1.7, 2.0), (-4.2, 2.8), 3.4
 WALL = 0.35
@@ -347,39 +347,92 @@ def add_butterfly():
 # ---- sky and sea
 
 DOME, EYE = 40.0, A([0.0, 1.15, 0.0])
+# Most texels go where the arches show them: azimuth from the back wall and elevation [degrees] along an image, from 0 to 1.
+AZIMUTH = (0, 0.05, 0.22, 0.92, 1), (-180, -125, -32, 32, 180)
+ELEVATION = (0, 0.16, 0.58, 0.95, 1), (90, 14, 0, -8.5, -90)
+SEA_BELOW_EYE_M = 6.0
+HEAPS = 3.1
 
 
-def sky(width=4096, height=512):
-    """Row by row from zenith to nadir, dense at the horizon."""
-    v, u = np.mgrid[0:height, 0:width]
-    q = 1 - 2 * (v + 0.5) / height
-    elevation, azimuth = np.sign(q) * q * q * np.pi / 2, (u + 0.5) / width * 2 * np.pi
-    direction = np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)], -1)
-    share = np.clip(np.sin(elevation), 0, 1)[..., None]**0.5
-    horizon = A([0.86, 0.80, 0.74])
-    out = horizon * (1 - share) + A([0.20, 0.38, 0.66]) * share
+def bearing(azimuth, elevation):
+    return np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), -np.cos(azimuth) * np.cos(elevation)], -1)
+
+
+def air(direction):
+    """Clear sky: warm haze, blue above, and a glow around the sun."""
+    up = np.clip(direction[..., 1:2], 0, 1)
     off_sun = np.arccos(np.clip(direction @ -SUN, -1, 1))[..., None]
-    out = out + A([0.50, 0.34, 0.16]) * np.exp(-off_sun / 0.2) + A([0.20, 0.12, 0.05]) * np.exp(-off_sun / 0.7)
-    streaks = np.clip(noise((height, width), (6, 24), 3, 5) * 1.5 + 0.1, 0, 1) * np.exp(-((elevation - 0.13) / 0.13)**2) * (elevation > 0)
-    out += (A([0.98, 0.90, 0.84]) - out) * (0.65 * streaks)[..., None]
-    for low, rise, tone, seed in ((0.022, 0.030, (0.50, 0.54, 0.64), 41), (0.008, 0.026, (0.30, 0.36, 0.46), 43)):
-        ridge = low + rise * noise((1, width), (1, 16), seed, 8, 0.5)[0]
-        cover = np.clip((ridge - elevation) / 0.0012, 0, 1) * (elevation > -0.001)
-        out += (A(tone) - out) * cover[..., None]
-    depth = np.exp(np.minimum(elevation, 0) / 0.07)[..., None]
-    sea = A([0.03, 0.17, 0.26]) * (1 - depth) + A([0.40, 0.54, 0.60]) * depth
-    ripples = noise((height, width), (128, 256), 78, 2)[..., None]
-    return np.where((elevation < 0)[..., None], sea * (1 + 0.16 * ripples), out)
+    glow = A([0.30, 0.20, 0.10]) * np.exp(-off_sun / 0.2) + A([0.06, 0.035, 0.012]) * np.exp(-off_sun / 0.7)
+    return A([0.07, 0.15, 0.27]) + A([0.17, 0.21, 0.23]) * np.exp(-up / 0.22) + A([0.50, 0.36, 0.19]) * np.exp(-up / 0.06) + glow
+
+
+def heap(x, y):
+    """Density of clouds with a flat foot; x, y in degrees."""
+    top = 4.2 + 4.5 * fractal(x / 8 + HEAPS, 0 * y, 91, 3)
+    return np.clip((top - y) / 2.2, -1.2, 0.6) + 0.8 * fractal(x / 2.4, y / 1.6, 92, 6, 0.55) - 1.2 * np.exp(-np.clip(y - 1.0, 0, 9) / 0.3)
+
+
+def sea(azimuth, elevation, step_rad):
+    """Waves on a plane, each as far as the texels there can show it; what they cannot show is roughness."""
+    outward, far = bearing(azimuth, 0 * elevation)[..., [0, 2]], SEA_BELOW_EYE_M / np.tan(np.maximum(-elevation, 4e-4))
+    at, blur = outward * far[..., None], far * far / SEA_BELOW_EYE_M * step_rad
+    random = np.random.default_rng(5)
+    gust = np.clip(1 + 0.9 * fractal(at[..., 0] / 90, at[..., 1] / 60, 71, 4), 0.25, 2)
+    slope, height, rough = np.zeros(at.shape), 0.0, 0.0
+    for wavelength in np.geomspace(0.35, 11, 48):
+        heading, k = np.radians(70) + 0.75 * random.normal(), 2 * np.pi / wavelength
+        along = A([np.cos(heading), np.sin(heading)])
+        seen = np.exp(-0.5 * (0.5 * k * (outward @ along) * blur)**2)
+        steep, phase = 0.024, k * (at @ along) + random.uniform(0, 7)
+        slope += (steep * seen * np.cos(phase))[..., None] * along
+        height = height + steep / k * seen * np.sin(phase)
+        rough = rough + steep**2 / 2 * (1 - seen**2)
+    slope, rough = slope * gust[..., None]**0.5, np.sqrt(rough * gust)
+    # Seen from low down, faces that lean to the eye hide the others.
+    lean = slope + outward * (0.9 * rough)[..., None]
+    n = unit(np.stack([-lean[..., 0], np.ones(far.shape), -lean[..., 1]], -1))
+    view = -bearing(azimuth, elevation)
+    cosine = np.clip((n * view).sum(-1), 0.03, 1)[..., None]
+    mirrored = 2 * cosine * n - view
+    fresnel = 0.02 + 0.98 * (1 - cosine)**5
+    water = A([0.010, 0.075, 0.105]) + A([0.02, 0.07, 0.07]) * np.clip(0.5 + 9 * height, 0, 1)[..., None]
+    out = fresnel * air(mirrored) + (1 - fresnel) * water
+    foam = np.clip((height - 0.105) * 40, 0, 1) * np.clip(fractal(at[..., 0] / 1.2, at[..., 1] / 2.0, 72, 4) * 2, 0, 1)
+    out += (A([0.75, 0.74, 0.70]) - out) * foam[..., None]
+    haze = (1 - np.exp(-far / 9000))[..., None]
+    return out + (air(bearing(azimuth, 0 * elevation)) - out) * haze
+
+
+def sky(width=2304, height=704):
+    u, v = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
+    x, y = np.meshgrid(np.interp(u, *AZIMUTH), np.interp(v, *ELEVATION))
+    azimuth, elevation = np.radians(x), np.radians(y)
+    out = air(bearing(azimuth, elevation))
+    cirrus = np.clip(fractal(x / 9 + y / 5, y / 1.1, 93, 5) * 1.2 - 0.1, 0, 1) * np.exp(-((y - 11) / 6)**2)
+    out += (A([0.62, 0.60, 0.60]) - out) * (0.5 * cirrus)[..., None]
+    density = heap(x, y)
+    lit = np.clip(0.45 + 0.9 * (density - heap(x - 0.7, y + 0.5)), 0, 1)[..., None]
+    cloud = A([0.40, 0.41, 0.45]) * (1 - lit) + A([1.0, 0.92, 0.80]) * lit
+    out += (cloud - out) * (np.clip(2.2 * density, 0, 1) * np.clip((y - 0.6) / 2.5, 0, 1) * 0.9)[..., None]
+    for low, rise, tone, seed in ((0.10, 0.8, (0.40, 0.42, 0.47), 41), (-0.3, 1.9, (0.24, 0.28, 0.33), 43)):
+        land = low + rise * (1 / (1 + np.exp(-(x - 8) / 2.5))) * np.exp(-np.clip(x - 20, 0, 99) / 10) + 0.35 * rise * fractal(x / 5, 0 * y, seed, 6)
+        face = 0.06 * fractal(x / 0.9 + 0.6 * y, y / 1.2, seed + 1, 5)[..., None]
+        out += (A(tone) * (1 + 2 * face) - out) * np.clip((land - y) / 0.05, 0, 1)[..., None]
+    first = np.searchsorted(-y[:, 0], 0)
+    step_rad = -np.gradient(elevation[:, 0])[first:, None]
+    out[first:] = sea(azimuth[first:], elevation[first:], step_rad)
+    return out
 
 
 def add_sky():
     """A painted dome that one lamp above the roof lights: all of its light comes as indirect light, without noise. It has an
     opening for the sun, and a screen keeps the lamp off the house and its terrace."""
     file.material('sky', texture=sky())
-    q = np.linspace(-1, 1, 33)
-    azimuth, elevation = np.meshgrid(np.linspace(0, 2 * np.pi, 65), np.sign(q) * q * q * np.pi / 2, indexing='ij')
-    p = EYE + DOME * np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)], -1)
-    dome = sheet(p, EYE - p, np.stack([azimuth / (2 * np.pi), np.broadcast_to(0.5 - q / 2, azimuth.shape)], -1))
+    x, y = ([a + (b - a) * t for (a, b), n in zip(zip(knots[:-1], knots[1:]), counts) for t in np.arange(n) / n] + [knots[-1]]
+            for (_, knots), counts in ((AZIMUTH, (8, 15, 10, 24)), (ELEVATION, (7, 4, 3, 8))))
+    uv = np.stack(np.meshgrid(np.interp(x, *AZIMUTH[::-1]), np.interp(-A(y), -A(ELEVATION[1]), ELEVATION[0]), indexing='ij'), -1)
+    p = EYE + DOME * bearing(*np.radians(np.meshgrid(x, y, indexing='ij')))
+    dome = sheet(p, EYE - p, uv)
     middle = unit(dome['p'][dome['i']].mean(1) - EYE)
     dome['i'] = dome['i'][middle @ -SUN < np.cos(np.radians(9))]
     file.add('sky', dict(dome, uv1=dome['uv0']), 'sky')

@@ -165,17 +165,33 @@ def noise(shape, cells, seed, octaves=5, gain=0.5):
     return out / total * 1.6
 
 
+def fractal(x, y, seed, octaves=5, gain=0.5):
+    """Value noise at any points, with cells of 1 in the first octave; roughly -1 to 1."""
+    grid, out, amplitude, total = np.random.default_rng(seed).uniform(-1, 1, (256, 256)), 0.0, 1.0, 0.0
+    for _ in range(octaves):
+        i, j = np.floor(x), np.floor(y)
+        fx, fy = (f * f * (3 - 2 * f) for f in (x - i, y - j))
+        a, b, c, d = [grid[i.astype(int) + m & 255, j.astype(int) + n & 255] for m in (0, 1) for n in (0, 1)]
+        out = out + amplitude * (a + (c - a) * fx + (b - a + (a - b - c + d) * fx) * fy)
+        total += amplitude
+        # Each octave is turned, so that its cells do not line up with the last.
+        amplitude, x, y = amplitude * gain, 1.6 * x - 1.2 * y + 17, 1.2 * x + 1.6 * y + 31
+    return out / total * 1.6
+
+
 def png(linear):
     v = np.clip(linear, 0, 1)
     v = np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055)
     v = (v * 255 + 0.5).astype(np.uint8)
     height, width, _ = v.shape
-    # Each row as differences from the one above, which pack better.
-    rows = np.diff(v.astype(np.int16), axis=0, prepend=np.zeros((1, width, 3), np.int16)).astype(np.uint8)
-    raw = b''.join(b'\2' + row.tobytes() for row in rows)
+    # As differences from the left or from above, whichever packs better.
+    packed = []
+    for kind, axis in ((b'\1', 1), (b'\2', 0)):
+        rows = np.diff(v, axis=axis, prepend=np.zeros_like(v[:, :1] if axis else v[:1]))
+        packed.append(zlib.compress(b''.join(kind + row.tobytes() for row in rows), 9))
     chunk = lambda kind, data: struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
     head = struct.pack('>IIBBBBB', width, height, 8, 2, 0, 0, 0)
-    return b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', head) + chunk(b'IDAT', zlib.compress(raw, 9)) + chunk(b'IEND', b'')
+    return b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', head) + chunk(b'IDAT', min(packed, key=len)) + chunk(b'IEND', b'')
 
 
 # ---- glTF
