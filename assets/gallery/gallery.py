@@ -19,10 +19,10 @@ SUN_W_PER_M2, SUN_COLOUR = 9.0, [1.0, 0.80, 0.52]
 SKY_W_PER_M2, SKY_COLOUR = 4.5, [1.0, 1.0, 1.0]
 
 ROOM_X, ROOM_Z, HEIGHT = (-1.7, 2.0), (-4.2, 2.8), 3.4
-WALL = 0.35
+WALL, BAND = 0.35, 0.088
 POOL_X, POOL_Z, RIM, WATER, BOTTOM = (-0.9, 1.55), (-3.6, -0.55), 0.46, 0.40, -0.35
 TABLE_X, TABLE_Z, TABLE = (-0.85, 0.85), (0.10, 1.15), 0.75
-CLOTH = TABLE + 0.0015
+CLOTH, CLOTH_SIZE = TABLE + 0.0015, (1.00, 0.74)
 
 file = File()
 
@@ -37,13 +37,20 @@ def plaster(colour, seed, n=256):
     return tinted(1 + 0.035 * noise((n, n), (3, 3), seed, 6, 0.6), colour)
 
 
+def limewash(colour, bloom, seed, n=512):
+    """Coats that dried unevenly: clouds, the sweep of the brush, and a pale bloom."""
+    veil = np.clip(0.4 + 0.9 * noise((n, n), (4, 4), seed, 6, 0.6), 0, 1)
+    sweep = 0.10 * noise((n, n), (3, 3), seed + 1, 3) + 0.05 * noise((n, n), (24, 6), seed + 2, 3) + 0.04 * noise((n, n), (6, 24), seed + 3, 3)
+    return (tinted(1 - veil, colour) + tinted(veil, bloom)) * (1 + sweep[..., None])
+
+
 def marble(n=512):
     cloud = noise((n, n), (3, 3), 1, 6, 0.55)
-    out = tinted(0.78 + 0.05 * noise((n, n), (2, 2), 2, 5), (1, 0.985, 0.955))
-    for width, depth, seed in ((0.05, 0.30, 5), (0.03, 0.22, 6), (0.10, 0.14, 7)):
+    out = tinted(0.74 + 0.07 * noise((n, n), (2, 2), 2, 5), (1, 0.99, 0.97))
+    for width, depth, seed in ((0.05, 0.42, 5), (0.03, 0.36, 6), (0.12, 0.20, 7)):
         line = np.exp(-np.abs(noise((n, n), (2, 2), seed, 6, 0.55) + 0.25 * cloud) / width)
         patchy = np.clip(0.5 + 0.9 * noise((n, n), (3, 3), seed + 20, 3), 0, 1)
-        out -= tinted(depth * line * patchy, (0.9, 0.95, 1.0))
+        out -= tinted(depth * line * patchy, (0.92, 0.95, 1.0))
     return out
 
 
@@ -56,29 +63,86 @@ def tiles(n, per_side, light, dark, joint, gap, seed):
     return np.where((edge < gap)[..., None], A(joint), A(light) * tone + A(dark) * (1 - tone))
 
 
-def linen(n=256):
-    y, x = np.mgrid[0:n, 0:n]
-    weave = 0.02 * np.sin(x * np.pi / 2) * np.sin(y * np.pi / 2)
-    threads = 0.025 * (noise((n, n), (4, 128), 61, 2) + noise((n, n), (128, 4), 62, 2))
-    return tinted(0.62 + weave + threads, (1, 0.955, 0.87))
+def linen(long, wide, texel=0.00062):
+    """A whole cloth, thread by thread: a border of stripes, a stitched hem, and creases where it lay folded."""
+    n, m = int(long / texel), int(wide / texel)
+    random, s, t = np.random.default_rng(61), np.arange(n)[:, None] * texel, np.arange(m) * texel
+    edge = np.minimum(np.minimum(s, long - s), np.minimum(t, wide - t))
+    out = 0.665 + 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel) + 0.02 * (random.normal(size=(n, 1)) + random.normal(size=m))
+    out += 0.03 * noise((n, m), (5, 4), 62, 3)
+    for fold in (s - long / 3, s - long * 2 / 3, (t - wide / 2)):
+        out -= 0.07 * fold / 0.004 * np.exp(-0.5 * (fold / 0.004)**2) * (-1 if fold.shape[0] == n else 1)
+    out += np.where(edge < 0.014, 0.02, 0) - np.where(np.abs(edge - 0.014) < 0.0012, 0.12, 0)
+    dyed = sum(np.clip((half - np.abs(edge - at)) / 0.001, 0, 1) for at, half in ((0.040, 0.003), (0.053, 0.007), (0.066, 0.003)))
+    return tinted(out, (0.985, 1, 1.02)) * (1 - dyed[..., None] * A([0.80, 0.66, 0.44]))
 
 
-def page(seed, width=384, height=576):
-    """Words as rows of dark strokes on warm paper."""
-    random = np.random.default_rng(seed)
-    ink = np.zeros((height, width))
-    for line, y in enumerate(range(int(0.12 * height), int(0.88 * height), 12)):
-        first, last = line % 9 == 0, line % 9 == 8
-        x, end = (0.19 if first else 0.14) * width, (random.uniform(0.3, 0.7) if last else 0.86) * width
-        while x < end - 8:
-            word = min(random.integers(8, 34), end - x)
-            stroke = x
-            while stroke < x + word:
-                thick, up, down = random.integers(2, 4), random.choice([0, 0, 0, 2]), random.choice([0, 0, 0, 2])
-                ink[y - up:y + 5 + down, int(stroke):int(stroke) + thick] = random.uniform(0.5, 0.95)
-                stroke += thick + 1
-            x += word + 6
-    return tinted(1 - 0.7 * ink, (0.84, 0.80, 0.72))
+# Letters as strokes of points x, y (hexadecimal): the line of writing is at 3, low letters reach 8 and high ones c.
+LETTERS = '''a0708484643,4606033345 b0c03,060848430306 c474808034344 d4c43,464808034345 e0646,464808034344 f4b4c1c13,0838
+    g48400001,464808034345 h0c03,0608484643 i0803,0b j28200001,2b k0c03,0548,1643 l0c03 m0803,0608383633,3638686663 n0803,0608484643
+    o280803434828 p0800,060848430306 q4840,464808034345 r0803,06083837 s4748080645430304 t1a133334,0838 u08034345,4843 v0823,2348
+    w0823,2338,3853,5368 x0843,4803 y0823,481000 z0848,4803,0343 A033b,3b63,1656 L0b03,0343 S5a5b0b0857530304 T0b6b,3b33
+    W0b23,234b,4b63,638b .03 ,1301 ;1301,17'''
+HEADING, TEXT = 'What the Sun Wrote', '''
+The sun writes without a hand. Lend it a glass of wine, and it draws a red leaf on the cloth; lend it a ring, and it draws a heart whose point turns to the lamp wherever you set it down.
+Light does nothing for show. At each wall of glass it takes the way that is soonest done, and where many such ways lie side by side the cloth is bright. The line you see is a crowd.
+Water is a lens that cannot keep still. A wave gathers its handful of day, carries it a little and lets it fall, so that the floor of a pool is a page that is never the same twice.
+A colour is a way of being turned aside. Send a white ray through a wedge of heavy glass; red leaves it almost straight, violet gives way the most, and all the rest stand in a row between.
+Shadows are not empty. Look into one as long as it takes for tea to cool, and you will find the room in it, folded small and faint, with its windows and with you.
+Stand where the light is sharpest and look back along it. Two pictures of the sun meet there, and with one step to the side both are gone.
+'''
+
+
+def letter(strokes, unit, fine=4):
+    """Ink of one letter, drawn by a broad nib whose edge stands at 30 degrees; upright strokes get serifs."""
+    lines = []
+    for stroke in strokes:
+        q = A([[int(a, 16), int(b, 16)] for a, b in zip(stroke[::2], stroke[1::2])], float)
+        lines.append(q)
+        if len(q) == 2 and q[0, 0] == q[1, 0]:
+            lines += [q[0] + A([[-0.8, -0.4], [0, 0]]), q[1] + A([[-0.8, 0], [0.8, 0]])]
+    # Corners are cut three times, which rounds them.
+    for k, q in enumerate(lines):
+        for _ in range(3 * (len(q) > 2)):
+            q = np.vstack([q[:1], np.stack([0.75 * q[:-1] + 0.25 * q[1:], 0.25 * q[:-1] + 0.75 * q[1:]], 1).reshape(-1, 2), q[-1:]])
+        at = np.linspace(0, len(q) - 1, 16 * len(q) if len(q) < 4 else 3 * len(q))
+        lines[k] = np.stack([np.interp(at, np.arange(len(q)), axis) for axis in q.T], 1)
+    p = np.vstack(lines)
+    width = int(np.ceil((p[:, 0].max() + 1.9) * unit))
+    y, x = np.mgrid[0:int(14 * unit) * fine, 0:width * fine] / (fine * unit)
+    dx, dy = x[..., None] - 0.5 - p[:, 0], 12.8 - y[..., None] - p[:, 1]
+    nib = np.hypot((0.87 * dx + 0.5 * dy) / 0.52, (0.87 * dy - 0.5 * dx) / 0.24).min(-1) < 1
+    return nib.reshape(-1, fine, width, fine).mean((1, 3))
+
+
+def page(first, heading=None, width=736, height=1088):
+    """Paragraphs from the first given on, in justified lines."""
+    ink, strokes = np.zeros((height, width)), {item[0]: item[1:].split(',') for item in LETTERS.split()}
+    font = lambda unit: {c: letter(s, unit) for c, s in strokes.items()} | {' ': np.zeros((int(14 * unit), int(2.6 * unit)))}
+
+    def write(text, row, letters, column, end=None):
+        words = [np.hstack([letters[c] for c in word]) for word in text]
+        spare = (end - column - sum(w.shape[1] for w in words)) / max(len(words) - 1, 1) if end else letters[' '].shape[1]
+        for word in words:
+            at = int(round(column))
+            ink[row:row + len(word), at:at + word.shape[1]] += word
+            column += word.shape[1] + spare
+
+    row, left, right, small = int(0.10 * height), 0.14 * width, 0.87 * width, font(1.85)
+    if heading:
+        write(heading.split(), row, font(3.0), left)
+        row += 84
+    size = lambda text: sum(small[c].shape[1] for c in text)
+    paragraphs = TEXT.strip().split('\n')
+    for k in range(2 * len(paragraphs)):
+        line, indent = [], 30
+        for word in paragraphs[(first + k) % len(paragraphs)].split() + [None]:
+            full = word and left + indent + size(' '.join(line + [word])) > right
+            if (full or not word) and row < 0.88 * height:
+                write(line, row, small, left + indent, right if full else None)
+                row, line, indent = row + 26, [], 0
+            line.append(word)
+    return tinted(1 - 0.8 * np.clip(ink, 0, 1), (0.84, 0.80, 0.72))
 
 
 def wave(amplitude_m, wavelength_m, degrees, phase_rad):
@@ -88,14 +152,15 @@ def wave(amplitude_m, wavelength_m, degrees, phase_rad):
 
 def add_materials():
     file.material('plaster', texture=plaster((0.86, 0.845, 0.81), 11), metres=2.4)
-    file.material('terracotta', texture=plaster((0.80, 0.56, 0.42), 12), metres=2.0)
+    file.material('terracotta', texture=limewash((0.74, 0.46, 0.31), (0.84, 0.64, 0.50), 12), metres=2.4)
     file.material('stone', texture=plaster((0.62, 0.57, 0.49), 13), metres=0.9)
+    file.material('ashlar', texture=tiles(256, 4, (0.78, 0.72, 0.62), (0.68, 0.61, 0.51), (0.46, 0.40, 0.33), 0.012, 21), metres=0.88)
     file.material('paving', texture=tiles(512, 4, (0.62, 0.54, 0.44), (0.50, 0.42, 0.33), (0.36, 0.32, 0.27), 0.02, 3), metres=2.4)
     file.material('mosaic', texture=tiles(512, 16, (0.46, 0.74, 0.74), (0.20, 0.54, 0.60), (0.62, 0.70, 0.68), 0.05, 9), metres=0.8)
     file.material('marble', texture=marble(), metres=1.3)
-    file.material('linen', texture=linen(), metres=0.10)
-    file.material('left page', texture=page(1))
-    file.material('right page', texture=page(2))
+    file.material('linen', texture=linen(*CLOTH_SIZE))
+    file.material('left page', texture=page(2))
+    file.material('right page', texture=page(0, HEADING))
     file.material('paper edge', (0.66, 0.60, 0.50))
     file.material('cedar', (0.34, 0.19, 0.11))
     file.material('black', (0.0, 0.0, 0.0))
@@ -146,7 +211,11 @@ def arched_wall(name, material, place, span, height, arches):
         p = A([[place(s, y, 0), place(s, y, WALL)] for s, y in line])
         n = A([[A(place(s, y, 0)) - origin] * 2 for s, y in inward])
         uv0 = np.stack(np.broadcast_arrays(along[:, None], [0, WALL]), -1)
-        file.add_to('reveals', sheet(p, n, uv0), material)
+        file.add_to('reveals', sheet(p, n, uv0), 'ashlar')
+        # A surround of the same blocks, a little proud of the wall.
+        p = A([[place(*(q - out * BAND), -0.004), place(*q, -0.004)] for q, out in zip(line, inward)])
+        uv0 = np.stack(np.broadcast_arrays(along[:, None], [-BAND, 0]), -1)
+        file.add_to('reveals', sheet(p, np.broadcast_to(A(place(0, 0, -1)) - origin, p.shape), uv0), 'ashlar')
 
 
 def flat(x, z, y, up=1):
@@ -219,7 +288,9 @@ def add_table():
     for x in (TABLE_X[0] + 0.3, TABLE_X[1] - 0.3):
         for face in sides((x - 0.11, x + 0.11), (TABLE_Z[0] + 0.2, TABLE_Z[1] - 0.2), (0.0, TABLE - thick), False):
             file.add_to('rim', face, 'stone')
-    file.add('cloth', flat((-0.46, 0.66), (0.16, 1.06), TABLE + 0.0012), 'linen')
+    along, across = (rotation(UP, 3) @ A([[CLOTH_SIZE[0] / 2, 0, 0], [0, 0, CLOTH_SIZE[1] / 2]]).T).T
+    cloth = rect([0.11, TABLE + 0.0012, 0.64], across, along)
+    file.add('cloth', dict(cloth, uv0=cloth['uv1']), 'linen')
 
 
 # ---- exhibits
@@ -232,14 +303,15 @@ WINE_GLASS, TUMBLER, BOOK, BALL = on_cloth(0.10, 0.47), on_cloth(-0.19, 0.55), o
 
 
 def add_wine_glass():
+    # The bowl narrows upwards: light that enters its side leaves it opposite and draws a leaf of ruby in the shadow.
     outline = [[0, .001], [.022, .0010], [.036, .0008], [.0400, .0014], [.0412, .0026], [.0400, .0038], [.034, .0052], [.020, .0085],
-               [.0085, .0155], [.0055, .026], [.0052, .044], [.0072, .0585], [.0190, .0690], [.0385, .0870], [.0510, .1140], [.0535, .1380],
-               [.0500, .1680], [.0442, .1950], [.0440, .1958], [.0434, .1962], [.0428, .1958], [.0426, .1950], [.0485, .1680], [.0519, .1380],
-               [.0494, .1145], [.0368, .0882], [.0180, .0715], [.0090, .0678], [0, .0668]]
+               [.0085, .0155], [.0055, .0240], [.0052, .0370], [.0072, .0420], [.0220, .0440], [.0430, .0520], [.0520, .0700], [.0505, .0970],
+               [.0445, .1270], [.0395, .1520], [.0375, .1660], [.0373, .1668], [.0368, .1672], [.0363, .1668], [.0361, .1658], [.0381, .1518],
+               [.0431, .1267], [.0491, .0968], [.0506, .0702], [.0421, .0531], [.0215, .0453], [.0108, .0421], [0, .0409]]
     # Wider than the bowl by 0.7 mm, so that no air is between.
-    wine = [[0, .0660], [.0090, .0669], [.0184, .0705], [.0376, .0873], [.0503, .1142], [.0526, .1340]]
+    wine = [[0, .0402], [.0108, .0413], [.0218, .0447], [.0425, .0525], [.0513, .0701], [.0498, .0969], [.0438, .1269], [.0424, .1340]]
     file.add('wine glass', moved(lathe([outline], 96, 4), WINE_GLASS), 'glass')
-    file.add('wine', moved(lathe([wine, [[.0526, .1340], [0, .1340]]], 96, 4), WINE_GLASS), 'wine')
+    file.add('wine', moved(lathe([wine, [[.0424, .1340], [0, .1340]]], 96, 4), WINE_GLASS), 'wine')
 
 
 def add_tumbler(n=14, finer=8):
