@@ -16,10 +16,10 @@ UP = A([0.0, 1.0, 0.0])
 # The sun stands 31 degrees high: lower, the glasses throw their light too far; higher, the pool leaves the wall dark.
 SUN = unit([0.76, -0.50, 0.36])
 SUN_W_PER_M2, SUN_COLOUR = 9.0, [1.0, 0.80, 0.52]
-SKY_W_PER_M2, SKY_COLOUR = 4.5, [1.0, 1.0, 1.0]
+SKY_W_PER_M2, SKY_COLOUR = 5.6, [1.0, 1.0, 1.0]
 
 ROOM_X, ROOM_Z, HEIGHT = (-1.7, 2.0), (-4.2, 2.8), 3.4
-WALL, BAND = 0.35, 0.088
+WALL, BAND = 0.35, 0.09
 POOL_X, POOL_Z, RIM, WATER, BOTTOM = (-0.9, 1.55), (-3.6, -0.55), 0.46, 0.40, -0.35
 TABLE_X, TABLE_Z, TABLE = (-0.85, 0.85), (0.10, 1.15), 0.75
 CLOTH, CLOTH_SIZE = TABLE + 0.0015, (1.00, 0.74)
@@ -37,20 +37,20 @@ def plaster(colour, seed, n=256):
     return tinted(1 + 0.035 * noise((n, n), (3, 3), seed, 6, 0.6), colour)
 
 
-def limewash(colour, bloom, seed, n=512):
+def limewash(colour, bloom, seed, n=384):
     """Coats that dried unevenly: clouds, the sweep of the brush, and a pale bloom."""
     veil = np.clip(0.4 + 0.9 * noise((n, n), (4, 4), seed, 6, 0.6), 0, 1)
-    sweep = 0.10 * noise((n, n), (3, 3), seed + 1, 3) + 0.05 * noise((n, n), (24, 6), seed + 2, 3) + 0.04 * noise((n, n), (6, 24), seed + 3, 3)
+    sweep = 0.07 * noise((n, n), (3, 3), seed + 1, 3) + 0.05 * noise((n, n), (24, 6), seed + 2, 3) + 0.04 * noise((n, n), (6, 24), seed + 3, 3)
     return (tinted(1 - veil, colour) + tinted(veil, bloom)) * (1 + sweep[..., None])
 
 
 def marble(n=512):
     cloud = noise((n, n), (3, 3), 1, 6, 0.55)
-    out = tinted(0.74 + 0.07 * noise((n, n), (2, 2), 2, 5), (1, 0.99, 0.97))
-    for width, depth, seed in ((0.05, 0.42, 5), (0.03, 0.36, 6), (0.12, 0.20, 7)):
+    out = tinted(0.50 + 0.10 * noise((n, n), (2, 2), 2, 5), (1.0, 0.99, 0.97))
+    for width, depth, seed in ((0.05, 0.34, 5), (0.025, 0.30, 6), (0.10, -0.16, 7)):
         line = np.exp(-np.abs(noise((n, n), (2, 2), seed, 6, 0.55) + 0.25 * cloud) / width)
         patchy = np.clip(0.5 + 0.9 * noise((n, n), (3, 3), seed + 20, 3), 0, 1)
-        out -= tinted(depth * line * patchy, (0.92, 0.95, 1.0))
+        out += tinted(depth * line * patchy, (1.0, 0.98, 0.93))
     return out
 
 
@@ -63,26 +63,27 @@ def tiles(n, per_side, light, dark, joint, gap, seed):
     return np.where((edge < gap)[..., None], A(joint), A(light) * tone + A(dark) * (1 - tone))
 
 
-def linen(long, wide, texel=0.00062):
+def linen(long, wide, texel=0.0006):
     """A whole cloth, thread by thread: a border of stripes, a stitched hem, and creases where it lay folded."""
     n, m = int(long / texel), int(wide / texel)
     random, s, t = np.random.default_rng(61), np.arange(n)[:, None] * texel, np.arange(m) * texel
     edge = np.minimum(np.minimum(s, long - s), np.minimum(t, wide - t))
-    out = 0.665 + 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel) + 0.02 * (random.normal(size=(n, 1)) + random.normal(size=m))
+    out = 0.67 + 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel) + 0.015 * (random.normal(size=(n, 1)) + random.normal(size=m))
     out += 0.03 * noise((n, m), (5, 4), 62, 3)
-    for fold in (s - long / 3, s - long * 2 / 3, (t - wide / 2)):
-        out -= 0.07 * fold / 0.004 * np.exp(-0.5 * (fold / 0.004)**2) * (-1 if fold.shape[0] == n else 1)
-    out += np.where(edge < 0.014, 0.02, 0) - np.where(np.abs(edge - 0.014) < 0.0012, 0.12, 0)
-    dyed = sum(np.clip((half - np.abs(edge - at)) / 0.001, 0, 1) for at, half in ((0.040, 0.003), (0.053, 0.007), (0.066, 0.003)))
-    return tinted(out, (0.985, 1, 1.02)) * (1 - dyed[..., None] * A([0.80, 0.66, 0.44]))
+    for fold, lit in ((s - long / 3, -1), (s - long * 2 / 3, -1), (t - wide / 2, 1)):
+        out -= lit * 0.11 * fold / 0.005 * np.exp(-0.5 * (fold / 0.005)**2)
+    out += np.where(edge < 0.014, 0.03, 0) - np.where(np.abs(edge - 0.014) < 0.0012, 0.14, 0)
+    dyed = sum(np.abs(edge - at) < half for at, half in ((0.040, 0.003), (0.053, 0.007), (0.066, 0.003)))
+    # In few steps, which pack well.
+    return tinted(np.round(out, 2), (0.985, 1, 1.02)) * (1 - dyed[..., None] * A([0.80, 0.66, 0.44]))
 
 
 # Letters as strokes of points x, y (hexadecimal): the line of writing is at 3, low letters reach 8 and high ones c.
-LETTERS = '''a0708484643,4606033345 b0c03,060848430306 c474808034344 d4c43,464808034345 e0646,464808034344 f4b4c1c13,0838
+LETTERS = '''a0708484643,4606033345 b0c03,060848430306 c474808034344 d4c43,464808034345 e0646,464808034344 f3b3c1c13,0838
     g48400001,464808034345 h0c03,0608484643 i0803,0b j28200001,2b k0c03,0548,1643 l0c03 m0803,0608383633,3638686663 n0803,0608484643
     o280803434828 p0800,060848430306 q4840,464808034345 r0803,06083837 s4748080645430304 t1a133334,0838 u08034345,4843 v0823,2348
     w0823,2338,3853,5368 x0843,4803 y0823,481000 z0848,4803,0343 A033b,3b63,1656 L0b03,0343 S5a5b0b0857530304 T0b6b,3b33
-    W0b23,234b,4b63,638b .03 ,1301 ;1301,17'''
+    W0b23,234b,4b63,638b .03,04 ,1301 ;1301,17'''
 HEADING, TEXT = 'What the Sun Wrote', '''
 The sun writes without a hand. Lend it a glass of wine, and it draws a red leaf on the cloth; lend it a ring, and it draws a heart whose point turns to the lamp wherever you set it down.
 Light does nothing for show. At each wall of glass it takes the way that is soonest done, and where many such ways lie side by side the cloth is bright. The line you see is a crowd.
@@ -111,14 +112,14 @@ def letter(strokes, unit, fine=4):
     width = int(np.ceil((p[:, 0].max() + 1.9) * unit))
     y, x = np.mgrid[0:int(14 * unit) * fine, 0:width * fine] / (fine * unit)
     dx, dy = x[..., None] - 0.5 - p[:, 0], 12.8 - y[..., None] - p[:, 1]
-    nib = np.hypot((0.87 * dx + 0.5 * dy) / 0.52, (0.87 * dy - 0.5 * dx) / 0.24).min(-1) < 1
+    nib = np.hypot((0.87 * dx + 0.5 * dy) / 0.60, (0.87 * dy - 0.5 * dx) / 0.28).min(-1) < 1
     return nib.reshape(-1, fine, width, fine).mean((1, 3))
 
 
 def page(first, heading=None, width=736, height=1088):
     """Paragraphs from the first given on, in justified lines."""
     ink, strokes = np.zeros((height, width)), {item[0]: item[1:].split(',') for item in LETTERS.split()}
-    font = lambda unit: {c: letter(s, unit) for c, s in strokes.items()} | {' ': np.zeros((int(14 * unit), int(2.6 * unit)))}
+    font = lambda unit: {c: letter(s, unit) for c, s in strokes.items()} | {' ': np.zeros((int(14 * unit), int(3.4 * unit)))}
 
     def write(text, row, letters, column, end=None):
         words = [np.hstack([letters[c] for c in word]) for word in text]
@@ -152,7 +153,7 @@ def wave(amplitude_m, wavelength_m, degrees, phase_rad):
 
 def add_materials():
     file.material('plaster', texture=plaster((0.86, 0.845, 0.81), 11), metres=2.4)
-    file.material('terracotta', texture=limewash((0.74, 0.46, 0.31), (0.84, 0.64, 0.50), 12), metres=2.4)
+    file.material('terracotta', texture=limewash((0.80, 0.53, 0.38), (0.88, 0.70, 0.56), 12), metres=2.4)
     file.material('stone', texture=plaster((0.62, 0.57, 0.49), 13), metres=0.9)
     file.material('ashlar', texture=tiles(256, 4, (0.78, 0.72, 0.62), (0.68, 0.61, 0.51), (0.46, 0.40, 0.33), 0.012, 21), metres=0.88)
     file.material('paving', texture=tiles(512, 4, (0.62, 0.54, 0.44), (0.50, 0.42, 0.33), (0.36, 0.32, 0.27), 0.02, 3), metres=2.4)
@@ -435,7 +436,7 @@ def air(direction):
     up = np.clip(direction[..., 1:2], 0, 1)
     off_sun = np.arccos(np.clip(direction @ -SUN, -1, 1))[..., None]
     glow = A([0.30, 0.20, 0.10]) * np.exp(-off_sun / 0.2) + A([0.06, 0.035, 0.012]) * np.exp(-off_sun / 0.7)
-    return A([0.07, 0.15, 0.27]) + A([0.17, 0.21, 0.23]) * np.exp(-up / 0.22) + A([0.50, 0.36, 0.19]) * np.exp(-up / 0.06) + glow
+    return A([0.025, 0.075, 0.15]) + A([0.18, 0.25, 0.31]) * np.exp(-up / 0.20) + A([0.52, 0.35, 0.15]) * np.exp(-up / 0.05) + glow
 
 
 def heap(x, y):
@@ -467,7 +468,7 @@ def sea(azimuth, elevation, step_rad):
     cosine = np.clip((n * view).sum(-1), 0.03, 1)[..., None]
     mirrored = 2 * cosine * n - view
     fresnel = 0.02 + 0.98 * (1 - cosine)**5
-    water = A([0.010, 0.075, 0.105]) + A([0.02, 0.07, 0.07]) * np.clip(0.5 + 9 * height, 0, 1)[..., None]
+    water = A([0.006, 0.060, 0.085]) + A([0.015, 0.065, 0.06]) * np.clip(0.5 + 9 * height, 0, 1)[..., None]
     out = fresnel * air(mirrored) + (1 - fresnel) * water
     foam = np.clip((height - 0.105) * 40, 0, 1) * np.clip(fractal(at[..., 0] / 1.2, at[..., 1] / 2.0, 72, 4) * 2, 0, 1)
     out += (A([0.75, 0.74, 0.70]) - out) * foam[..., None]
@@ -493,6 +494,12 @@ def sky(width=2304, height=704):
     first = np.searchsorted(-y[:, 0], 0)
     step_rad = -np.gradient(elevation[:, 0])[first:, None]
     out[first:] = sea(azimuth[first:], elevation[first:], step_rad)
+    # A boat under sail half a mile out.
+    for side, wide, tall in ((1, 0.30, 1.15), (-1, 0.22, 0.85), (0, 0.30, 0.0)):
+        right, up = x + 10.4, y + 0.42
+        sail = np.minimum(side * right - 0.015, (wide * (1 - up / tall) - side * right)) if side else 0.08 - np.hypot(right / 4, up)
+        cover = np.clip(sail / 0.03, 0, 1) * (up > (0.06 if side else -0.05))
+        out += (A([0.95, 0.90, 0.80] if side else [0.10, 0.10, 0.11]) - out) * cover[..., None]
     return out
 
 

@@ -180,18 +180,23 @@ def fractal(x, y, seed, octaves=5, gain=0.5):
 
 
 def png(linear):
+    """8 bits for each colour, or a palette where it has so few."""
     v = np.clip(linear, 0, 1)
     v = np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055)
     v = (v * 255 + 0.5).astype(np.uint8)
     height, width, _ = v.shape
-    # As differences from the left or from above, whichever packs better.
+    palette, index = np.unique((v.astype(int) @ [65536, 256, 1]), return_inverse=True)
+    few = len(palette) <= 256
+    v = index.reshape(height, width, 1).astype(np.uint8) if few else v
+    # As differences from the left or from above, or as it is, whichever packs best.
     packed = []
-    for kind, axis in ((b'\1', 1), (b'\2', 0)):
-        rows = np.diff(v, axis=axis, prepend=np.zeros_like(v[:, :1] if axis else v[:1]))
+    for kind, axis in ((b'\0', None), (b'\1', 1), (b'\2', 0)):
+        rows = v if axis is None else np.diff(v, axis=axis, prepend=np.zeros_like(v[:, :1] if axis else v[:1]))
         packed.append(zlib.compress(b''.join(kind + row.tobytes() for row in rows), 9))
     chunk = lambda kind, data: struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
-    head = struct.pack('>IIBBBBB', width, height, 8, 2, 0, 0, 0)
-    return b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', head) + chunk(b'IDAT', min(packed, key=len)) + chunk(b'IEND', b'')
+    head = chunk(b'IHDR', struct.pack('>IIBBBBB', width, height, 8, 3 if few else 2, 0, 0, 0))
+    head += chunk(b'PLTE', b''.join(int(c).to_bytes(3, 'big') for c in palette)) if few else b''
+    return b'\x89PNG\r\n\x1a\n' + head + chunk(b'IDAT', min(packed, key=len)) + chunk(b'IEND', b'')
 
 
 # ---- glTF
