@@ -45,11 +45,12 @@ def limewash(colour, bloom, seed, n=384):
 
 
 def marble(n=512):
+    """Dark green, with white veins that cross."""
     cloud = noise((n, n), (3, 3), 1, 6, 0.55)
-    out = tinted(0.50 + 0.10 * noise((n, n), (2, 2), 2, 5), (1.0, 0.99, 0.97))
-    for width, depth, seed in ((0.05, 0.34, 5), (0.025, 0.30, 6), (0.10, -0.16, 7)):
+    out = tinted(0.19 + 0.07 * noise((n, n), (5, 5), 2, 6, 0.6), (0.84, 1.0, 1.02))
+    for width, depth, seed in ((0.016, 0.60, 5), (0.05, 0.16, 6), (0.010, 0.50, 7)):
         line = np.exp(-np.abs(noise((n, n), (2, 2), seed, 6, 0.55) + 0.25 * cloud) / width)
-        patchy = np.clip(0.5 + 0.9 * noise((n, n), (3, 3), seed + 20, 3), 0, 1)
+        patchy = np.clip(0.4 + 1.1 * noise((n, n), (3, 3), seed + 20, 3), 0, 1)
         out += tinted(depth * line * patchy, (1.0, 0.98, 0.93))
     return out
 
@@ -68,7 +69,7 @@ def linen(long, wide, texel=0.0006):
     n, m = int(long / texel), int(wide / texel)
     random, s, t = np.random.default_rng(61), np.arange(n)[:, None] * texel, np.arange(m) * texel
     edge = np.minimum(np.minimum(s, long - s), np.minimum(t, wide - t))
-    out = 0.67 + 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel) + 0.015 * (random.normal(size=(n, 1)) + random.normal(size=m))
+    out = 0.67 + 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel) + 0.011 * (random.normal(size=(n, 1)) + random.normal(size=m))
     out += 0.03 * noise((n, m), (5, 4), 62, 3)
     for fold, lit in ((s - long / 3, -1), (s - long * 2 / 3, -1), (t - wide / 2, 1)):
         out -= lit * 0.11 * fold / 0.005 * np.exp(-0.5 * (fold / 0.005)**2)
@@ -146,6 +147,11 @@ def page(first, heading=None, width=736, height=1088):
     return tinted(1 - 0.8 * np.clip(ink, 0, 1), (0.84, 0.80, 0.72))
 
 
+def peel(n=256):
+    pores = np.clip(noise((n, n), (80, 80), 31, 2), -1, 0.3)
+    return tinted(1 + 0.16 * pores + 0.05 * noise((n, n), (3, 3), 32, 3), (0.86, 0.60, 0.07))
+
+
 def wave(amplitude_m, wavelength_m, degrees, phase_rad):
     direction = [np.cos(np.radians(degrees)), np.sin(np.radians(degrees))]
     return dict(amplitude_m=amplitude_m, wavelength_m=wavelength_m, direction=direction, phase_rad=phase_rad)
@@ -153,15 +159,16 @@ def wave(amplitude_m, wavelength_m, degrees, phase_rad):
 
 def add_materials():
     file.material('plaster', texture=plaster((0.86, 0.845, 0.81), 11), metres=2.4)
-    file.material('terracotta', texture=limewash((0.80, 0.53, 0.38), (0.88, 0.70, 0.56), 12), metres=2.4)
+    file.material('terracotta', texture=limewash((0.86, 0.59, 0.43), (0.93, 0.76, 0.62), 12), metres=2.4)
     file.material('stone', texture=plaster((0.62, 0.57, 0.49), 13), metres=0.9)
     file.material('ashlar', texture=tiles(256, 4, (0.78, 0.72, 0.62), (0.68, 0.61, 0.51), (0.46, 0.40, 0.33), 0.012, 21), metres=0.88)
     file.material('paving', texture=tiles(512, 4, (0.62, 0.54, 0.44), (0.50, 0.42, 0.33), (0.36, 0.32, 0.27), 0.02, 3), metres=2.4)
     file.material('mosaic', texture=tiles(512, 16, (0.46, 0.74, 0.74), (0.20, 0.54, 0.60), (0.62, 0.70, 0.68), 0.05, 9), metres=0.8)
-    file.material('marble', texture=marble(), metres=1.3)
+    file.material('marble', texture=marble(), metres=0.8)
     file.material('linen', texture=linen(*CLOTH_SIZE))
     file.material('left page', texture=page(2))
     file.material('right page', texture=page(0, HEADING))
+    file.material('lemon', texture=peel())
     file.material('paper edge', (0.66, 0.60, 0.50))
     file.material('cedar', (0.34, 0.19, 0.11))
     file.material('black', (0.0, 0.0, 0.0))
@@ -374,6 +381,12 @@ def add_book(half_width=0.155, half_height=0.115):
     file.add('ring', moved(lathe(list(zip(profile[:-1], profile[1:])), 160), place, turn @ rotation([0, 0, 1], -8)), 'gold')
 
 
+def add_lemon(length=0.082, radius=0.030):
+    outline = A([[0, 0], [.42, .05], [.84, .20], [1, .44], [.86, .70], [.48, .90], [.20, .975], [0, 1]]) * [radius, length]
+    lemon = moved(lathe([outline], 40, 2), turn=rotation(UP, -28) @ rotation([0, 0, 1], 86))
+    file.add('lemon', moved(lemon, on_cloth(0.335, 0.845) - UP * lemon['p'][:, 1].min()), 'lemon')
+
+
 def add_prism():
     """A bar of dense flint on a post by the pool: edge down, it turns the sun upwards and throws a spectrum on the vault."""
     apex_rad, side, half, centre = np.radians(42), 0.075, 0.14, A([-1.22, 1.00, -2.70])
@@ -436,7 +449,7 @@ def air(direction):
     up = np.clip(direction[..., 1:2], 0, 1)
     off_sun = np.arccos(np.clip(direction @ -SUN, -1, 1))[..., None]
     glow = A([0.30, 0.20, 0.10]) * np.exp(-off_sun / 0.2) + A([0.06, 0.035, 0.012]) * np.exp(-off_sun / 0.7)
-    return A([0.025, 0.075, 0.15]) + A([0.18, 0.25, 0.31]) * np.exp(-up / 0.20) + A([0.52, 0.35, 0.15]) * np.exp(-up / 0.05) + glow
+    return A([0.025, 0.075, 0.15]) + A([0.16, 0.25, 0.34]) * np.exp(-up / 0.20) + A([0.60, 0.37, 0.12]) * np.exp(-up / 0.05) + glow
 
 
 def heap(x, y):
@@ -455,7 +468,7 @@ def sea(azimuth, elevation, step_rad):
     for wavelength in np.geomspace(0.35, 11, 48):
         heading, k = np.radians(70) + 0.75 * random.normal(), 2 * np.pi / wavelength
         along = A([np.cos(heading), np.sin(heading)])
-        seen = np.exp(-0.5 * (0.5 * k * (outward @ along) * blur)**2)
+        seen = np.exp(-0.5 * (0.5 * k * np.hypot(outward @ along, 0.3) * blur)**2)
         steep, phase = 0.024, k * (at @ along) + random.uniform(0, 7)
         slope += (steep * seen * np.cos(phase))[..., None] * along
         height = height + steep / k * seen * np.sin(phase)
@@ -487,9 +500,9 @@ def sky(width=2304, height=704):
     lit = np.clip(0.45 + 0.9 * (density - heap(x - 0.7, y + 0.5)), 0, 1)[..., None]
     cloud = A([0.40, 0.41, 0.45]) * (1 - lit) + A([1.0, 0.92, 0.80]) * lit
     out += (cloud - out) * (np.clip(2.2 * density, 0, 1) * np.clip((y - 0.6) / 2.5, 0, 1) * 0.9)[..., None]
-    for low, rise, tone, seed in ((0.10, 0.8, (0.40, 0.42, 0.47), 41), (-0.3, 1.9, (0.24, 0.28, 0.33), 43)):
-        land = low + rise * (1 / (1 + np.exp(-(x - 8) / 2.5))) * np.exp(-np.clip(x - 20, 0, 99) / 10) + 0.35 * rise * fractal(x / 5, 0 * y, seed, 6)
-        face = 0.06 * fractal(x / 0.9 + 0.6 * y, y / 1.2, seed + 1, 5)[..., None]
+    for low, rise, tone, seed in ((0.10, 0.8, (0.40, 0.42, 0.47), 41), (-0.3, 2.2, (0.22, 0.25, 0.28), 43)):
+        land = low + rise * (1 / (1 + np.exp(-(x - 6.5) / 1.8))) * np.exp(-np.clip(x - 20, 0, 99) / 10) + 0.35 * rise * fractal(x / 5, 0 * y, seed, 6)
+        face = 0.16 * fractal(x / 0.8 + 0.9 * y, y / 0.9, seed + 1, 5)[..., None]
         out += (A(tone) * (1 + 2 * face) - out) * np.clip((land - y) / 0.05, 0, 1)[..., None]
     first = np.searchsorted(-y[:, 0], 0)
     step_rad = -np.gradient(elevation[:, 0])[first:, None]
@@ -540,6 +553,7 @@ add_wine_glass()
 add_tumbler()
 add_ball()
 add_book()
+add_lemon()
 add_prism()
 add_butterfly()
 add_sky()
