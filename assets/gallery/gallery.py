@@ -33,14 +33,10 @@ def tinted(value, colour):
     return value[..., None] * A(colour)
 
 
-def plaster(colour, seed, n=256):
-    return tinted(1 + 0.035 * noise((n, n), (3, 3), seed, 6, 0.6), colour)
-
-
-def limewash(colour, bloom, seed, n=384):
-    """Coats that dried unevenly: clouds, the sweep of the brush, and a pale bloom."""
+def plaster(colour, bloom, seed, n=256):
+    """Coats that dried unevenly: a pale bloom, broad sweeps, and strokes of the brush both ways."""
     veil = np.clip(0.4 + 0.9 * noise((n, n), (4, 4), seed, 6, 0.6), 0, 1)
-    sweep = 0.07 * noise((n, n), (3, 3), seed + 1, 3) + 0.05 * noise((n, n), (24, 6), seed + 2, 3) + 0.04 * noise((n, n), (6, 24), seed + 3, 3)
+    sweep = sum(depth * noise((n, n), cells, seed, 3) for depth, cells in ((0.04, (3, 3)), (0.03, (24, 6)), (0.03, (6, 24))))
     return (tinted(1 - veil, colour) + tinted(veil, bloom)) * (1 + sweep[..., None])
 
 
@@ -66,14 +62,13 @@ def tiles(n, per_side, light, dark, joint, gap, seed):
 
 def linen(long, wide, texel=0.0006):
     """A whole cloth, thread by thread: a border of stripes, a stitched hem, and creases where it lay folded."""
-    n, m = int(long / texel), int(wide / texel)
-    random, s, t = np.random.default_rng(61), np.arange(n)[:, None] * texel, np.arange(m) * texel
+    random, s, t = np.random.default_rng(61), np.arange(0, long, texel)[:, None], np.arange(0, wide, texel)
     edge = np.minimum(np.minimum(s, long - s), np.minimum(t, wide - t))
-    out = 0.67 + 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel) + 0.011 * (random.normal(size=(n, 1)) + random.normal(size=m))
-    out += 0.03 * noise((n, m), (5, 4), 62, 3)
-    for fold, lit in ((s - long / 3, -1), (s - long * 2 / 3, -1), (t - wide / 2, 1)):
-        out -= lit * 0.11 * fold / 0.005 * np.exp(-0.5 * (fold / 0.005)**2)
-    out += np.where(edge < 0.014, 0.03, 0) - np.where(np.abs(edge - 0.014) < 0.0012, 0.14, 0)
+    weave = 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel)
+    out = 0.67 + weave + random.normal(0, 0.011, s.shape) + random.normal(0, 0.011, t.shape) + 0.03 * noise(edge.shape, (5, 4), 62, 3)
+    for fold in ((s - long / 3) / 0.005, (s - long * 2 / 3) / 0.005, (wide / 2 - t) / 0.005):
+        out += 0.11 * fold * np.exp(-0.5 * fold**2)
+    out += 0.03 * (edge < 0.014) - 0.14 * (np.abs(edge - 0.014) < 0.0012)
     dyed = sum(np.abs(edge - at) < half for at, half in ((0.040, 0.003), (0.053, 0.007), (0.066, 0.003)))
     # In few steps, which pack well.
     return tinted(np.round(out, 2), (0.985, 1, 1.02)) * (1 - dyed[..., None] * A([0.80, 0.66, 0.44]))
@@ -97,59 +92,45 @@ Stand where the light is sharpest and look back along it. Two pictures of the su
 
 def letter(strokes, unit, fine=4):
     """Ink of one letter, drawn by a broad nib whose edge stands at 30 degrees; upright strokes get serifs."""
-    lines = []
+    lines, p, high = [], [], int(14 * unit)
     for stroke in strokes:
-        q = A([[int(a, 16), int(b, 16)] for a, b in zip(stroke[::2], stroke[1::2])], float)
-        lines.append(q)
-        if len(q) == 2 and q[0, 0] == q[1, 0]:
-            lines += [q[0] + A([[-0.8, -0.4], [0, 0]]), q[1] + A([[-0.8, 0], [0.8, 0]])]
-    # Corners are cut three times, which rounds them.
-    for k, q in enumerate(lines):
-        for _ in range(3 * (len(q) > 2)):
+        q = A([[int(x, 16), int(y, 16)] for x, y in zip(stroke[::2], stroke[1::2])], float)
+        upright = len(q) == 2 and stroke[0] == stroke[2]
+        lines += [q] + ([q[0] + A([[-0.8, -0.4], [0, 0]]), q[1] + A([[-0.8, 0], [0.8, 0]])] if upright else [])
+    for q in lines:
+        # Cutting its corners rounds a stroke and makes its points many.
+        for _ in range(5):
             q = np.vstack([q[:1], np.stack([0.75 * q[:-1] + 0.25 * q[1:], 0.25 * q[:-1] + 0.75 * q[1:]], 1).reshape(-1, 2), q[-1:]])
-        at = np.linspace(0, len(q) - 1, 16 * len(q) if len(q) < 4 else 3 * len(q))
-        lines[k] = np.stack([np.interp(at, np.arange(len(q)), axis) for axis in q.T], 1)
-    p = np.vstack(lines)
+        p.append(q)
+    p = np.vstack(p)
     width = int(np.ceil((p[:, 0].max() + 1.9) * unit))
-    y, x = np.mgrid[0:int(14 * unit) * fine, 0:width * fine] / (fine * unit)
+    y, x = np.mgrid[0:high * fine, 0:width * fine] / (fine * unit)
     dx, dy = x[..., None] - 0.5 - p[:, 0], 12.8 - y[..., None] - p[:, 1]
     nib = np.hypot((0.87 * dx + 0.5 * dy) / 0.60, (0.87 * dy - 0.5 * dx) / 0.28).min(-1) < 1
-    return nib.reshape(-1, fine, width, fine).mean((1, 3))
+    return nib.reshape(high, fine, width, fine).mean((1, 3))
 
 
-def page(first, heading=None, width=736, height=1088):
-    """Paragraphs from the first given on, in justified lines."""
-    ink, strokes = np.zeros((height, width)), {item[0]: item[1:].split(',') for item in LETTERS.split()}
-    font = lambda unit: {c: letter(s, unit) for c, s in strokes.items()} | {' ': np.zeros((int(14 * unit), int(3.4 * unit)))}
-
-    def write(text, row, letters, column, end=None):
-        words = [np.hstack([letters[c] for c in word]) for word in text]
-        spare = (end - column - sum(w.shape[1] for w in words)) / max(len(words) - 1, 1) if end else letters[' '].shape[1]
-        for word in words:
-            at = int(round(column))
-            ink[row:row + len(word), at:at + word.shape[1]] += word
-            column += word.shape[1] + spare
-
-    row, left, right, small = int(0.10 * height), 0.14 * width, 0.87 * width, font(1.85)
-    if heading:
-        write(heading.split(), row, font(3.0), left)
-        row += 84
-    size = lambda text: sum(small[c].shape[1] for c in text)
-    paragraphs = TEXT.strip().split('\n')
-    for k in range(2 * len(paragraphs)):
-        line, indent = [], 30
-        for word in paragraphs[(first + k) % len(paragraphs)].split() + [None]:
-            full = word and left + indent + size(' '.join(line + [word])) > right
-            if (full or not word) and row < 0.88 * height:
-                write(line, row, small, left + indent, right if full else None)
-                row, line, indent = row + 26, [], 0
-            line.append(word)
+def page(first, heading='', width=736, height=1088):
+    """A heading and paragraphs, from the first given on, in justified lines."""
+    ink, left, right, row = np.zeros((height, width)), int(0.14 * width), int(0.87 * width), int(0.10 * height)
+    small, large = ({s[0]: letter(s[1:].split(','), unit) for s in LETTERS.split()} for unit in (1.85, 3.0))
+    words = lambda text, font: [np.hstack([font[c] for c in word]) for word in text.split()]
+    blank, paragraphs = np.zeros((25, 24)), TEXT.strip().split('\n')
+    lines = [(words(heading, large), False), ([blank], False)] if heading else []
+    for text in (paragraphs[first:] + paragraphs) * 2:
+        line, used = [blank], 24
+        for word in words(text, small):
+            if used + 7 + word.shape[1] > right - left:
+                lines, line, used = lines + [(line, True)], [], -7
+            line, used = line + [word], used + 7 + word.shape[1]
+        lines.append((line, False))
+    for line, full in lines[:30]:
+        at, gap = left, (right - left - sum(w.shape[1] for w in line)) / (len(line) - 1) if full else 7
+        for word in line:
+            ink[row:row + len(word), int(at):int(at) + word.shape[1]] += word
+            at += word.shape[1] + gap
+        row += len(line[0]) + 1
     return tinted(1 - 0.8 * np.clip(ink, 0, 1), (0.84, 0.80, 0.72))
-
-
-def peel(n=256):
-    pores = np.clip(noise((n, n), (80, 80), 31, 2), -1, 0.3)
-    return tinted(1 + 0.16 * pores + 0.05 * noise((n, n), (3, 3), 32, 3), (0.86, 0.60, 0.07))
 
 
 def wave(amplitude_m, wavelength_m, degrees, phase_rad):
@@ -158,17 +139,17 @@ def wave(amplitude_m, wavelength_m, degrees, phase_rad):
 
 
 def add_materials():
-    file.material('plaster', texture=plaster((0.86, 0.845, 0.81), 11), metres=2.4)
-    file.material('terracotta', texture=limewash((0.86, 0.59, 0.43), (0.93, 0.76, 0.62), 12), metres=2.4)
-    file.material('stone', texture=plaster((0.62, 0.57, 0.49), 13), metres=0.9)
-    file.material('ashlar', texture=tiles(256, 4, (0.78, 0.72, 0.62), (0.68, 0.61, 0.51), (0.46, 0.40, 0.33), 0.012, 21), metres=0.88)
+    file.material('plaster', texture=plaster((0.84, 0.82, 0.78), (0.88, 0.87, 0.84), 11), metres=2.4)
+    file.material('terracotta', texture=plaster((0.86, 0.58, 0.42), (0.94, 0.77, 0.63), 12, 384), metres=2.4)
+    file.material('stone', texture=plaster((0.61, 0.56, 0.48), (0.66, 0.61, 0.53), 13), metres=0.9)
+    file.material('ashlar', texture=tiles(256, 4, (0.88, 0.83, 0.74), (0.80, 0.74, 0.64), (0.52, 0.46, 0.38), 0.012, 21), metres=0.88)
     file.material('paving', texture=tiles(512, 4, (0.62, 0.54, 0.44), (0.50, 0.42, 0.33), (0.36, 0.32, 0.27), 0.02, 3), metres=2.4)
     file.material('mosaic', texture=tiles(512, 16, (0.46, 0.74, 0.74), (0.20, 0.54, 0.60), (0.62, 0.70, 0.68), 0.05, 9), metres=0.8)
     file.material('marble', texture=marble(), metres=0.8)
     file.material('linen', texture=linen(*CLOTH_SIZE))
     file.material('left page', texture=page(2))
     file.material('right page', texture=page(0, HEADING))
-    file.material('lemon', texture=peel())
+    file.material('lemon', texture=plaster((0.80, 0.52, 0.04), (0.88, 0.64, 0.08), 31), metres=0.5)
     file.material('paper edge', (0.66, 0.60, 0.50))
     file.material('cedar', (0.34, 0.19, 0.11))
     file.material('black', (0.0, 0.0, 0.0))
@@ -437,11 +418,14 @@ DOME, EYE = 40.0, A([0.0, 1.15, 0.0])
 AZIMUTH = (0, 0.05, 0.22, 0.92, 1), (-180, -125, -32, 32, 180)
 ELEVATION = (0, 0.16, 0.58, 0.95, 1), (90, 14, 0, -8.5, -90)
 SEA_BELOW_EYE_M = 6.0
-HEAPS = 3.1
 
 
 def bearing(azimuth, elevation):
     return np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), -np.cos(azimuth) * np.cos(elevation)], -1)
+
+
+def over(below, colour, cover):
+    return below + (A(colour) - below) * cover[..., None]
 
 
 def air(direction):
@@ -452,68 +436,53 @@ def air(direction):
     return A([0.025, 0.075, 0.15]) + A([0.16, 0.25, 0.34]) * np.exp(-up / 0.20) + A([0.60, 0.37, 0.12]) * np.exp(-up / 0.05) + glow
 
 
-def heap(x, y):
-    """Density of clouds with a flat foot; x, y in degrees."""
-    top = 4.2 + 4.5 * fractal(x / 8 + HEAPS, 0 * y, 91, 3)
-    return np.clip((top - y) / 2.2, -1.2, 0.6) + 0.8 * fractal(x / 2.4, y / 1.6, 92, 6, 0.55) - 1.2 * np.exp(-np.clip(y - 1.0, 0, 9) / 0.3)
-
-
-def sea(azimuth, elevation, step_rad):
+def sea(azimuth, elevation):
     """Waves on a plane, each as far as the texels there can show it; what they cannot show is roughness."""
-    outward, far = bearing(azimuth, 0 * elevation)[..., [0, 2]], SEA_BELOW_EYE_M / np.tan(np.maximum(-elevation, 4e-4))
-    at, blur = outward * far[..., None], far * far / SEA_BELOW_EYE_M * step_rad
-    random = np.random.default_rng(5)
-    gust = np.clip(1 + 0.9 * fractal(at[..., 0] / 90, at[..., 1] / 60, 71, 4), 0.25, 2)
-    slope, height, rough = np.zeros(at.shape), 0.0, 0.0
+    outward, far = bearing(azimuth, 0 * elevation), SEA_BELOW_EYE_M / np.tan(np.maximum(-elevation, 4e-4))
+    at, blur, random = outward * far[..., None], far**2 / SEA_BELOW_EYE_M * -np.gradient(elevation, axis=0), np.random.default_rng(5)
+    gust = np.clip(1 + 0.9 * fractal(at[..., 0] / 90, at[..., 2] / 60, 71, 4), 0.25, 2)
+    slope, height, rough = 0.0, 0.0, 0.0
     for wavelength in np.geomspace(0.35, 11, 48):
-        heading, k = np.radians(70) + 0.75 * random.normal(), 2 * np.pi / wavelength
-        along = A([np.cos(heading), np.sin(heading)])
-        seen = np.exp(-0.5 * (0.5 * k * np.hypot(outward @ along, 0.3) * blur)**2)
-        steep, phase = 0.024, k * (at @ along) + random.uniform(0, 7)
-        slope += (steep * seen * np.cos(phase))[..., None] * along
-        height = height + steep / k * seen * np.sin(phase)
-        rough = rough + steep**2 / 2 * (1 - seen**2)
-    slope, rough = slope * gust[..., None]**0.5, np.sqrt(rough * gust)
+        heading, k = 0.35 + 0.8 * random.normal(), 2 * np.pi / wavelength
+        along = A([np.sin(heading), 0, np.cos(heading)])
+        seen, phase = np.exp(-0.5 * (0.4 * k * np.hypot(outward @ along, 0.3) * blur)**2), k * (at @ along) + random.uniform(0, 7)
+        slope = slope + (seen * np.cos(phase))[..., None] * along
+        height, rough = height + seen * np.sin(phase) / k, rough + (1 - seen**2) / 2
     # Seen from low down, faces that lean to the eye hide the others.
-    lean = slope + outward * (0.9 * rough)[..., None]
-    n = unit(np.stack([-lean[..., 0], np.ones(far.shape), -lean[..., 1]], -1))
-    view = -bearing(azimuth, elevation)
-    cosine = np.clip((n * view).sum(-1), 0.03, 1)[..., None]
-    mirrored = 2 * cosine * n - view
-    fresnel = 0.02 + 0.98 * (1 - cosine)**5
-    water = A([0.006, 0.060, 0.085]) + A([0.015, 0.065, 0.06]) * np.clip(0.5 + 9 * height, 0, 1)[..., None]
-    out = fresnel * air(mirrored) + (1 - fresnel) * water
-    foam = np.clip((height - 0.105) * 40, 0, 1) * np.clip(fractal(at[..., 0] / 1.2, at[..., 1] / 2.0, 72, 4) * 2, 0, 1)
-    out += (A([0.75, 0.74, 0.70]) - out) * foam[..., None]
-    haze = (1 - np.exp(-far / 9000))[..., None]
-    return out + (air(bearing(azimuth, 0 * elevation)) - out) * haze
+    steep = 0.025 * np.sqrt(gust)[..., None]
+    n, view = unit(UP - steep * (slope + 0.9 * outward * np.sqrt(rough)[..., None])), -bearing(azimuth, elevation)
+    cosine = np.clip((n * view).sum(-1, keepdims=True), 0.03, 1)
+    fresnel, crest = 0.02 + 0.98 * (1 - cosine)**5, np.clip(0.5 + 0.22 * height, 0, 1)
+    out = fresnel * air(2 * cosine * n - view) + (1 - fresnel) * over(A([0.004, 0.045, 0.068]), [0.014, 0.105, 0.125], crest)
+    foam = np.clip(height - 6.2, 0, 1) * np.clip(fractal(at[..., 0] / 0.6, at[..., 2], 72, 4) * 2, 0, 1)
+    return over(over(out, [0.75, 0.74, 0.70], foam), air(outward), 1 - np.exp(-far / 25e3))
+
+
+def heap(x, y):
+    """Density of clouds with a flat foot."""
+    rising = (4.2 - y + 4.5 * fractal(x / 8 + 3.1, 0 * y, 91, 3)) / 2.2
+    return np.clip(rising, -1.2, 0.6) + 0.8 * fractal(x / 2.4, y / 1.6, 92, 6, 0.55) - 1.2 * np.exp(-np.clip(y - 1, 0, 9) / 0.3)
 
 
 def sky(width=2304, height=704):
-    u, v = (np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height
-    x, y = np.meshgrid(np.interp(u, *AZIMUTH), np.interp(v, *ELEVATION))
+    x, y = np.meshgrid(*(np.interp((np.arange(n) + 0.5) / n, *knots) for n, knots in ((width, AZIMUTH), (height, ELEVATION))))
     azimuth, elevation = np.radians(x), np.radians(y)
-    out = air(bearing(azimuth, elevation))
     cirrus = np.clip(fractal(x / 9 + y / 5, y / 1.1, 93, 5) * 1.2 - 0.1, 0, 1) * np.exp(-((y - 11) / 6)**2)
-    out += (A([0.62, 0.60, 0.60]) - out) * (0.5 * cirrus)[..., None]
-    density = heap(x, y)
-    lit = np.clip(0.45 + 0.9 * (density - heap(x - 0.7, y + 0.5)), 0, 1)[..., None]
-    cloud = A([0.40, 0.41, 0.45]) * (1 - lit) + A([1.0, 0.92, 0.80]) * lit
-    out += (cloud - out) * (np.clip(2.2 * density, 0, 1) * np.clip((y - 0.6) / 2.5, 0, 1) * 0.9)[..., None]
+    out, density = over(air(bearing(azimuth, elevation)), [0.62, 0.60, 0.60], 0.5 * cirrus), heap(x, y)
+    lit = np.clip(0.45 + 1.1 * (density - heap(x - 0.7, y + 0.5)), 0, 1)
+    out = over(out, over(A([0.34, 0.36, 0.41]), [1.0, 0.92, 0.80], lit), 0.9 * np.clip(2.2 * density, 0, 1) * np.clip((y - 0.6) / 2.5, 0, 1))
     for low, rise, tone, seed in ((0.10, 0.8, (0.40, 0.42, 0.47), 41), (-0.3, 2.2, (0.22, 0.25, 0.28), 43)):
-        land = low + rise * (1 / (1 + np.exp(-(x - 6.5) / 1.8))) * np.exp(-np.clip(x - 20, 0, 99) / 10) + 0.35 * rise * fractal(x / 5, 0 * y, seed, 6)
-        face = 0.16 * fractal(x / 0.8 + 0.9 * y, y / 0.9, seed + 1, 5)[..., None]
-        out += (A(tone) * (1 + 2 * face) - out) * np.clip((land - y) / 0.05, 0, 1)[..., None]
-    first = np.searchsorted(-y[:, 0], 0)
-    step_rad = -np.gradient(elevation[:, 0])[first:, None]
-    out[first:] = sea(azimuth[first:], elevation[first:], step_rad)
-    # A boat under sail half a mile out.
-    for side, wide, tall in ((1, 0.30, 1.15), (-1, 0.22, 0.85), (0, 0.30, 0.0)):
-        right, up = x + 10.4, y + 0.42
-        sail = np.minimum(side * right - 0.015, (wide * (1 - up / tall) - side * right)) if side else 0.08 - np.hypot(right / 4, up)
-        cover = np.clip(sail / 0.03, 0, 1) * (up > (0.06 if side else -0.05))
-        out += (A([0.95, 0.90, 0.80] if side else [0.10, 0.10, 0.11]) - out) * cover[..., None]
-    return out
+        bulk = np.exp(-np.clip(x - 20, 0, 99) / 10) / (1 + np.exp(-(x - 6.5) / 1.8))
+        land = low + rise * (bulk + 0.35 * fractal(x / 5, 0 * y, seed, 6))
+        faces = 1 + 0.22 * fractal(x / 0.8 + 0.9 * y, y / 0.9, seed + 1, 5)
+        out = over(out, tinted(faces, tone), np.clip((land - y) / 0.05, 0, 1))
+    wet = y[:, 0] < 0
+    out[wet] = sea(azimuth[wet], elevation[wet])
+    # A boat under sail half a mile out: jib, mainsail and hull.
+    right, up = x + 10.4, y + 0.42
+    for side, wide, tall in ((1, 0.30, 1.15), (-1, 0.22, 0.85)):
+        out = over(out, [0.95, 0.90, 0.80], np.clip(np.minimum(side * right - 0.015, wide * (1 - up / tall) - side * right) / 0.03, 0, 1) * (up > 0.06))
+    return over(out, [0.10, 0.10, 0.11], np.clip((0.08 - np.hypot(right / 4, up)) / 0.03, 0, 1) * (up > -0.05))
 
 
 def add_sky():
