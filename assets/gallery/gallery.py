@@ -16,7 +16,7 @@ UP = A([0.0, 1.0, 0.0])
 # The sun stands 31 degrees high: lower, the glasses throw their light too far; higher, the pool leaves the wall dark.
 SUN = unit([0.76, -0.50, 0.36])
 SUN_W_PER_M2, SUN_COLOUR = 9.0, [1.0, 0.80, 0.52]
-SKY_W_PER_M2, SKY_COLOUR = 5.6, [1.0, 1.0, 1.0]
+SKY_W_PER_M2, SKY_COLOUR = 5.6, [0.96, 1.0, 1.09]
 
 ROOM_X, ROOM_Z, HEIGHT = (-1.7, 2.0), (-4.2, 2.8), 3.4
 WALL, BAND = 0.35, 0.09
@@ -36,7 +36,7 @@ def tinted(value, colour):
 def plaster(colour, bloom, seed, n=256):
     """Coats that dried unevenly: a pale bloom, broad sweeps, and strokes of the brush both ways."""
     veil = np.clip(0.4 + 0.9 * noise((n, n), (4, 4), seed, 6, 0.6), 0, 1)
-    sweep = sum(depth * noise((n, n), cells, seed, 3) for depth, cells in ((0.04, (3, 3)), (0.03, (24, 6)), (0.03, (6, 24))))
+    sweep = sum(depth * noise((n, n), cells, seed, 3) for depth, cells in ((0.04, (3, 3)), (0.025, (24, 6)), (0.02, (6, 24))))
     return (tinted(1 - veil, colour) + tinted(veil, bloom)) * (1 + sweep[..., None])
 
 
@@ -79,7 +79,7 @@ LETTERS = '''a0708484643,4606033345 b0c03,060848430306 c474808034344 d4c43,46480
     g48400001,464808034345 h0c03,0608484643 i0803,0b j28200001,2b k0c03,0548,1643 l0c03 m0803,0608383633,3638686663 n0803,0608484643
     o280803434828 p0800,060848430306 q4840,464808034345 r0803,06083837 s4748080645430304 t1a133334,0838 u08034345,4843 v0823,2348
     w0823,2338,3853,5368 x0843,4803 y0823,481000 z0848,4803,0343 A033b,3b63,1656 L0b03,0343 S5a5b0b0857530304 T0b6b,3b33
-    W0b23,234b,4b63,638b .03,04 ,1301 ;1301,17'''
+    W0b23,234b,4b63,638b .03,04,13,14 ,1301 ;1301,17'''
 HEADING, TEXT = 'What the Sun Wrote', '''
 The sun writes without a hand. Lend it a glass of wine, and it draws a red leaf on the cloth; lend it a ring, and it draws a heart whose point turns to the lamp wherever you set it down.
 Light does nothing for show. At each wall of glass it takes the way that is soonest done, and where many such ways lie side by side the cloth is bright. The line you see is a crowd.
@@ -124,7 +124,7 @@ def page(first, heading='', width=736, height=1088):
                 lines, line, used = lines + [(line, True)], [], -7
             line, used = line + [word], used + 7 + word.shape[1]
         lines.append((line, False))
-    for line, full in lines[:30]:
+    for line, full in lines[:33]:
         at, gap = left, (right - left - sum(w.shape[1] for w in line)) / (len(line) - 1) if full else 7
         for word in line:
             ink[row:row + len(word), int(at):int(at) + word.shape[1]] += word
@@ -139,7 +139,7 @@ def wave(amplitude_m, wavelength_m, degrees, phase_rad):
 
 
 def add_materials():
-    file.material('plaster', texture=plaster((0.84, 0.82, 0.78), (0.88, 0.87, 0.84), 11), metres=2.4)
+    file.material('plaster', texture=plaster((0.85, 0.83, 0.795), (0.90, 0.885, 0.855), 11), metres=2.4)
     file.material('terracotta', texture=plaster((0.86, 0.58, 0.42), (0.94, 0.77, 0.63), 12, 384), metres=2.4)
     file.material('stone', texture=plaster((0.61, 0.56, 0.48), (0.66, 0.61, 0.53), 13), metres=0.9)
     file.material('ashlar', texture=tiles(256, 4, (0.88, 0.83, 0.74), (0.80, 0.74, 0.64), (0.52, 0.46, 0.38), 0.012, 21), metres=0.88)
@@ -149,7 +149,7 @@ def add_materials():
     file.material('linen', texture=linen(*CLOTH_SIZE))
     file.material('left page', texture=page(2))
     file.material('right page', texture=page(0, HEADING))
-    file.material('lemon', texture=plaster((0.80, 0.52, 0.04), (0.88, 0.64, 0.08), 31), metres=0.5)
+    file.material('lemon', texture=plaster((0.80, 0.52, 0.04), (0.88, 0.64, 0.08), 31), metres=0.3)
     file.material('paper edge', (0.66, 0.60, 0.50))
     file.material('cedar', (0.34, 0.19, 0.11))
     file.material('black', (0.0, 0.0, 0.0))
@@ -440,22 +440,22 @@ def sea(azimuth, elevation):
     """Waves on a plane, each as far as the texels there can show it; what they cannot show is roughness."""
     outward, far = bearing(azimuth, 0 * elevation), SEA_BELOW_EYE_M / np.tan(np.maximum(-elevation, 4e-4))
     at, blur, random = outward * far[..., None], far**2 / SEA_BELOW_EYE_M * -np.gradient(elevation, axis=0), np.random.default_rng(5)
-    gust = np.clip(1 + 0.9 * fractal(at[..., 0] / 90, at[..., 2] / 60, 71, 4), 0.25, 2)
+    gust = np.clip(1 + 1.5 * fractal(at[..., 0] / 40, at[..., 2] / 60, 71, 5), 0.1, 2.4)
     slope, height, rough = 0.0, 0.0, 0.0
-    for wavelength in np.geomspace(0.35, 11, 48):
-        heading, k = 0.35 + 0.8 * random.normal(), 2 * np.pi / wavelength
+    for wavelength in np.geomspace(0.3, 8, 52):
+        heading, k = 0.5 + 0.95 * random.normal(), 2 * np.pi / wavelength
         along = A([np.sin(heading), 0, np.cos(heading)])
         seen, phase = np.exp(-0.5 * (0.4 * k * np.hypot(outward @ along, 0.3) * blur)**2), k * (at @ along) + random.uniform(0, 7)
         slope = slope + (seen * np.cos(phase))[..., None] * along
         height, rough = height + seen * np.sin(phase) / k, rough + (1 - seen**2) / 2
     # Seen from low down, faces that lean to the eye hide the others.
-    steep = 0.025 * np.sqrt(gust)[..., None]
-    n, view = unit(UP - steep * (slope + 0.9 * outward * np.sqrt(rough)[..., None])), -bearing(azimuth, elevation)
+    steep = 0.024 * np.sqrt(gust)[..., None]
+    n, view = unit(UP - steep * (slope + 0.65 * outward * np.sqrt(rough)[..., None])), -bearing(azimuth, elevation)
     cosine = np.clip((n * view).sum(-1, keepdims=True), 0.03, 1)
     fresnel, crest = 0.02 + 0.98 * (1 - cosine)**5, np.clip(0.5 + 0.22 * height, 0, 1)
     out = fresnel * air(2 * cosine * n - view) + (1 - fresnel) * over(A([0.004, 0.045, 0.068]), [0.014, 0.105, 0.125], crest)
-    foam = np.clip(height - 6.2, 0, 1) * np.clip(fractal(at[..., 0] / 0.6, at[..., 2], 72, 4) * 2, 0, 1)
-    return over(over(out, [0.75, 0.74, 0.70], foam), air(outward), 1 - np.exp(-far / 25e3))
+    foam = np.clip(height - 4.7, 0, 1) * np.clip(fractal(at[..., 0] / 0.8, at[..., 2] / 1.5, 72, 4) * 2.5, 0, 1)
+    return over(over(out, [0.75, 0.74, 0.70], foam), air(outward), 1 - np.exp(-far / 15e3))
 
 
 def heap(x, y):
@@ -474,7 +474,7 @@ def sky(width=2304, height=704):
     for low, rise, tone, seed in ((0.10, 0.8, (0.40, 0.42, 0.47), 41), (-0.3, 2.2, (0.22, 0.25, 0.28), 43)):
         bulk = np.exp(-np.clip(x - 20, 0, 99) / 10) / (1 + np.exp(-(x - 6.5) / 1.8))
         land = low + rise * (bulk + 0.35 * fractal(x / 5, 0 * y, seed, 6))
-        faces = 1 + 0.22 * fractal(x / 0.8 + 0.9 * y, y / 0.9, seed + 1, 5)
+        faces = 1 + 0.17 * fractal(x / 0.8 + 0.9 * y, y / 0.9, seed + 1, 5)
         out = over(out, tinted(faces, tone), np.clip((land - y) / 0.05, 0, 1))
     wet = y[:, 0] < 0
     out[wet] = sea(azimuth[wet], elevation[wet])
