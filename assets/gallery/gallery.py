@@ -4,6 +4,8 @@ the first camera.
     python3 gallery.py
 """
 import os
+import re
+import textwrap
 
 import numpy as np
 
@@ -40,7 +42,7 @@ def plaster(colour, bloom, seed, n=256):
     return (tinted(1 - veil, colour) + tinted(veil, bloom)) * (1 + sweep[..., None])
 
 
-def marble(n=512):
+def marble(n=448):
     """Dark green, with white veins that cross."""
     cloud = noise((n, n), (3, 3), 1, 6, 0.55)
     out = tinted(0.19 + 0.07 * noise((n, n), (5, 5), 2, 6, 0.6), (0.84, 1.0, 1.02))
@@ -70,7 +72,7 @@ def linen(long, wide, texel=0.0006):
         out += 0.11 * fold * np.exp(-0.5 * fold**2)
     out += 0.03 * (edge < 0.014) - 0.14 * (np.abs(edge - 0.014) < 0.0012)
     dyed = sum(np.abs(edge - at) < half for at, half in ((0.040, 0.003), (0.053, 0.007), (0.066, 0.003)))
-    # In few steps, which pack well.
+    # In steps, so that a palette holds them.
     return tinted(np.round(out, 2), (0.985, 1, 1.02)) * (1 - dyed[..., None] * A([0.80, 0.66, 0.44]))
 
 
@@ -81,56 +83,55 @@ LETTERS = '''a0708484643,4606033345 b0c03,060848430306 c474808034344 d4c43,46480
     w0823,2338,3853,5368 x0843,4803 y0823,481000 z0848,4803,0343 A033b,3b63,1656 L0b03,0343 S5a5b0b0857530304 T0b6b,3b33
     W0b23,234b,4b63,638b .03,04,13,14 ,1301 ;1301,17'''
 HEADING, TEXT = 'What the Sun Wrote', '''
-The sun writes without a hand. Lend it a glass of wine, and it draws a red leaf on the cloth; lend it a ring, and it draws a heart whose point turns to the lamp wherever you set it down.
-Light does nothing for show. At each wall of glass it takes the way that is soonest done, and where many such ways lie side by side the cloth is bright. The line you see is a crowd.
-Water is a lens that cannot keep still. A wave gathers its handful of day, carries it a little and lets it fall, so that the floor of a pool is a page that is never the same twice.
-A colour is a way of being turned aside. Send a white ray through a wedge of heavy glass; red leaves it almost straight, violet gives way the most, and all the rest stand in a row between.
-Shadows are not empty. Look into one as long as it takes for tea to cool, and you will find the room in it, folded small and faint, with its windows and with you.
-Stand where the light is sharpest and look back along it. Two pictures of the sun meet there, and with one step to the side both are gone.
+The sun writes without a hand. Lend it a glass of wine, and it draws a red leaf on the cloth; lend it a ring, and it draws a heart
+whose point turns to the lamp wherever you set it down.
+Light does nothing for show. At each wall of glass it takes the way that is soonest done, and where many such ways lie side by side
+the cloth is bright. The line you see is a crowd.
+Water is a lens that cannot keep still. A wave gathers its handful of day, carries it a little and lets it fall, so that the floor
+of a pool is a page that is never the same twice.
+Send a white ray through a wedge of heavy glass; red leaves it almost straight, violet gives way the most, and all the rest stand
+in a row between. A colour is a way of being turned aside.
+Shadows are not empty. Look into one as long as it takes for tea to cool, and you will find the room in it, folded small and faint.
+Stand where the light is sharpest and look back along it. Two suns meet there, and with one step to the side both are gone.
 '''
 
 
-def letter(strokes, unit, fine=4):
+def letter(strokes, unit):
     """Ink of one letter, drawn by a broad nib whose edge stands at 30 degrees; upright strokes get serifs."""
-    lines, p, high = [], [], int(14 * unit)
+    p = []
     for stroke in strokes:
         q = A([[int(x, 16), int(y, 16)] for x, y in zip(stroke[::2], stroke[1::2])], float)
-        upright = len(q) == 2 and stroke[0] == stroke[2]
-        lines += [q] + ([q[0] + A([[-0.8, -0.4], [0, 0]]), q[1] + A([[-0.8, 0], [0.8, 0]])] if upright else [])
-    for q in lines:
-        # Cutting its corners rounds a stroke and makes its points many.
-        for _ in range(5):
-            q = np.vstack([q[:1], np.stack([0.75 * q[:-1] + 0.25 * q[1:], 0.25 * q[:-1] + 0.75 * q[1:]], 1).reshape(-1, 2), q[-1:]])
-        p.append(q)
-    p = np.vstack(p)
-    width = int(np.ceil((p[:, 0].max() + 1.9) * unit))
-    y, x = np.mgrid[0:high * fine, 0:width * fine] / (fine * unit)
-    dx, dy = x[..., None] - 0.5 - p[:, 0], 12.8 - y[..., None] - p[:, 1]
-    nib = np.hypot((0.87 * dx + 0.5 * dy) / 0.60, (0.87 * dy - 0.5 * dx) / 0.28).min(-1) < 1
-    return nib.reshape(high, fine, width, fine).mean((1, 3))
+        serifs = [q[0] + A([[-0.8, -0.4], [0, 0]]), q[1] + A([[-0.8, 0], [0.8, 0]])] if len(q) == 2 and stroke[0] == stroke[2] else []
+        for line in [q, *serifs]:
+            # Cutting its corners rounds a stroke and makes its points many.
+            for _ in range(5):
+                cuts = np.stack([0.75 * line[:-1] + 0.25 * line[1:], 0.25 * line[:-1] + 0.75 * line[1:]], 1)
+                line = np.vstack([line[:1], cuts.reshape(-1, 2), line[-1:]])
+            p += line.tolist()
+    p = A(p)
+    y, x = np.mgrid[0:int(14 * unit), 0:int(np.ceil((p[:, 0].max() + 1.9) * unit))] / unit
+    dx, dy = x[..., None] - 0.5 - p[:, 0], 12.6 - y[..., None] - p[:, 1]
+    nib = np.hypot((0.87 * dx + 0.5 * dy) / 0.60, (0.87 * dy - 0.5 * dx) / 0.28).min(-1)
+    return np.clip(0.5 + 0.4 * unit * (1 - nib), 0, 1)
 
 
 def page(first, heading='', width=736, height=1088):
     """A heading and paragraphs, from the first given on, in justified lines."""
-    ink, left, right, row = np.zeros((height, width)), int(0.14 * width), int(0.87 * width), int(0.10 * height)
+    ink, measure, row = np.zeros((height, width)), 0.73 * width, int(0.10 * height)
     small, large = ({s[0]: letter(s[1:].split(','), unit) for s in LETTERS.split()} for unit in (1.85, 3.0))
     words = lambda text, font: [np.hstack([font[c] for c in word]) for word in text.split()]
-    blank, paragraphs = np.zeros((25, 24)), TEXT.strip().split('\n')
+    blank, paragraphs = np.zeros((25, 24)), re.split(r'\n(?=[A-Z])', TEXT.strip())
     lines = [(words(heading, large), False), ([blank], False)] if heading else []
     for text in (paragraphs[first:] + paragraphs) * 2:
-        line, used = [blank], 24
-        for word in words(text, small):
-            if used + 7 + word.shape[1] > right - left:
-                lines, line, used = lines + [(line, True)], [], -7
-            line, used = line + [word], used + 7 + word.shape[1]
-        lines.append((line, False))
+        wrapped = textwrap.wrap(text, 52)
+        lines += [([blank] * (k == 0) + words(line, small), k < len(wrapped) - 1) for k, line in enumerate(wrapped)]
     for line, full in lines[:33]:
-        at, gap = left, (right - left - sum(w.shape[1] for w in line)) / (len(line) - 1) if full else 7
+        at, gap = 0.14 * width, (measure - sum(w.shape[1] for w in line)) / (len(line) - 1) if full else 7
         for word in line:
             ink[row:row + len(word), int(at):int(at) + word.shape[1]] += word
             at += word.shape[1] + gap
         row += len(line[0]) + 1
-    return tinted(1 - 0.8 * np.clip(ink, 0, 1), (0.84, 0.80, 0.72))
+    return tinted(1 - 0.05 * np.round(16 * np.clip(ink, 0, 1)), (0.84, 0.80, 0.72))
 
 
 def wave(amplitude_m, wavelength_m, degrees, phase_rad):
@@ -458,15 +459,12 @@ def sea(azimuth, elevation):
     return over(over(out, [0.75, 0.74, 0.70], foam), air(outward), 1 - np.exp(-far / 15e3))
 
 
-def heap(x, y):
-    """Density of clouds with a flat foot."""
-    rising = (4.2 - y + 4.5 * fractal(x / 8 + 3.1, 0 * y, 91, 3)) / 2.2
-    return np.clip(rising, -1.2, 0.6) + 0.8 * fractal(x / 2.4, y / 1.6, 92, 6, 0.55) - 1.2 * np.exp(-np.clip(y - 1, 0, 9) / 0.3)
-
-
 def sky(width=2304, height=704):
     x, y = np.meshgrid(*(np.interp((np.arange(n) + 0.5) / n, *knots) for n, knots in ((width, AZIMUTH), (height, ELEVATION))))
     azimuth, elevation = np.radians(x), np.radians(y)
+    # Clouds with a flat foot, lit from the upper left: thinner there than behind.
+    rising = lambda x, y: np.clip((4.2 - y + 4.5 * fractal(x / 8 + 3.1, 0 * y, 91, 3)) / 2.2, -1.2, 0.6) - 1.2 * np.exp(-np.clip(y - 1, 0, 9) / 0.3)
+    heap = lambda x, y: rising(x, y) + 0.8 * fractal(x / 2.4, y / 1.6, 92, 6, 0.55)
     cirrus = np.clip(fractal(x / 9 + y / 5, y / 1.1, 93, 5) * 1.2 - 0.1, 0, 1) * np.exp(-((y - 11) / 6)**2)
     out, density = over(air(bearing(azimuth, elevation)), [0.62, 0.60, 0.60], 0.5 * cirrus), heap(x, y)
     lit = np.clip(0.45 + 1.1 * (density - heap(x - 0.7, y + 0.5)), 0, 1)
@@ -505,7 +503,7 @@ def add_sky():
 
 def add_cameras():
     file.camera('overview', [-0.11, 1.00, 1.25], [0.155, 0.872, 0.3], 0.72)
-    file.camera('wine glass', [0.16, 0.98, 1.10], [0.20, 0.83, 0.50], 0.50)
+    file.camera('wine glass', [0.16, 0.98, 1.10], [0.20, 0.845, 0.50], 0.50)
     file.camera('tumbler', [-0.02, 0.98, 0.95], [-0.06, 0.79, 0.60], 0.46)
     file.camera('ring', [0.05, 0.97, 1.01], [0.075, 0.765, 0.785], 0.42)
     file.camera('pool', [-1.15, 1.35, 0.05], [0.75, 0.25, -2.3], 1.0)
