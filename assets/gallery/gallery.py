@@ -4,10 +4,12 @@ the first camera.
     python3 gallery.py
 """
 import os
+import re
+import textwrap
 
 import numpy as np
 
-from kit import File, box, facets, join, lathe, mesh, moved, noise, rect, ring, rotation, sheet, unit
+from kit import File, box, facets, fractal, join, lathe, mesh, moved, noise, rect, ring, rotation, sheet, unit
 from lens import relief
 
 A = np.array
@@ -16,13 +18,13 @@ UP = A([0.0, 1.0, 0.0])
 # The sun stands 31 degrees high: lower, the glasses throw their light too far; higher, the pool leaves the wall dark.
 SUN = unit([0.76, -0.50, 0.36])
 SUN_W_PER_M2, SUN_COLOUR = 9.0, [1.0, 0.80, 0.52]
-SKY_W_PER_M2, SKY_COLOUR = 1.8, [0.90, 1.0, 1.12]
+SKY_W_PER_M2, SKY_COLOUR = 5.6, [0.96, 1.0, 1.09]
 
 ROOM_X, ROOM_Z, HEIGHT = (-1.7, 2.0), (-4.2, 2.8), 3.4
-WALL = 0.35
+WALL, BAND = 0.35, 0.09
 POOL_X, POOL_Z, RIM, WATER, BOTTOM = (-0.9, 1.55), (-3.6, -0.55), 0.46, 0.40, -0.35
 TABLE_X, TABLE_Z, TABLE = (-0.85, 0.85), (0.10, 1.15), 0.75
-CLOTH = TABLE + 0.0015
+CLOTH, CLOTH_SIZE = TABLE + 0.0015, (1.00, 0.74)
 
 file = File()
 
@@ -33,17 +35,21 @@ def tinted(value, colour):
     return value[..., None] * A(colour)
 
 
-def plaster(colour, seed, n=256):
-    return tinted(1 + 0.035 * noise((n, n), (3, 3), seed, 6, 0.6), colour)
+def plaster(colour, bloom, seed, n=256):
+    """Coats that dried unevenly: a pale bloom, broad sweeps, and strokes of the brush both ways."""
+    veil = np.clip(0.4 + 0.9 * noise((n, n), (4, 4), seed, 6, 0.6), 0, 1)
+    sweep = sum(depth * noise((n, n), cells, seed, 3) for depth, cells in ((0.04, (3, 3)), (0.025, (24, 6)), (0.02, (6, 24))))
+    return (tinted(1 - veil, colour) + tinted(veil, bloom)) * (1 + sweep[..., None])
 
 
-def marble(n=512):
+def marble(n=448):
+    """Dark green, with white veins that cross."""
     cloud = noise((n, n), (3, 3), 1, 6, 0.55)
-    out = tinted(0.78 + 0.05 * noise((n, n), (2, 2), 2, 5), (1, 0.985, 0.955))
-    for width, depth, seed in ((0.05, 0.30, 5), (0.03, 0.22, 6), (0.10, 0.14, 7)):
+    out = tinted(0.19 + 0.07 * noise((n, n), (5, 5), 2, 6, 0.6), (0.84, 1.0, 1.02))
+    for width, depth, seed in ((0.016, 0.60, 5), (0.05, 0.16, 6), (0.010, 0.50, 7)):
         line = np.exp(-np.abs(noise((n, n), (2, 2), seed, 6, 0.55) + 0.25 * cloud) / width)
-        patchy = np.clip(0.5 + 0.9 * noise((n, n), (3, 3), seed + 20, 3), 0, 1)
-        out -= tinted(depth * line * patchy, (0.9, 0.95, 1.0))
+        patchy = np.clip(0.4 + 1.1 * noise((n, n), (3, 3), seed + 20, 3), 0, 1)
+        out += tinted(depth * line * patchy, (1.0, 0.98, 0.93))
     return out
 
 
@@ -56,29 +62,76 @@ def tiles(n, per_side, light, dark, joint, gap, seed):
     return np.where((edge < gap)[..., None], A(joint), A(light) * tone + A(dark) * (1 - tone))
 
 
-def linen(n=256):
-    y, x = np.mgrid[0:n, 0:n]
-    weave = 0.02 * np.sin(x * np.pi / 2) * np.sin(y * np.pi / 2)
-    threads = 0.025 * (noise((n, n), (4, 128), 61, 2) + noise((n, n), (128, 4), 62, 2))
-    return tinted(0.62 + weave + threads, (1, 0.955, 0.87))
+def linen(long, wide, texel=0.0006):
+    """A whole cloth, thread by thread: a border of stripes, a stitched hem, and creases where it lay folded."""
+    random, s, t = np.random.default_rng(61), np.arange(0, long, texel)[:, None], np.arange(0, wide, texel)
+    edge = np.minimum(np.minimum(s, long - s), np.minimum(t, wide - t))
+    weave = 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel)
+    out = 0.67 + weave + random.normal(0, 0.011, s.shape) + random.normal(0, 0.011, t.shape) + 0.03 * noise(edge.shape, (5, 4), 62, 3)
+    for fold in ((s - long / 3) / 0.005, (s - long * 2 / 3) / 0.005, (wide / 2 - t) / 0.005):
+        out += 0.11 * fold * np.exp(-0.5 * fold**2)
+    out += 0.03 * (edge < 0.014) - 0.14 * (np.abs(edge - 0.014) < 0.0012)
+    dyed = sum(np.abs(edge - at) < half for at, half in ((0.040, 0.003), (0.053, 0.007), (0.066, 0.003)))
+    # In steps, so that a palette holds them.
+    return tinted(np.round(out, 2), (0.985, 1, 1.02)) * (1 - dyed[..., None] * A([0.80, 0.66, 0.44]))
 
 
-def page(seed, width=384, height=576):
-    """Words as rows of dark strokes on warm paper."""
-    random = np.random.default_rng(seed)
-    ink = np.zeros((height, width))
-    for line, y in enumerate(range(int(0.12 * height), int(0.88 * height), 12)):
-        first, last = line % 9 == 0, line % 9 == 8
-        x, end = (0.19 if first else 0.14) * width, (random.uniform(0.3, 0.7) if last else 0.86) * width
-        while x < end - 8:
-            word = min(random.integers(8, 34), end - x)
-            stroke = x
-            while stroke < x + word:
-                thick, up, down = random.integers(2, 4), random.choice([0, 0, 0, 2]), random.choice([0, 0, 0, 2])
-                ink[y - up:y + 5 + down, int(stroke):int(stroke) + thick] = random.uniform(0.5, 0.95)
-                stroke += thick + 1
-            x += word + 6
-    return tinted(1 - 0.7 * ink, (0.84, 0.80, 0.72))
+# Letters as strokes of points x, y (hexadecimal): the line of writing is at 3, low letters reach 8 and high ones c.
+LETTERS = '''a0708484643,4606033345 b0c03,060848430306 c474808034344 d4c43,464808034345 e0646,464808034344 f3b3c1c13,0838
+    g48400001,464808034345 h0c03,0608484643 i0803,0b j28200001,2b k0c03,0548,1643 l0c03 m0803,0608383633,3638686663 n0803,0608484643
+    o280803434828 p0800,060848430306 q4840,464808034345 r0803,06083837 s4748080645430304 t1a133334,0838 u08034345,4843 v0823,2348
+    w0823,2338,3853,5368 x0843,4803 y0823,481000 z0848,4803,0343 A033b,3b63,1656 L0b03,0343 S5a5b0b0857530304 T0b6b,3b33
+    W0b23,234b,4b63,638b .03,04,13,14 ,1301 ;1301,17'''
+HEADING, TEXT = 'What the Sun Wrote', '''
+The sun writes without a hand. Lend it a glass of wine, and it draws a red leaf on the cloth; lend it a ring, and it draws a heart
+whose point turns to the lamp wherever you set it down.
+Light does nothing for show. At each wall of glass it takes the way that is soonest done, and where many such ways lie side by side
+the cloth is bright. The line you see is a crowd.
+Water is a lens that cannot keep still. A wave gathers its handful of day, carries it a little and lets it fall, so that the floor
+of a pool is a page that is never the same twice.
+Send a white ray through a wedge of heavy glass; red leaves it almost straight, violet gives way the most, and all the rest stand
+in a row between. A colour is a way of being turned aside.
+Shadows are not empty. Look into one as long as it takes for tea to cool, and you will find the room in it, folded small and faint.
+Stand where the light is sharpest and look back along it. Two suns meet there, and with one step to the side both are gone.
+'''
+
+
+def letter(strokes, unit):
+    """Ink of one letter, drawn by a broad nib whose edge stands at 30 degrees; upright strokes get serifs."""
+    p = []
+    for stroke in strokes:
+        q = A([[int(x, 16), int(y, 16)] for x, y in zip(stroke[::2], stroke[1::2])], float)
+        serifs = [q[0] + A([[-0.8, -0.4], [0, 0]]), q[1] + A([[-0.8, 0], [0.8, 0]])] if len(q) == 2 and stroke[0] == stroke[2] else []
+        for line in [q, *serifs]:
+            # Cutting its corners rounds a stroke and makes its points many.
+            for _ in range(5):
+                cuts = np.stack([0.75 * line[:-1] + 0.25 * line[1:], 0.25 * line[:-1] + 0.75 * line[1:]], 1)
+                line = np.vstack([line[:1], cuts.reshape(-1, 2), line[-1:]])
+            p += line.tolist()
+    p = A(p)
+    y, x = np.mgrid[0:int(14 * unit), 0:int(np.ceil((p[:, 0].max() + 1.9) * unit))] / unit
+    dx, dy = x[..., None] - 0.5 - p[:, 0], 12.6 - y[..., None] - p[:, 1]
+    nib = np.hypot((0.87 * dx + 0.5 * dy) / 0.60, (0.87 * dy - 0.5 * dx) / 0.28).min(-1)
+    return np.clip(0.5 + 0.4 * unit * (1 - nib), 0, 1)
+
+
+def page(first, heading='', width=736, height=1088):
+    """A heading and paragraphs, from the first given on, in justified lines."""
+    ink, measure, row = np.zeros((height, width)), 0.73 * width, int(0.10 * height)
+    small, large = ({s[0]: letter(s[1:].split(','), unit) for s in LETTERS.split()} for unit in (1.85, 3.0))
+    words = lambda text, font: [np.hstack([font[c] for c in word]) for word in text.split()]
+    blank, paragraphs = np.zeros((25, 24)), re.split(r'\n(?=[A-Z])', TEXT.strip())
+    lines = [(words(heading, large), False), ([blank], False)] if heading else []
+    for text in (paragraphs[first:] + paragraphs) * 2:
+        wrapped = textwrap.wrap(text, 52)
+        lines += [([blank] * (k == 0) + words(line, small), k < len(wrapped) - 1) for k, line in enumerate(wrapped)]
+    for line, full in lines[:33]:
+        at, gap = 0.14 * width, (measure - sum(w.shape[1] for w in line)) / (len(line) - 1) if full else 7
+        for word in line:
+            ink[row:row + len(word), int(at):int(at) + word.shape[1]] += word
+            at += word.shape[1] + gap
+        row += len(line[0]) + 1
+    return tinted(1 - 0.05 * np.round(16 * np.clip(ink, 0, 1)), (0.84, 0.80, 0.72))
 
 
 def wave(amplitude_m, wavelength_m, degrees, phase_rad):
@@ -87,15 +140,17 @@ def wave(amplitude_m, wavelength_m, degrees, phase_rad):
 
 
 def add_materials():
-    file.material('plaster', texture=plaster((0.86, 0.845, 0.81), 11), metres=2.4)
-    file.material('terracotta', texture=plaster((0.80, 0.56, 0.42), 12), metres=2.0)
-    file.material('stone', texture=plaster((0.62, 0.57, 0.49), 13), metres=0.9)
+    file.material('plaster', texture=plaster((0.85, 0.83, 0.795), (0.90, 0.885, 0.855), 11), metres=2.4)
+    file.material('terracotta', texture=plaster((0.86, 0.58, 0.42), (0.94, 0.77, 0.63), 12, 384), metres=2.4)
+    file.material('stone', texture=plaster((0.61, 0.56, 0.48), (0.66, 0.61, 0.53), 13), metres=0.9)
+    file.material('ashlar', texture=tiles(256, 4, (0.88, 0.83, 0.74), (0.80, 0.74, 0.64), (0.52, 0.46, 0.38), 0.012, 21), metres=0.88)
     file.material('paving', texture=tiles(512, 4, (0.62, 0.54, 0.44), (0.50, 0.42, 0.33), (0.36, 0.32, 0.27), 0.02, 3), metres=2.4)
     file.material('mosaic', texture=tiles(512, 16, (0.46, 0.74, 0.74), (0.20, 0.54, 0.60), (0.62, 0.70, 0.68), 0.05, 9), metres=0.8)
-    file.material('marble', texture=marble(), metres=1.3)
-    file.material('linen', texture=linen(), metres=0.10)
-    file.material('left page', texture=page(1))
-    file.material('right page', texture=page(2))
+    file.material('marble', texture=marble(), metres=0.8)
+    file.material('linen', texture=linen(*CLOTH_SIZE))
+    file.material('left page', texture=page(2))
+    file.material('right page', texture=page(0, HEADING))
+    file.material('lemon', texture=plaster((0.80, 0.52, 0.04), (0.88, 0.64, 0.08), 31), metres=0.3)
     file.material('paper edge', (0.66, 0.60, 0.50))
     file.material('cedar', (0.34, 0.19, 0.11))
     file.material('black', (0.0, 0.0, 0.0))
@@ -146,7 +201,11 @@ def arched_wall(name, material, place, span, height, arches):
         p = A([[place(s, y, 0), place(s, y, WALL)] for s, y in line])
         n = A([[A(place(s, y, 0)) - origin] * 2 for s, y in inward])
         uv0 = np.stack(np.broadcast_arrays(along[:, None], [0, WALL]), -1)
-        file.add_to('reveals', sheet(p, n, uv0), material)
+        file.add_to('reveals', sheet(p, n, uv0), 'ashlar')
+        # A surround of the same blocks, a little proud of the wall.
+        p = A([[place(*(q - out * BAND), -0.004), place(*q, -0.004)] for q, out in zip(line, inward)])
+        uv0 = np.stack(np.broadcast_arrays(along[:, None], [-BAND, 0]), -1)
+        file.add_to('reveals', sheet(p, np.broadcast_to(A(place(0, 0, -1)) - origin, p.shape), uv0), 'ashlar')
 
 
 def flat(x, z, y, up=1):
@@ -219,7 +278,9 @@ def add_table():
     for x in (TABLE_X[0] + 0.3, TABLE_X[1] - 0.3):
         for face in sides((x - 0.11, x + 0.11), (TABLE_Z[0] + 0.2, TABLE_Z[1] - 0.2), (0.0, TABLE - thick), False):
             file.add_to('rim', face, 'stone')
-    file.add('cloth', flat((-0.46, 0.66), (0.16, 1.06), TABLE + 0.0012), 'linen')
+    along, across = (rotation(UP, 3) @ A([[CLOTH_SIZE[0] / 2, 0, 0], [0, 0, CLOTH_SIZE[1] / 2]]).T).T
+    cloth = rect([0.11, TABLE + 0.0012, 0.64], across, along)
+    file.add('cloth', dict(cloth, uv0=cloth['uv1']), 'linen')
 
 
 # ---- exhibits
@@ -232,14 +293,15 @@ WINE_GLASS, TUMBLER, BOOK, BALL = on_cloth(0.10, 0.47), on_cloth(-0.19, 0.55), o
 
 
 def add_wine_glass():
+    # The bowl narrows upwards: light that enters its side leaves it opposite and draws a leaf of ruby in the shadow.
     outline = [[0, .001], [.022, .0010], [.036, .0008], [.0400, .0014], [.0412, .0026], [.0400, .0038], [.034, .0052], [.020, .0085],
-               [.0085, .0155], [.0055, .026], [.0052, .044], [.0072, .0585], [.0190, .0690], [.0385, .0870], [.0510, .1140], [.0535, .1380],
-               [.0500, .1680], [.0442, .1950], [.0440, .1958], [.0434, .1962], [.0428, .1958], [.0426, .1950], [.0485, .1680], [.0519, .1380],
-               [.0494, .1145], [.0368, .0882], [.0180, .0715], [.0090, .0678], [0, .0668]]
+               [.0085, .0155], [.0055, .0240], [.0052, .0370], [.0072, .0420], [.0220, .0440], [.0430, .0520], [.0520, .0700], [.0505, .0970],
+               [.0445, .1270], [.0395, .1520], [.0375, .1660], [.0373, .1668], [.0368, .1672], [.0363, .1668], [.0361, .1658], [.0381, .1518],
+               [.0431, .1267], [.0491, .0968], [.0506, .0702], [.0421, .0531], [.0215, .0453], [.0108, .0421], [0, .0409]]
     # Wider than the bowl by 0.7 mm, so that no air is between.
-    wine = [[0, .0660], [.0090, .0669], [.0184, .0705], [.0376, .0873], [.0503, .1142], [.0526, .1340]]
+    wine = [[0, .0402], [.0108, .0413], [.0218, .0447], [.0425, .0525], [.0513, .0701], [.0498, .0969], [.0438, .1269], [.0424, .1340]]
     file.add('wine glass', moved(lathe([outline], 96, 4), WINE_GLASS), 'glass')
-    file.add('wine', moved(lathe([wine, [[.0526, .1340], [0, .1340]]], 96, 4), WINE_GLASS), 'wine')
+    file.add('wine', moved(lathe([wine, [[.0424, .1340], [0, .1340]]], 96, 4), WINE_GLASS), 'wine')
 
 
 def add_tumbler(n=14, finer=8):
@@ -301,6 +363,12 @@ def add_book(half_width=0.155, half_height=0.115):
     file.add('ring', moved(lathe(list(zip(profile[:-1], profile[1:])), 160), place, turn @ rotation([0, 0, 1], -8)), 'gold')
 
 
+def add_lemon(length=0.082, radius=0.030):
+    outline = A([[0, 0], [.42, .05], [.84, .20], [1, .44], [.86, .70], [.48, .90], [.20, .975], [0, 1]]) * [radius, length]
+    lemon = moved(lathe([outline], 40, 2), turn=rotation(UP, -28) @ rotation([0, 0, 1], 86))
+    file.add('lemon', moved(lemon, on_cloth(0.335, 0.845) - UP * lemon['p'][:, 1].min()), 'lemon')
+
+
 def add_prism():
     """A bar of dense flint on a post by the pool: edge down, it turns the sun upwards and throws a spectrum on the vault."""
     apex_rad, side, half, centre = np.radians(42), 0.075, 0.14, A([-1.22, 1.00, -2.70])
@@ -347,39 +415,83 @@ def add_butterfly():
 # ---- sky and sea
 
 DOME, EYE = 40.0, A([0.0, 1.15, 0.0])
+# Most texels go where the arches show them: azimuth from the back wall and elevation [degrees] along an image, from 0 to 1.
+AZIMUTH = (0, 0.05, 0.22, 0.92, 1), (-180, -125, -32, 32, 180)
+ELEVATION = (0, 0.16, 0.58, 0.95, 1), (90, 14, 0, -8.5, -90)
+SEA_BELOW_EYE_M = 6.0
 
 
-def sky(width=4096, height=512):
-    """Row by row from zenith to nadir, dense at the horizon."""
-    v, u = np.mgrid[0:height, 0:width]
-    q = 1 - 2 * (v + 0.5) / height
-    elevation, azimuth = np.sign(q) * q * q * np.pi / 2, (u + 0.5) / width * 2 * np.pi
-    direction = np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)], -1)
-    share = np.clip(np.sin(elevation), 0, 1)[..., None]**0.5
-    horizon = A([0.86, 0.80, 0.74])
-    out = horizon * (1 - share) + A([0.20, 0.38, 0.66]) * share
+def bearing(azimuth, elevation):
+    return np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), -np.cos(azimuth) * np.cos(elevation)], -1)
+
+
+def over(below, colour, cover):
+    return below + (A(colour) - below) * cover[..., None]
+
+
+def air(direction):
+    """Clear sky: warm haze, blue above, and a glow around the sun."""
+    up = np.clip(direction[..., 1:2], 0, 1)
     off_sun = np.arccos(np.clip(direction @ -SUN, -1, 1))[..., None]
-    out = out + A([0.50, 0.34, 0.16]) * np.exp(-off_sun / 0.2) + A([0.20, 0.12, 0.05]) * np.exp(-off_sun / 0.7)
-    streaks = np.clip(noise((height, width), (6, 24), 3, 5) * 1.5 + 0.1, 0, 1) * np.exp(-((elevation - 0.13) / 0.13)**2) * (elevation > 0)
-    out += (A([0.98, 0.90, 0.84]) - out) * (0.65 * streaks)[..., None]
-    for low, rise, tone, seed in ((0.022, 0.030, (0.50, 0.54, 0.64), 41), (0.008, 0.026, (0.30, 0.36, 0.46), 43)):
-        ridge = low + rise * noise((1, width), (1, 16), seed, 8, 0.5)[0]
-        cover = np.clip((ridge - elevation) / 0.0012, 0, 1) * (elevation > -0.001)
-        out += (A(tone) - out) * cover[..., None]
-    depth = np.exp(np.minimum(elevation, 0) / 0.07)[..., None]
-    sea = A([0.03, 0.17, 0.26]) * (1 - depth) + A([0.40, 0.54, 0.60]) * depth
-    ripples = noise((height, width), (128, 256), 78, 2)[..., None]
-    return np.where((elevation < 0)[..., None], sea * (1 + 0.16 * ripples), out)
+    glow = A([0.30, 0.20, 0.10]) * np.exp(-off_sun / 0.2) + A([0.06, 0.035, 0.012]) * np.exp(-off_sun / 0.7)
+    return A([0.025, 0.075, 0.15]) + A([0.16, 0.25, 0.34]) * np.exp(-up / 0.20) + A([0.60, 0.37, 0.12]) * np.exp(-up / 0.05) + glow
+
+
+def sea(azimuth, elevation):
+    """Waves on a plane, each as far as the texels there can show it; what they cannot show is roughness."""
+    outward, far = bearing(azimuth, 0 * elevation), SEA_BELOW_EYE_M / np.tan(np.maximum(-elevation, 4e-4))
+    at, blur, random = outward * far[..., None], far**2 / SEA_BELOW_EYE_M * -np.gradient(elevation, axis=0), np.random.default_rng(5)
+    gust = np.clip(1 + 1.5 * fractal(at[..., 0] / 40, at[..., 2] / 60, 71, 5), 0.1, 2.4)
+    slope, height, rough = 0.0, 0.0, 0.0
+    for wavelength in np.geomspace(0.3, 8, 52):
+        heading, k = 0.5 + 0.95 * random.normal(), 2 * np.pi / wavelength
+        along = A([np.sin(heading), 0, np.cos(heading)])
+        seen, phase = np.exp(-0.5 * (0.4 * k * np.hypot(outward @ along, 0.3) * blur)**2), k * (at @ along) + random.uniform(0, 7)
+        slope = slope + (seen * np.cos(phase))[..., None] * along
+        height, rough = height + seen * np.sin(phase) / k, rough + (1 - seen**2) / 2
+    # Seen from low down, faces that lean to the eye hide the others.
+    steep = 0.024 * np.sqrt(gust)[..., None]
+    n, view = unit(UP - steep * (slope + 0.65 * outward * np.sqrt(rough)[..., None])), -bearing(azimuth, elevation)
+    cosine = np.clip((n * view).sum(-1, keepdims=True), 0.03, 1)
+    fresnel, crest = 0.02 + 0.98 * (1 - cosine)**5, np.clip(0.5 + 0.22 * height, 0, 1)
+    out = fresnel * air(2 * cosine * n - view) + (1 - fresnel) * over(A([0.004, 0.045, 0.068]), [0.014, 0.105, 0.125], crest)
+    foam = np.clip(height - 4.7, 0, 1) * np.clip(fractal(at[..., 0] / 0.8, at[..., 2] / 1.5, 72, 4) * 2.5, 0, 1)
+    return over(over(out, [0.75, 0.74, 0.70], foam), air(outward), 1 - np.exp(-far / 15e3))
+
+
+def sky(width=2304, height=704):
+    x, y = np.meshgrid(*(np.interp((np.arange(n) + 0.5) / n, *knots) for n, knots in ((width, AZIMUTH), (height, ELEVATION))))
+    azimuth, elevation = np.radians(x), np.radians(y)
+    # Clouds with a flat foot, lit from the upper left: thinner there than behind.
+    rising = lambda x, y: np.clip((4.2 - y + 4.5 * fractal(x / 8 + 3.1, 0 * y, 91, 3)) / 2.2, -1.2, 0.6) - 1.2 * np.exp(-np.clip(y - 1, 0, 9) / 0.3)
+    heap = lambda x, y: rising(x, y) + 0.8 * fractal(x / 2.4, y / 1.6, 92, 6, 0.55)
+    cirrus = np.clip(fractal(x / 9 + y / 5, y / 1.1, 93, 5) * 1.2 - 0.1, 0, 1) * np.exp(-((y - 11) / 6)**2)
+    out, density = over(air(bearing(azimuth, elevation)), [0.62, 0.60, 0.60], 0.5 * cirrus), heap(x, y)
+    lit = np.clip(0.45 + 1.1 * (density - heap(x - 0.7, y + 0.5)), 0, 1)
+    out = over(out, over(A([0.34, 0.36, 0.41]), [1.0, 0.92, 0.80], lit), 0.9 * np.clip(2.2 * density, 0, 1) * np.clip((y - 0.6) / 2.5, 0, 1))
+    for low, rise, tone, seed in ((0.10, 0.8, (0.40, 0.42, 0.47), 41), (-0.3, 2.2, (0.22, 0.25, 0.28), 43)):
+        bulk = np.exp(-np.clip(x - 20, 0, 99) / 10) / (1 + np.exp(-(x - 6.5) / 1.8))
+        land = low + rise * (bulk + 0.35 * fractal(x / 5, 0 * y, seed, 6))
+        faces = 1 + 0.17 * fractal(x / 0.8 + 0.9 * y, y / 0.9, seed + 1, 5)
+        out = over(out, tinted(faces, tone), np.clip((land - y) / 0.05, 0, 1))
+    wet = y[:, 0] < 0
+    out[wet] = sea(azimuth[wet], elevation[wet])
+    # A boat under sail half a mile out: jib, mainsail and hull.
+    right, up = x + 10.4, y + 0.42
+    for side, wide, tall in ((1, 0.30, 1.15), (-1, 0.22, 0.85)):
+        out = over(out, [0.95, 0.90, 0.80], np.clip(np.minimum(side * right - 0.015, wide * (1 - up / tall) - side * right) / 0.03, 0, 1) * (up > 0.06))
+    return over(out, [0.10, 0.10, 0.11], np.clip((0.08 - np.hypot(right / 4, up)) / 0.03, 0, 1) * (up > -0.05))
 
 
 def add_sky():
     """A painted dome that one lamp above the roof lights: all of its light comes as indirect light, without noise. It has an
     opening for the sun, and a screen keeps the lamp off the house and its terrace."""
     file.material('sky', texture=sky())
-    q = np.linspace(-1, 1, 33)
-    azimuth, elevation = np.meshgrid(np.linspace(0, 2 * np.pi, 65), np.sign(q) * q * q * np.pi / 2, indexing='ij')
-    p = EYE + DOME * np.stack([np.sin(azimuth) * np.cos(elevation), np.sin(elevation), np.cos(azimuth) * np.cos(elevation)], -1)
-    dome = sheet(p, EYE - p, np.stack([azimuth / (2 * np.pi), np.broadcast_to(0.5 - q / 2, azimuth.shape)], -1))
+    x, y = ([a + (b - a) * t for (a, b), n in zip(zip(knots[:-1], knots[1:]), counts) for t in np.arange(n) / n] + [knots[-1]]
+            for (_, knots), counts in ((AZIMUTH, (8, 15, 10, 24)), (ELEVATION, (7, 4, 3, 8))))
+    uv = np.stack(np.meshgrid(np.interp(x, *AZIMUTH[::-1]), np.interp(-A(y), -A(ELEVATION[1]), ELEVATION[0]), indexing='ij'), -1)
+    p = EYE + DOME * bearing(*np.radians(np.meshgrid(x, y, indexing='ij')))
+    dome = sheet(p, EYE - p, uv)
     middle = unit(dome['p'][dome['i']].mean(1) - EYE)
     dome['i'] = dome['i'][middle @ -SUN < np.cos(np.radians(9))]
     file.add('sky', dict(dome, uv1=dome['uv0']), 'sky')
@@ -391,7 +503,7 @@ def add_sky():
 
 def add_cameras():
     file.camera('overview', [-0.11, 1.00, 1.25], [0.155, 0.872, 0.3], 0.72)
-    file.camera('wine glass', [0.16, 0.98, 1.10], [0.20, 0.83, 0.50], 0.50)
+    file.camera('wine glass', [0.16, 0.98, 1.10], [0.20, 0.845, 0.50], 0.50)
     file.camera('tumbler', [-0.02, 0.98, 0.95], [-0.06, 0.79, 0.60], 0.46)
     file.camera('ring', [0.05, 0.97, 1.01], [0.075, 0.765, 0.785], 0.42)
     file.camera('pool', [-1.15, 1.35, 0.05], [0.75, 0.25, -2.3], 1.0)
@@ -408,6 +520,7 @@ add_wine_glass()
 add_tumbler()
 add_ball()
 add_book()
+add_lemon()
 add_prism()
 add_butterfly()
 add_sky()

@@ -146,36 +146,41 @@ def ring(corners, r, y, turn=0.0):
 
 # ---- textures: arrays of linear colour
 
-def noise(shape, cells, seed, octaves=5, gain=0.5):
-    """Value noise that repeats, roughly -1 to 1."""
-    random = np.random.default_rng(seed)
-    out, amplitude, total, cells = np.zeros(shape), 1.0, 0.0, list(cells)
-    for _ in range(octaves):
-        grid = random.uniform(-1, 1, cells)
-        at = [np.arange(n) * c / n for n, c in zip(shape, cells)]
-        cell = [a.astype(int) for a in at]
-        fy, fx = [(f * f * (3 - 2 * f)) for f in (a - c for a, c in zip(at, cell))]
-        low, high = grid[cell[0] % cells[0]], grid[(cell[0] + 1) % cells[0]]
-        row = low + (high - low) * fy[:, None]
-        out += amplitude * (row[:, cell[1] % cells[1]] * (1 - fx) + row[:, (cell[1] + 1) % cells[1]] * fx)
-        total += amplitude
-        amplitude, cells = amplitude * gain, [2 * c for c in cells]
-        if cells[0] > shape[0] or cells[1] > shape[1]:
-            break
+def fractal(x, y, seed, octaves=5, gain=0.5, period=None):
+    """Value noise at any points, roughly -1 to 1, with cells of 1 in its first octave; may repeat after so many of them."""
+    grid, out, amplitude, total = np.random.default_rng(seed).uniform(-1, 1, (256, 256)), 0.0, 1.0, 0.0
+    for octave in range(octaves):
+        i, j = np.floor(x).astype(int), np.floor(y).astype(int)
+        fx, fy = (f * f * (3 - 2 * f) for f in (x - i, y - j))
+        wrap = [256 if period is None else cells << octave for cells in period or (0, 0)]
+        a, b, c, d = [grid[(i + m) % wrap[0] & 255, (j + n) % wrap[1] & 255] for m in (0, 1) for n in (0, 1)]
+        out = out + amplitude * (a + (c - a) * fx + (b - a + (a - b - c + d) * fx) * fy)
+        total, amplitude = total + amplitude, amplitude * gain
+        # Each octave is turned if it may, so that its cells do not line up with the last.
+        x, y = (2 * x, 2 * y) if period else (1.6 * x - 1.2 * y + 17, 1.2 * x + 1.6 * y + 31)
     return out / total * 1.6
 
 
+def noise(shape, cells, seed, octaves=5, gain=0.5):
+    y, x = (np.arange(n) * c / n for n, c in zip(shape, cells))
+    return fractal(y[:, None], x[None, :], seed, octaves, gain, cells)
+
+
 def png(linear):
+    """8 bits for each colour, or a palette where so few are."""
     v = np.clip(linear, 0, 1)
-    v = np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055)
-    v = (v * 255 + 0.5).astype(np.uint8)
+    v = (np.where(v <= 0.0031308, 12.92 * v, 1.055 * v ** (1 / 2.4) - 0.055) * 255 + 0.5).astype(np.uint8)
     height, width, _ = v.shape
-    # Each row as differences from the one above, which pack better.
-    rows = np.diff(v.astype(np.int16), axis=0, prepend=np.zeros((1, width, 3), np.int16)).astype(np.uint8)
-    raw = b''.join(b'\2' + row.tobytes() for row in rows)
+    palette, index = np.unique(v.astype(int) @ [65536, 256, 1], return_inverse=True)
+    few = len(palette) <= 256
+    v = index.reshape(height, width, 1).astype(np.uint8) if few else v
+    # As differences from the left or from above, whichever packs better.
+    change = [np.diff(v, axis=1, prepend=np.zeros_like(v[:, :1])), np.diff(v, axis=0, prepend=np.zeros_like(v[:1]))]
+    packed = [zlib.compress(b''.join(kind + row.tobytes() for row in rows), 9) for kind, rows in zip((b'\1', b'\2'), change)]
     chunk = lambda kind, data: struct.pack('>I', len(data)) + kind + data + struct.pack('>I', zlib.crc32(kind + data))
-    head = struct.pack('>IIBBBBB', width, height, 8, 2, 0, 0, 0)
-    return b'\x89PNG\r\n\x1a\n' + chunk(b'IHDR', head) + chunk(b'IDAT', zlib.compress(raw, 9)) + chunk(b'IEND', b'')
+    head = chunk(b'IHDR', struct.pack('>IIBBBBB', width, height, 8, 3 if few else 2, 0, 0, 0))
+    head += chunk(b'PLTE', b''.join(int(c).to_bytes(3, 'big') for c in palette)) if few else b''
+    return b'\x89PNG\r\n\x1a\n' + head + chunk(b'IDAT', min(packed, key=len)) + chunk(b'IEND', b'')
 
 
 # ---- glTF
