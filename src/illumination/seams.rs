@@ -12,7 +12,11 @@ const REACH_TEXELS: f64 = 2.5;
 /// Distance up to which ends of edges coincide in the map, relative to its side.
 const SAME_PLACE: f64 = 1e-9;
 
-/// An edge of a triangle at which its chart ends although the mesh continues.
+/// Normals on both sides of an edge that are further apart, by the cosine of 10°, make it a crease. What light one side
+/// has tells little about the other: a wall is dark beside its sunlit end.
+const CREASE_COS: f64 = 0.985;
+
+/// An edge of a triangle at which its chart ends although the mesh continues smoothly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Seam {
     /// Ends of the edge in the map [0, 1].
@@ -57,7 +61,7 @@ pub fn find(mesh: &Mesh, corner_uvs: &[[DVec2; 3]]) -> Vec<Seam> {
 }
 
 impl Seam {
-    /// `None` if the chart continues across the edge.
+    /// `None` if the chart continues across the edge, or the edge is a crease.
     fn at(
         mesh: &Mesh,
         corner_uvs: &[[DVec2; 3]],
@@ -72,7 +76,13 @@ impl Seam {
         let other = corner_uvs[beyond];
         let goes_on =
             uvs[edge].distance(other[first]) <= SAME_PLACE && uvs[next].distance(other[second]) <= SAME_PLACE;
-        if goes_on {
+        if goes_on
+            || is_crease(
+                mesh,
+                [(triangle, edge), (beyond, first)],
+                [(triangle, next), (beyond, second)],
+            )
+        {
             return None;
         }
 
@@ -101,6 +111,17 @@ impl Seam {
             steps,
         })
     }
+}
+
+/// Whether the normals of two triangles differ at either end of their edge, given as corners of both.
+fn is_crease(mesh: &Mesh, start: [(usize, usize); 2], end: [(usize, usize); 2]) -> bool {
+    let normal = |(triangle, corner): (usize, usize)| {
+        let vertex = mesh.triangles[triangle][corner];
+        mesh.normals[vertex as usize].normalize_or_zero()
+    };
+    [start, end]
+        .into_iter()
+        .any(|[here, there]| normal(here).dot(normal(there)) < CREASE_COS)
 }
 
 /// A seam in texels: its ends, and unit vectors along it and out of the chart.
