@@ -104,10 +104,12 @@ impl DirectSource {
             let has_image =
                 matches!(light.kind, LightKind::Surface { object, .. } if scene.glows.contains_key(&object));
             let is_narrow = |size: LightSize| matches!(size, LightSize::Angle { diameter_rad } if diameter_rad <= NARROW_RAD);
+            let places = LightSamples::new(light, scene, index, shape.is_some())?;
+            let is_ball = matches!(places, LightSamples::Ball { .. });
             Emission::Extended(ExtendedLight {
-                places: LightSamples::new(light, scene, index, shape.is_some())?,
+                places,
                 light: index as u64,
-                is_even: (shape.is_some() && !has_image) || is_narrow(light.size),
+                is_even: (shape.is_some() && !has_image) || is_ball || is_narrow(light.size),
                 shape,
             })
         } else {
@@ -248,12 +250,10 @@ impl ExtendedLight {
         }
 
         // The share of light that is not occluded scales the analytic E, so that fully lit places are free of noise.
-        let irradiance = match &self.shape {
+        let irradiance = match self.unoccluded(point) {
             // Heitz, Hill and McGuire, "Combining analytic direct illumination and stochastic shadows", I3D 2018. The
             // ratio includes the image on a light, as it includes shadows.
-            Some(shape) if sum.unoccluded > 0.0 => {
-                sum.irradiance * (shape.projected_solid_angle_sr(point) / (sum.unoccluded * shape.area_m2))
-            }
+            Some(unoccluded) if sum.unoccluded > 0.0 => sum.irradiance * (unoccluded / sum.unoccluded),
             Some(_) => LinearSrgb::BLACK,
             None => sum.irradiance / count,
         };
@@ -261,6 +261,23 @@ impl ExtendedLight {
             irradiance,
             shadow_rays: sum.shadow_rays,
             blocked_rays: sum.blocked_rays,
+        }
+    }
+
+    /// Unoccluded E at unit strength of a sample, where there is a closed form.
+    fn unoccluded(&self, point: &SurfacePoint) -> Option<f64> {
+        match (&self.shape, &self.places) {
+            (Some(shape), _) => Some(shape.projected_solid_angle_sr(point) / shape.area_m2),
+            // That of a ball holds where no part of it is below the horizon.
+            (None, LightSamples::Ball { centre, radius_m, .. }) => {
+                let offset = *centre - point.position;
+                let heights = [point.geometric_normal, point.shading_normal].map(|normal| normal.dot(offset));
+                let distance_m = offset.length();
+                let sine = radius_m / distance_m;
+                let is_above = heights.iter().all(|height| *height >= *radius_m);
+                is_above.then_some(PI * sine * sine * heights[1] / distance_m)
+            }
+            _ => None,
         }
     }
 
