@@ -41,9 +41,12 @@ impl Polygon {
         if seen <= self.least_height_m {
             return 0.0;
         }
-        let from_point: Vec<DVec3> = self.corners.iter().map(|corner| *corner - point).collect();
-        let above = clipped(&from_point, |corner| geometric.dot(corner));
-        let above = clipped(&above, |corner| shading.dot(corner));
+        let mut above: Vec<DVec3> = self.corners.iter().map(|corner| *corner - point).collect();
+        for normal in [geometric, shading] {
+            if above.iter().any(|corner| normal.dot(*corner) < 0.0) {
+                above = clipped(&above, |corner| normal.dot(corner));
+            }
+        }
         cosine_integral(&above, shading)
     }
 }

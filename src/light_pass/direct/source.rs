@@ -17,7 +17,7 @@ use super::texel::SamplingDetail;
 use crate::geometry::sampling::{even_point, mix64};
 use crate::optics::LinearSrgb;
 use crate::scene::emitter::{Emitter, EmitterSampler};
-use crate::scene::{Environment, Light, LightKind, LightSize, Material, Scene};
+use crate::scene::{Environment, Light, LightKind, LightSize, Material, PanelShape, Scene};
 use crate::transport::{DiffuseResponse, MediumStack, Tracer, media_at};
 
 /// Number of samples that are prepared for a light: a power of 2.
@@ -28,8 +28,10 @@ const READY_OF_SKY: usize = 1 << 14;
 const NARROW_RAD: f64 = 0.03;
 /// Luminous surfaces of more triangles are integrated by samples alone.
 const MAX_POLYGONS: usize = 16;
-/// Corners of the polygon that approximates a disc.
-const DISC_CORNERS: u32 = 64;
+/// Corners of the polygon of the same area that approximates a disc, close by and from afar.
+const DISC_CORNERS: [u32; 2] = [64, 12];
+/// Half-axes of a disc from which on it is far: E is then within 1e-4 of the disc's.
+const FAR: f64 = 4.0;
 /// Part of its length by which a shadow ray ends short of a light, so as not to hit the light's own surface.
 const SHADOW_RAY_MARGIN: f64 = 1e-9;
 const SEED: u64 = 0x6c69_6768_7473;
@@ -78,8 +80,17 @@ enum LightSamples {
 
 struct Shape {
     polygons: Vec<Polygon>,
+    from_afar: Option<FarDisc>,
     /// Of all emitting sides [m²].
     area_m2: f64,
+}
+
+/// A simpler polygon in place of a disc.
+struct FarDisc {
+    centre: DVec3,
+    /// Distance from which on it does [m].
+    far_m: f64,
+    polygon: Polygon,
 }
 
 /// Irradiance at a point from an extended light.
@@ -169,6 +180,7 @@ impl LightSamples {
 /// The polygons of a light if they are few.
 fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
     // Panels and meshes of few triangles have a closed form of E; all other lights are left to samples.
+    let mut from_afar = None;
     let polygons = match light.kind {
         LightKind::Panel {
             centre,
@@ -178,11 +190,18 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
             ..
         } => {
             let normal = across.cross(down).try_normalize()?;
-            let outline = shape.corners(DISC_CORNERS, 0.0);
-            let corners = outline
-                .iter()
-                .map(|place| centre + across * place.x + down * place.y);
-            vec![Polygon::new(corners.collect(), normal, false)]
+            let outlined = |corners: u32| {
+                let outline = shape.corners(corners, 0.0).into_iter();
+                let corners = outline.map(|place| centre + across * place.x + down * place.y);
+                Polygon::new(corners.collect(), normal, false)
+            };
+            let [near, far] = DISC_CORNERS;
+            from_afar = (shape == PanelShape::Disc).then(|| FarDisc {
+                centre,
+                far_m: FAR * across.length().max(down.length()),
+                polygon: outlined(far),
+            });
+            vec![outlined(near)]
         }
         // At each sample point, the closed form of every triangle is computed, which pays for few triangles only. Few
         // even samples would find the bright parts of a dark image.
@@ -206,6 +225,7 @@ fn shape(light: &Light, scene: &Scene) -> Option<Shape> {
     };
     Some(Shape {
         polygons,
+        from_afar,
         area_m2: EmitterSampler::new(light, scene).area_m2(),
     })
 }
@@ -384,7 +404,10 @@ struct Sum {
 impl Shape {
     /// Unoccluded E/L [sr] at a point.
     fn projected_solid_angle_sr(&self, point: &SurfacePoint) -> f64 {
-        let seen = self.polygons.iter().map(|polygon| {
+        let afar = self.from_afar.as_ref();
+        let afar = afar.filter(|disc| point.position.distance_squared(disc.centre) > disc.far_m * disc.far_m);
+        let polygons = afar.map_or(&self.polygons[..], |disc| std::slice::from_ref(&disc.polygon));
+        let seen = polygons.iter().map(|polygon| {
             polygon.projected_solid_angle_sr(point.position, point.geometric_normal, point.shading_normal)
         });
         seen.sum()
