@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use nephroid::illumination::Side;
+use nephroid::illumination::lookup::in_chart;
 use nephroid::light_pass::direct::bake_direct;
 use nephroid::optics::fresnel::dielectric_reflectance;
 
@@ -54,6 +55,45 @@ fn point_light_follows_its_closed_form() {
         assert_eq!(e[0], e[2], "a white light is white");
     }
     assert_eq!(layer.shadow_rays, 4 * (n * n) as u64, "no second look");
+}
+
+/// E = πL sin²α cos θ, without noise.
+#[test]
+fn bulb_follows_its_closed_form() {
+    let (place, radius_m) = (dvec3(0.3, 0.8, -0.2), 0.2);
+    let tracer = under(vec![Light {
+        size: LightSize::Radius { radius_m },
+        ..point_light(place, 2.0)
+    }]);
+    let n = 64;
+    let layer = direct(&tracer, &chart(&tracer, 0, n, n));
+    let side = 2.0 / n as f64;
+    for (texel, e) in layer.irradiance.iter().enumerate() {
+        // A bulb above the horizon lights a surface as its centre would.
+        let low = [texel % n, texel / n].map(|index| index as f64 * side - 1.0);
+        let exact = exact_point_mean(place, 2.0, low, side);
+        assert_close(f64::from(e[0]), exact, 2e-4, "irradiance");
+    }
+    assert_eq!(layer.shadow_rays, 8 * (n * n) as u64, "no second look");
+}
+
+/// A wall is dark up to its sharp edge beside a sunlit side, though their charts meet there on the surface.
+#[test]
+fn light_stays_on_its_side_of_a_crease() {
+    let cube = cuboid(dvec3(-1.0, -1.0, -1.0), dvec3(1.0, 1.0, 1.0));
+    let tracer = tracer(vec![(cube, diffuse(0.5))], vec![sun(DVec3::NEG_Y, 1.0)]);
+    let chart = chart(&tracer, 0, 64, 64);
+    let irradiance = direct(&tracer, &chart).irradiance;
+    let mesh = tracer.scene().objects[0].mesh_in_scene();
+    for triangle in 0..mesh.triangles.len() {
+        let lit = f64::from(u8::from(mesh.face_normal(triangle).y > 0.5));
+        for corner in 0..3 {
+            let mut weights = [0.0; 3];
+            (weights[corner], weights[(corner + 1) % 3]) = (0.5, 0.5);
+            let found = in_chart(&chart, &irradiance, chart.uv(triangle, weights));
+            assert_close(found.g, lit, 1e-6, "irradiance at an edge");
+        }
+    }
 }
 
 /// Rays along the floor, far off and tiny scenes: a surface never shadows itself.

@@ -1,6 +1,7 @@
 //! The CPU eye pass on scenes of known radiance.
 
-use nephroid::eye_pass::reference::{first_hits, render};
+use nephroid::effect::EffectSwitch;
+use nephroid::eye_pass::reference::{ReferenceSettings, first_hits, render};
 use nephroid::optics::fresnel::{dielectric_reflectance, thin_wall_reflectance};
 use nephroid::scene::Environment;
 
@@ -454,6 +455,17 @@ fn more_samples_soften_edges() {
     assert!((fine[1] - 0.5).abs() < 0.05, "{} of the middle", fine[1]);
     assert!((at(4)[1] - fine[1]).abs() <= 0.25);
     assert!(at(1).iter().all(|share| share.min(1.0 - share).abs() < 1e-6));
+
+    // A pixel whose samples differ gets more, the others do not.
+    let still = |settings: &ReferenceSettings| seen(&lit.0, &lit.1, &view, settings);
+    let few = ReferenceSettings {
+        samples_per_side: 2,
+        ..ReferenceSettings::default()
+    };
+    let (picture, rays) = still(&ReferenceSettings::still(EffectSwitch::Auto));
+    assert_eq!(rays.camera_rays, 3 * 4 + 16);
+    assert!((share(&picture.radiance[1]) - fine[1]).abs() <= 0.125);
+    assert_eq!(picture.radiance[2], still(&few).0.radiance[2]);
 }
 
 #[test]
