@@ -13,6 +13,10 @@ fn scrambled(number: u32) -> u32 {
     return (word >> 22u) ^ word;
 }
 
+fn seed_of(pixel: vec2f) -> u32 {
+    return scrambled(u32(pixel.x) + scrambled(u32(pixel.y)));
+}
+
 // The point of the unit square that selects a microfacet, for a surface that follows after `lobes` rough ones.
 fn facet_point(lobes: u32) -> vec2f {
     let first = pixel_seed + 2u * lobes;

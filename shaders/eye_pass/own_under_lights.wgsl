@@ -3,6 +3,7 @@
 @fragment
 fn own_under_lights(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
     let object = objects[fragment.object];
+    pixel_seed = seed_of(fragment.clip.xy);
     // Normal of the triangle's plane, which contains both derivatives.
     let across = cross(dpdx(fragment.from_camera), dpdy(fragment.from_camera));
     let towards_eye = select(1.0, -1.0, dot(across, fragment.from_camera) > 0.0);

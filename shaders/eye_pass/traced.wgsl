@@ -15,6 +15,6 @@ fn traced(fragment: Fragment) -> @location(0) vec4f {
     let origin = start.eye + direction * (start.near / dot(direction, frame.forward));
     let width = start.near * frame.pixel_rad;
     let gaze = Gaze(origin, 0u, direction, width, vec3f(1.0), frame.pixel_rad, start.media, 0u, 0.0, 0u, COAT_NONE);
-    pixel_seed = scrambled(u32(fragment.clip.x) + scrambled(u32(fragment.clip.y)));
+    pixel_seed = seed_of(fragment.clip.xy);
     return vec4f(written(chain_radiance(gaze)), mark(fragment.object));
 }

@@ -18,7 +18,8 @@ macro_rules! chains {
         program! { $name:
             "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
             "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-            "eye_pass/mixture" "eye_pass/light_record" "eye_pass/relief" "eye_pass/lights" "eye_pass/corners" $indices "eye_pass/medium" "eye_pass/facets" "eye_pass/interaction"
+            "eye_pass/mixture" "eye_pass/light_record" "eye_pass/relief" "eye_pass/facets" "eye_pass/lights" "eye_pass/corners"
+            $indices "eye_pass/medium" "eye_pass/interaction"
             "eye_pass/lamps" "eye_pass/highlights" $background "eye_pass/chain" "eye_pass/traced"
         }
     };
@@ -65,7 +66,8 @@ pub(super) const LAMPS: Program = program! { "lamps":
 pub(super) const UNDER_LIGHTS: Program = program! { "under_lights":
     "shared/srgb" "shared/refraction" "shared/fresnel" "shared/traversal" "eye_pass/frame"
     "eye_pass/objects" "eye_pass/images" "eye_pass/bumps" "eye_pass/place" "eye_pass/mask" "eye_pass/start"
-    "eye_pass/mixture" "eye_pass/light_record" "eye_pass/relief" "eye_pass/lights" "eye_pass/surface" "eye_pass/own_under_lights"
+    "eye_pass/mixture" "eye_pass/light_record" "eye_pass/relief" "eye_pass/facets" "eye_pass/lights" "eye_pass/surface"
+    "eye_pass/own_under_lights"
 };
 
 /// The traced image, composed into the frame.

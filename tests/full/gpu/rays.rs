@@ -9,7 +9,7 @@ use crate::gpu::rig::{AS_CPU, Rig, gpu, or_skip, unlike};
 use support::floors::{diffuse, floor_scene};
 use support::meshes::{inside_out, moved};
 use support::prelude::*;
-use support::scenes::{light, panel, point_light, spot, sun, tinted, view};
+use support::scenes::{lamps_of_all_kinds, light, panel, point_light, spot, sun, tinted, view};
 use support::tools::{bake, builtin_scene, set, to};
 
 /// Evenly spread numbers that are the same in every run (SplitMix64).
@@ -484,6 +484,80 @@ fn water_weakens_shadow_rays_as_the_layer() {
     // The comparison sees what the water takes.
     scene.materials[1].volume = None;
     assert!(unlike(&expected, &by_layer(&scene)) > 0.1);
+}
+
+/// While hands move, each pixel of a picture aims at one point of a lamp, and the mean of pictures at all of it. Panels
+/// that shine from their middles, a quarter as wide as they are far away, are 2 % too bright.
+#[test]
+fn soft_lamps_keep_their_size() {
+    // Means over blocks of pixels, which leave little of the grain.
+    let sampled = |rig: &mut Rig| blocks(&rig.sampled(&ahead(), 4), 10);
+    for lamp in lamps_of_all_kinds(dvec3(0.3, 0.8, 0.4)) {
+        let scene = scene(vec![wide(&lamp, 2.0)]);
+        let found = sampled(&mut or_skip!(tracing(&scene)));
+        let settings = set(to(0.05, 512), |s| s.layers = vec![LayerKind::Direct]);
+        let maps = bake(scene.clone(), &settings).maps;
+        let expected = sampled(&mut Rig::at(AS_CPU, &scene, &maps).expect("there is a device"));
+        let off = apart(&found, &expected);
+        // The comparison sees another size.
+        let narrow = sampled(&mut tracing(&self::scene(vec![wide(&lamp, 0.1)])).expect("there is a device"));
+        let other = apart(&narrow, &expected);
+        assert!(
+            off < 0.025 && other > 1.5 * off,
+            "{:?}: {off}, {other}",
+            lamp.kind
+        );
+    }
+}
+
+/// Sum of all differences relative to that of the second picture.
+fn apart(found: &Picture, expected: &Picture) -> f32 {
+    let channels = found
+        .radiance
+        .iter()
+        .flatten()
+        .zip(expected.radiance.iter().flatten());
+    let [off, sum] = channels.fold([0.0; 2], |[off, sum], (a, b)| [off + (a - b).abs(), sum + b]);
+    off / sum
+}
+
+/// Means over squares of so many pixels a side.
+fn blocks(picture: &Picture, side: u32) -> Picture {
+    let [width, height] = [picture.width, picture.height].map(|pixels| pixels / side);
+    let mut radiance = vec![[0.0; 3]; (width * height) as usize];
+    for (pixel, value) in (0..).zip(&picture.radiance) {
+        let [column, row] = [pixel % picture.width, pixel / picture.width].map(|place| place / side);
+        let mean = &mut radiance[(row * width + column) as usize];
+        for channel in 0..3 {
+            mean[channel] += value[channel] / (side * side) as f32;
+        }
+    }
+    Picture {
+        width,
+        height,
+        radiance,
+    }
+}
+
+/// A lamp of the same strength that is so many times as wide.
+fn wide(lamp: &Light, times: f64) -> Light {
+    let mut lamp = lamp.clone();
+    match &mut lamp.size {
+        LightSize::None => {}
+        LightSize::Radius { radius_m } => *radius_m *= times,
+        LightSize::Angle { diameter_rad } => *diameter_rad *= times,
+    }
+    if let LightKind::Panel {
+        across,
+        down,
+        radiance,
+        ..
+    } = &mut lamp.kind
+    {
+        (*across, *down) = (*across * times, *down * times);
+        radiance.0 /= times * times;
+    }
+    lamp
 }
 
 /// While hands move, a lamp with a surface is its middle: so small a one is nothing else.
