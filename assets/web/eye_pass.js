@@ -140,7 +140,7 @@ export class EyePass {
     if (this.sky) others.push(this.pipeline("sky", ["frame", "nothing", "sky"], "behind", behind));
     const added = { srcFactor: "one", dstFactor: "one" }, blend = { color: added, alpha: added };
     const seen = { program: "lamps", entry: "lamp_drawn", format: formats.radiance, depth: [false, "greater-equal"], samples, blend, buffers: lamps.vertices };
-    others.push(this.pipeline("lamps", ["frame", "lamps"], "lamp_corner", seen));
+    if (lamps.draw[1]) others.push(this.pipeline("lamps", ["frame", "lamps"], "lamp_corner", seen));
     const compute = { module: this.module("summed"), entryPoint: "summed" };
     this.summed ??= await device.createComputePipelineAsync({ layout: "auto", compute });
     this.isFresh = surfaces.some((made) => made instanceof Promise);
@@ -308,7 +308,7 @@ export class EyePass {
       }
       pass.setBindGroup(1, targets.composed);
       lists.forEach((list) => this.drawEach(pass, list));
-      if (colours) return;
+      if (colours || !scene.lamps.draw[1]) return;
       pass.setPipeline(this.pipelines.get("lamps"));
       pass.setBindGroup(1, this.bind("lamps", [this.buffers.seen_lamps]));
       pass.setVertexBuffer(0, this.buffers.seen_lamps);

@@ -116,6 +116,8 @@ pub struct VisibleLamp {
     outline: Outline,
     /// Of a panel; 0 for others.
     area_m2: f64,
+    /// Whether the eye sees it directly.
+    pub has_extent: bool,
 }
 
 /// What a lamp looks like.
@@ -153,15 +155,6 @@ impl Outline {
             } => Some(Self::Flat { across, down, shape }),
             LightKind::Sun { .. } => Some(Self::Angle { tan_radius: radius }),
             LightKind::Point { .. } | LightKind::Spot { .. } => Some(Self::Round { radius_m: radius }),
-        }
-    }
-
-    /// Whether the eye sees it directly.
-    pub(super) fn has_extent(&self) -> bool {
-        match *self {
-            Self::Angle { tan_radius } => tan_radius > 0.0,
-            Self::Round { radius_m } => radius_m > 0.0,
-            Self::Flat { .. } => true,
         }
     }
 }
@@ -220,6 +213,7 @@ impl VisibleLamp {
             outline,
             emitter: sampler.middle()?,
             area_m2: sampler.area_m2(),
+            has_extent: light.has_extent(),
         })
     }
 
@@ -227,11 +221,6 @@ impl VisibleLamp {
     #[cfg(feature = "gpu")]
     pub(super) fn strength(&self) -> LinearSrgb {
         self.emitter.strength
-    }
-
-    /// Whether the eye sees it directly.
-    pub fn has_extent(&self) -> bool {
-        self.outline.has_extent()
     }
 
     /// Radiance [W/(m² sr)] that a cone sees, averaged over it, with the distance of the lamp [m]. `reach_m`: distance

@@ -115,10 +115,8 @@ impl Seam {
 
 /// Whether the normals of two triangles differ at either end of their edge, given as corners of both.
 fn is_crease(mesh: &Mesh, start: [(usize, usize); 2], end: [(usize, usize); 2]) -> bool {
-    let normal = |(triangle, corner): (usize, usize)| {
-        let vertex = mesh.triangles[triangle][corner];
-        mesh.normals[vertex as usize].normalize_or_zero()
-    };
+    let normal =
+        |(triangle, corner): (usize, usize)| mesh.corner_normals(triangle)[corner].normalize_or_zero();
     [start, end]
         .into_iter()
         .any(|[here, there]| normal(here).dot(normal(there)) < CREASE_COS)

@@ -327,10 +327,7 @@ impl<'a> LitScene<'a> {
         }
         // The eye does not see points directly.
         let mut seen = LinearSrgb::BLACK;
-        let lamps = self
-            .lamps
-            .iter()
-            .filter(|lamp| path.depth > 0 || lamp.has_extent());
+        let lamps = self.lamps.iter().filter(|lamp| path.depth > 0 || lamp.has_extent);
         let lamps = lamps.map(|lamp| lamp.seen(&path.cone, reach_m));
         let in_lobe = self
             .lobe_lamps

@@ -4,9 +4,9 @@ use std::mem::offset_of;
 
 use glam::DVec3;
 
-use super::bindings::{Binding, Storage, bind_group, bind_group_layout, pipeline_layout, storage};
+use super::bindings::{Binding, Storage, bind_group, bind_group_layout, storage};
 use super::geometry::attribute;
-use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
+use super::pipelines::Beside;
 use super::shaders::LAMPS;
 use super::uniforms::LightRecord;
 use crate::eye_pass::highlights::Outline;
@@ -35,7 +35,7 @@ pub(super) const LAMP_LAYOUT: wgpu::VertexBufferLayout<'static> = wgpu::VertexBu
 pub(super) const CORNERS: u32 = 6;
 
 /// Light is added to what is behind.
-pub(super) const ADDED: wgpu::BlendComponent = wgpu::BlendComponent {
+const ADDED: wgpu::BlendComponent = wgpu::BlendComponent {
     src_factor: wgpu::BlendFactor::One,
     dst_factor: wgpu::BlendFactor::One,
     operation: wgpu::BlendOperation::Add,
@@ -46,8 +46,8 @@ pub(super) const ADDED: wgpu::BlendComponent = wgpu::BlendComponent {
 pub(super) struct SeenLamps {
     records: Storage,
     count: u32,
-    /// Made with the first lamp.
-    pipeline: Option<wgpu::RenderPipeline>,
+    /// Made with the first lamp, as is the layout of group 1.
+    pipeline: Option<(wgpu::RenderPipeline, wgpu::BindGroupLayout)>,
 }
 
 impl SeenLamps {
@@ -66,7 +66,7 @@ impl SeenLamps {
         let placed = |place: DVec3| place.as_vec3().to_array();
         let mut records = Vec::new();
         for light in &scene.lights {
-            let outline = Outline::of(light).filter(|outline| outline.has_extent());
+            let outline = Outline::of(light).filter(|_| light.has_extent());
             if let (Some(outline), Some(emitter)) = (outline, Emitter::middle(light, scene)) {
                 records.push(LightRecord::of(&emitter, placed).outlined(Some(outline), 1.0));
             }
@@ -78,17 +78,17 @@ impl SeenLamps {
     /// Makes what drawing takes, if there are lamps to draw.
     pub(super) fn make(&mut self, gpu: &Gpu, frame: &wgpu::BindGroupLayout, sample_count: u32) {
         if self.count > 0 && self.pipeline.is_none() {
-            self.pipeline = Some(pipeline(gpu, frame, sample_count));
+            let layout = bind_group_layout(gpu, "seen lamps", &BINDINGS);
+            self.pipeline = Some((pipeline(gpu, frame, &layout, sample_count), layout));
         }
     }
 
     /// Draws the lamps after all surfaces, in a pass whose group 0 is set.
     pub(super) fn draw(&self, gpu: &Gpu, pass: &mut wgpu::RenderPass<'_>) {
-        let Some(pipeline) = self.pipeline.as_ref().filter(|_| self.count > 0) else {
+        let Some((pipeline, layout)) = self.pipeline.as_ref().filter(|_| self.count > 0) else {
             return;
         };
-        let layout = bind_group_layout(gpu, "seen lamps", &BINDINGS);
-        let bound = bind_group(gpu, "seen lamps", &layout, [self.records.binding()]);
+        let bound = bind_group(gpu, "seen lamps", layout, [self.records.binding()]);
         pass.set_pipeline(pipeline);
         pass.set_bind_group(1, &bound, &[]);
         pass.set_vertex_buffer(0, self.records.buffer().slice(..));
@@ -105,46 +105,23 @@ impl SeenLamps {
     }
 }
 
-fn pipeline(gpu: &Gpu, frame: &wgpu::BindGroupLayout, sample_count: u32) -> wgpu::RenderPipeline {
-    let module = LAMPS.module(&gpu.device);
-    let lamps = bind_group_layout(gpu, "seen lamps", &BINDINGS);
-
+fn pipeline(
+    gpu: &Gpu,
+    frame: &wgpu::BindGroupLayout,
+    lamps: &wgpu::BindGroupLayout,
+    sample_count: u32,
+) -> wgpu::RenderPipeline {
     // Surfaces in front hide lamps, which hide nothing. Suns lie at the depth that the pass begins with.
-    gpu.device
-        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("lamps"),
-            layout: Some(&pipeline_layout(gpu, &[frame, &lamps])),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("lamp_corner"),
-                compilation_options: Default::default(),
-                buffers: &[Some(LAMP_LAYOUT)],
-            },
-            primitive: Default::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH_FORMAT,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(wgpu::CompareFunction::GreaterEqual),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: wgpu::MultisampleState {
-                count: sample_count,
-                ..Default::default()
-            },
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("lamp_drawn"),
-                compilation_options: Default::default(),
-                targets: &[Some(wgpu::ColorTargetState {
-                    blend: Some(wgpu::BlendState {
-                        color: ADDED,
-                        alpha: ADDED,
-                    }),
-                    ..HDR_FORMAT.into()
-                })],
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
+    let drawn = Beside {
+        program: LAMPS,
+        groups: &[frame, lamps],
+        entry_points: ["lamp_corner", "lamp_drawn"],
+        buffers: &[Some(LAMP_LAYOUT)],
+        depth_compare: wgpu::CompareFunction::GreaterEqual,
+        blend: Some(wgpu::BlendState {
+            color: ADDED,
+            alpha: ADDED,
+        }),
+    };
+    drawn.pipeline(gpu, sample_count)
 }

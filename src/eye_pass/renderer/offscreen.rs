@@ -152,7 +152,7 @@ impl Renderer {
     fn peak_of_lamps(&self) -> f64 {
         let has_specular = self.draw_state().has_specular(&self.objects);
         let lamps = VisibleLamp::all(&self.scene).into_iter();
-        let lamps = lamps.filter(|lamp| has_specular || lamp.has_extent());
+        let lamps = lamps.filter(|lamp| has_specular || lamp.has_extent);
         let strongest = lamps.map(|lamp| lamp.strength().max_channel()).reduce(f64::max);
         let lit = match self.objects.peak_radiance {
             0.0 => strongest.map(|strength| strength / std::f64::consts::PI),

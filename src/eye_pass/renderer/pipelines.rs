@@ -251,6 +251,59 @@ fn flag(is_set: bool) -> f64 {
     f64::from(u8::from(is_set))
 }
 
+/// What is drawn in the pass of the surfaces besides them, and leaves the depth as it is.
+pub(super) struct Beside<'a> {
+    pub(super) program: Program,
+    pub(super) groups: &'a [&'a wgpu::BindGroupLayout],
+    /// Of vertices and fragments.
+    pub(super) entry_points: [&'a str; 2],
+    pub(super) buffers: &'a [Option<wgpu::VertexBufferLayout<'a>>],
+    pub(super) depth_compare: wgpu::CompareFunction,
+    /// How it is put over what is there; replaces that without.
+    pub(super) blend: Option<wgpu::BlendState>,
+}
+
+impl Beside<'_> {
+    pub(super) fn pipeline(&self, gpu: &Gpu, sample_count: u32) -> wgpu::RenderPipeline {
+        let module = self.program.module(&gpu.device);
+        let [vertex, fragment] = self.entry_points;
+        gpu.device
+            .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                label: Some(self.program.name),
+                layout: Some(&pipeline_layout(gpu, self.groups)),
+                vertex: wgpu::VertexState {
+                    module: &module,
+                    entry_point: Some(vertex),
+                    compilation_options: Default::default(),
+                    buffers: self.buffers,
+                },
+                primitive: Default::default(),
+                depth_stencil: Some(wgpu::DepthStencilState {
+                    format: DEPTH_FORMAT,
+                    depth_write_enabled: Some(false),
+                    depth_compare: Some(self.depth_compare),
+                    stencil: Default::default(),
+                    bias: Default::default(),
+                }),
+                multisample: wgpu::MultisampleState {
+                    count: sample_count,
+                    ..Default::default()
+                },
+                fragment: Some(wgpu::FragmentState {
+                    module: &module,
+                    entry_point: Some(fragment),
+                    compilation_options: Default::default(),
+                    targets: &[Some(wgpu::ColorTargetState {
+                        blend: self.blend,
+                        ..HDR_FORMAT.into()
+                    })],
+                }),
+                multiview_mask: None,
+                cache: None,
+            })
+    }
+}
+
 /// The pipelines created so far, with their bind group layouts.
 #[derive(Debug)]
 pub(super) struct SurfacePipelines {

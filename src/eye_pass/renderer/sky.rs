@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use wgpu::util::DeviceExt;
 
-use super::bindings::{Binding, bind_group, bind_group_layout, pipeline_layout, texture};
-use super::pipelines::{DEPTH_FORMAT, HDR_FORMAT};
+use super::bindings::{Binding, bind_group, bind_group_layout, texture};
+use super::pipelines::Beside;
 use super::shaders::SKY;
 use crate::gpu::{Gpu, texture_of};
 use crate::scene::Environment;
@@ -119,43 +119,18 @@ fn pipeline(
     sky: &wgpu::BindGroupLayout,
     sample_count: u32,
 ) -> wgpu::RenderPipeline {
-    let module = SKY.module(&gpu.device);
-
-    // Group 1 is used by chains, which this pipeline does not trace.
+    // Group 1 is used by chains, which this pipeline does not trace. The environment covers every pixel before any surface
+    // is drawn.
     let nothing = bind_group_layout(gpu, "nothing", &[]);
-
-    // The environment covers every pixel before any surface is drawn, and leaves the depth as cleared.
-    gpu.device
-        .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("sky"),
-            layout: Some(&pipeline_layout(gpu, &[frame, &nothing, sky])),
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("behind"),
-                compilation_options: Default::default(),
-                buffers: &[],
-            },
-            primitive: Default::default(),
-            depth_stencil: Some(wgpu::DepthStencilState {
-                format: DEPTH_FORMAT,
-                depth_write_enabled: Some(false),
-                depth_compare: Some(wgpu::CompareFunction::Always),
-                stencil: Default::default(),
-                bias: Default::default(),
-            }),
-            multisample: wgpu::MultisampleState {
-                count: sample_count,
-                ..Default::default()
-            },
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("sky_drawn"),
-                compilation_options: Default::default(),
-                targets: &[Some(HDR_FORMAT.into())],
-            }),
-            multiview_mask: None,
-            cache: None,
-        })
+    let drawn = Beside {
+        program: SKY,
+        groups: &[frame, &nothing, sky],
+        entry_points: ["behind", "sky_drawn"],
+        buffers: &[],
+        depth_compare: wgpu::CompareFunction::Always,
+        blend: None,
+    };
+    drawn.pipeline(gpu, sample_count)
 }
 
 #[cfg(test)]

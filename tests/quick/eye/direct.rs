@@ -41,39 +41,36 @@ fn exact_point_mean(light: DVec3, intensity: f64, [x, z]: [f64; 2], side: f64) -
     intensity * sr / (side * side)
 }
 
-#[test]
-fn point_light_follows_its_closed_form() {
-    let lamp = dvec3(0.3, 0.8, -0.2);
-    let tracer = under(vec![point_light(lamp, 2.0)]);
-    let n = 64;
-    let layer = direct(&tracer, &chart(&tracer, 0, n, n));
+/// The floor has the light of a point lamp of 2 W/sr at a place.
+fn assert_lit_as_by_a_point(irradiance: &[[f32; 3]], place: DVec3, n: usize) {
     let side = 2.0 / n as f64;
-    for (texel, e) in layer.irradiance.iter().enumerate() {
-        let low = [texel % n, texel / n].map(|index| index as f64 * side - 1.0);
-        let exact = exact_point_mean(lamp, 2.0, low, side);
-        assert_close(f64::from(e[0]), exact, 2e-4, "irradiance");
-        assert_eq!(e[0], e[2], "a white light is white");
-    }
-    assert_eq!(layer.shadow_rays, 4 * (n * n) as u64, "no second look");
-}
-
-/// E = πL sin²α cos θ, without noise.
-#[test]
-fn bulb_follows_its_closed_form() {
-    let (place, radius_m) = (dvec3(0.3, 0.8, -0.2), 0.2);
-    let tracer = under(vec![Light {
-        size: LightSize::Radius { radius_m },
-        ..point_light(place, 2.0)
-    }]);
-    let n = 64;
-    let layer = direct(&tracer, &chart(&tracer, 0, n, n));
-    let side = 2.0 / n as f64;
-    for (texel, e) in layer.irradiance.iter().enumerate() {
-        // A bulb above the horizon lights a surface as its centre would.
+    for (texel, e) in irradiance.iter().enumerate() {
         let low = [texel % n, texel / n].map(|index| index as f64 * side - 1.0);
         let exact = exact_point_mean(place, 2.0, low, side);
         assert_close(f64::from(e[0]), exact, 2e-4, "irradiance");
+        assert_eq!(e[0], e[2], "a white light is white");
     }
+}
+
+#[test]
+fn point_light_follows_its_closed_form() {
+    let (place, n) = (dvec3(0.3, 0.8, -0.2), 64);
+    let tracer = under(vec![point_light(place, 2.0)]);
+    let layer = direct(&tracer, &chart(&tracer, 0, n, n));
+    assert_lit_as_by_a_point(&layer.irradiance, place, n);
+    assert_eq!(layer.shadow_rays, 4 * (n * n) as u64, "no second look");
+}
+
+/// E = πL sin²α cos θ, without noise: a bulb above the horizon lights a surface as its centre would.
+#[test]
+fn bulb_follows_its_closed_form() {
+    let (place, n) = (dvec3(0.3, 0.8, -0.2), 64);
+    let tracer = under(vec![Light {
+        size: LightSize::Radius { radius_m: 0.2 },
+        ..point_light(place, 2.0)
+    }]);
+    let layer = direct(&tracer, &chart(&tracer, 0, n, n));
+    assert_lit_as_by_a_point(&layer.irradiance, place, n);
     assert_eq!(layer.shadow_rays, 8 * (n * n) as u64, "no second look");
 }
 
