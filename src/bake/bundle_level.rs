@@ -171,7 +171,7 @@ impl CausticLayer<'_> {
         // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the
         // target is near.
         let scaled = AIM * before * (wanted2 / noise2).sqrt();
-        let next = if error > SURPRISE * before {
+        let next = if error.max(last.found) > SURPRISE * before {
             AIM * target
         } else if before > FAR * target {
             scaled.max(AIM * target).clamp(STEPS.0 * before, STEPS.1 * before)
@@ -296,6 +296,7 @@ impl CausticLayer<'_> {
         Ok(BundleLevel::Made(Box::new(LightLevel {
             segments: report.pass.segments,
             goal: report.goal,
+            found: report.photon_square.sqrt(),
             ..level
         })))
     }

@@ -94,6 +94,8 @@ pub(super) struct LightLevel {
     pub(super) noise: Option<Noise>,
     /// Relative RMSE that bundles and residual photons aimed at; 0 for other carriers.
     pub(super) goal: f64,
+    /// Relative error that the flux of its photons tells; 0 without a goal.
+    pub(super) found: f64,
     /// `None` for splats of a thinned lattice, or if no light arrived.
     pub(super) error: Option<LightError>,
     /// Sums that the next level adds to; only the last level of a light by photons has them.

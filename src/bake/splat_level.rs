@@ -242,6 +242,7 @@ impl CausticLayer<'_> {
             ledger,
             noise: None,
             goal: 0.0,
+            found: 0.0,
             error: None,
             photons: None,
             segments: 0,
