@@ -8,7 +8,11 @@ fn mark(object: u32) -> f32 {
 }
 
 @fragment
-fn traced(fragment: Fragment) -> @location(0) vec4f {
+fn traced(fragment: Fragment, @builtin(front_facing) is_front: bool) -> @location(0) vec4f {
+    // One pipeline draws all objects: culling by state would compile this long shader twice.
+    if !is_front && objects[fragment.object].double_sided == 0u {
+        discard;
+    }
     let size = vec2f(frame.traced_width, frame.traced_height);
     let within = fragment.clip.xy / size * vec2f(2.0, -2.0) + vec2f(-1.0, 1.0) + frame.jitter;
     let direction = normalize(frame.forward + within.x * frame.right + within.y * frame.up);

@@ -223,7 +223,7 @@ impl TimedRenderer {
         renderer.set_maps(gpu, walk.scene, walk.maps)?;
         renderer.set_chains(gpu, chains)?;
         renderer.set_dispersion(walk.effects.get(Effect::Dispersion));
-        renderer.set_white_balance(gpu, &walk.white_balance);
+        renderer.set_white_balance(&walk.white_balance);
         gpu.wait()?;
         Ok(Self {
             chains,
@@ -270,7 +270,7 @@ impl TimedRenderer {
         let counts = self.renderer.counts();
         Ok(TimedFrame {
             wall_ms,
-            device_ms: counts.gpu_ms.filter(|_| is_measured),
+            device_ms: counts.timed.filter(|_| is_measured).map(|timed| timed.ms),
             objects: counts.drawn_objects,
             specular: counts.drawn_specular,
         })

@@ -9,9 +9,10 @@ use winit::window::{Window, WindowAttributes};
 
 use super::app::UserEvent;
 use super::interface::{Interface, Painting};
+use super::pace::PictureQuality;
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
-use crate::eye_pass::renderer::{EyeQuality, GpuMs, MapStyle, Renderer, Uploaded};
+use crate::eye_pass::renderer::{MapStyle, Renderer, TimedFrame, Uploaded};
 use crate::eye_pass::{self, View};
 use crate::gpu::{Gpu, texture_of};
 use crate::illumination::IlluminationMap;
@@ -68,6 +69,8 @@ pub struct Canvas {
     size: [u32; 2],
     /// `None` if the picture is out of date.
     shown: Option<View>,
+    /// Pixels of the picture per pixel of the view.
+    scale: f64,
     pub renderer: Renderer,
     /// The scene on the device.
     scene: Arc<Scene>,
@@ -85,6 +88,7 @@ impl Canvas {
             target,
             size,
             shown: None,
+            scale: 1.0,
             renderer: Renderer::new(gpu, scene, FORMAT, SAMPLES)?,
             scene: Arc::clone(scene),
             style: MapStyle::default(),
@@ -148,8 +152,15 @@ impl Canvas {
         }
         (self.options, self.shown) = (options, None);
         self.renderer.set_dispersion(options.dispersion);
-        self.renderer.set_white_balance(gpu, &options.white_balance);
+        self.renderer.set_white_balance(&options.white_balance);
         self.renderer.set_chains(gpu, options.chains)
+    }
+
+    pub fn quality(&self) -> PictureQuality {
+        PictureQuality {
+            scale: self.scale,
+            eye: self.renderer.quality(),
+        }
     }
 
     /// Draws a view, unless the picture shows it already in that quality; returns whether it drew.
@@ -158,22 +169,43 @@ impl Canvas {
         gpu: &Gpu,
         egui: &mut egui_wgpu::Renderer,
         view: &View,
-        quality: EyeQuality,
+        quality: PictureQuality,
     ) -> Result<bool> {
-        if self.renderer.quality() != quality {
-            self.renderer.set_quality(quality);
-        } else if self.shows(view) {
+        if self.shows(view) && self.quality() == quality {
             return Ok(false);
         }
-        if self.size != [view.width, view.height] {
-            self.size = [view.width, view.height];
+
+        // Another exposure or tone map of what was drawn, in whichever quality, needs no new frame.
+        if self.shown.is_some() && !self.shows(view) {
+            let mut encoder = gpu.device.create_command_encoder(&Default::default());
+            let scaled = scaled(view, self.scale);
+            if self.renderer.expose(gpu, &mut encoder, &self.target, &scaled) {
+                self.shown = Some(view.clone());
+                gpu.queue.submit([encoder.finish()]);
+                return Ok(true);
+            }
+        }
+
+        // The target has the size of the frame; egui scales it to that of the view.
+        if self.renderer.quality() != quality.eye {
+            self.renderer.set_quality(quality.eye);
+        }
+        self.scale = quality.scale;
+        let frame = scaled(view, self.scale);
+        if self.size != [frame.width, frame.height] {
+            self.size = [frame.width, frame.height];
             self.target = texture(&gpu.device, self.size);
-            let (target, filter) = (&self.target, wgpu::FilterMode::Nearest);
+            let filter = if self.scale < 1.0 {
+                wgpu::FilterMode::Linear
+            } else {
+                wgpu::FilterMode::Nearest
+            };
+            let target = &self.target;
             egui.update_egui_texture_from_wgpu_texture(&gpu.device, target, filter, self.id);
         }
         self.shown = Some(view.clone());
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        self.renderer.draw(gpu, &mut encoder, &self.target, view)?;
+        self.renderer.draw(gpu, &mut encoder, &self.target, &frame)?;
         gpu.queue.submit([encoder.finish()]);
         Ok(true)
     }
@@ -185,13 +217,14 @@ impl Canvas {
         gpu: &Gpu,
         egui: &mut egui_wgpu::Renderer,
         view: &View,
-        quality: EyeQuality,
+        quality: PictureQuality,
     ) -> Result<()> {
         if self.draw(gpu, egui, view, quality)? {
             return Ok(());
         }
         let mut encoder = gpu.device.create_command_encoder(&Default::default());
-        self.renderer.refine(gpu, &mut encoder, &self.target, view)?;
+        self.renderer
+            .refine(gpu, &mut encoder, &self.target, &scaled(view, self.scale))?;
         gpu.queue.submit([encoder.finish()]);
         Ok(())
     }
@@ -288,10 +321,10 @@ impl Graphics {
         self.screen.resize(&self.gpu.device);
     }
 
-    /// GPU time of the latest picture for which it is known; `None` if there is none since the last call.
-    pub fn take_times(&mut self) -> Option<GpuMs> {
+    /// The latest frame whose GPU time is known; `None` if there is none since the last call.
+    pub fn take_times(&mut self) -> Option<TimedFrame> {
         let is_new = self.main.renderer.collect_times(&self.gpu);
-        self.main.renderer.counts().gpu_ms.filter(|_| is_new)
+        self.main.renderer.counts().timed.filter(|_| is_new)
     }
 
     /// Measures the exposure that suits the picture [stops].
@@ -327,7 +360,7 @@ impl Graphics {
     ///
     /// # Errors
     /// A picture of that size does not fit on the device.
-    pub fn refine_picture(&mut self, view: &View, quality: EyeQuality) -> Result<()> {
+    pub fn refine_picture(&mut self, view: &View, quality: PictureQuality) -> Result<()> {
         for canvas in [Some(&mut self.main), self.beside.as_mut()].into_iter().flatten() {
             canvas.refine(&self.gpu, &mut self.interface.renderer, view, quality)?;
         }
@@ -338,7 +371,7 @@ impl Graphics {
     ///
     /// # Errors
     /// A picture of that size does not fit on the device.
-    pub fn draw_picture(&mut self, view: &View, quality: EyeQuality) -> Result<bool> {
+    pub fn draw_picture(&mut self, view: &View, quality: PictureQuality) -> Result<bool> {
         let egui = &mut self.interface.renderer;
         if let Some(beside) = &mut self.beside {
             beside.set_options(&self.gpu, self.main.options)?;
@@ -380,6 +413,16 @@ fn window_error(what: &str) -> Error {
         format!("the system gives none ({what})"),
         "check the display, or use `bake` and `render`, which need no window",
     )
+}
+
+/// A view with fewer pixels.
+fn scaled(view: &View, scale: f64) -> View {
+    let scaled = |pixels: u32| (f64::from(pixels) * scale).ceil() as u32;
+    View {
+        width: scaled(view.width),
+        height: scaled(view.height),
+        ..view.clone()
+    }
 }
 
 pub(super) fn texture(device: &wgpu::Device, [width, height]: [u32; 2]) -> wgpu::TextureView {

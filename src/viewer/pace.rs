@@ -1,14 +1,25 @@
-//! Picture quality against frame rate: mirrors and glass are traced more coarsely while the camera moves and frames are
-//! late, and at rest the picture averages many samples.
+//! Picture quality against frame rate: pictures, and mirrors and glass in them, are coarser while the camera moves and
+//! frames are late, and at rest the picture averages many samples.
 
 use std::time::{Duration, Instant};
 
-use crate::eye_pass::renderer::{EyeQuality, GpuMs};
+use crate::eye_pass::renderer::{EyeQuality, TimedFrame};
 
-/// Available resolutions of the traced image, in pixels per pixel of the frame along a side.
-const SCALES: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+/// Resolutions from coarse to fine, along a side: pixels of the picture per pixel of the window, and pixels of the traced
+/// image per pixel of the picture.
+const SCALES: [(f64, f64); 6] = [
+    (0.25, 0.5),
+    (0.5, 0.5),
+    (1.0, 0.25),
+    (1.0, 0.5),
+    (1.0, 1.0),
+    (1.0, 2.0),
+];
+/// Index of the coarsest scale at which the picture has all pixels of the window. Those below are for devices that are
+/// too slow even for surfaces without mirrors and glass: software.
+const SHARP: usize = 2;
 /// Index of the scale before any time is known.
-const WHOLE: usize = 2;
+const WHOLE: usize = 4;
 /// A frame of a moving camera that takes longer than this is late [ms].
 const LATE_MS: f64 = 33.0;
 /// The scale is raised only if frames are expected to take less than this [ms].
@@ -24,10 +35,27 @@ const PAUSE: Duration = Duration::from_millis(400);
 /// Time for which samples beyond the minimum are added.
 const REFINES_FOR: Duration = Duration::from_secs(4);
 
+/// Quality of a picture of the window.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PictureQuality {
+    /// Pixels of the picture per pixel of the window, along a side, (0, 1].
+    pub scale: f64,
+    pub eye: EyeQuality,
+}
+
+impl PictureQuality {
+    fn new((scale, traced_scale): (f64, f64), eye: EyeQuality) -> Self {
+        let eye = EyeQuality { traced_scale, ..eye };
+        Self { scale, eye }
+    }
+}
+
 /// Chooses the quality of each picture from the GPU times of earlier ones.
 #[derive(Clone, Debug)]
 pub struct Pace {
+    /// Indices into [`SCALES`].
     walking: usize,
+    waiting: usize,
     resting: usize,
     /// When the camera came to rest and refinement began.
     rests_since: Option<Instant>,
@@ -39,6 +67,7 @@ impl Default for Pace {
     fn default() -> Self {
         Self {
             walking: WHOLE,
+            waiting: WHOLE,
             resting: WHOLE,
             rests_since: None,
             touched: None,
@@ -51,47 +80,64 @@ impl Pace {
     pub fn of_software() -> Self {
         Self {
             walking: 0,
-            resting: 1,
-            rests_since: None,
-            touched: None,
+            waiting: 1,
+            resting: SHARP + 1,
+            ..Self::default()
         }
     }
 
     /// Quality while the view changes.
-    pub fn walking(&self) -> EyeQuality {
-        EyeQuality {
-            traced_scale: SCALES[self.walking],
-            ..EyeQuality::WALKING
-        }
+    pub fn walking(&self) -> PictureQuality {
+        PictureQuality::new(SCALES[self.walking], EyeQuality::WALKING)
+    }
+
+    /// Quality of a view that rests while a bake goes on, with which a software rasterizer shares the cores.
+    pub fn waiting(&self) -> PictureQuality {
+        PictureQuality::new(SCALES[self.waiting], EyeQuality::WALKING)
     }
 
     /// Quality while the view rests.
-    pub fn resting(&self) -> EyeQuality {
-        EyeQuality {
-            traced_scale: SCALES[self.resting],
-            ..EyeQuality::STILL
-        }
+    pub fn resting(&self) -> PictureQuality {
+        PictureQuality::new(SCALES[self.resting], EyeQuality::STILL)
     }
 
-    /// Adapts the scales to the GPU time of a picture of a given quality. Times of pictures at rest are ignored: a
-    /// change of their scale would discard the samples taken so far.
-    pub fn learn(&mut self, ms: GpuMs, quality: EyeQuality) {
-        let traced_scale = quality.traced_scale;
-        if ms.specular <= 0.0 || quality.branching_depth != EyeQuality::WALKING.branching_depth {
+    /// Adapts the scales to the GPU time of a frame, of a window of some width [pixels]. Frames of pictures at rest are
+    /// ignored: a change of their scale would discard the samples taken so far.
+    pub fn learn(&mut self, frame: &TimedFrame, window_width: u32) {
+        let TimedFrame { ms, quality, width } = frame;
+        // Frames that are read back have no tone mapping, and are too small to tell anything.
+        if quality.branching_depth != EyeQuality::WALKING.branching_depth || ms.tone_mapping == 0.0 {
             return;
         }
-        let at = |scale: usize| {
-            let ratio = SCALES[scale] / traced_scale;
-            ms.opaque + ms.tone_mapping + ms.specular * ratio * ratio
+        let drawn_scale = f64::from(*width) / f64::from(window_width.max(1));
+        let expected_ms = |index: usize| {
+            let (scale, traced_scale) = SCALES[index];
+            let ratio = scale / drawn_scale;
+            let traced_ratio = ratio * traced_scale / quality.traced_scale;
+            (ms.opaque + ms.tone_mapping) * ratio * ratio + ms.specular * traced_ratio * traced_ratio
         };
-        let finest_within = |limit_ms: f64| (0..SCALES.len()).rev().find(|scale| at(*scale) <= limit_ms);
-        if at(self.walking) > LATE_MS {
+        let finest_within = |limit_ms: f64| {
+            (0..SCALES.len())
+                .rev()
+                .find(|index| expected_ms(*index) <= limit_ms)
+        };
+
+        // Frames without mirrors and glass tell nothing about what tracing costs.
+        let finest = if ms.specular > 0.0 {
+            SCALES.len() - 1
+        } else {
+            self.walking.max(SHARP)
+        };
+        if expected_ms(self.walking) > LATE_MS {
             self.walking = finest_within(LATE_MS).unwrap_or(0).min(self.walking);
         } else if let Some(finer) = finest_within(EARLY_MS) {
-            self.walking = finer.max(self.walking);
+            self.walking = finer.min(finest).max(self.walking);
         }
-        // The mean of many samples needs no supersampled tracing.
-        self.resting = finest_within(REST_MS).unwrap_or(0).min(WHOLE);
+        if ms.specular > 0.0 {
+            // The mean of many samples needs no supersampled tracing.
+            let within = finest_within(REST_MS).unwrap_or(0).min(WHOLE);
+            (self.waiting, self.resting) = (within.max(1), within.max(SHARP));
+        }
     }
 
     /// The view has changed.

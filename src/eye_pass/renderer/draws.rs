@@ -250,11 +250,17 @@ pub struct EyeCounts {
     pub traced_pixels: u64,
     /// Frames in the mean that was shown last.
     pub samples: u32,
-    /// GPU time of the latest frame for which it is known; `None` without timestamp queries, or before the first
-    /// result.
-    pub gpu_ms: Option<GpuMs>,
-    /// Quality of that frame.
-    pub timed_quality: Option<EyeQuality>,
+    /// The latest frame whose GPU time is known; `None` without timestamp queries, or before the first result.
+    pub timed: Option<TimedFrame>,
+}
+
+/// GPU time of a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TimedFrame {
+    pub ms: GpuMs,
+    pub quality: EyeQuality,
+    /// Width of the frame [pixels].
+    pub width: u32,
 }
 
 /// GPU time by pass [ms].

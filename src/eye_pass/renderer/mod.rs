@@ -34,7 +34,7 @@ mod uniforms;
 mod web;
 
 pub use draws::EyeQuality;
-pub use draws::{EyeCounts, GpuMs};
+pub use draws::{EyeCounts, GpuMs, TimedFrame};
 pub use objects::{Inspected, MapStyle};
 pub use offscreen::render_counted;
 pub use paging::Uploaded;
@@ -55,7 +55,7 @@ use self::pipelines::{PipelineFlags, SurfacePipelines};
 use self::sky::Sky;
 use self::targets::Targets;
 use self::timing::Timing;
-use self::tone_mapping::ToneMappingPipelines;
+use self::tone_mapping::{Exposed, ToneMappingPipelines};
 use super::View;
 use crate::effect::EffectSwitch;
 use crate::error::{Error, Result};
@@ -66,6 +66,9 @@ use crate::scene::Scene;
 
 /// Default memory budget of illumination maps on the device [bytes].
 const MAP_BUDGET_BYTES: u64 = 1 << 30;
+/// Largest difference of exposures between a frame and the picture shown of it [stops]. Half floats hold radiance of
+/// 16,368 times white (`LARGEST` in `frame.wgsl`): four stops darker, a thousand times white is left.
+const MAX_GAIN_STOPS: f64 = 4.0;
 /// Storage buffers that fragment shaders read even without chains.
 const MIN_BUFFERS: u32 = 3;
 
@@ -92,7 +95,7 @@ pub struct Renderer {
     mean: Option<Mean>,
     /// Whether mirrors are grey instead of black while chains are switched off.
     has_stand_in: bool,
-    /// View of the last [`draw`](Self::draw), as long as `targets` show it.
+    /// View of the last [`draw`](Self::draw), with the exposure of its radiance, as long as `targets` show it.
     drawn_view: Option<View>,
     map_style: MapStyle,
     chains: EffectSwitch,
@@ -272,10 +275,8 @@ impl Renderer {
 
     /// Multiplies radiance by a matrix of [`WhiteBalance::matrix`](super::WhiteBalance::matrix) before tone mapping,
     /// from the next frame on. Radiance that is read back is not affected.
-    pub fn set_white_balance(&mut self, gpu: &Gpu, matrix: &Matrix3) {
-        if self.tone_mapping.set_white_balance(gpu, matrix) {
-            self.drawn_view = None;
-        }
+    pub fn set_white_balance(&mut self, matrix: &Matrix3) {
+        self.tone_mapping.set_white_balance(matrix);
     }
 
     /// Whether mirrors are grey instead of black while chains are switched off, from the next frame on.
@@ -311,8 +312,7 @@ impl Renderer {
             drawn_specular: self.drawn[1] as u64,
             traced_pixels: traced_pixels.unwrap_or(0),
             samples: self.mean.as_ref().map_or(1, |mean| mean.count().max(1)),
-            gpu_ms: timed.map(|(ms, _)| ms),
-            timed_quality: timed.map(|(_, quality)| quality),
+            timed,
         }
     }
 
@@ -351,16 +351,53 @@ impl Renderer {
                 .timing
                 .as_ref()
                 .map(|timing| timing.marks(timing::TONE_MAPPING));
-            let radiance = &targets.resolved_view;
-            self.tone_mapping
-                .draw(gpu, encoder, target, radiance, view.tone_map, marks);
+            let exposed = Exposed {
+                radiance: &targets.resolved_view,
+                gain_stops: 0.0,
+                tone_map: view.tone_map,
+            };
+            self.tone_mapping.draw(gpu, encoder, target, &exposed, marks);
         }
         let has_specular = self.drawn[1] > 0;
         if let Some(timing) = &mut self.timing {
-            timing.finish(gpu, encoder, (has_specular, true), self.quality);
+            timing.finish(gpu, encoder, (has_specular, true), (self.quality, view.width));
         }
         self.drawn_view = Some(view.clone());
         Ok(())
+    }
+
+    /// Shows the last frame, or the mean of its view, under the exposure and the tone map of `view`, without drawing it
+    /// anew. Returns false, and does nothing, if that frame is another view or its exposure too different.
+    pub fn expose(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &wgpu::TextureView,
+        view: &View,
+    ) -> bool {
+        let (Some(drawn_stops), Some(targets)) = (self.drawn_stops(view), &self.targets) else {
+            return false;
+        };
+        let mean = self.mean.as_ref().filter(|mean| mean.count() > 0);
+        let exposed = Exposed {
+            radiance: mean.map_or(&targets.resolved_view, |mean| mean.picture().1),
+            gain_stops: view.exposure_stops - drawn_stops,
+            tone_map: view.tone_map,
+        };
+        self.tone_mapping.draw(gpu, encoder, target, &exposed, None);
+        true
+    }
+
+    /// Exposure of the radiance of the last frame [stops], if that shows `view` but for exposure and tone map.
+    fn drawn_stops(&self, view: &View) -> Option<f64> {
+        let drawn = self.drawn_view.as_ref()?;
+        let under_same = View {
+            exposure_stops: drawn.exposure_stops,
+            tone_map: drawn.tone_map,
+            ..view.clone()
+        };
+        let gain_stops = view.exposure_stops - drawn.exposure_stops;
+        (under_same == *drawn && gain_stops.abs() <= MAX_GAIN_STOPS).then_some(drawn.exposure_stops)
     }
 
     /// Refines the last frame: draws the view again with a subpixel offset and shows the mean of all its frames. If
@@ -375,9 +412,13 @@ impl Renderer {
         target: &wgpu::TextureView,
         view: &View,
     ) -> Result<()> {
-        if self.drawn_view.as_ref() != Some(view) {
+        let Some(drawn_stops) = self.drawn_stops(view) else {
             return self.draw(gpu, encoder, target, view);
-        }
+        };
+        let drawn = View {
+            exposure_stops: drawn_stops,
+            ..view.clone()
+        };
         let mut mean = Mean::of_size(self.mean.take(), gpu, [view.width, view.height]);
         if mean.count() == 0
             && let Some(targets) = &self.targets
@@ -385,15 +426,13 @@ impl Renderer {
             mean.add(gpu, encoder, &targets.resolved_view);
         }
         let sample = Sample::of_sequence(mean.count());
-        self.draw_radiance(gpu, encoder, view, exposure(view), sample)?;
+        self.draw_radiance(gpu, encoder, &drawn, exposure(&drawn), sample)?;
         if let Some(targets) = &self.targets {
             mean.add(gpu, encoder, &targets.resolved_view);
         }
-        let (_, radiance) = mean.picture();
-        self.tone_mapping
-            .draw(gpu, encoder, target, radiance, view.tone_map, None);
         self.mean = Some(mean);
-        self.drawn_view = Some(view.clone());
+        self.drawn_view = Some(drawn);
+        self.expose(gpu, encoder, target, view);
         Ok(())
     }
 

@@ -143,7 +143,12 @@ impl PipelineKey {
         };
         Self {
             writes,
-            faces,
+            // The shader of chains leaves out back faces itself.
+            faces: if writes == RenderTarget::Traced {
+                Faces::Both
+            } else {
+                faces
+            },
             surface: if shows_itself {
                 surface
             } else {

@@ -3,7 +3,7 @@
 use std::sync::mpsc::{Receiver, Sender, channel};
 
 use super::EyeQuality;
-use super::draws::GpuMs;
+use super::draws::{GpuMs, TimedFrame};
 use crate::gpu::Gpu;
 
 /// Queries at the beginning and the end of a pass. Passes are surfaces, chains, tone mapping, with two queries each.
@@ -23,12 +23,13 @@ const MAX_PENDING: usize = 3;
 
 /// The queries of one frame, which can be read if `is_mapped`.
 #[derive(Debug)]
-struct TimedFrame {
+struct PendingFrame {
     buffer: wgpu::Buffer,
     is_mapped: bool,
     /// Passes that were drawn.
     drawn: [bool; PASSES as usize],
     quality: EyeQuality,
+    width: u32,
 }
 
 /// Times frames on devices with timestamp queries.
@@ -36,11 +37,11 @@ struct TimedFrame {
 pub(super) struct Timing {
     marks: wgpu::QuerySet,
     resolved: wgpu::Buffer,
-    frames: (Sender<TimedFrame>, Receiver<TimedFrame>),
+    frames: (Sender<PendingFrame>, Receiver<PendingFrame>),
     pending: usize,
     /// Duration of one tick [ms].
     tick_ms: f64,
-    latest: Option<(GpuMs, EyeQuality)>,
+    latest: Option<TimedFrame>,
 }
 
 fn buffer(gpu: &wgpu::Device, usage: wgpu::BufferUsages) -> wgpu::Buffer {
@@ -75,8 +76,8 @@ impl Timing {
         })
     }
 
-    /// Times and quality of the latest frame that is done.
-    pub(super) fn latest(&self) -> Option<(GpuMs, EyeQuality)> {
+    /// The latest frame that is done.
+    pub(super) fn latest(&self) -> Option<TimedFrame> {
         self.latest
     }
 
@@ -95,7 +96,7 @@ impl Timing {
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         (has_specular, has_tone_mapping): (bool, bool),
-        quality: EyeQuality,
+        (quality, width): (EyeQuality, u32),
     ) {
         // A device that falls behind is not given more to read back.
         if self.pending == MAX_PENDING {
@@ -117,11 +118,12 @@ impl Timing {
         let (give, mapped) = (self.frames.0.clone(), buffer.clone());
         encoder.map_buffer_on_submit(&mapped, wgpu::MapMode::Read, .., move |outcome| {
             // Nobody listens once the renderer is gone.
-            let _ = give.send(TimedFrame {
+            let _ = give.send(PendingFrame {
                 buffer,
                 is_mapped: outcome.is_ok(),
                 drawn,
                 quality,
+                width,
             });
         });
     }
@@ -134,7 +136,7 @@ impl Timing {
         while let Ok(frame) = self.frames.1.try_recv() {
             self.pending -= 1;
             if frame.is_mapped {
-                self.latest = self.times(&frame).map(|ms| (ms, frame.quality)).or(self.latest);
+                self.latest = self.times(&frame).or(self.latest);
                 has_news = true;
             }
         }
@@ -146,7 +148,7 @@ impl Timing {
         self.pending > 0
     }
 
-    fn times(&self, frame: &TimedFrame) -> Option<GpuMs> {
+    fn times(&self, frame: &PendingFrame) -> Option<TimedFrame> {
         let range = frame.buffer.get_mapped_range(..).ok()?;
         let [opaque, specular, tone_mapping] = std::array::from_fn(|pass| {
             let at = pass * STRIDE as usize;
@@ -158,10 +160,14 @@ impl Timing {
             };
             ticks as f64 * self.tick_ms
         });
-        Some(GpuMs {
-            opaque,
-            specular,
-            tone_mapping,
+        Some(TimedFrame {
+            ms: GpuMs {
+                opaque,
+                specular,
+                tone_mapping,
+            },
+            quality: frame.quality,
+            width: frame.width,
         })
     }
 }

@@ -14,6 +14,14 @@ const BINDINGS: [Binding; 2] = [
     uniform(wgpu::ShaderStages::FRAGMENT),
 ];
 
+/// A frame to be tone-mapped.
+pub(super) struct Exposed<'a> {
+    pub(super) radiance: &'a wgpu::TextureView,
+    /// Exposure beyond that of the frame [stops].
+    pub(super) gain_stops: f64,
+    pub(super) tone_map: ToneMap,
+}
+
 /// The pipelines created so far.
 #[derive(Debug)]
 pub(super) struct ToneMappingPipelines {
@@ -21,7 +29,6 @@ pub(super) struct ToneMappingPipelines {
     target: wgpu::TextureFormat,
     layout: wgpu::BindGroupLayout,
     white_balance: Matrix3,
-    white: wgpu::Buffer,
     made: HashMap<ToneMap, wgpu::RenderPipeline>,
 }
 
@@ -32,35 +39,30 @@ impl ToneMappingPipelines {
             target,
             layout: bind_group_layout(gpu, "tone mapping", &BINDINGS),
             white_balance: IDENTITY,
-            white: white(gpu, &IDENTITY),
             made: HashMap::new(),
         }
     }
 
-    /// Multiplies radiance by a matrix from the next frame on; returns whether the matrix changed.
-    pub(super) fn set_white_balance(&mut self, gpu: &Gpu, matrix: &Matrix3) -> bool {
-        let is_new = self.white_balance != *matrix;
-        if is_new {
-            self.white_balance = *matrix;
-            self.white = white(gpu, matrix);
-        }
-        is_new
+    /// Multiplies radiance by a matrix from the next frame on.
+    pub(super) fn set_white_balance(&mut self, matrix: &Matrix3) {
+        self.white_balance = *matrix;
     }
 
     pub(super) fn count(&self) -> usize {
         self.made.len()
     }
 
-    /// Tone-maps `radiance` into `target`, texel by texel.
+    /// Tone-maps `exposed` into `target`, texel by texel.
     pub(super) fn draw(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         target: &wgpu::TextureView,
-        radiance: &wgpu::TextureView,
-        tone_map: ToneMap,
+        exposed: &Exposed<'_>,
         timestamp_writes: Option<wgpu::RenderPassTimestampWrites<'_>>,
     ) {
+        let tone_map = exposed.tone_map;
+
         // Each tone map is a specialisation of one shader, compiled when it is first shown.
         if !self.made.contains_key(&tone_map) {
             let constants = constants(tone_map, !self.target.is_srgb());
@@ -76,9 +78,16 @@ impl ToneMappingPipelines {
         }
 
         // The radiance is that of the frame or the mean of several, so that its texture is bound anew each time.
+        let gain = exposed.gain_stops.exp2();
+        let balance = self.white_balance.map(|row| row.map(|share| gain * share));
+        let white = gpu.filled_buffer(
+            "white balance",
+            bytemuck::bytes_of(&DisplayWhite::new(&balance)),
+            wgpu::BufferUsages::UNIFORM,
+        );
         let resources = [
-            wgpu::BindingResource::TextureView(radiance),
-            self.white.as_entire_binding(),
+            wgpu::BindingResource::TextureView(exposed.radiance),
+            white.as_entire_binding(),
         ];
         let bind_group = bind_group(gpu, "tone mapping", &self.layout, resources);
         cover(
@@ -88,15 +97,6 @@ impl ToneMappingPipelines {
             timestamp_writes,
         );
     }
-}
-
-fn white(gpu: &Gpu, matrix: &Matrix3) -> wgpu::Buffer {
-    let white = DisplayWhite::new(matrix);
-    gpu.filled_buffer(
-        "white balance",
-        bytemuck::bytes_of(&white),
-        wgpu::BufferUsages::UNIFORM,
-    )
 }
 
 /// Values of the shader's overrides. sRGB formats take linear values.

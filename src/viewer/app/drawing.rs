@@ -1,7 +1,7 @@
 //! The picture beside the panel: what it shows, at which quality, and the status text about it.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde_json::json;
 
@@ -103,11 +103,9 @@ impl App {
         graphics.main.set_options(&graphics.gpu, options)?;
 
         // Must come before `expose` and drawing, which would collect the times without reporting them.
-        if let Some(ms) = graphics.take_times() {
-            if let Some(quality) = graphics.main.renderer.counts().timed_quality {
-                self.pace.learn(ms, quality);
-            }
-            self.tell_time(ms);
+        if let Some(frame) = graphics.take_times() {
+            self.pace.learn(&frame, view.width);
+            self.tell_time(frame.ms);
         }
 
         // A measured exposure changes the view, and with it whether the picture shows it already.
@@ -116,10 +114,17 @@ impl App {
             return Ok(());
         };
 
-        // Once there is light, compilation begins, in the quality that a moving camera needs.
+        // Once there is light, compilation begins, in the quality that a moving camera needs. A software rasterizer
+        // compiles on the cores that bake, so that it comes after the first caustics unless these take long.
         if !self.model.maps().is_empty() {
-            let quality = self.pace.walking();
-            self.warm_up.begin(self.model.scene(), &view, quality);
+            let lit = *self.lit.get_or_insert_with(Instant::now);
+            let is_first_look =
+                self.model.state.is_working() && self.model.last.as_ref().is_some_and(|last| last.level == 1);
+            let waits = graphics.gpu.is_software() && is_first_look && lit.elapsed() < CAUSTICS_WITHIN;
+            if !waits {
+                let quality = self.pace.walking().eye;
+                self.warm_up.begin(self.model.scene(), &view, quality);
+            }
         }
 
         // A view that is shown already is refined; any other one is drawn at the quality that keeps the frame rate.
@@ -128,30 +133,44 @@ impl App {
         }
         self.pace.moves();
         self.is_refining = true;
-        if graphics.draw_picture(&view, self.pace.walking())? {
+        let is_still = !self.model.is_moving() && self.pace.pause(Instant::now()).is_zero();
+        let quality = if is_still && self.model.state.is_working() {
+            self.pace.waiting()
+        } else {
+            self.pace.walking()
+        };
+        if graphics.draw_picture(&view, quality)? {
             self.pictures += 1;
             self.reports_due = MAX_REPORTS;
         }
         Ok(())
     }
 
-    /// Refines the picture while the camera rests and no bake runs.
+    /// Refines the picture while the camera rests; while a bake runs, only if it is coarser than it has to be.
     pub(super) fn refine_picture(&mut self, view: &View) -> Result<()> {
-        let is_busy = self.model.state.is_working() || self.model.navigator.is_moving();
-        let Some(graphics) = self.graphics.as_mut().filter(|_| !is_busy) else {
+        let is_moving = self.model.navigator.is_moving();
+        let Some(graphics) = self.graphics.as_mut().filter(|_| !is_moving) else {
             self.is_refining = false;
             return Ok(());
         };
-        let samples = if graphics.main.renderer.quality() == self.pace.resting() {
-            graphics.main.renderer.counts().samples
-        } else {
-            0
-        };
         let now = Instant::now();
         let is_paused = !self.pace.pause(now).is_zero();
-        self.is_refining = is_paused || self.pace.refines(samples, now);
-        if self.is_refining && !is_paused {
-            graphics.refine_picture(view, self.pace.resting())?;
+        let shown = graphics.main.quality();
+        let (wanted, is_wanting) = if self.model.state.is_working() {
+            let waiting = self.pace.waiting();
+            (waiting, shown.scale < waiting.scale)
+        } else {
+            let resting = self.pace.resting();
+            let samples = if shown == resting {
+                graphics.main.renderer.counts().samples
+            } else {
+                0
+            };
+            (resting, is_paused || self.pace.refines(samples, now))
+        };
+        self.is_refining = is_wanting;
+        if is_wanting && !is_paused {
+            graphics.refine_picture(view, wanted)?;
         }
         Ok(())
     }
@@ -219,8 +238,8 @@ impl App {
         };
         let times = graphics.take_times();
         let is_complete = !graphics.main.renderer.awaits_times();
-        if let Some(ms) = times {
-            self.tell_time(ms);
+        if let Some(frame) = times {
+            self.tell_time(frame.ms);
         }
         let aspect = f64::from(view.width) / f64::from(view.height);
         let chains = plan::chains(self.model.scene(), Some((&view.camera, aspect)), switch);
@@ -235,10 +254,10 @@ impl App {
     /// Reports how the picture was rendered, and tells the user once if chains are not available.
     pub(super) fn report_making(&mut self) {
         let Some(graphics) = &self.graphics else { return };
-        let (counts, quality) = (graphics.main.renderer.counts(), graphics.main.renderer.quality());
+        let (counts, quality) = (graphics.main.renderer.counts(), graphics.main.quality());
         if let Some(times) = &mut self.model.picture.frame_times {
             times.made = Some(FrameStats {
-                traced_scale: (counts.drawn_specular > 0).then_some(quality.traced_scale),
+                traced_scale: (counts.drawn_specular > 0).then_some(quality.scale * quality.eye.traced_scale),
                 samples: counts.samples,
             });
         }
@@ -269,6 +288,9 @@ impl App {
     }
 }
 
+/// How long a software rasterizer leaves all cores to the first caustics of a scene: the gallery's take two seconds on two
+/// cores.
+const CAUSTICS_WITHIN: Duration = Duration::from_secs(3);
 /// Width of the picture that shaders are compiled with [pixels].
 const WARM_UP_WIDTH: u32 = 64;
 

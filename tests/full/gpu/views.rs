@@ -186,6 +186,45 @@ fn every_target_shows_what_the_cpu_shows() {
     assert!(brightest >= 250, "the ramp reaches white: {brightest}");
 }
 
+/// A frame, or the mean of several, shows other exposures and tone maps without being drawn anew; another view, or an
+/// exposure that half floats may not hold, is left alone.
+#[test]
+fn exposure_needs_no_new_frame() {
+    let (scene, maps) = lit();
+    let mut rig = or_skip!(Rig::new(&scene, &maps));
+    let shown = |exposure_stops: f64, tone_map: ToneMap| View {
+        exposure_stops,
+        tone_map,
+        ..from_above(SIZE)
+    };
+    let first = shown(-1.0, ToneMap::Soft);
+    assert_eq!(rig.exposed(&first), None, "nothing was drawn");
+    rig.drawn(&first);
+    for samples in [1, 3] {
+        let radiance = rig.renderer.shown_radiance(rig.gpu, &first);
+        let radiance = radiance.expect("it is read back");
+        for (exposure_stops, tone_map) in [(-1.0, ToneMap::AgX), (2.5, ToneMap::None), (-4.0, ToneMap::Soft)]
+        {
+            let found = rig.exposed(&shown(exposure_stops, tone_map));
+            let expected = display_rgba8(&radiance, exposure_stops, tone_map);
+            let (most, mean) = apart(&found.expect("it is the same frame"), &expected);
+            assert!(
+                most <= 1 && mean < 0.1,
+                "{samples}, {tone_map:?}: {most}, mean {mean}"
+            );
+        }
+        if samples == 1 {
+            rig.refined(&shown(0.5, ToneMap::Soft));
+            rig.refined(&shown(0.0, ToneMap::Soft));
+            assert_eq!(rig.renderer.counts().samples, 3, "exposures share a mean");
+        }
+    }
+    assert_eq!(rig.exposed(&shown(3.5, ToneMap::Soft)), None, "too far from -1");
+    let mut other = shown(-1.0, ToneMap::Soft);
+    other.camera.position.y *= 1.5;
+    assert_eq!(rig.exposed(&other), None, "another view");
+}
+
 #[test]
 fn white_is_balanced_as_on_the_cpu() {
     let (scene, maps) = lit();
@@ -199,7 +238,7 @@ fn white_is_balanced_as_on_the_cpu() {
     for white in ["2856", "9000K", "0.38,0.42"] {
         let matrix = white.parse::<WhiteBalance>().expect("a white").matrix(&scene);
         let expected = display_rgba8(&picture.clone().white_balanced(&matrix), 0.0, ToneMap::AgX);
-        rig.renderer.set_white_balance(rig.gpu, &matrix);
+        rig.renderer.set_white_balance(&matrix);
         let most = apart(&rig.drawn(&view), &expected).0;
         assert!(most <= 1, "{white}: {most}");
         assert!(apart(&as_it_is, &expected).0 > 8, "{white}");

@@ -142,7 +142,27 @@ impl<'a> Rig<'a> {
         self.shown(view, Renderer::refine)
     }
 
-    fn shown(&mut self, view: &View, draw: Draw) -> Vec<u8> {
+    /// The same for a picture that is the last frame under another exposure or tone map; `None` if it cannot be.
+    pub fn exposed(&mut self, view: &View) -> Option<Vec<u8>> {
+        let mut is_shown = false;
+        let bytes = self.shown(view, |renderer, gpu, encoder, target, view| {
+            is_shown = renderer.expose(gpu, encoder, target, view);
+            Ok(())
+        });
+        is_shown.then_some(bytes)
+    }
+
+    fn shown(
+        &mut self,
+        view: &View,
+        draw: impl FnOnce(
+            &mut Renderer,
+            &Gpu,
+            &mut wgpu::CommandEncoder,
+            &wgpu::TextureView,
+            &View,
+        ) -> nephroid::error::Result<()>,
+    ) -> Vec<u8> {
         let texture = self.gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: None,
             size: wgpu::Extent3d {
@@ -165,11 +185,3 @@ impl<'a> Rig<'a> {
         readback::read_texture(self.gpu, &texture).expect("it is read back")
     }
 }
-
-type Draw = fn(
-    &mut Renderer,
-    &Gpu,
-    &mut wgpu::CommandEncoder,
-    &wgpu::TextureView,
-    &View,
-) -> nephroid::error::Result<()>;

@@ -3,7 +3,8 @@
 
 use nephroid::bake::CostPoint;
 use nephroid::bake::forecast::forecast;
-use nephroid::viewer::pace::Pace;
+use nephroid::eye_pass::renderer::TimedFrame;
+use nephroid::viewer::pace::{Pace, PictureQuality};
 use nephroid::viewer::panel::accuracy::course::{Curve, Frame};
 use nephroid::viewer::timing::FrameTimes;
 
@@ -18,36 +19,85 @@ fn ms(opaque: f64, specular: f64) -> GpuMs {
     }
 }
 
-/// A device on which chains take so long for one traced pixel per pixel, used until nothing changes.
-fn settled(mut pace: Pace, specular: f64) -> Pace {
+/// Width of the window [pixels].
+const WIDTH: u32 = 1000;
+
+/// A device on which surfaces, and chains for one traced pixel per pixel, take so long in all of the window, used until
+/// nothing changes.
+fn settled_at(mut pace: Pace, opaque: f64, specular: f64) -> Pace {
     for _ in 0..8 {
-        let quality = pace.walking();
-        let pixels = quality.traced_scale * quality.traced_scale;
-        pace.learn(ms(1.0, specular * pixels), quality);
+        let PictureQuality { scale, eye } = pace.walking();
+        let pixels = scale * scale;
+        let frame = TimedFrame {
+            ms: ms(
+                opaque * pixels,
+                specular * pixels * eye.traced_scale * eye.traced_scale,
+            ),
+            quality: eye,
+            width: (f64::from(WIDTH) * scale) as u32,
+        };
+        pace.learn(&frame, WIDTH);
     }
     pace
 }
 
+fn settled(pace: Pace, specular: f64) -> Pace {
+    settled_at(pace, 1.0, specular)
+}
+
+fn traced_scale(quality: PictureQuality) -> f64 {
+    assert_eq!(quality.scale, 1.0, "the picture is sharp");
+    quality.eye.traced_scale
+}
+
 #[test]
 fn traced_scale_follows_the_frame_time() {
-    assert_eq!(Pace::default().walking().traced_scale, 1.0);
+    assert_eq!(traced_scale(Pace::default().walking()), 1.0);
     let slow = settled(Pace::default(), 400.0);
     for (specular, walking, resting) in [
         (2.0, 2.0, 1.0),
         (20.0, 1.0, 1.0),
         (100.0, 0.5, 1.0),
         (300.0, 0.25, 0.5),
-        (1e5, 0.25, 0.25),
     ] {
         let pace = settled(Pace::default(), specular);
-        let found = (pace.walking().traced_scale, pace.resting().traced_scale);
+        let found = (traced_scale(pace.walking()), traced_scale(pace.resting()));
         assert_eq!(found, (walking, resting), "{specular} ms");
         // It settles.
         assert_eq!(settled(pace.clone(), specular).walking(), pace.walking());
     }
-    assert_eq!(slow.walking().traced_scale, 0.25);
+    assert_eq!(traced_scale(slow.walking()), 0.25);
     // A calm view is fine again.
-    assert_eq!(settled(slow, 3.0).walking().traced_scale, 2.0);
+    assert_eq!(traced_scale(settled(slow, 3.0).walking()), 2.0);
+}
+
+/// Where surfaces alone are late, pictures have fewer pixels than the window: a quarter along a side while the camera
+/// moves, half while a bake shares the cores, all at rest.
+#[test]
+fn pictures_of_slow_devices_are_coarser() {
+    for specular in [0.0, 3000.0] {
+        let pace = settled_at(Pace::of_software(), 500.0, specular);
+        let scales = [pace.walking(), pace.waiting(), pace.resting()].map(|quality| quality.scale);
+        assert_eq!(scales, [0.25, 0.5, 1.0], "{specular} ms");
+    }
+    // Software that keeps pace is as sharp as any device, and a device that does not is as coarse.
+    assert_eq!(
+        settled_at(Pace::of_software(), 1.0, 2.0).walking(),
+        settled(Pace::default(), 2.0).walking()
+    );
+    assert_eq!(settled_at(Pace::default(), 500.0, 100.0).walking().scale, 0.25);
+    // Frames that are read back tell nothing.
+    let mut pace = Pace::default();
+    let read_back = TimedFrame {
+        ms: GpuMs {
+            opaque: 1e4,
+            ..GpuMs::default()
+        },
+        quality: pace.walking().eye,
+        width: WIDTH / 8,
+    };
+    pace.learn(&read_back, WIDTH);
+    assert_eq!(pace.walking(), Pace::default().walking());
 }
 
 #[test]
