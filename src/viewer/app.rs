@@ -105,8 +105,6 @@ pub struct App {
     wake_at: Option<Instant>,
     /// Compiles the shaders for chains in advance.
     warm_up: WarmUp,
-    /// When there was light first.
-    lit: Option<Instant>,
     exposure: AutoExposure,
     /// When the exposure was last updated.
     exposed: Instant,
@@ -158,7 +156,6 @@ impl App {
             exposure: AutoExposure::new(options.exposure_stops.is_none() && !model.exposure_is_kept),
             exposed: Instant::now(),
             warm_up: WarmUp::new(wake),
-            lit: None,
             notice: files::dark_notice(&model),
             shown: model.maps_shown(),
             model,

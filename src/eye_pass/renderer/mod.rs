@@ -375,21 +375,21 @@ impl Renderer {
         target: &wgpu::TextureView,
         view: &View,
     ) -> bool {
-        let (Some(drawn_stops), Some(targets)) = (self.drawn_stops(view), &self.targets) else {
+        let (Some(drawn), Some(targets)) = (self.drawn_as(view), &self.targets) else {
             return false;
         };
         let mean = self.mean.as_ref().filter(|mean| mean.count() > 0);
         let exposed = Exposed {
             radiance: mean.map_or(&targets.resolved_view, |mean| mean.picture().1),
-            gain_stops: view.exposure_stops - drawn_stops,
+            gain_stops: view.exposure_stops - drawn.exposure_stops,
             tone_map: view.tone_map,
         };
         self.tone_mapping.draw(gpu, encoder, target, &exposed, None);
         true
     }
 
-    /// Exposure of the radiance of the last frame [stops], if that shows `view` but for exposure and tone map.
-    fn drawn_stops(&self, view: &View) -> Option<f64> {
+    /// The view of the last frame, if that is `view` but for exposure and tone map.
+    fn drawn_as(&self, view: &View) -> Option<&View> {
         let drawn = self.drawn_view.as_ref()?;
         let under_same = View {
             exposure_stops: drawn.exposure_stops,
@@ -397,7 +397,7 @@ impl Renderer {
             ..view.clone()
         };
         let gain_stops = view.exposure_stops - drawn.exposure_stops;
-        (under_same == *drawn && gain_stops.abs() <= MAX_GAIN_STOPS).then_some(drawn.exposure_stops)
+        (under_same == *drawn && gain_stops.abs() <= MAX_GAIN_STOPS).then_some(drawn)
     }
 
     /// Refines the last frame: draws the view again with a subpixel offset and shows the mean of all its frames. If
@@ -412,12 +412,8 @@ impl Renderer {
         target: &wgpu::TextureView,
         view: &View,
     ) -> Result<()> {
-        let Some(drawn_stops) = self.drawn_stops(view) else {
+        let Some(drawn) = self.drawn_as(view).cloned() else {
             return self.draw(gpu, encoder, target, view);
-        };
-        let drawn = View {
-            exposure_stops: drawn_stops,
-            ..view.clone()
         };
         let mut mean = Mean::of_size(self.mean.take(), gpu, [view.width, view.height]);
         if mean.count() == 0

@@ -93,10 +93,10 @@ impl Renderer {
     /// # Errors
     /// Those of [`radiance`](Self::radiance).
     pub fn shown_radiance(&mut self, gpu: &Gpu, view: &View) -> Result<Picture> {
-        let Some(drawn_stops) = self.drawn_stops(view) else {
+        let Some(drawn) = self.drawn_as(view) else {
             return self.radiance_sampled(gpu, view, ANEW_SIDE);
         };
-        let scale = drawn_stops.exp2();
+        let scale = drawn.exposure_stops.exp2();
         let is_mean = self.mean.as_ref().is_some_and(|mean| mean.count() > 0);
         let picture = self.read_radiance(gpu, view, scale, is_mean)?;
         let largest = picture.radiance.iter().flatten().fold(0.0_f32, |a, b| a.max(*b));

@@ -117,14 +117,11 @@ impl App {
         // Once there is light, compilation begins, in the quality that a moving camera needs. A software rasterizer
         // compiles on the cores that bake, so that it comes after the first caustics unless these take long.
         if !self.model.maps().is_empty() {
-            let lit = *self.lit.get_or_insert_with(Instant::now);
             let is_first_look =
                 self.model.state.is_working() && self.model.last.as_ref().is_some_and(|last| last.level == 1);
-            let waits = graphics.gpu.is_software() && is_first_look && lit.elapsed() < CAUSTICS_WITHIN;
-            if !waits {
-                let quality = self.pace.walking().eye;
-                self.warm_up.begin(self.model.scene(), &view, quality);
-            }
+            let may_wait = graphics.gpu.is_software() && is_first_look;
+            let quality = self.pace.walking().eye;
+            self.warm_up.begin(self.model.scene(), (&view, quality), may_wait);
         }
 
         // A view that is shown already is refined; any other one is drawn at the quality that keeps the frame rate.
@@ -300,7 +297,8 @@ const WARM_UP_WIDTH: u32 = 64;
 #[derive(Debug)]
 pub struct WarmUp {
     work: Background<(), Result<()>>,
-    is_lit: bool,
+    /// When the first lit picture came.
+    lit: Option<Instant>,
     is_done: bool,
 }
 
@@ -309,15 +307,20 @@ impl WarmUp {
     pub fn new(wake: &Wake) -> Self {
         Self {
             work: Background::new("shaders", wake),
-            is_lit: false,
+            lit: None,
             is_done: false,
         }
     }
 
-    /// Starts with the second lit picture, so that the first one does not wait.
-    pub fn begin(&mut self, scene: &Arc<Scene>, view: &View, quality: EyeQuality) {
-        let was_lit = std::mem::replace(&mut self.is_lit, true);
-        if !was_lit || self.is_done || self.is_coming() {
+    /// Starts with the second lit picture, so that the first one does not wait; with `may_wait`, not before
+    /// [`CAUSTICS_WITHIN`] of the first.
+    pub fn begin(&mut self, scene: &Arc<Scene>, (view, quality): (&View, EyeQuality), may_wait: bool) {
+        let Some(lit) = self.lit else {
+            self.lit = Some(Instant::now());
+            return;
+        };
+        let waits = may_wait && lit.elapsed() < CAUSTICS_WITHIN;
+        if waits || self.is_done || self.is_coming() {
             return;
         }
         let scene = Arc::clone(scene);
