@@ -169,10 +169,16 @@ impl CausticLayer<'_> {
         let [noise2, wanted2] = squared_noise(error, truncated, target);
 
         // The filter may leave less noise than planned. More noise than planned is in the plan by now, unless the
-        // target is near.
+        // target is near. How much of it the filter will leave is not: if it helps, the next level goes half of the
+        // way.
         let scaled = AIM * before * (wanted2 / noise2).sqrt();
         let next = if error.max(last.found) > SURPRISE * before {
-            AIM * target
+            let helps = error < last.found;
+            AIM * if helps {
+                (target * last.found).sqrt().max(target)
+            } else {
+                target
+            }
         } else if before > FAR * target {
             scaled.max(AIM * target).clamp(STEPS.0 * before, STEPS.1 * before)
         } else {

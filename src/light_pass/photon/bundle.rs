@@ -47,7 +47,7 @@ pub(super) const PART_TEXELS: f64 = 0.1;
 const MAX_LAMP_PARTS: [f64; 2] = [4.0, 2.0];
 
 /// Minimum and maximum number of parts of a spectrum. Fewer would leave colour noise.
-const HUE_PARTS: (f64, f64) = (16.0, 64.0);
+const HUE_PARTS: (f64, f64) = (8.0, 64.0);
 
 /// Maximum distance between the arrivals from neighbouring parts of a lamp [texels]. A larger lamp is left to photons.
 pub(super) const MAX_STEP_TEXELS: f64 = 0.5;
@@ -229,13 +229,6 @@ impl OriginShift {
     pub(super) fn parts_hues(&self) -> bool {
         self.hues_across() > PART_TEXELS
     }
-
-    /// Parts of the spectrum for which a bundle is deposited.
-    pub(super) fn hue_parts(&self) -> f64 {
-        (self.hues_across() / PART_TEXELS)
-            .ceil()
-            .clamp(HUE_PARTS.0, HUE_PARTS.1)
-    }
 }
 
 /// The light of one path over a square.
@@ -251,6 +244,8 @@ pub(super) struct Bundle {
     pub(super) displaced_texels: f64,
     /// Divisions of the square's sides for the deposit.
     pub(super) divisions: usize,
+    /// Parts of the spectrum for the deposit.
+    pub(super) hue_parts: f64,
     /// Index of its first triangle among those of its path in all squares.
     pub(super) first_triangle: u32,
     /// Whether light varies little from texel to texel.
@@ -267,20 +262,25 @@ impl Bundle {
             flux_w,
             displaced_texels: 0.0,
             divisions: 1,
+            hue_parts: HUE_PARTS.1,
             first_triangle: 0,
             is_smooth: true,
         }
     }
 
     /// Chooses the divisions of the deposit so that it errs no more than `allowed`, the squared flux of the bundle with
-    /// this weight [W²/m²]. Returns the squared error that is left.
+    /// this weight [W²/m²], and as many parts of the spectrum as keep their noise below that. Returns the squared error
+    /// that the divisions leave.
     pub(super) fn plan_deposit(&mut self, weight: f64, allowed: f64) -> f64 {
-        let Shape::Whole(nodes) = &self.shape else {
-            return 0.0;
-        };
-        let image = Image::of(nodes).blurred(self.shift.lamp_width());
-        let (divisions, left) = image.divisions(self.flux_w * weight, allowed);
-        self.divisions = divisions;
+        let flux = self.flux_w * weight;
+        let mut image = Image::default();
+        let mut left = 0.0;
+        if let Shape::Whole(nodes) = &self.shape {
+            image = Image::of(nodes).blurred(self.shift.lamp_width());
+            (self.divisions, left) = image.divisions(flux, allowed);
+        }
+        let parts = image.hue_parts(self.shift.hues_across(), flux, allowed);
+        self.hue_parts = parts.clamp(HUE_PARTS.0, HUE_PARTS.1);
         left
     }
 
@@ -627,6 +627,20 @@ mod tests {
             assert!(bundle.divisions > before, "{} divisions", bundle.divisions);
             before = bundle.divisions;
         }
+
+        // A spectrum of many texels has more parts, the less is allowed.
+        bundle.shift.hues = [Vec2::ZERO, Vec2::X * 30.0];
+        let parts = [1e-4, 1e-6].map(|allowed| {
+            bundle.plan_deposit(1.0, allowed);
+            bundle.hue_parts
+        });
+        assert!(parts[0] < parts[1], "{parts:?}");
+        assert!(
+            parts
+                .iter()
+                .all(|parts| (HUE_PARTS.0..=HUE_PARTS.1).contains(parts)),
+            "{parts:?}"
+        );
 
         // No finer than the lamp shows it.
         bundle.shift.lamp = [Vec2::X * 2.0, Vec2::Y * 2.0];

@@ -139,7 +139,7 @@ impl ResidualPass<'_> {
             return vec![(self.rules.whole_hue(), 1.0)];
         };
         let within = even_point(draw.index, WAVELENGTH_DIMENSION, draw.seed).x;
-        let parts = bundle.shift.hue_parts();
+        let parts = bundle.hue_parts;
         let mut hues = Vec::with_capacity(parts as usize);
         for part in 0..parts as u32 {
             let hue = spectrum.one((f64::from(part) + within) / parts);

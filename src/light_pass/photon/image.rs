@@ -22,7 +22,7 @@ pub(super) const SMOOTH_TEXELS: f64 = 1.5;
 const QUARTERS: [[usize; 4]; 4] = [[0, 1, 3, 4], [1, 2, 4, 5], [3, 4, 6, 7], [4, 5, 7, 8]];
 
 /// Size of the image of a whole square on the map.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Image {
     /// Longest side along an axis of the map [texels].
     length: f64,
@@ -98,6 +98,14 @@ impl Image {
     /// Texels that the image covers, at least one detail along each axis.
     fn spread_texels(&self) -> f64 {
         self.length.max(self.detail()) * self.width.max(self.detail())
+    }
+
+    /// Parts of a spectrum that is so long on the map [texels] for which this flux errs by `allowed`: wavelengths are
+    /// drawn from each part, so that its image is displaced by up to half of the part's length.
+    pub(super) fn hue_parts(&self, across: f64, flux: f64, allowed: f64) -> f64 {
+        let displaced = across / 12_f64.sqrt() / self.width.max(self.detail());
+        let error = (self.spread_texels() * allowed).sqrt();
+        (displaced * flux / error.max(f64::MIN_POSITIVE)).ceil()
     }
 
     /// Squared error that a deposit in n² parts of this flux leaves, and the least n for which it is at most
