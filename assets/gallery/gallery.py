@@ -35,6 +35,13 @@ def tinted(value, colour):
     return value[..., None] * A(colour)
 
 
+def wood(n=256):
+    """Planed boards: rings that run along, with pores."""
+    rings = noise((n, n), (7, 1), 51, 3) + 0.35 * noise((n, n), (3, 2), 52, 3)
+    grain = 0.5 + 0.5 * np.sin(34 * rings) + 0.35 * noise((n, n), (120, 3), 53, 2)
+    return tinted(np.clip(1.06 - 0.30 * np.clip(grain, 0, 1), 0, 2), (0.47, 0.29, 0.18))
+
+
 def plaster(colour, bloom, seed, n=256):
     """Coats that dried unevenly: a pale bloom, broad sweeps, and strokes of the brush both ways."""
     veil = np.clip(0.4 + 0.9 * noise((n, n), (4, 4), seed, 6, 0.6), 0, 1)
@@ -152,7 +159,7 @@ def add_materials():
     file.material('right page', texture=page(0, HEADING))
     file.material('lemon', texture=plaster((0.80, 0.52, 0.04), (0.88, 0.64, 0.08), 31), metres=0.3)
     file.material('paper edge', (0.66, 0.60, 0.50))
-    file.material('cedar', (0.34, 0.19, 0.11))
+    file.material('cedar', texture=wood(), metres=0.4)
     file.material('black', (0.0, 0.0, 0.0))
     file.material('gold', metal='gold')
     file.material('glass', glass=1.52)
@@ -166,11 +173,12 @@ def add_materials():
 
 # ---- the room
 
-def arched_wall(name, material, place, span, height, arches):
-    """A wall along s with round arches (centre, half width, spring height); place(s, y, depth) is a point of it."""
+def arched_wall(name, material, place, top, arches):
+    """A wall along s with round arches (centre, half width, spring height) below a line of points (s, y); place(s, y, depth) is a
+    point of it."""
     # Strips end at equal angles of the arches, so that their upper edges follow the rounds.
-    steps, origin = 24, A(place(0, 0, 0))
-    cuts = set(span)
+    steps, origin, top = 24, A(place(0, 0, 0)), A(top)
+    cuts, span, height = set(top[:, 0]), top[[0, -1], 0], top[:, 1].max()
     for centre, half, _ in arches:
         cuts |= set(centre - half * np.cos(np.pi * np.arange(steps + 1) / steps))
     cuts = sorted(cuts)
@@ -184,7 +192,7 @@ def arched_wall(name, material, place, span, height, arches):
     # The face towards the room and the one outside: each strip reaches from its arch, or the floor, to the top.
     for depth, normal, owner in ((0.0, place(0, 0, -1), name), (WALL, place(0, 0, 1), 'outside')):
         p = [corner for a, b in zip(cuts[:-1], cuts[1:]) if b - a > 1e-9 for strip in [(a + b) / 2]
-             for corner in ((a, foot(a, strip)), (b, foot(b, strip)), (b, height), (a, height))]
+             for corner in ((a, foot(a, strip)), (b, foot(b, strip)), (b, np.interp(b, *top.T)), (a, np.interp(a, *top.T)))]
         p, first = A(p), 4 * np.arange(len(p) // 4)[:, None]
         i = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]])
         uv1 = np.stack([(p[:, 0] - span[0]) / (span[1] - span[0]), 1 - p[:, 1] / height], 1)
@@ -224,11 +232,10 @@ def sides(x, z, y, inwards):
 
 def add_room():
     outer_x, outer_z = (ROOM_X[0] - WALL, ROOM_X[1] + WALL), (ROOM_Z[0] - WALL, ROOM_Z[1] + WALL)
-    arched_wall('left wall', 'plaster', lambda s, y, d: (ROOM_X[0] - d, y, s), ROOM_Z, HEIGHT, [(z, 0.85, 2.20) for z in (-2.95, -0.75, 1.45)])
-    arched_wall('back wall', 'terracotta', lambda s, y, d: (s, y, ROOM_Z[0] - d), ROOM_X, HEIGHT, [(-0.72, 0.62, 1.42), (0.70, 0.62, 1.42)])
     # The right wall bends into a vault, which takes the net of the pool.
     spring, width, turn = 1.3, 1.7, np.linspace(0, np.pi / 2, 33)
-    profile = np.vstack([[(ROOM_X[1], 0.0)], np.stack([ROOM_X[1] - width * (1 - np.cos(turn)), spring + (HEIGHT - spring) * np.sin(turn)], 1)])
+    arch = np.stack([ROOM_X[1] - width * (1 - np.cos(turn)), spring + (HEIGHT - spring) * np.sin(turn)], 1)
+    profile = np.vstack([[(ROOM_X[1], 0.0)], arch])
     normal = np.vstack([[(-1, 0)], np.stack([-np.cos(turn) / width, -np.sin(turn) / (HEIGHT - spring)], 1)])
     along = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(profile, axis=0), axis=1))])
     p = A([[(x, y, z) for z in ROOM_Z] for x, y in profile])
@@ -237,8 +244,20 @@ def add_room():
     vault['uv1'] = np.stack(np.broadcast_arrays(A([0.0, 1.0]), (along / along[-1])[:, None]), -1).reshape(-1, 2)
     file.add('wall', vault, 'plaster')
     file.add('ceiling', flat((ROOM_X[0], ROOM_X[1] - width), ROOM_Z, HEIGHT, -1), 'plaster')
+    # The other walls: those at its ends follow the vault.
+    level, vaulted = [(z, HEIGHT) for z in ROOM_Z], [(ROOM_X[0], HEIGHT), *arch[::-1]]
+    arched_wall('left wall', 'plaster', lambda s, y, d: (ROOM_X[0] - d, y, s), level, [(z, 0.85, 2.20) for z in (-2.95, -0.75, 1.45)])
+    arched_wall('back wall', 'terracotta', lambda s, y, d: (s, y, ROOM_Z[0] - d), vaulted, [(-0.72, 0.62, 1.42), (0.70, 0.62, 1.42)])
     middle_x, half_x = sum(ROOM_X) / 2, (ROOM_X[1] - ROOM_X[0]) / 2
     file.add('front wall', rect([middle_x, HEIGHT / 2, ROOM_Z[1]], [-half_x, 0, 0], [0, HEIGHT / 2, 0]), 'plaster')
+    # A rib of stone where the vault meets them.
+    line, normal = np.vstack([profile, [(ROOM_X[0], HEIGHT)]]), np.vstack([normal, [(0, -1)]])
+    along, inner = np.append(along, along[-1] + ROOM_X[1] - width - ROOM_X[0]), line + BAND * unit(normal)
+    for wall, out in zip(ROOM_Z, (1, -1)):
+        face = A([[(*q, wall + out * 0.06) for q in pair] for pair in zip(line, inner)])
+        soffit = A([[(*q, wall), (*q, wall + out * 0.06)] for q in inner])
+        for p, n in ((face, np.broadcast_to([0, 0, out], face.shape)), (soffit, np.insert(normal, 2, 0, 1)[:, None].repeat(2, 1))):
+            file.add_to('reveals', sheet(p, n, np.stack(np.broadcast_arrays(along[:, None], [-BAND, 0]), -1)), 'ashlar')
     file.add_to('outside', flat(outer_x, outer_z, HEIGHT + 0.25), 'stone')
     file.add_to('outside', flat((-6.0, outer_x[0]), (-8.0, 3.8), 0.0), 'stone')
     file.add_to('outside', flat((outer_x[0], 6.0), (-8.0, outer_z[0]), 0.0), 'stone')
@@ -370,7 +389,7 @@ def add_lemon(length=0.082, radius=0.030):
 
 
 def add_prism():
-    """A bar of dense flint on a post by the pool: edge down, it turns the sun upwards and throws a spectrum on the vault."""
+    """A bar of dense flint on two posts by the pool: edge down, it turns the sun upwards and throws a spectrum on the vault."""
     apex_rad, side, half, centre = np.radians(42), 0.075, 0.14, A([-1.22, 1.00, -2.70])
     ahead, along = unit(SUN * [1, 0, 1]), unit(np.cross(UP, SUN))
     # At least deviation the light inside runs along the base; outside it comes from half the deviation above.
@@ -387,8 +406,9 @@ def add_prism():
     triangles = [a, b] + [[q[k] for k in pick] for q in quads for pick in ((0, 1, 2), (0, 2, 3))]
     file.add('prism', facets(triangles, centre), 'flint')
     frame = A([ahead, UP, along])
-    for low, high in (((-0.03, -1.02, -half - 0.03), (0.03, 0.06, -half - 0.005)), ((-0.03, -1.02, half + 0.005), (0.03, 0.06, half + 0.03))):
-        file.add_to('stands', box(low, high, frame, centre), 'cedar')
+    # Its edge rests in a groove of each post.
+    for end in (0.02 - half, half - 0.02):
+        file.add_to('stands', box((-0.014, -1.02, end - 0.012), (0.014, 0.004 - tall / 2, end + 0.012), frame, centre), 'cedar')
 
 
 def add_butterfly():
@@ -508,7 +528,7 @@ def add_cameras():
     file.camera('ring', [0.05, 0.97, 1.01], [0.075, 0.765, 0.785], 0.42)
     file.camera('pool', [-1.15, 1.35, 0.05], [0.75, 0.25, -2.3], 1.0)
     file.camera('ceiling', [-1.30, 1.25, 0.10], [1.20, 1.95, -2.2], 1.05)
-    file.camera('prism', [-1.55, 1.15, -3.05], [0.3, 1.02, -1.9], 0.76)
+    file.camera('prism', [-1.44, 1.20, -3.26], [-0.85, 1.10, -2.46], 0.80)
     file.camera('butterfly', [-0.62, 1.45, 1.25], [-0.52, 1.13, 2.05], 0.72)
 
 

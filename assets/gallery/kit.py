@@ -66,13 +66,15 @@ def box(low, high, axes=np.eye(3), origin=(0, 0, 0)):
     """Cuboid between two corners in a frame of three axes (rows)."""
     low, high = np.asarray(low, float), np.asarray(high, float)
     middle, half = (low + high) / 2, (high - low) / 2
-    faces = []
+    faces, longest = [], np.argmax(half)
     for k in range(3):
         for sign in (-1, 1):
             out, u, v = np.eye(3)[k] * sign, np.eye(3)[(k + 1) % 3], np.eye(3)[(k + 2) % 3]
             u, v = (u, v) if sign > 0 else (v, u)
             face = rect(middle + out * half, u * half, v * half)
-            # A cell of its own in the map.
+            # The grain of wood runs along the longest side. Each face has a cell of its own in the map.
+            p = face['p']
+            face['uv0'] = np.stack([p[:, longest], p.sum(1) - p[:, longest]], 1)
             face['uv1'] = (face['uv1'] * 0.94 + 0.03 + [k, (sign + 1) / 2]) / 3
             faces.append(face)
     # The frame may be left-handed: `mesh` turns the triangles.

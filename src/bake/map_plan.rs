@@ -228,19 +228,34 @@ impl CausticLayer<'_> {
     pub(super) fn chart(&self, receiver: Receiver, sizes: &Sizes) -> Option<Arc<Chart>> {
         match sizes.get(&receiver) {
             Some(size) => self.sizes.chart_of(receiver, size),
-            None => self.sizes.chart(receiver, self.default_size(receiver.object())?),
+            None => self.sizes.chart_of(receiver, &self.default_size(receiver)?),
         }
     }
 
-    /// Size for a surface that only the full lattice reached.
-    fn default_size(&self, object: usize) -> Option<(usize, usize)> {
-        let (width, height) = self.sizes.doubled_size(object, 0)?;
-        Some(match self.settings.map_resolution {
-            MapResolution::Auto => (width, height),
-            MapResolution::Fixed {
-                width: most,
-                height: highest,
-            } => (width.min(most), height.min(highest)),
+    /// Size for a surface that only later photons reached: at least that of a map without caustics, if it holds direct
+    /// light.
+    fn default_size(&self, receiver: Receiver) -> Option<MapSize> {
+        let (width, height) = self.sizes.doubled_size(receiver.object(), 0)?;
+        if let MapResolution::Fixed {
+            width: most,
+            height: highest,
+        } = self.settings.map_resolution
+        {
+            return Some(MapSize::dense((width.min(most), height.min(highest))));
+        }
+        let first = MapSize::dense((width, height));
+        let holds_direct = self.plan.is_on(Effect::Direct)
+            && self.settings.estimator.refines()
+            && self.sizes.may_see_lights(receiver);
+        if !holds_direct {
+            return Some(first);
+        }
+        let wish = self.sizes.direct_wish(receiver, self.settings)?;
+        let of_direct = wish.granted(map_size::MemoryReduction::Nothing);
+        Some(if of_direct.texels() > first.texels() {
+            of_direct
+        } else {
+            first
         })
     }
 }
