@@ -43,13 +43,13 @@ pub(super) const NEAREST_WEIGHTS: [f64; 9] = [
 /// parts.
 pub(super) const PART_TEXELS: f64 = 0.1;
 
-/// Maximum number of parts of a lamp along each axis: of light of one hue, and of dispersed light.
-const MAX_LAMP_PARTS: [f64; 2] = [4.0, 2.0];
+/// Minimum and maximum number of parts of a lamp: of light of one hue, and of dispersed light.
+const LAMP_PARTS: [(f64, f64); 2] = [(4.0, 32.0), (4.0, 4.0)];
 
 /// Minimum and maximum number of parts of a spectrum. Fewer would leave colour noise.
 const HUE_PARTS: (f64, f64) = (8.0, 64.0);
 
-/// Maximum distance between the arrivals from neighbouring parts of a lamp [texels]. A larger lamp is left to photons.
+/// Maximum length of the steps in which the parts of a lamp spread an edge [texels]. A larger lamp is left to photons.
 pub(super) const MAX_STEP_TEXELS: f64 = 0.5;
 
 /// A triangle lies beside a fold if it is less than so many times as thick as it is moved: chords of x(u) = u² move the
@@ -190,20 +190,16 @@ impl OriginShift {
         first * ends[0] + last * ends[1]
     }
 
-    /// Parts of a lamp for which a bundle is deposited, along both axes: each spreads light over about so many texels.
-    pub(super) fn lamp_parts(&self, part_texels: f64, is_dispersed: bool) -> DVec2 {
-        let parts = |moved: Vec2| {
-            let width = 2.0 * f64::from(moved.abs().max_element());
-            let parts = (width / part_texels).ceil();
-            // A single part would have no width at all.
-            if width > PART_TEXELS {
-                parts.max(2.0)
-            } else {
-                parts
-            }
-        };
-        let most = MAX_LAMP_PARTS[usize::from(is_dispersed)];
-        DVec2::from(self.lamp.map(parts)).clamp(DVec2::ONE, DVec2::splat(most))
+    /// Parts of a lamp for which a bundle is deposited, a multiple of four, or one: so many that an edge is spread in
+    /// steps of about this length.
+    pub(super) fn lamp_parts(&self, part_texels: f64, is_dispersed: bool) -> u32 {
+        let length = self.lamp_length();
+        // A single part would have no width at all.
+        if length <= PART_TEXELS {
+            return 1;
+        }
+        let (least, most) = LAMP_PARTS[usize::from(is_dispersed)];
+        4 * (0.25 * (length / part_texels).clamp(least, most)).ceil() as u32
     }
 
     /// Width of the lamp's image across its longer side [texels].
@@ -212,11 +208,16 @@ impl OriginShift {
         2.0 * x.perp_dot(y).abs() / x.length().max(y.length()).max(f64::MIN_POSITIVE)
     }
 
-    /// Distance between the arrivals from neighbouring parts of a lamp [texels].
+    /// Length of the lamp's image along an axis of the map [texels].
+    fn lamp_length(&self) -> f64 {
+        let [x, y] = self.lamp.map(|moved| moved.as_dvec2());
+        2.0 * (x * x + y * y).max_element().sqrt()
+    }
+
+    /// Length of the steps in which the parts of a lamp spread an edge [texels].
     fn lamp_step_texels(&self) -> f64 {
-        let parts = self.lamp_parts(PART_TEXELS, false).to_array();
-        let step = |axis: usize| 2.0 * f64::from(self.lamp[axis].abs().max_element()) / parts[axis];
-        step(0).max(step(1))
+        let is_dispersed = self.parts_hues();
+        self.lamp_length() / f64::from(self.lamp_parts(PART_TEXELS, is_dispersed))
     }
 
     /// Extent of the spectrum on the map [texels].

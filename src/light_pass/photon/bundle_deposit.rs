@@ -6,7 +6,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::bundle::{Bundle, MAX_STEP_TEXELS, OriginShift, PART_TEXELS, flux_triangle};
-use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE};
+use super::launch::LAMP_DIMENSION;
 use super::pass::{half_seed, set_of};
 use super::receivers::Receivers;
 use super::residual::{ResidualPass, TIMES};
@@ -25,6 +25,15 @@ use crate::scene::PanelShape;
 /// Part of the squared goal that the deposit of bundles may err by its plan: curves laid down as chords, slopes as
 /// steps.
 const DEPOSIT_PART: f64 = 0.1;
+
+/// Corners of the image of a disc on a small triangle, besides one for every other part of the lamp.
+const LEAST_CORNERS: u32 = 8;
+
+/// Multiples of it are spread evenly over the unit interval.
+const GOLDEN_SECTION: f64 = 0.618_033_988_749_895;
+
+/// Within each part of a lamp: places that differ along both axes even where there are four.
+const MIDDLES: DVec2 = DVec2::new(0.5, 0.25);
 
 /// Squares whose triangles are made before they are deposited: of light of one hue, and of a spectrum, which takes many
 /// times the triangles.
@@ -179,8 +188,7 @@ struct BundleDraw {
 struct LampImage<'a> {
     lamp: PanelShape,
     shift: &'a OriginShift,
-    /// Along both axes.
-    parts: DVec2,
+    parts: u32,
     /// Displacement for each part [texels]; empty where each triangle draws its own.
     middles: Vec<DVec2>,
 }
@@ -196,24 +204,34 @@ impl<'a> LampImage<'a> {
         if !is_dispersed {
             // The middles of parts are nearer to the centre than all of the lamp: they are moved out to have its second
             // moments.
-            let middles = image.places(LAMP_MIDDLE);
-            let moment = middles.iter().map(|at| at * at).sum::<DVec2>() / middles.len() as f64;
-            let scale = (DVec2::splat(lamp.second_moment()) / moment).map(f64::sqrt);
-            let scale = DVec2::select(image.parts.cmpgt(DVec2::ONE), scale, DVec2::ONE);
+            let middles = image.places(MIDDLES);
+            let moment = middles.iter().map(|at| at.length_squared()).sum::<f64>() / middles.len() as f64;
+            let scale = if image.parts > 1 {
+                (2.0 * lamp.second_moment() / moment).sqrt()
+            } else {
+                1.0
+            };
             image.middles = middles.iter().map(|&at| shift.of_lamp(at * scale)).collect();
         }
         image
     }
 
-    /// A place in each part of the lamp, in half-axes from its centre, by a point of the unit square.
+    /// A place in each part of the lamp, in half-axes from its centre, by a point of the unit square: those of a lattice
+    /// in one quarter, turned into the others. Seen along any direction they lie at different distances, and their
+    /// second moments are the same in all directions.
     fn places(&self, within: DVec2) -> Vec<DVec2> {
-        let count = (self.parts.x * self.parts.y) as u32;
+        if self.parts == 1 {
+            return vec![DVec2::ZERO];
+        }
+        let of_quarter = self.parts / 4;
         let place = |part: u32| {
-            let part = f64::from(part);
-            let part = DVec2::new(part % self.parts.x, (part / self.parts.x).floor());
-            self.lamp.at((part + within) / self.parts)
+            let number = f64::from(part / 4);
+            let along = (number + within.x) / f64::from(of_quarter);
+            let across = (number * GOLDEN_SECTION + within.y).fract();
+            let at = self.lamp.at(0.5 + 0.5 * DVec2::new(along, across));
+            (0..part % 4).fold(at, |at, _| at.perp())
         };
-        (0..count).map(place).collect()
+        (0..self.parts).map(place).collect()
     }
 
     /// A triangle [texels], spread by the lamp's image into triangles that share its flux evenly. Those of one hue are
@@ -239,9 +257,7 @@ impl<'a> LampImage<'a> {
         let wider = self
             .shift
             .widened(self.lamp, corners.map(|corner| corner - middle));
-        let outline = self
-            .lamp
-            .corners(4 * self.parts.max_element() as u32, on_lamp().x);
+        let outline = self.lamp.corners(LEAST_CORNERS + self.parts / 2, on_lamp().x);
         let corners: Vec<DVec2> = outline
             .iter()
             .map(|&at| middle + self.shift.of_lamp(wider * at))
