@@ -93,7 +93,10 @@ impl CausticLayer<'_> {
                 (MapResolution::Auto, Some(seen)) => self.automatic_wish(receiver, seen),
                 (MapResolution::Auto, None) => None,
             };
-            wish.map(|wish| (receiver, wish))
+            let flux_w = statistics
+                .and_then(|seen| seen.mean(receiver))
+                .map_or(0.0, |mean| mean.flux_w);
+            wish.map(|wish| (receiver, SizeRequest { flux_w, ..wish }))
         };
         let wishes: BTreeMap<Receiver, SizeRequest> = receivers.filter_map(wish).collect();
 

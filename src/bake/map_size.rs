@@ -140,6 +140,8 @@ pub(super) struct SizeRequest {
     pub(super) fineness: f64,
     /// Coarsest level of tiles, if memory allows.
     pub(super) coarsest: u8,
+    /// Caustics that were seen on the map [W].
+    pub(super) flux_w: f64,
 }
 
 /// Levels by which texels may be larger than footprints, to save memory.
@@ -159,6 +161,7 @@ impl SizeRequest {
             tiles: None,
             fineness: 0.0,
             coarsest: COARSEST,
+            flux_w: 0.0,
         }
     }
 
@@ -277,7 +280,20 @@ pub(super) fn fit(wishes: &BTreeMap<Receiver, SizeRequest>, (limit, memory): (u6
             low = middle + 1;
         }
     }
-    granted(wishes, sparing(high))
+
+    // A step halves large maps, so that much may be left: single ones, those with most light first, take it back.
+    let mut sizes = granted(wishes, sparing(high));
+    let mut by_light: Vec<(&Receiver, &SizeRequest)> = wishes.iter().collect();
+    by_light.sort_by(|(_, a), (_, b)| b.flux_w.total_cmp(&a.flux_w));
+    for (&receiver, wish) in by_light {
+        let finer = wish.granted(sparing((high - 1).max(0)));
+        if let Some(size) = sizes.insert(receiver, finer)
+            && !fits(&sizes)
+        {
+            sizes.insert(receiver, size);
+        }
+    }
+    sizes
 }
 
 /// Maximum number of cells across and down that light is sorted into.
@@ -348,4 +364,28 @@ fn parts(low: f64, high: f64, count: usize) -> Vec<(usize, f64)> {
             (index, if length > 0.0 { inside / length } else { 1.0 })
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_step_leaves_goes_to_the_brightest_maps() {
+        let wishes: BTreeMap<Receiver, SizeRequest> = [1.0, 3.0, 2.0]
+            .into_iter()
+            .enumerate()
+            .map(|(object, flux_w)| {
+                let wish = SizeRequest::dense((256, 256));
+                (Receiver::front(object), SizeRequest { flux_w, ..wish })
+            })
+            .collect();
+        let memory = MapMemory::finished(BTreeMap::new());
+        let limit = memory.of_sizes(&requested(&wishes)) * 3 / 4;
+        let sides = fit(&wishes, (limit, &memory))
+            .values()
+            .map(|size| size.size.0)
+            .collect::<Vec<_>>();
+        assert_eq!(sides, [128, 256, 256]);
+    }
 }

@@ -47,6 +47,8 @@ pub struct MeanFootprint {
     pub area_m2: f64,
     /// Share of the whole map that it covers.
     pub map_share: f64,
+    /// Flux of all footprints [W].
+    pub flux_w: f64,
 }
 
 /// How detailed the light of one receiver is.
@@ -129,6 +131,7 @@ impl FootprintStatistics {
         Some(MeanFootprint {
             area_m2: (sums.log_area_m2 / sums.flux).exp(),
             map_share: (sums.log_area_share / sums.flux).exp(),
+            flux_w: sums.flux,
         })
     }
 

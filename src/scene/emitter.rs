@@ -417,7 +417,11 @@ pub fn on_disc(square: DVec2) -> DVec2 {
 
 /// Unit directions within a half-angle [rad] of an axis, uniform in solid angle.
 pub fn in_cap(axis: DVec3, half_angle_rad: f64, square: DVec2) -> DVec3 {
-    let (x, y) = axis.any_orthonormal_pair();
+    in_cap_across(axis, axis.any_orthonormal_pair(), half_angle_rad, square)
+}
+
+/// The same with two vectors across the axis, along which the square lies.
+pub fn in_cap_across(axis: DVec3, (x, y): (DVec3, DVec3), half_angle_rad: f64, square: DVec2) -> DVec3 {
     let place = on_disc(square);
     // 1 − cos θ, without cancellation.
     let height = 2.0 * (0.5 * half_angle_rad).sin().powi(2) * place.length_squared();

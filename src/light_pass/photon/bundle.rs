@@ -124,7 +124,7 @@ pub(super) struct Origin {
 }
 
 impl OriginShift {
-    /// Measured at the square's middle; `None` if light takes another path from there, or if the lamp is too large.
+    /// Measured at one point of the square; `None` if light takes another path from there, or if the lamp is too large.
     pub(super) fn measured(
         middle: &PathEnd,
         lamp_sides: Option<&[PointPaths; 2]>,

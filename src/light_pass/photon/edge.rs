@@ -101,30 +101,38 @@ impl Cutter<'_, '_> {
 
     /// Finds how bundles move with lamp and wavelength; those of which that is not known are left to photons.
     fn measure_shifts(&self, square: &mut Square) -> (u64, u64) {
-        let root = square.place.corner.root as usize;
-        let middle = square.place.node(CENTRE).square();
-        let lamp_sides = self.finder.at_lamp_sides(root, middle);
-        let spectrum_ends = self.finder.at_spectrum_ends(root, middle);
-        if lamp_sides.is_none() && spectrum_ends.is_none() {
-            return (0, 0);
-        }
-        let centre = Arc::clone(&square.points[CENTRE]);
-        for bundle in 0..square.bundles.len() {
-            let end = centre.end(square.bundles[bundle].route.signature);
-            let shift =
-                end.and_then(|end| OriginShift::measured(end, lamp_sides.as_ref(), spectrum_ends.as_ref()));
-            match shift {
-                Some(shift) => {
-                    square.bundles[bundle].shift = shift;
-                    square.bundles[bundle].is_smooth |= shift.is_smooth();
-                }
-                None => square.give_up(bundle),
+        let mut traced = (0, 0);
+        let mut left: Vec<usize> = (0..square.bundles.len()).collect();
+        // At the centre, or where else a path is: edges leave it to a part of the square.
+        for node in [CENTRE].into_iter().chain(AROUND) {
+            let point = Arc::clone(&square.points[node]);
+            let has = |bundle: &usize| point.end(square.bundles[*bundle].route.signature).is_some();
+            if left.is_empty() || (node != CENTRE && !left.iter().any(has)) {
+                continue;
             }
+            let place = square.place.node(node);
+            let lamp_sides = self.finder.at_lamp_sides(place.root as usize, place.square());
+            let spectrum_ends = self.finder.at_spectrum_ends(place.root as usize, place.square());
+            if lamp_sides.is_none() && spectrum_ends.is_none() {
+                return traced;
+            }
+            for paths in lamp_sides.iter().chain(&spectrum_ends).flatten() {
+                traced = (traced.0 + 1, traced.1 + u64::from(paths.traced));
+            }
+            left.retain(|&bundle| {
+                let bundle = &mut square.bundles[bundle];
+                let shift = point
+                    .end(bundle.route.signature)
+                    .and_then(|end| OriginShift::measured(end, lamp_sides.as_ref(), spectrum_ends.as_ref()));
+                if let Some(shift) = shift {
+                    bundle.shift = shift;
+                    bundle.is_smooth |= shift.is_smooth();
+                }
+                shift.is_none()
+            });
         }
-        let traced = lamp_sides.iter().chain(&spectrum_ends).flatten();
-        traced.fold((0, 0), |(rays, segments), paths| {
-            (rays + 1, segments + u64::from(paths.traced))
-        })
+        left.into_iter().for_each(|bundle| square.give_up(bundle));
+        traced
     }
 
     /// The parts of a square that have a path.

@@ -6,10 +6,10 @@ use std::collections::BTreeSet;
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
 
-use super::launch::LAMP_DIMENSION;
+use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE};
 use crate::geometry::Ray;
 use crate::geometry::sampling::{even_code, even_point, in_square, unfolded};
-use crate::scene::emitter::{Emitter, EmitterKind, EmitterSampler, in_cap, on_disc};
+use crate::scene::emitter::{Emitter, EmitterKind, EmitterSampler, in_cap_across, on_disc};
 use crate::scene::{Light, Scene};
 use crate::transport::Tracer;
 
@@ -29,6 +29,9 @@ const PROBE_SEED: u64 = 0x7072_6f62_6573;
 
 /// Density of photons in a cell without hits, relative to one with hits.
 const RARE: f64 = 1.0 / 16.0;
+
+/// Directions are opposite if one plus the cosine between them is less.
+const OPPOSITE: f64 = 1e-6;
 
 /// A point of a lamp, as rays are aimed from it.
 pub struct LampPoint {
@@ -105,6 +108,8 @@ pub struct Spheres(Vec<GuidedSphere>);
 #[derive(Clone, Debug)]
 struct GuidedSphere {
     sphere: Sphere,
+    /// Towards it from the middle of the lamp.
+    axis: DVec3,
     /// Density summed over the cells before each along Morton's curve; full density in all cells sums to 1.
     before: Vec<f64>,
 }
@@ -113,9 +118,10 @@ impl Spheres {
     /// Bounding spheres of casters, for a light of unit strength.
     pub fn around(tracer: &Tracer, light: &Light, casters: &[usize]) -> Self {
         let spheres = spheres(tracer.scene(), casters, MAX_SPHERES);
-        let evenly = |sphere| GuidedSphere::new(sphere, |_| 1.0);
+        let evenly = |sphere| GuidedSphere::new(sphere, DVec3::Z, |_| 1.0);
         let even = Self(spheres.into_iter().map(evenly).collect());
         let places = even.places(light, tracer.scene());
+        let middle = LampPoint::of(&places, LAMP_MIDDLE);
         let (low, high) = tracer.scene().bounds().unwrap_or_default();
         let across_m = (high - low).length();
         let meets = |index: u32| {
@@ -128,7 +134,8 @@ impl Spheres {
         let met: Vec<(usize, usize)> = (0..PROBES).into_par_iter().filter_map(meets).collect();
         let met: BTreeSet<(usize, [u32; 2])> = met.into_iter().flat_map(with_neighbours).collect();
         let guided = even.0.into_iter().enumerate().map(|(which, guided)| {
-            GuidedSphere::new(guided.sphere, |cell| {
+            let axis = middle.as_ref().map(|lamp| guided.sphere.axis(&lamp.emitter));
+            GuidedSphere::new(guided.sphere, axis.unwrap_or(DVec3::Z), |cell| {
                 if met.contains(&(which, unfolded(cell as u64))) {
                     1.0
                 } else {
@@ -194,14 +201,14 @@ impl Spheres {
     /// From a point of a lamp through a point of a sphere's square, and the share of the square's measure that it stands
     /// for; `None` if the ray belongs to an earlier sphere.
     fn ray(&self, lamp: &LampPoint, which: usize, square: DVec2, across_m: f64) -> Option<(Ray, f64)> {
-        let sphere = &self.0[which].sphere;
+        let GuidedSphere { sphere, .. } = &self.0[which];
         let is_taken = |ray: &Ray| {
             let mut earlier = self.0[..which].iter().map(|guided| &guided.sphere);
             earlier.any(|sphere| sphere.has(ray, &lamp.emitter) && sphere.measure(lamp) > 0.0)
         };
         let ray = match lamp.emitter.kind {
             EmitterKind::Parallel { direction } => {
-                let (x, y) = direction.any_orthonormal_pair();
+                let (x, y) = self.0[which].across(direction);
                 let offset = on_disc(square) * sphere.radius_m;
                 Ray {
                     origin: sphere.centre + x * offset.x + y * offset.y - direction * across_m,
@@ -211,8 +218,9 @@ impl Spheres {
             EmitterKind::Point { position }
             | EmitterKind::Spot { position, .. }
             | EmitterKind::Facet { position, .. } => {
-                let axis = (sphere.centre - position).normalize_or(DVec3::Z);
-                let direction = in_cap(axis, sphere.half_angle_rad(position, lamp.ball), square);
+                let axis = sphere.axis(&lamp.emitter);
+                let half_angle_rad = sphere.half_angle_rad(position, lamp.ball);
+                let direction = in_cap_across(axis, self.0[which].across(axis), half_angle_rad, square);
                 if let Some(ball) = lamp.ball {
                     let distance_m = position.distance(sphere.centre);
                     let across = axis.any_orthonormal_vector();
@@ -281,12 +289,24 @@ fn with_neighbours((which, cell): (usize, usize)) -> impl Iterator<Item = (usize
 }
 
 impl GuidedSphere {
-    fn new(sphere: Sphere, density: impl Fn(usize) -> f64) -> Self {
+    fn new(sphere: Sphere, axis: DVec3, density: impl Fn(usize) -> f64) -> Self {
         let mut before = vec![0.0; CELLS + 1];
         for cell in 0..CELLS {
             before[cell + 1] = before[cell] + density(cell) / CELLS as f64;
         }
-        Self { sphere, before }
+        Self { sphere, axis, before }
+    }
+
+    /// Two vectors across a direction. From other points of the lamp they are turned as little as can be, so that rays
+    /// through one point of the square cross each other near the sphere.
+    fn across(&self, direction: DVec3) -> (DVec3, DVec3) {
+        let (x, y) = self.axis.any_orthonormal_pair();
+        let both = 1.0 + self.axis.dot(direction);
+        if both < OPPOSITE {
+            return direction.any_orthonormal_pair();
+        }
+        let turned = |side: DVec3| side - (self.axis + direction) * (side.dot(direction) / both);
+        (turned(x), turned(y))
     }
 }
 
@@ -297,6 +317,16 @@ struct Sphere {
 }
 
 impl Sphere {
+    /// Direction in which an emitter shines on its centre.
+    fn axis(&self, emitter: &Emitter) -> DVec3 {
+        match emitter.kind {
+            EmitterKind::Parallel { direction } => direction,
+            EmitterKind::Point { position }
+            | EmitterKind::Spot { position, .. }
+            | EmitterKind::Facet { position, .. } => (self.centre - position).normalize_or(DVec3::Z),
+        }
+    }
+
     /// Solid angle that an emitter illuminates towards the sphere [sr], or its cross-section in parallel light [m²].
     fn measure(&self, lamp: &LampPoint) -> f64 {
         let LampPoint { emitter, ball } = lamp;

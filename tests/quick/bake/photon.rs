@@ -5,8 +5,10 @@ use nephroid::optics::luminance;
 use nephroid::settings::{ErrorMetric, Estimator};
 
 use support::hard_scenes::roughened;
+use support::meshes::floor;
 use support::prelude::*;
-use support::tools::{bake, builtin_scene, energy_fault, photons};
+use support::scenes::sun;
+use support::tools::{bake, builtin_scene, caustic, energy_fault, map_of, photons, to};
 
 const SIDE: usize = 64;
 /// Fine enough that light is smooth from texel to texel.
@@ -90,4 +92,42 @@ fn bundles_carry_what_stays_together() {
     let [smooth, rough] = [builtin_scene("ring"), roughened("ball", 0.2)].map(bundled);
     assert!(smooth > 0.95, "a smooth mirror: {smooth}");
     assert!(rough < 0.05, "rough glass: {rough}");
+}
+
+/// The image of the sun's disc at the edge of a pane, nine texels wide: bundles carry it, and it is as bright as the
+/// share of a circle beyond a line.
+#[test]
+fn light_through_a_pane_ends_in_the_suns_penumbra() {
+    let (diameter_rad, height_m, side) = (0.53_f64.to_radians(), 4.0, 512);
+    let mut scene = Scene::default();
+    parts::add(&mut scene, "floor", floor(1.0, 0.0), Material::default());
+    let pane = Material {
+        surface: SurfaceKind::ThinWall,
+        volume: None,
+        ..parts::dielectric("pane", 1.5)
+    };
+    parts::add(&mut scene, "pane", floor(0.5, height_m), pane);
+    scene.lights = vec![Light {
+        size: LightSize::Angle { diameter_rad },
+        ..sun(-DVec3::Y, 1.0)
+    }];
+    let result = bake(scene.clone(), &to(0.02, side));
+    assert_eq!(energy_fault(&result), None);
+    let ledger = &result.ledgers[0];
+    let bundled = ledger.carried_w.bundles / ledger.energy_w.deposited;
+    assert!(bundled > 0.99, "bundles carry {bundled}");
+
+    // Reflected to and fro between both faces, 2 n / (n² + 1) of the light passes.
+    let passed = 3.0 / 3.25;
+    let map = caustic(map_of(&result, &scene, "floor"));
+    let radius_m = height_m * (0.5 * diameter_rad).tan();
+    let rows = side * 3 / 8..side * 5 / 8;
+    for column in 0..side {
+        let mean = rows.clone().map(|row| map[row * side + column]).sum::<f64>() / rows.len() as f64;
+        let x_m = (column as f64 + 0.5) * 2.0 / side as f64 - 1.0;
+        let t = ((0.5 - x_m.abs()) / radius_m).clamp(-1.0, 1.0);
+        let share = 0.5 + (t * (1.0 - t * t).sqrt() + t.asin()) / PI;
+        let off = mean / passed - share;
+        assert!(off.abs() < 0.02, "at {x_m} m: {off} beside {share}");
+    }
 }
