@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::bundle::{Node, OriginShift, Piece, Shape};
 use super::domain::DomainPoint;
-use super::paths::PathFinder;
+use super::paths::{PathFinder, PointPaths};
 use super::squares::{Plan, Points, Square, Squares};
 use crate::light_pass::pass_report::PassReport;
 use crate::light_pass::path::PathSignature;
@@ -103,11 +103,15 @@ impl Cutter<'_, '_> {
     fn measure_shifts(&self, square: &mut Square) -> (u64, u64) {
         let mut traced = (0, 0);
         let mut left: Vec<usize> = (0..square.bundles.len()).collect();
-        // At the centre, or where else a path is: edges leave it to a part of the square.
+        // At the centre or, of a path that only a part of the square has, where else it is.
         for node in [CENTRE].into_iter().chain(AROUND) {
             let point = Arc::clone(&square.points[node]);
-            let has = |bundle: &usize| point.end(square.bundles[*bundle].route.signature).is_some();
-            if left.is_empty() || (node != CENTRE && !left.iter().any(has)) {
+            let is_sought = |bundle: &usize| {
+                let signature = square.bundles[*bundle].route.signature;
+                let is_missing = |point: &Arc<PointPaths>| point.end(signature).is_none();
+                node == CENTRE || (!is_missing(&point) && square.points.iter().any(is_missing))
+            };
+            if !left.iter().any(is_sought) {
                 continue;
             }
             let place = square.place.node(node);
@@ -214,7 +218,7 @@ impl Cutter<'_, '_> {
         (square.place.within(edge).as_vec2(), light)
     }
 
-    fn paths(&mut self, point: DomainPoint) -> &super::paths::PointPaths {
+    fn paths(&mut self, point: DomainPoint) -> &PointPaths {
         if let Some(known) = self.shared.get(&point) {
             return known;
         }

@@ -201,14 +201,15 @@ impl Spheres {
     /// From a point of a lamp through a point of a sphere's square, and the share of the square's measure that it stands
     /// for; `None` if the ray belongs to an earlier sphere.
     fn ray(&self, lamp: &LampPoint, which: usize, square: DVec2, across_m: f64) -> Option<(Ray, f64)> {
-        let GuidedSphere { sphere, .. } = &self.0[which];
+        let guided = &self.0[which];
+        let sphere = &guided.sphere;
         let is_taken = |ray: &Ray| {
             let mut earlier = self.0[..which].iter().map(|guided| &guided.sphere);
             earlier.any(|sphere| sphere.has(ray, &lamp.emitter) && sphere.measure(lamp) > 0.0)
         };
         let ray = match lamp.emitter.kind {
             EmitterKind::Parallel { direction } => {
-                let (x, y) = self.0[which].across(direction);
+                let (x, y) = guided.across(direction);
                 let offset = on_disc(square) * sphere.radius_m;
                 Ray {
                     origin: sphere.centre + x * offset.x + y * offset.y - direction * across_m,
@@ -220,7 +221,7 @@ impl Spheres {
             | EmitterKind::Facet { position, .. } => {
                 let axis = sphere.axis(&lamp.emitter);
                 let half_angle_rad = sphere.half_angle_rad(position, lamp.ball);
-                let direction = in_cap_across(axis, self.0[which].across(axis), half_angle_rad, square);
+                let direction = in_cap_across(axis, guided.across(axis), half_angle_rad, square);
                 if let Some(ball) = lamp.ball {
                     let distance_m = position.distance(sphere.centre);
                     let across = axis.any_orthonormal_vector();
