@@ -174,24 +174,12 @@ impl CausticLayer<'_> {
         &self,
         states: &mut LightStates,
         (clock, role): (&mut Clock, &mut ShardRole),
-        mut showing: Option<&mut Showing>,
+        showing: Option<&mut Showing>,
     ) -> Result<CausticOutcome> {
-        // A shard knows only its own part of the light, so that sizes of maps must not depend on what is lit.
-        if role.is_cut() && !self.fits_anyway() {
-            return Err(Error::failure(
-                "--memory",
-                format!(
-                    "shards need maps of a fixed size, but these may take more than {} MiB and would be made coarser",
-                    self.settings.map_memory_bytes() >> 20
-                ),
-                "allow more --memory or ask for a smaller --map-resolution",
-            ));
-        }
-        let mut outcome = CausticOutcome::default();
+        self.refuse_coarser_shards(role)?;
         self.refuse_soft_light()?;
 
         // Indirect light needs the last part of the time. The first picture takes as long as it takes.
-        let whole = self.control.without_deadline();
         let part = if self.plan.is_on(Effect::Indirect) {
             PART_BEFORE_INDIRECT
         } else {
@@ -199,8 +187,10 @@ impl CausticLayer<'_> {
         };
         let limit_s = self.settings.max_time_s.map(|limit_s| part * limit_s);
         let limited = super::limited(self.control, limit_s, self.began);
+        let whole = self.control.without_deadline();
 
         // All lights and levels are deposited on maps of the same sizes, so that these are found first.
+        let mut outcome = CausticOutcome::default();
         let mut lights = self.begin(states);
         let mut context = BakeContext {
             control: &limited,
@@ -214,57 +204,9 @@ impl CausticLayer<'_> {
             open_lights: lights.len(),
         };
         self.find_sizes(&mut states.statistics, &mut lights, &mut context)?;
+
         context.control = &whole;
-
-        // Each round adds a level to every light that is not done, so that every picture shows all of them.
-        let mut is_first = true;
-        let errors = loop {
-            // Lights that are done leave their room to the others.
-            context.open_lights = lights.len();
-            let own_bytes = self.squares_bytes(&context);
-            let done = lights.iter_mut().filter(|light| light.done);
-            done.for_each(|light| light.state.fit_squares(own_bytes));
-            context.open_lights = lights.iter().filter(|light| !light.done).count();
-            for light in lights.iter_mut().filter(|light| !light.done) {
-                self.advance(light, &mut context)?;
-            }
-
-            // The first caustics are shown before the visible error asks for direct light on all maps.
-            if let Some(showing) = &mut showing
-                && std::mem::take(&mut is_first)
-                && !self.control.is_cancelled()
-            {
-                showing.show_first(&shown(&lights), context.outcome, context.clock);
-            }
-
-            // Light that was taken for negligible may be bright on one spot: it begins anew, and changes the errors.
-            let mut terms = self.error_terms(&lights, showing.as_deref_mut());
-            let mut errors = self.errors(&lights, &terms);
-            let dim = self.promote_dim_lights(&errors, &lights);
-            for &index in &dim {
-                lights[index].start_over();
-                self.advance(&mut lights[index], &mut context)?;
-            }
-            if !dim.is_empty() {
-                terms = self.error_terms(&lights, showing.as_deref_mut());
-                errors = self.errors(&lights, &terms);
-            }
-
-            // The target is divided between the lights; those that meet their part are done.
-            self.decide(&mut lights, &errors);
-            self.note_cost(states, &lights, &errors, &mut context);
-
-            // The first picture ignores the time limit, the others respect it.
-            context.control = &limited;
-            if limited.is_cancelled() || lights.iter().all(|light| light.done) {
-                break errors;
-            }
-
-            // The last round is not shown: the finished maps are those of its levels.
-            if let Some(showing) = &mut showing {
-                showing.show(&shown(&lights), context.outcome, context.clock);
-            }
-        };
+        let errors = self.refine(states, &mut lights, &mut context, &limited, showing)?;
 
         // Levels and squares are kept for the next bake, as far as memory allows.
         let spare_bytes = context.spare_bytes;
@@ -277,6 +219,93 @@ impl CausticLayer<'_> {
             states.put(light.visible.light, light.state);
         }
         Ok(outcome)
+    }
+
+    /// A shard knows only its own part of the light, so that sizes of maps must not depend on what is lit.
+    fn refuse_coarser_shards(&self, role: &ShardRole) -> Result<()> {
+        if !role.is_cut() || self.fits_anyway() {
+            return Ok(());
+        }
+        Err(Error::failure(
+            "--memory",
+            format!(
+                "shards need maps of a fixed size, but these may take more than {} MiB and would be made coarser",
+                self.settings.map_memory_bytes() >> 20
+            ),
+            "allow more --memory or ask for a smaller --map-resolution",
+        ))
+    }
+
+    /// Adds levels to the lights until all of them are done or `limited` is cancelled, and shows each round but the last.
+    /// Returns the errors of the last.
+    fn refine<'b>(
+        &self,
+        states: &LightStates,
+        lights: &mut [LightProgress],
+        context: &mut BakeContext<'b>,
+        limited: &'b Control,
+        mut showing: Option<&mut Showing>,
+    ) -> Result<Errors> {
+        let mut is_first = true;
+        loop {
+            // Lights that are done leave their room to the others.
+            context.open_lights = lights.len();
+            let own_bytes = self.squares_bytes(context);
+            let done = lights.iter_mut().filter(|light| light.done);
+            done.for_each(|light| light.state.fit_squares(own_bytes));
+            context.open_lights = lights.iter().filter(|light| !light.done).count();
+
+            // Each round adds a level to every light that is not done, so that every picture shows all of them.
+            for light in lights.iter_mut().filter(|light| !light.done) {
+                self.advance(light, context)?;
+            }
+
+            // The first caustics are shown before the visible error asks for direct light on all maps.
+            if let Some(showing) = &mut showing
+                && std::mem::take(&mut is_first)
+                && !self.control.is_cancelled()
+            {
+                showing.show_first(&shown(lights), context.outcome, context.clock);
+            }
+
+            // The target is divided between the lights; those that meet their part are done.
+            let errors = self.errors_of_round(lights, context, showing.as_deref_mut())?;
+            self.decide(lights, &errors);
+            self.note_cost(states, lights, &errors, context);
+
+            // The first picture ignores the time limit, the others respect it.
+            context.control = limited;
+            if limited.is_cancelled() || lights.iter().all(|light| light.done) {
+                return Ok(errors);
+            }
+
+            // The last round is not shown: the finished maps are those of its levels.
+            if let Some(showing) = &mut showing {
+                showing.show(&shown(lights), context.outcome, context.clock);
+            }
+        }
+    }
+
+    /// Errors of the levels so far. Light that was taken for negligible may be bright on one spot: it begins anew, and
+    /// changes the errors.
+    fn errors_of_round(
+        &self,
+        lights: &mut [LightProgress],
+        context: &mut BakeContext,
+        mut showing: Option<&mut Showing>,
+    ) -> Result<Errors> {
+        let terms = self.error_terms(lights, showing.as_deref_mut());
+        let errors = self.errors(lights, &terms);
+        let dim = self.promote_dim_lights(&errors, lights);
+        if dim.is_empty() {
+            return Ok(errors);
+        }
+        for index in dim {
+            lights[index].start_over();
+            self.advance(&mut lights[index], context)?;
+        }
+        let terms = self.error_terms(lights, showing);
+        Ok(self.errors(lights, &terms))
     }
 
     /// All lights, with what is still valid of their states.

@@ -58,6 +58,9 @@ pub(super) enum DirectDetail {
 /// Halvings of coarse direct maps below the requested size.
 const COARSE_HALVINGS: u32 = 2;
 
+/// Fraction of the time limit after which direct light is not refined further.
+const PART_OF_DIRECT: f64 = 0.5;
+
 impl DirectDetail {
     /// What a bake needs.
     pub(super) fn of(plan: &EffectPlan, settings: &BakeSettings) -> Self {
@@ -83,6 +86,15 @@ impl DirectDetail {
         match self {
             Self::Full => shown,
             Self::Coarse | Self::Absent => &(),
+        }
+    }
+
+    /// Time until which direct light may be refined, since the bake began [s]: caustics and indirect light still wait.
+    pub(super) fn limit_s(self, settings: &BakeSettings) -> Option<f64> {
+        match self {
+            // A few samples of each texel are enough.
+            Self::Coarse => Some(0.0),
+            Self::Full | Self::Absent => settings.max_time_s.map(|limit_s| PART_OF_DIRECT * limit_s),
         }
     }
 

@@ -43,7 +43,7 @@ pub use spectra::SpectralBand;
 pub use survey::{PresetForecast, Survey};
 
 use crate::effect::EffectSwitch;
-use crate::error::{Error, Result, Warning};
+use crate::error::{Error, Result};
 use crate::light_pass::pass_report::Stopwatch;
 use crate::light_pass::visibility::{CullMode, LightVisibility};
 use crate::plan::{self, Effect, EffectPlan};
@@ -51,23 +51,19 @@ use crate::progress::{Control, Progress, Stage};
 use crate::scene::Scene;
 use crate::settings::{BakeSettings, ItemBufferKind};
 use crate::transport::Tracer;
-use caustic::{CausticLayer, CausticOutcome, Stopped};
+use caustic::{CausticLayer, CausticOutcome};
 use clock::Clock;
 use direct_cache::DirectCache;
 use direct_work::DirectWork;
 use finish::{CompletedLevel, DirectDetail, MapAssembler};
 use first_look::FirstLook;
 use indirect_cache::IndirectCache;
-use indirect_work::IndirectWork;
 use light_level::LightStates;
 use scene_change::SceneChange;
 use shards::ShardRole;
 use showing::{LevelCallback, Showing};
 use sizes::ChartCache;
 use spectra::Spectra;
-
-/// Fraction of the time limit after which direct light is not refined further.
-const PART_OF_DIRECT: f64 = 0.5;
 
 /// Owns a scene and everything derived from it, and bakes it again whenever scene or settings change. What a change
 /// does not affect is kept: hierarchy, parametrisations, item buffers, squares and bundles, maps and their errors.
@@ -373,43 +369,24 @@ impl Baker {
         let mut level = level;
         let first_look = self.first_look(settings, progress, control, (&mut level, &mut clock));
         let ground = self.prepare(settings, progress, control, (&mut clock, began));
-        let PreparedBake {
-            tracer,
-            visibility,
-            plan,
-            item_buffer_tests,
-            ..
-        } = &ground;
-        let item_buffer_tests = *item_buffer_tests;
 
         // Shadow borders of direct light are sought before caustics fix the sizes of their maps, which hold both.
         let finish = MapAssembler {
             scene: &self.scene,
             sizes: &self.sizes,
             settings,
-            plan,
-            direct: DirectDetail::of(plan, settings),
+            plan: &ground.plan,
+            direct: DirectDetail::of(&ground.plan, settings),
         };
         self.direct.begin(settings);
         let mut lamps = DirectWork::default();
-        if plan.is_on(Effect::Direct) {
-            lamps.look_for_borders(tracer, &self.sizes, settings, control);
+        if ground.plan.is_on(Effect::Direct) {
+            lamps.look_for_borders(&ground.tracer, &self.sizes, settings, control);
         }
 
-        // Direct light may take a part of the time only: it is refined while caustics and indirect light still wait.
-        let direct_limit_s = match finish.direct {
-            // A few samples of each texel are enough.
-            DirectDetail::Coarse => Some(0.0),
-            DirectDetail::Full | DirectDetail::Absent => {
-                settings.max_time_s.map(|limit_s| PART_OF_DIRECT * limit_s)
-            }
-        };
-        let for_direct = limited(control, direct_limit_s, began);
-
         // The caustic layer, level by level; each is shown with the other layers as far as they are known.
-        let lights = &mut self.lights;
         let mut showing = Showing {
-            for_direct: &for_direct,
+            for_direct: &limited(control, finish.direct.limit_s(settings), began),
             finish: &finish,
             bake: &ground,
             watch: &whole,
@@ -421,14 +398,8 @@ impl Baker {
             first_look,
             glance: None,
         };
+        let lights = &mut self.lights;
         let mut outcome = ground.bake(&self.sizes, lights, &mut clock, role, Some(&mut showing))?;
-        let Showing {
-            mut lamps,
-            direct,
-            indirect,
-            mut level,
-            ..
-        } = showing;
 
         // Charts of lit maps are those of their levels. Maps of direct and indirect light alone join them.
         let finished: Vec<CompletedLevel> = outcome
@@ -438,60 +409,21 @@ impl Baker {
             .collect();
         let (charts, memory_warning) = finish.charts(&finished);
         outcome.warnings.extend(memory_warning);
-
-        // Direct light on the charts that no intermediate picture or earlier bake has filled.
-        if finish.direct != DirectDetail::Absent {
-            let direct_charts = finish.direct_charts(&charts);
-            let progress = finish.direct.progress(progress);
-            let complete = lamps.bake_missing(tracer, &direct_charts, direct, progress, &for_direct);
-            if !complete {
-                outcome.stopped = Some(Stopped::Cancelled);
-            } else if finish.direct == DirectDetail::Full && !direct.is_refined() {
-                outcome.warnings.push(Warning::new(
-                    "direct layer",
-                    "the time was up before all shadows had the samples that they need",
-                    "allow more --max-time",
-                ));
-            }
-        }
+        showing.complete_direct(&charts, &mut outcome);
 
         // The flux of lights at unit strength becomes irradiance at their own strengths.
-        let mut outcome = lamps.added_to(&outcome);
-        outcome.counts.item_buffer_tests = item_buffer_tests;
-        let mut clock = lamps.clock(&clock);
         let watch = Stopwatch::start();
-        let (mut maps, mut parts) = finish.maps(&finished, &charts, direct);
+        let mut maps = finish.maps(&finished, &charts, showing.direct);
         clock.deposit.add(watch.elapsed());
 
-        // Indirect light is gathered from the finished layers, and shown each time that it is less noisy.
-        if plan.is_on(Effect::Indirect) {
-            let mut gathered = IndirectWork::default();
-            let complete = gathered.gather(&ground, &self.sizes, indirect, &maps, &mut |so_far, known| {
-                let Some(level) = level.as_mut().filter(|_| control.is_watched()) else {
-                    return;
-                };
-                let (mut maps, mut parts) = (maps.clone(), parts.clone());
-                so_far.add_to(known, &mut maps, &mut parts);
-                let outcome = so_far.added_to(&outcome);
-                let mut result = finish.result((maps, parts), &finished, &outcome);
-                let mut clock = so_far.clock(&clock);
-                clock.total = whole.elapsed();
-                account(&mut result, &finish, visibility, &clock);
-                level(result);
-            });
-            if !complete {
-                outcome.stopped = Some(Stopped::Cancelled);
-            }
-            gathered.add_to(indirect, &mut maps, &mut parts);
-            outcome = gathered.added_to(&outcome);
-            clock = gathered.clock(&clock);
+        // Indirect light is gathered from the finished layers.
+        let mut outcome = showing.with_direct(&outcome);
+        if ground.plan.is_on(Effect::Indirect) {
+            showing.gather_indirect(&mut maps, &finished, &mut outcome, &mut clock);
         }
 
         // Intermediate maps went to the callback; the finished ones are returned, with the cost of all stages.
-        let mut result = finish.result((maps, parts), &finished, &outcome);
-        clock.total = whole.elapsed();
-        account(&mut result, &finish, visibility, &clock);
-        Ok(result)
+        Ok(showing.assembled(maps, &finished, &outcome, &mut clock))
     }
 }
 

@@ -2,16 +2,17 @@
 
 use std::sync::Arc;
 
-use super::caustic::CausticOutcome;
+use super::caustic::{CausticOutcome, Stopped};
 use super::clock::Clock;
 use super::direct_cache::{DirectCache, DirectCharts};
 use super::direct_work::DirectWork;
-use super::finish::{CompletedLevel, DirectDetail, MapAssembler};
+use super::finish::{Charts, CompletedLevel, DirectDetail, MapAssembler};
 use super::first_look::FirstLook;
 use super::indirect_cache::IndirectCache;
 use super::indirect_work::IndirectWork;
 use super::metric::{Backdrop, ComparisonView};
 use super::{Bake, LightLayer, PreparedBake, account};
+use crate::error::Warning;
 use crate::illumination::IlluminationMap;
 use crate::light_pass::pass_report::Stopwatch;
 use crate::optics::luminance;
@@ -21,6 +22,9 @@ use crate::settings::LayerKind;
 
 /// Receives intermediate results.
 pub(super) type LevelCallback<'a> = dyn FnMut(Bake) + Send + 'a;
+
+/// Maps, and what single lights add to them.
+type AssembledMaps = (Vec<IlluminationMap>, Vec<LightLayer>);
 
 /// Passes the levels of a bake to a callback.
 pub(super) struct Showing<'a, 'level> {
@@ -43,13 +47,14 @@ pub(super) struct Showing<'a, 'level> {
 }
 
 impl Showing<'_, '_> {
-    fn hand_out(
-        &mut self,
-        maps: (Vec<IlluminationMap>, Vec<LightLayer>),
+    /// A result with the cost of all stages so far.
+    pub(super) fn assembled(
+        &self,
+        maps: AssembledMaps,
         levels: &[CompletedLevel],
         so_far: &CausticOutcome,
         clock: &mut Clock,
-    ) {
+    ) -> Bake {
         let mut result = self.finish.result(maps, levels, so_far);
         clock.total = self.watch.elapsed();
         account(
@@ -58,20 +63,82 @@ impl Showing<'_, '_> {
             &self.bake.visibility,
             &self.lamps.clock(clock),
         );
+        result
+    }
+
+    fn hand_out(
+        &mut self,
+        maps: AssembledMaps,
+        levels: &[CompletedLevel],
+        so_far: &CausticOutcome,
+        clock: &mut Clock,
+    ) {
+        let result = self.assembled(maps, levels, so_far, clock);
         if let Some(level) = &mut self.level {
             level(result);
         }
     }
 
-    /// Bakes direct light that is missing on these charts, where there is any.
-    fn bake_direct(&mut self, charts: &DirectCharts) {
+    /// The outcome with the work for direct light and item buffers.
+    pub(super) fn with_direct(&self, so_far: &CausticOutcome) -> CausticOutcome {
+        let mut both = self.lamps.added_to(so_far);
+        both.counts.item_buffer_tests = self.bake.item_buffer_tests;
+        both
+    }
+
+    /// Bakes direct light that is missing on these charts, where there is any; false if cancelled.
+    fn bake_direct(&mut self, charts: &DirectCharts) -> bool {
         let detail = self.finish.direct;
-        if detail != DirectDetail::Absent {
-            let progress = detail.progress(self.bake.progress);
-            let tracer = &self.bake.tracer;
-            self.lamps
-                .bake_missing(tracer, charts, self.direct, progress, self.for_direct);
+        let progress = detail.progress(self.bake.progress);
+        let tracer = &self.bake.tracer;
+        detail == DirectDetail::Absent
+            || self
+                .lamps
+                .bake_missing(tracer, charts, self.direct, progress, self.for_direct)
+    }
+
+    /// Bakes direct light on the charts that no intermediate picture or earlier bake has filled.
+    pub(super) fn complete_direct(&mut self, charts: &Charts, outcome: &mut CausticOutcome) {
+        if !self.bake_direct(&self.finish.direct_charts(charts)) {
+            outcome.stopped = Some(Stopped::Cancelled);
+        } else if self.finish.direct == DirectDetail::Full && !self.direct.is_refined() {
+            outcome.warnings.push(Warning::new(
+                "direct layer",
+                "the time was up before all shadows had the samples that they need",
+                "allow more --max-time",
+            ));
         }
+    }
+
+    /// Adds the indirect light of finished layers to their maps, and shows it each time that it is less noisy.
+    pub(super) fn gather_indirect(
+        &mut self,
+        (maps, parts): &mut AssembledMaps,
+        levels: &[CompletedLevel],
+        outcome: &mut CausticOutcome,
+        clock: &mut Clock,
+    ) {
+        // The cache is taken out while solutions are shown.
+        let mut cache = std::mem::take(self.indirect);
+        let mut level = self.level.take();
+        let mut gathered = IndirectWork::default();
+        let mut show = |so_far: &IndirectWork, known: &IndirectCache| {
+            let Some(level) = level.as_mut().filter(|_| self.bake.control.is_watched()) else {
+                return;
+            };
+            let (mut maps, mut parts) = (maps.clone(), parts.clone());
+            so_far.add_to(known, &mut maps, &mut parts);
+            let (outcome, mut clock) = (so_far.added_to(outcome), so_far.clock(clock));
+            level(self.assembled((maps, parts), levels, &outcome, &mut clock));
+        };
+        let is_complete = gathered.gather(self.bake, self.finish.sizes, &mut cache, maps, &mut show);
+        if !is_complete {
+            outcome.stopped = Some(Stopped::Cancelled);
+        }
+        gathered.add_to(&cache, maps, parts);
+        *self.indirect = cache;
+        *outcome = gathered.added_to(outcome);
+        *clock = gathered.clock(clock);
     }
 
     /// Takes the first result, when the light of other layers is not known yet.
@@ -126,8 +193,7 @@ impl Showing<'_, '_> {
         }
 
         // Indirect light is solved with rays that are there already. New ones are traced after the last level.
-        let mut so_far = self.lamps.added_to(so_far);
-        so_far.counts.item_buffer_tests = self.bake.item_buffer_tests;
+        let mut so_far = self.with_direct(so_far);
         so_far.warnings.extend(memory_warning);
         let (mut maps, mut parts) = finish.maps(levels, &charts, self.direct);
         if plan.is_on(Effect::Indirect) && !waits {
