@@ -230,62 +230,19 @@ impl Details {
         let cells = details.par_iter_mut().zip(&self.raw[level]);
         cells.for_each(|(detail, raw)| *detail = [0, 1, 2, 3, 4, 5].map(|i| raw[i] - detail[i]));
 
-        // Filtered details are added to the filtered light of the coarser levels.
+        // Filtered details are added to the filtered light of the coarser levels. Noise and tint are judged by all
+        // light that is seen: bundles have no noise, but belong to it.
         let mut refined = self.cells.between(level, kept);
-        let noise = |detail: &Raw| {
-            let [a, b] = luminances(detail);
-            0.25 * (a - b) * (a - b)
-        };
-        // Noise is proportional to light where photons carry equal flux.
-        let light = |smooth: &FilteredCell| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
-
-        // Slivers at the edge of an island are noisier in inverse proportion to their area, and say less about others.
-        let above = self.cells.areas_above(level, PHOTONS_POOLED);
-        let areas = self.cells.relative_areas(level, &above);
-
-        // Noise and tint are judged by all light that is seen: bundles have no noise, but belong to it.
         let whole: Vec<FilteredCell> = refined
             .par_iter()
             .zip(&self.bundled[level])
             .map(|(filtered, bundled)| with_bundles(filtered, bundled))
             .collect();
 
-        // Photons of luminance p make halves of light L differ by a variance of 2pL: the ratio of noise to light tells
-        // p. It is averaged over a wide region, since a cell with few photons cannot tell.
-        let cells = details.par_iter().zip(&whole).zip(&areas);
-        let both = cells
-            .clone()
-            .map(|((detail, smooth), area)| [noise(detail) * area, light(smooth)]);
-        let by_light = self.cells.pooled(level, both.collect(), &above);
-
-        // Signal and noise of luminance, and of tint. A few photons that fall into one cell in both halves by chance
-        // would pass for signal.
-        let power = cells
-            .zip(&by_light)
-            .map(|(((detail, smooth), area), [noise_of_all, light])| {
-                let photon = if *light > 0.0 && *area > 0.0 {
-                    2.0 * noise_of_all / (light * area)
-                } else {
-                    0.0
-                };
-                let [a, b] = luminances(detail);
-                let product = a * b;
-                let [first, second] = tints(detail, smooth);
-                let chance = CHANCE_PAIRS * photon * photon;
-                let signal = if product > 0.0 {
-                    (product - chance).max(0.0)
-                } else {
-                    product
-                };
-                [
-                    signal * area,
-                    noise(detail) * area * area,
-                    (0..3).map(|i| first[i] * second[i]).sum::<f32>() * area,
-                    (0..3).map(|i| 0.25 * (first[i] - second[i]).powi(2)).sum::<f32>() * area * area,
-                ]
-            });
-        let power: Vec<[f32; 4]> = power.collect();
-        drop(by_light);
+        // Slivers at the edge of an island are noisier in inverse proportion to their area, and say less about others.
+        let above = self.cells.areas_above(level, PHOTONS_POOLED);
+        let areas = self.cells.relative_areas(level, &above);
+        let power = self.power(level, [&details, &whole], (&areas, &above));
 
         // The mean over the surroundings leaves the cell itself out: it would keep whatever agrees in both halves by
         // chance.
@@ -322,6 +279,57 @@ impl Details {
             },
         );
         refined
+    }
+
+    /// Signal and noise of luminance and of tint in the details of each cell of a level, given all light of the coarser
+    /// levels there.
+    fn power(
+        &self,
+        level: usize,
+        [details, whole]: [&[[f32; 6]]; 2],
+        (areas, above): (&[f32], &[Vec<[f32; 1]>]),
+    ) -> Vec<[f32; 4]> {
+        let noise = |detail: &Raw| {
+            let [a, b] = luminances(detail);
+            0.25 * (a - b) * (a - b)
+        };
+        // Noise is proportional to light where photons carry equal flux.
+        let light = |smooth: &FilteredCell| (0.5 * (smooth[3] + smooth[4])).max(1e-2 * DARKEST);
+
+        // Photons of luminance p make halves of light L differ by a variance of 2pL: the ratio of noise to light tells
+        // p. It is averaged over a wide region, since a cell with few photons cannot tell.
+        let cells = details.par_iter().zip(whole).zip(areas);
+        let both = cells
+            .clone()
+            .map(|((detail, smooth), area)| [noise(detail) * area, light(smooth)]);
+        let by_light = self.cells.pooled(level, both.collect(), above);
+
+        // A few photons that fall into one cell in both halves by chance would pass for signal.
+        let power = cells
+            .zip(&by_light)
+            .map(|(((detail, smooth), area), [noise_of_all, light])| {
+                let photon = if *light > 0.0 && *area > 0.0 {
+                    2.0 * noise_of_all / (light * area)
+                } else {
+                    0.0
+                };
+                let [a, b] = luminances(detail);
+                let product = a * b;
+                let [first, second] = tints(detail, smooth);
+                let chance = CHANCE_PAIRS * photon * photon;
+                let signal = if product > 0.0 {
+                    (product - chance).max(0.0)
+                } else {
+                    product
+                };
+                [
+                    signal * area,
+                    noise(detail) * area * area,
+                    (0..3).map(|i| first[i] * second[i]).sum::<f32>() * area,
+                    (0..3).map(|i| 0.25 * (first[i] - second[i]).powi(2)).sum::<f32>() * area * area,
+                ]
+            });
+        power.collect()
     }
 
     /// Channels of a cell with one share of its detail's luminance and another of its tint, both reduced where too

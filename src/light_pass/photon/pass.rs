@@ -22,7 +22,7 @@ use crate::progress::Stage;
 const BLOCK: u32 = 1 << 12;
 
 /// Blocks that are traced before their hits are deposited.
-pub(super) const BLOCKS_AT_ONCE: usize = 64;
+const BLOCKS_AT_ONCE: usize = 64;
 
 /// Independent samples of the same strata; their difference is the noise.
 pub const HALVES: usize = 2;
@@ -80,42 +80,17 @@ impl PhotonPass<'_> {
             .map(|(_, block)| block)
             .collect();
 
-        // Hits of one chunk are deposited while the next one is traced; an empty last chunk flushes the rest.
         let receivers = Receivers::new(self.rules.tracer.scene().objects.len(), self.chart_for);
         let mut report = PassReport::default();
-        let mut waiting: Vec<Block> = Vec::new();
-        for chunk in blocks.chunks(BLOCKS_AT_ONCE).chain([&[][..]]) {
-            let watch = Stopwatch::start();
-            let follow = || -> Vec<Block> {
-                let of = |&(half, first): &(usize, u32)| {
-                    let cancelled = listener.control.is_cancelled();
-                    let own = (first..indices.end).step_by(stride as usize);
-                    let own = own.filter(|index| *index >= indices.start);
-                    (!cancelled).then(|| self.block(half, own, &receivers))
-                };
-                chunk.par_iter().filter_map(of).collect()
-            };
-            let (traced, ()) = rayon::join(follow, || deposit_blocks(&waiting, halves, self.chart_for));
-            report.trace_s.add(watch.elapsed());
-
-            // A chunk that was cancelled may lack blocks, and is dropped.
-            if listener.control.is_cancelled() {
-                report.cancelled = true;
-                return report;
-            }
-
-            // Counts are merged once, when a chunk is traced; its hits wait for the next round.
-            for block in &traced {
-                report.ledger.merge(&block.ledger);
-                report.rays += block.rays;
-                report.segments += block.segments;
-                report.splats += block.deposits.len() as u64;
-            }
-            listener
-                .progress
-                .advance(Stage::Caustic, listener.done + report.rays, listener.total);
-            waiting = traced;
-        }
+        let trace = |&(half, first): &(usize, u32)| {
+            let own = (first..indices.end).step_by(stride as usize);
+            let own = own.filter(|index| *index >= indices.start);
+            (vec![self.block(half, own, &receivers)], ())
+        };
+        let watch = Stopwatch::start();
+        trace_and_deposit(&blocks, trace, halves, self.chart_for, &mut report, listener);
+        report.trace_s.add(watch.elapsed());
+        report.cancelled = listener.control.is_cancelled();
         report
     }
 
@@ -179,18 +154,58 @@ fn texel(hit: &Hit, receivers: &Receivers) -> Option<u32> {
     chart.texel_at(place)
 }
 
-/// Adds what blocks deposit to the maps of their halves.
-pub(super) fn deposit_blocks<M: AsMut<[ReceiverMaps]>>(
-    blocks: &[Block],
-    halves: &mut [M],
+/// Traces blocks of photons for each piece of `work`, deposits them, and returns what `trace` tells besides: of fewer
+/// pieces than there are if that is cancelled.
+pub(super) fn trace_and_deposit<W: Sync, T: Send>(
+    work: &[W],
+    trace: impl Fn(&W) -> (Vec<Block>, T) + Sync,
+    halves: &mut [&mut [ReceiverMaps]],
     chart_for: &ChartFor,
-) {
+    report: &mut PassReport,
+    listener: &ProgressScope,
+) -> Vec<T> {
+    // Hits of one chunk are deposited while the next one is traced; an empty last chunk flushes the rest.
+    let mut told = Vec::with_capacity(work.len());
+    let mut waiting: Vec<Block> = Vec::new();
+    for chunk in work.chunks(BLOCKS_AT_ONCE).chain([&[][..]]) {
+        let follow = || -> Vec<(Vec<Block>, T)> {
+            let of = |piece: &W| (!listener.control.is_cancelled()).then(|| trace(piece));
+            chunk.par_iter().filter_map(of).collect()
+        };
+        let (traced, ()) = rayon::join(follow, || deposit_blocks(&waiting, halves, chart_for));
+
+        // A chunk that was cancelled may lack blocks, and is dropped.
+        if listener.control.is_cancelled() {
+            break;
+        }
+
+        // Counts are merged once, when a chunk is traced; its hits wait for the next round.
+        waiting.clear();
+        for (blocks, more) in traced {
+            for block in blocks {
+                report.ledger.merge(&block.ledger);
+                report.rays += block.rays;
+                report.segments += block.segments;
+                report.splats += block.deposits.len() as u64;
+                waiting.push(block);
+            }
+            told.push(more);
+        }
+        listener
+            .progress
+            .advance(Stage::Caustic, listener.done + report.rays, listener.total);
+    }
+    told
+}
+
+/// Adds what blocks deposit to the maps of their halves.
+fn deposit_blocks(blocks: &[Block], halves: &mut [&mut [ReceiverMaps]], chart_for: &ChartFor) {
     for block in blocks {
         for run in block
             .deposits
             .chunk_by(|a, b| (a.band, a.receiver) == (b.band, b.receiver))
         {
-            let sets = halves[block.half].as_mut();
+            let sets = &mut *halves[block.half];
             let set = set_of(run[0].band, sets.len());
             sets[set].touch(run[0].receiver, chart_for);
             let Some(map) = sets[set].get_mut(run[0].receiver) else {

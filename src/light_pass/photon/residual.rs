@@ -11,12 +11,11 @@
 //! dispersed bundles each half samples the wavelengths anew, so that their noise is seen.
 
 use glam::DVec2;
-use rayon::prelude::*;
 
 use super::bundle_deposit::plan_deposits;
 use super::edge;
 use super::launch::{LAMP_DIMENSION, LAMP_MIDDLE, PhotonLaunch, Start};
-use super::pass::{BLOCKS_AT_ONCE, Block, Deposit, HALVES, deposit_blocks, half_seed};
+use super::pass::{Block, Deposit, HALVES, half_seed, trace_and_deposit};
 use super::paths::PathFinder;
 use super::receivers::{MeasuredChart, Receivers};
 use super::squares::{Found, Square, Squares};
@@ -28,7 +27,6 @@ use crate::light_pass::ledger_sum::{Account, LedgerSum};
 use crate::light_pass::pass_report::{PassReport, ProgressScope, Stopwatch};
 use crate::light_pass::receiver_maps::{ChartFor, ReceiverMaps};
 use crate::optics::LinearSrgb;
-use crate::progress::Stage;
 
 /// All flux is counted so many times, in bundles and in each half: enough that rounding to counts does not matter.
 pub const TIMES: u32 = 1 << 20;
@@ -257,38 +255,12 @@ impl ResidualPhotons<'_> {
             }
         }
 
-        // Hits of one chunk are deposited while the next one is traced; an empty last chunk flushes the rest.
-        let mut found = vec![Found::default(); squares.len()];
-        let mut waiting: Vec<Block> = Vec::new();
-        for chunk in blocks.chunks(BLOCKS_AT_ONCE).chain([&[][..]]) {
-            let follow = || -> Vec<(Vec<Block>, Vec<Found>)> {
-                let of_block = |block: &std::ops::Range<usize>| {
-                    let cancelled = listener.control.is_cancelled();
-                    (!cancelled).then(|| self.block(&squares[block.clone()], &orders[block.clone()]))
-                };
-                chunk.par_iter().filter_map(of_block).collect()
-            };
-            let (traced, ()) = rayon::join(follow, || deposit_blocks(&waiting, halves, self.pass.chart_for));
-            if listener.control.is_cancelled() {
-                return found;
-            }
-
-            // Squares learn what their photons found; hits wait for the next round.
-            waiting.clear();
-            for ((of_halves, of_squares), block) in traced.into_iter().zip(chunk) {
-                found[block.clone()].copy_from_slice(&of_squares);
-                for half in of_halves {
-                    report.ledger.merge(&half.ledger);
-                    report.rays += half.rays;
-                    report.segments += half.segments;
-                    report.splats += half.deposits.len() as u64;
-                    waiting.push(half);
-                }
-            }
-            listener
-                .progress
-                .advance(Stage::Caustic, listener.done + report.rays, listener.total);
-        }
+        // Squares learn what their photons found.
+        let trace =
+            |block: &std::ops::Range<usize>| self.block(&squares[block.clone()], &orders[block.clone()]);
+        let found = trace_and_deposit(&blocks, trace, halves, self.pass.chart_for, report, listener);
+        let mut found: Vec<Found> = found.into_iter().flatten().collect();
+        found.resize(squares.len(), Found::default());
         found
     }
 

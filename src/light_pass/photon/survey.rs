@@ -88,17 +88,13 @@ impl<'a> Surveyor<'a> {
         // casters.
         if squares.squares.is_empty() {
             let places = self.with_small_casters(self.lit.first());
-            self.trace_points(
-                places
-                    .iter()
-                    .flat_map(|place| (0..9).map(|node| place.node(node))),
-                &mut squares.points,
-            );
+            let nodes = places
+                .iter()
+                .flat_map(|place| (0..9).map(|node| place.node(node)));
+            self.trace_points(nodes, &mut squares.points);
             let points = &squares.points;
-            squares.squares = places
-                .par_iter()
-                .map(|&place| self.square(place, points, None))
-                .collect();
+            let square = |&place| self.square(place, points, None);
+            squares.squares = places.par_iter().map(square).collect();
         }
         for round in 0..=MAX_ROUNDS {
             // Each round plans anew, since finer squares leave less to photons. Where no bundle carries light, finer
@@ -110,57 +106,15 @@ impl<'a> Surveyor<'a> {
             if is_last || plan.per_root.is_infinite() || self.control.is_cancelled() {
                 break;
             }
-
-            // Photons that finer squares would save are dearer than the points of these.
-            let is_divided = |square: &Square| {
-                let beside_edges = if square.is_beside_edge {
-                    plan.audits(square)
-                } else {
-                    0.0
-                };
-                let photons = plan.photons_for(square.dividable_root(&plan), square) + beside_edges;
-                let segments = photons * square.segments;
-                square.place.level < LAST_LEVEL && segments > DIVISION_COST * square.traced
-            };
-            let divided: Vec<bool> = squares.squares.iter().map(is_divided).collect();
+            let divided: Vec<bool> = squares
+                .squares
+                .iter()
+                .map(|square| is_worth_dividing(square, &plan))
+                .collect();
             if !divided.contains(&true) {
                 break;
             }
-
-            // A division adds the points of a grid of five by five that are not among the nine.
-            let new_points = squares
-                .squares
-                .iter()
-                .zip(&divided)
-                .filter(|(_, divided)| **divided)
-                .flat_map(|(square, _)| {
-                    let place = square.place;
-                    (0..25)
-                        .filter(|n| n % 5 % 2 == 1 || n / 5 % 2 == 1)
-                        .map(move |n| place.point(n % 5, n / 5, 4))
-                });
-            self.trace_points(new_points, &mut squares.points);
-
-            // Quarters take their parent's place, so that neighbours stay together; those without light are dropped.
-            let points = &squares.points;
-            let before = std::mem::take(&mut squares.squares);
-            let after = before
-                .into_par_iter()
-                .zip(divided)
-                .flat_map_iter(|(square, is_divided)| {
-                    if !is_divided {
-                        return vec![square];
-                    }
-                    let quarters = square
-                        .place
-                        .quarters()
-                        .into_iter()
-                        .filter(|place| self.lit.has(*place));
-                    quarters
-                        .map(|place| self.square(place, points, Some(&square)))
-                        .collect()
-                });
-            squares.squares = after.collect();
+            self.divide(squares, &divided);
         }
 
         // Emitted flux of the squares that are looked at closely. Audits take at least a small part of it to arrive: of
@@ -170,6 +124,44 @@ impl<'a> Surveyor<'a> {
             .iter()
             .filter(|square| square.is_looked_at_closely());
         squares.plan.close_start_w = close.map(|square| square.start_w).sum();
+    }
+
+    /// Replaces squares by their quarters.
+    fn divide(&self, squares: &mut Squares, divided: &[bool]) {
+        // A division adds the points of a grid of five by five that are not among the nine.
+        let new_points = squares
+            .squares
+            .iter()
+            .zip(divided)
+            .filter(|(_, divided)| **divided)
+            .flat_map(|(square, _)| {
+                let place = square.place;
+                (0..25)
+                    .filter(|n| n % 5 % 2 == 1 || n / 5 % 2 == 1)
+                    .map(move |n| place.point(n % 5, n / 5, 4))
+            });
+        self.trace_points(new_points, &mut squares.points);
+
+        // Quarters take their parent's place, so that neighbours stay together; those without light are dropped.
+        let points = &squares.points;
+        let quarters_of = |square: &Square| -> Vec<Square> {
+            let quarters = square.place.quarters().into_iter();
+            let lit = quarters.filter(|place| self.lit.has(*place));
+            lit.map(|place| self.square(place, points, Some(square)))
+                .collect()
+        };
+        let before = std::mem::take(&mut squares.squares);
+        let after = before
+            .into_par_iter()
+            .zip(divided)
+            .flat_map_iter(|(square, is_divided)| {
+                if *is_divided {
+                    quarters_of(&square)
+                } else {
+                    vec![square]
+                }
+            });
+        squares.squares = after.collect();
     }
 
     /// Divides the first squares until small casters and openings are as large as the squares around them.
@@ -422,6 +414,18 @@ impl<'a> Surveyor<'a> {
         });
         square.bundles.push(bundle);
     }
+}
+
+/// Whether the photons that finer squares would save are dearer than the points of these.
+fn is_worth_dividing(square: &Square, plan: &Plan) -> bool {
+    let beside_edges = if square.is_beside_edge {
+        plan.audits(square)
+    } else {
+        0.0
+    };
+    let photons = plan.photons_for(square.dividable_root(plan), square) + beside_edges;
+    let segments = photons * square.segments;
+    square.place.level < LAST_LEVEL && segments > DIVISION_COST * square.traced
 }
 
 /// Mean squared change of the map, for unit flux, by a photon whose prediction is displaced.
