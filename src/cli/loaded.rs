@@ -83,7 +83,10 @@ impl LoadedScene {
     ) -> Result<T> {
         console.check(&self.scene.source)?;
         let mut session = Baker::new(self.scene.clone())?;
-        work(&mut session, &console.bar(), console.control())
+        let result = work(&mut session, &console.bar(), console.control());
+        // What it keeps for another bake takes up to half a second to free: maps are written meanwhile.
+        std::thread::spawn(|| drop(session));
+        result
     }
 
     /// Bakes within the available memory, and prints the bake's warnings.
