@@ -17,12 +17,12 @@ UP = A([0.0, 1.0, 0.0])
 
 # The sun stands 31 degrees high: lower, the glasses throw their light too far; higher, the pool leaves the wall dark.
 SUN = unit([0.76, -0.50, 0.36])
-SUN_W_PER_M2, SUN_COLOUR = 9.0, [1.0, 0.80, 0.52]
-SKY_W_PER_M2, SKY_COLOUR = 5.6, [0.96, 1.0, 1.09]
+SUN_W_PER_M2, SUN_COLOUR = 10.2, [1.0, 0.80, 0.52]
+SKY_W_PER_M2, SKY_COLOUR = 5.0, [0.96, 1.0, 1.09]
 
 ROOM_X, ROOM_Z, HEIGHT = (-1.7, 2.0), (-4.2, 2.8), 3.4
 WALL, BAND = 0.35, 0.09
-POOL_X, POOL_Z, RIM, WATER, BOTTOM = (-0.9, 1.55), (-3.6, -0.55), 0.46, 0.40, -0.35
+POOL_X, POOL_Z, RIM, WATER, BOTTOM = (-0.9, 1.55), (-3.6, -0.55), 0.46, 0.40, -0.90
 TABLE_X, TABLE_Z, TABLE = (-0.85, 0.85), (0.10, 1.15), 0.75
 CLOTH, CLOTH_SIZE = TABLE + 0.0015, (1.00, 0.74)
 
@@ -39,14 +39,24 @@ def wood(n=256):
     """Planed boards: rings that run along, with pores."""
     rings = noise((n, n), (7, 1), 51, 3) + 0.35 * noise((n, n), (3, 2), 52, 3)
     grain = 0.5 + 0.5 * np.sin(34 * rings) + 0.35 * noise((n, n), (120, 3), 53, 2)
-    return tinted(np.clip(1.06 - 0.30 * np.clip(grain, 0, 1), 0, 2), (0.47, 0.29, 0.18))
+    return tinted(1.06 - 0.30 * np.clip(grain, 0, 1), (0.47, 0.29, 0.18))
 
 
 def plaster(colour, bloom, seed, n=256):
     """Coats that dried unevenly: a pale bloom, broad sweeps, and strokes of the brush both ways."""
     veil = np.clip(0.4 + 0.9 * noise((n, n), (4, 4), seed, 6, 0.6), 0, 1)
-    sweep = sum(depth * noise((n, n), cells, seed, 3) for depth, cells in ((0.04, (3, 3)), (0.025, (24, 6)), (0.02, (6, 24))))
+    sweep = sum(depth * noise((n, n), cells, seed, 3) for depth, cells in ((0.04, (3, 3)), (0.02, (12, 10)), (0.015, (40, 40))))
     return (tinted(1 - veil, colour) + tinted(veil, bloom)) * (1 + sweep[..., None])
+
+
+def fresco(n=512):
+    """The back wall from floor to ceiling: a red dado, a frieze above the arches, and lines that part them."""
+    y, out = HEIGHT * (1 - (np.arange(n)[:, None] + 0.5) / n), plaster((0.90, 0.60, 0.42), (0.95, 0.77, 0.61), 12, n)
+    bands = ((0.40, 0.40, (0.46, 0.15, 0.10)), (0.83, 0.02, (0.90, 0.84, 0.72)), (2.37, 0.16, (0.17, 0.27, 0.40)),
+             (2.19, 0.02, (0.90, 0.84, 0.72)), (2.55, 0.02, (0.90, 0.84, 0.72)))
+    for at, half, colour in bands:
+        out = np.where((np.abs(y - at) < half)[..., None], A(colour) * out / out.mean((0, 1)), out)
+    return out
 
 
 def marble(n=448):
@@ -74,7 +84,7 @@ def linen(long, wide, texel=0.0006):
     random, s, t = np.random.default_rng(61), np.arange(0, long, texel)[:, None], np.arange(0, wide, texel)
     edge = np.minimum(np.minimum(s, long - s), np.minimum(t, wide - t))
     weave = 0.016 * np.sin(s * np.pi / 2 / texel) * np.sin(t * np.pi / 2 / texel)
-    out = 0.67 + weave + random.normal(0, 0.011, s.shape) + random.normal(0, 0.011, t.shape) + 0.03 * noise(edge.shape, (5, 4), 62, 3)
+    out = 0.62 + weave + random.normal(0, 0.011, s.shape) + random.normal(0, 0.011, t.shape) + 0.03 * noise(edge.shape, (5, 4), 62, 3)
     for fold in ((s - long / 3) / 0.005, (s - long * 2 / 3) / 0.005, (wide / 2 - t) / 0.005):
         out += 0.11 * fold * np.exp(-0.5 * fold**2)
     out += 0.03 * (edge < 0.014) - 0.14 * (np.abs(edge - 0.014) < 0.0012)
@@ -147,8 +157,8 @@ def wave(amplitude_m, wavelength_m, degrees, phase_rad):
 
 
 def add_materials():
-    file.material('plaster', texture=plaster((0.85, 0.83, 0.795), (0.90, 0.885, 0.855), 11), metres=2.4)
-    file.material('terracotta', texture=plaster((0.86, 0.58, 0.42), (0.94, 0.77, 0.63), 12, 384), metres=2.4)
+    file.material('plaster', texture=plaster((0.82, 0.68, 0.50), (0.86, 0.74, 0.57), 11), metres=2.4)
+    file.material('terracotta', texture=fresco(), metres=HEIGHT)
     file.material('stone', texture=plaster((0.61, 0.56, 0.48), (0.66, 0.61, 0.53), 13), metres=0.9)
     file.material('ashlar', texture=tiles(256, 4, (0.88, 0.83, 0.74), (0.80, 0.74, 0.64), (0.52, 0.46, 0.38), 0.012, 21), metres=0.88)
     file.material('paving', texture=tiles(512, 4, (0.62, 0.54, 0.44), (0.50, 0.42, 0.33), (0.36, 0.32, 0.27), 0.02, 3), metres=2.4)
@@ -164,11 +174,13 @@ def add_materials():
     file.material('gold', metal='gold')
     file.material('glass', glass=1.52)
     file.material('crystal', glass=1.60)
+    # A ball of fused silica focuses almost on the cloth where the sun stands 31 degrees high, one of crystal above it.
+    file.material('silica', glass=1.458)
     file.material('flint', glass='785258')
     file.material('wine', glass=1.345, tint=(0.060, (0.86, 0.06, 0.12)))
     file.material('whisky', glass=1.36, tint=(0.050, (0.90, 0.42, 0.06)))
-    file.material('water', glass=1.333, tint=(2.5, (0.55, 0.90, 0.92)), waves=[
-        wave(0.0034, 0.46, 20, 0.3), wave(0.0030, 0.39, 75, 1.9), wave(0.0022, 0.30, 130, 4.0), wave(0.0014, 0.23, 50, 2.2)])
+    file.material('water', glass=1.333, tint=(3.5, (0.55, 0.90, 0.92)), waves=[
+        wave(0.0018, 0.48, 15, 0.3), wave(0.0016, 0.40, 80, 1.9), wave(0.0012, 0.31, 130, 4.0), wave(0.0007, 0.24, 50, 2.2)])
 
 
 # ---- the room
@@ -246,7 +258,7 @@ def add_room():
     file.add('ceiling', flat((ROOM_X[0], ROOM_X[1] - width), ROOM_Z, HEIGHT, -1), 'plaster')
     # The other walls: those at its ends follow the vault.
     level, vaulted = [(z, HEIGHT) for z in ROOM_Z], [(ROOM_X[0], HEIGHT), *arch[::-1]]
-    arched_wall('left wall', 'plaster', lambda s, y, d: (ROOM_X[0] - d, y, s), level, [(z, 0.85, 2.20) for z in (-2.95, -0.75, 1.45)])
+    arched_wall('left wall', 'plaster', lambda s, y, d: (ROOM_X[0] - d, y, s), level, [(-3.20, 0.80, 1.80), (-0.75, 0.85, 2.20), (1.45, 0.85, 2.20)])
     arched_wall('back wall', 'terracotta', lambda s, y, d: (s, y, ROOM_Z[0] - d), vaulted, [(-0.72, 0.62, 1.42), (0.70, 0.62, 1.42)])
     middle_x, half_x = sum(ROOM_X) / 2, (ROOM_X[1] - ROOM_X[0]) / 2
     file.add('front wall', rect([middle_x, HEIGHT / 2, ROOM_Z[1]], [-half_x, 0, 0], [0, HEIGHT / 2, 0]), 'plaster')
@@ -258,9 +270,10 @@ def add_room():
         soffit = A([[(*q, wall), (*q, wall + out * 0.06)] for q in inner])
         for p, n in ((face, np.broadcast_to([0, 0, out], face.shape)), (soffit, np.insert(normal, 2, 0, 1)[:, None].repeat(2, 1))):
             file.add_to('reveals', sheet(p, n, np.stack(np.broadcast_arrays(along[:, None], [-BAND, 0]), -1)), 'ashlar')
-    file.add_to('outside', flat(outer_x, outer_z, HEIGHT + 0.25), 'stone')
-    file.add_to('outside', flat((-6.0, outer_x[0]), (-8.0, 3.8), 0.0), 'stone')
-    file.add_to('outside', flat((outer_x[0], 6.0), (-8.0, outer_z[0]), 0.0), 'stone')
+    # A dark terrace: a pale one would fill the vault with light and drown the net.
+    file.add_to('outside', flat(outer_x, outer_z, HEIGHT + 0.25), 'marble')
+    file.add_to('outside', flat((-6.0, outer_x[0]), (-8.0, 3.8), 0.0), 'marble')
+    file.add_to('outside', flat((outer_x[0], 6.0), (-8.0, outer_z[0]), 0.0), 'marble')
 
 
 def add_pool():
@@ -308,7 +321,7 @@ def on_cloth(x, z):
     return A([x, CLOTH + 0.0003, z])
 
 
-WINE_GLASS, TUMBLER, BOOK, BALL = on_cloth(0.10, 0.47), on_cloth(-0.19, 0.55), on_cloth(-0.01, 0.79), on_cloth(0.37, 0.63)
+WINE_GLASS, TUMBLER, BOOK, BALL = on_cloth(0.10, 0.47), on_cloth(0.42, 0.48), on_cloth(0.04, 0.81), on_cloth(-0.20, 0.55)
 
 
 def add_wine_glass():
@@ -349,10 +362,10 @@ def add_tumbler(n=14, finer=8):
     file.add('whisky', moved(lathe([whisky, [[.0407, .046], [0, .046]]], 96, 3), TUMBLER), 'whisky')
 
 
-def add_ball(radius=0.05):
+def add_ball(radius=0.056):
     arc = [[radius * np.sin(t), radius - radius * np.cos(t)] for t in np.linspace(0, np.pi, 13)]
     arc[0][0] = arc[-1][0] = 0.0
-    file.add('ball', moved(lathe([arc]), BALL), 'crystal')
+    file.add('ball', moved(lathe([arc]), BALL), 'silica')
 
 
 def add_book(half_width=0.155, half_height=0.115):
@@ -389,15 +402,15 @@ def add_lemon(length=0.082, radius=0.030):
 
 
 def add_prism():
-    """A bar of dense flint on two posts by the pool: edge down, it turns the sun upwards and throws a spectrum on the vault."""
-    apex_rad, side, half, centre = np.radians(42), 0.075, 0.14, A([-1.22, 1.00, -2.70])
-    ahead, along = unit(SUN * [1, 0, 1]), unit(np.cross(UP, SUN))
-    # At least deviation the light inside runs along the base; outside it comes from half the deviation above.
-    half_turn = np.arcsin(1.785 * np.sin(apex_rad / 2)) - apex_rad / 2
-    inside = rotation(along, -np.degrees(half_turn)) @ SUN
-    if inside[1] < SUN[1]:
-        inside = rotation(along, np.degrees(half_turn)) @ SUN
-    up = np.cross(inside, along) * np.sign(np.cross(inside, along)[1])
+    """A bar of dense flint on two posts by the pool, between the sun and the place of its spectrum on the vault."""
+    side, half, centre, index = 0.07, 0.21, A([-0.98, 0.77, -2.98]), 1.785
+    out = unit(A([1.92, 1.68, -2.70]) - centre)
+    along = unit(np.cross(SUN, out))
+    # At least deviation the light inside runs along the base, and both faces turn it alike.
+    turn = np.arccos(SUN @ out) / 2
+    apex_rad = 2 * np.arctan2(np.sin(turn), index - np.cos(turn))
+    inside = unit(SUN + out)
+    up = unit(out - SUN)
     base = 2 * side * np.sin(apex_rad / 2)
     tall = side * np.cos(apex_rad / 2)
     outline = [centre - up * tall / 2, centre + up * tall / 2 + inside * base / 2, centre + up * tall / 2 - inside * base / 2]
@@ -405,10 +418,10 @@ def add_prism():
     quads = [(a[i], a[j], b[j], b[i]) for i, j in ((0, 1), (1, 2), (2, 0))]
     triangles = [a, b] + [[q[k] for k in pick] for q in quads for pick in ((0, 1, 2), (0, 2, 3))]
     file.add('prism', facets(triangles, centre), 'flint')
-    frame = A([ahead, UP, along])
     # Its edge rests in a groove of each post.
-    for end in (0.02 - half, half - 0.02):
-        file.add_to('stands', box((-0.014, -1.02, end - 0.012), (0.014, 0.004 - tall / 2, end + 0.012), frame, centre), 'cedar')
+    for end in (0.03 - half, half - 0.03):
+        foot = centre - up * (tall / 2 - 0.004) + along * end
+        file.add_to('stands', box((-0.009, RIM - foot[1], -0.009), (0.009, 0, 0.009), origin=foot), 'cedar')
 
 
 def add_butterfly():
@@ -522,13 +535,13 @@ def add_sky():
 
 
 def add_cameras():
-    file.camera('overview', [-0.11, 1.00, 1.25], [0.155, 0.872, 0.3], 0.72)
-    file.camera('wine glass', [0.16, 0.98, 1.10], [0.20, 0.845, 0.50], 0.50)
-    file.camera('tumbler', [-0.02, 0.98, 0.95], [-0.06, 0.79, 0.60], 0.46)
-    file.camera('ring', [0.05, 0.97, 1.01], [0.075, 0.765, 0.785], 0.42)
-    file.camera('pool', [-1.15, 1.35, 0.05], [0.75, 0.25, -2.3], 1.0)
-    file.camera('ceiling', [-1.30, 1.25, 0.10], [1.20, 1.95, -2.2], 1.05)
-    file.camera('prism', [-1.44, 1.20, -3.26], [-0.85, 1.10, -2.46], 0.80)
+    file.camera('overview', [-0.11, 0.97, 1.27], [0.165, 0.890, 0.3], 0.76)
+    file.camera('wine glass', [0.17, 0.98, 1.00], [0.215, 0.82, 0.50], 0.46)
+    file.camera('tumbler', [0.46, 1.00, 0.86], [0.485, 0.78, 0.52], 0.46)
+    file.camera('ring', [0.12, 0.96, 1.00], [0.13, 0.765, 0.805], 0.42)
+    file.camera('pool', [-0.75, 1.55, -0.65], [0.85, -0.10, -2.05], 0.85)
+    file.camera('ceiling', [-0.90, 1.15, -1.10], [1.95, 1.45, -1.60], 0.72)
+    file.camera('prism', [-1.64, 1.04, -2.22], [-0.75, 0.99, -2.69], 0.70)
     file.camera('butterfly', [-0.62, 1.45, 1.25], [-0.52, 1.13, 2.05], 0.72)
 
 
