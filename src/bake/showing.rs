@@ -42,7 +42,7 @@ pub(super) struct Showing<'a, 'level> {
     pub(super) is_first: bool,
     /// Stand-in for layers that are not baked yet, if nothing was shown before the bake.
     pub(super) first_look: Option<FirstLook>,
-    /// Coarse indirect light for the error metric, if neither `first_look` nor the cache has any.
+    /// The same after an edit; also indirect light for the error metric, if neither `first_look` nor the cache has any.
     pub(super) glance: Option<FirstLook>,
 }
 
@@ -148,24 +148,34 @@ impl Showing<'_, '_> {
         so_far: &CausticOutcome,
         clock: &mut Clock,
     ) {
-        if self.level.is_none() || levels.is_empty() || self.finish.direct != DirectDetail::Full {
-            return;
-        }
-        let (charts, _) = self.finish.charts(levels);
-        let direct_charts = self.finish.direct_charts(&charts);
-        if !self.direct.knows(self.finish.scene.lights.len(), &direct_charts) {
+        if self.level.is_some() && !levels.is_empty() && self.lacks_direct(levels) {
             self.show(levels, so_far, clock);
         }
     }
 
+    /// Whether direct light is to be shown and not known yet.
+    fn lacks_direct(&self, levels: &[CompletedLevel]) -> bool {
+        if self.finish.direct != DirectDetail::Full {
+            return false;
+        }
+        let (charts, _) = self.finish.charts(levels);
+        let direct_charts = self.finish.direct_charts(&charts);
+        !self.direct.knows(self.finish.scene.lights.len(), &direct_charts)
+    }
+
     /// Takes a result that is not the final one.
     pub(super) fn show(&mut self, levels: &[CompletedLevel], so_far: &CausticOutcome, clock: &mut Clock) {
-        // Until direct and indirect light are baked, the coarse first look stands in for them.
+        // Until direct and indirect light are baked, a coarse look stands in for them: of a new scene, and after a change
+        // that moves shadows.
         let is_first = std::mem::take(&mut self.is_first);
         if self.level.is_none() {
             return;
         }
-        if is_first && let Some(look) = &mut self.first_look {
+        if is_first && (self.first_look.is_some() || self.lacks_direct(levels)) {
+            let look = match &mut self.first_look {
+                Some(look) => look,
+                None => self.glance.get_or_insert_default(),
+            };
             let PreparedBake {
                 tracer,
                 progress,

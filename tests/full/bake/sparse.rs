@@ -1,10 +1,11 @@
 //! Maps in tiles: how much memory they save and what that costs; direct light beside caustics, and levels on the way.
 
-use nephroid::bake::BYTES_PER_TEXEL;
+use nephroid::bake::{BYTES_PER_TEXEL, Baker};
 use nephroid::settings::{ErrorMetric, Preset};
 
 use crate::bake::common::{
-    CAUSTIC_AND_DIRECT, all_bits, assert_same, automatic, estimate, rmse, session, sized, torus, with_layers,
+    CAUSTIC_AND_DIRECT, all_bits, assert_same, automatic, edit, estimate, rmse, session, sized, torus,
+    with_layers,
 };
 use support::prelude::*;
 use support::tools::{bake, builtin_scene, caustic, energy_fault, map_of, set, to};
@@ -256,7 +257,7 @@ fn whole_pictures_come_before_the_last() {
     assert!(errors.windows(2).all(|pair| pair[1] < pair[0]), "{errors:?}");
 }
 
-/// Direct and indirect light come before any caustic.
+/// Direct and indirect light come before any caustic, and stay while glass is moved.
 #[test]
 fn a_room_is_lit_before_its_caustics() {
     let scene = builtin_scene("gallery");
@@ -265,14 +266,25 @@ fn a_room_is_lit_before_its_caustics() {
         s.max_error = Some(Preset::Draft.max_error())
     });
     let settings = with_layers(&layers, automatic(draft));
-    let mut levels = Vec::new();
-    let last = session(&scene).bake_levels(&settings, &(), &Control::default(), &mut |level| {
-        levels.push(level)
-    });
+    let mut session = session(&scene);
+    let levels_of = |session: &mut Baker| {
+        let mut levels = Vec::new();
+        let last = session.bake_levels(&settings, &(), &Control::default(), &mut |level| {
+            levels.push(level)
+        });
+        (levels, last.expect("a bake"))
+    };
     let lit = |result: &Bake, kind| result.maps.iter().any(|map| map.flux_w(kind).luminance() > 0.0);
+    let (levels, last) = levels_of(&mut session);
     let first = levels.first().expect("a level before the last");
     assert_eq!(first.counts.rays, 0);
     assert!(lit(first, LayerKind::Direct) && lit(first, LayerKind::Indirect));
-    let last = last.expect("a bake");
     assert!(last.counts.rays > 0 && layers.iter().all(|kind| lit(&last, *kind)));
+
+    let ball = scene.objects.iter().position(|object| object.name == "ball");
+    let aside = Motion::turned(0.0, dvec3(0.05, 0.0, 0.0));
+    edit(&mut session, &Edit::Place(ball.expect("a ball"), aside));
+    let (levels, _) = levels_of(&mut session);
+    let first = levels.first().expect("a level before the last");
+    assert!(layers.iter().all(|kind| lit(first, *kind)));
 }
