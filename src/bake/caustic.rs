@@ -204,7 +204,6 @@ impl CausticLayer<'_> {
             open_lights: lights.len(),
         };
         self.find_sizes(&mut states.statistics, &mut lights, &mut context)?;
-
         context.control = &whole;
         let errors = self.refine(states, &mut lights, &mut context, &limited, showing)?;
 

@@ -148,43 +148,42 @@ impl Showing<'_, '_> {
         so_far: &CausticOutcome,
         clock: &mut Clock,
     ) {
-        if self.level.is_some() && !levels.is_empty() && self.lacks_direct(levels) {
-            self.show(levels, so_far, clock);
-        }
-    }
-
-    /// Whether direct light is to be shown and not known yet.
-    fn lacks_direct(&self, levels: &[CompletedLevel]) -> bool {
-        if self.finish.direct != DirectDetail::Full {
-            return false;
+        if self.level.is_none() || levels.is_empty() || self.finish.direct != DirectDetail::Full {
+            return;
         }
         let (charts, _) = self.finish.charts(levels);
         let direct_charts = self.finish.direct_charts(&charts);
-        !self.direct.knows(self.finish.scene.lights.len(), &direct_charts)
+        if !self.direct.knows(self.finish.scene.lights.len(), &direct_charts) {
+            self.show_coarse(levels, so_far, clock);
+        }
+    }
+
+    /// Shows these levels, with a coarse look at direct and indirect light in their place: of a new scene, and after a
+    /// change that moves shadows.
+    fn show_coarse(&mut self, levels: &[CompletedLevel], so_far: &CausticOutcome, clock: &mut Clock) {
+        self.is_first = false;
+        let look = match &mut self.first_look {
+            Some(look) => look,
+            None => self.glance.get_or_insert_default(),
+        };
+        let PreparedBake {
+            tracer,
+            progress,
+            control,
+            ..
+        } = self.bake;
+        let maps = look.maps(self.finish, tracer, levels, *progress, control);
+        self.hand_out(maps, levels, so_far, clock);
     }
 
     /// Takes a result that is not the final one.
     pub(super) fn show(&mut self, levels: &[CompletedLevel], so_far: &CausticOutcome, clock: &mut Clock) {
-        // Until direct and indirect light are baked, a coarse look stands in for them: of a new scene, and after a change
-        // that moves shadows.
         let is_first = std::mem::take(&mut self.is_first);
         if self.level.is_none() {
             return;
         }
-        if is_first && (self.first_look.is_some() || self.lacks_direct(levels)) {
-            let look = match &mut self.first_look {
-                Some(look) => look,
-                None => self.glance.get_or_insert_default(),
-            };
-            let PreparedBake {
-                tracer,
-                progress,
-                control,
-                ..
-            } = self.bake;
-            let maps = look.maps(self.finish, tracer, levels, *progress, control);
-            self.hand_out(maps, levels, so_far, clock);
-            return;
+        if is_first && self.first_look.is_some() {
+            return self.show_coarse(levels, so_far, clock);
         }
 
         // Assembling maps takes time, so that later levels are shown only to someone who watches.

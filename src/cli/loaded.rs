@@ -85,7 +85,8 @@ impl LoadedScene {
         let mut session = Baker::new(self.scene.clone())?;
         let result = work(&mut session, &console.bar(), console.control());
         // What it keeps for another bake takes up to half a second to free: maps are written meanwhile.
-        std::thread::spawn(|| drop(session));
+        // Without a thread to be had, it is freed here.
+        let _ = std::thread::Builder::new().spawn(|| drop(session));
         result
     }
 
